@@ -1,0 +1,40 @@
+#pragma once
+/// Mesh files. VTU is written by hand (appended raw binary, little-endian) so that ParaView and Slicer read it.
+
+#include "meshing/tet_mesh.hpp"
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace tissuewarp::meshing {
+
+/// A named array on nodes or tetrahedra: C × N, float64 in memory, float32 in the file.
+struct MeshArray {
+    std::string name;
+    Eigen::MatrixXd values;
+};
+
+/// Writes .vtu with the cell array `label`, plus the given point and cell arrays. Coordinates as float64, LPS mm.
+/// Complete or absent: written to a temporary name and renamed. Throws IoError.
+void write_vtu(const TetMesh& mesh, const std::filesystem::path& path, const std::vector<MeshArray>& point_arrays = {},
+               const std::vector<MeshArray>& cell_arrays = {});
+
+/// Reads a .vtu of tetrahedra: what write_vtu makes, and the ascii, base64-inline and raw-appended (uncompressed)
+/// variants that VTK and meshio write. A missing `label` array means label 1. Throws IoError or InvalidInput.
+TetMesh read_vtu(const std::filesystem::path& path);
+
+/// Surface with optional unit normals per node (3 × N or empty).
+struct Surface {
+    SurfaceMesh mesh;
+    Eigen::Matrix3Xd normals;
+};
+
+/// Reads .ply, .stl, .obj, .vtk (legacy polydata) and point lists .csv/.xyz (x,y,z[,nx,ny,nz], mm LPS) by extension.
+/// Point clouds have no triangles. Throws IoError or InvalidInput.
+Surface read_surface(const std::filesystem::path& path);
+
+/// Writes .ply (binary), .stl, .obj or .vtk by extension. Complete or absent. Throws IoError.
+void write_surface(const SurfaceMesh& surface, const std::filesystem::path& path);
+
+}  // namespace tissuewarp::meshing
