@@ -1,0 +1,69 @@
+#include "core/atomic_file.hpp"
+
+#include "core/errors.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <string>
+#include <system_error>
+
+namespace tissuewarp {
+namespace fs = std::filesystem;
+
+namespace {
+
+/// ".nii.gz" counts as one extension: readers look at both parts.
+std::string full_extension(const fs::path& path) {
+    const std::string last = path.extension().string();
+    if (last != ".gz") return last;
+    return path.stem().extension().string() + last;
+}
+
+fs::path temporary_name(const fs::path& destination) {
+    const std::string name = destination.filename().string();
+    const std::string extension = full_extension(destination);
+    const std::string base = name.substr(0, name.size() - extension.size());
+    return destination.parent_path() / ("." + base + ".partial-" + std::to_string(::getpid()) + extension);
+}
+
+}  // namespace
+
+AtomicFile::AtomicFile(fs::path destination)
+    : destination_(std::move(destination)), temporary_(temporary_name(destination_)) {}
+
+AtomicFile::~AtomicFile() {
+    if (committed_) return;
+    std::error_code ignored;
+    fs::remove(temporary_, ignored);
+}
+
+void AtomicFile::commit() {
+    const int descriptor = ::open(temporary_.c_str(), O_RDONLY);
+    if (descriptor < 0) throw IoError("cannot write '" + destination_.string() + "': " + std::strerror(errno));
+    const bool flushed = ::fsync(descriptor) == 0;
+    const int cause = errno;
+    ::close(descriptor);
+    if (!flushed) throw IoError("cannot write '" + destination_.string() + "': " + std::strerror(cause));
+    std::error_code failure;
+    fs::rename(temporary_, destination_, failure);
+    if (failure) throw IoError("cannot write '" + destination_.string() + "': " + failure.message());
+    committed_ = true;
+}
+
+void require_writable_folder(const fs::path& folder) {
+    std::error_code failure;
+    fs::create_directories(folder, failure);
+    if (failure) throw IoError("cannot create the folder '" + folder.string() + "': " + failure.message());
+    const fs::path probe = folder / (".writable-" + std::to_string(::getpid()));
+    const int descriptor = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_EXCL, 0600);
+    if (descriptor < 0)
+        throw IoError("cannot write into the folder '" + folder.string() + "': " + std::strerror(errno) +
+                      "; choose another --output");
+    ::close(descriptor);
+    ::unlink(probe.c_str());
+}
+
+}  // namespace tissuewarp

@@ -1,0 +1,81 @@
+#include "tled/conditions.hpp"
+
+#include "core/errors.hpp"
+
+#include <Eigen/Eigenvalues>
+
+#include <map>
+#include <string>
+
+namespace tissuewarp::tled {
+
+namespace {
+
+void require_node(int node, int node_count, const char* what) {
+    if (node < 0 || node >= node_count)
+        throw InvalidInput(std::string(what) + " names node " + std::to_string(node) + "; the mesh has nodes 0 to " +
+                           std::to_string(node_count - 1));
+}
+
+void require_stiffness(const Spring& spring) {
+    const Eigen::Matrix3d& k = spring.stiffness;
+    const double size = k.norm();
+    const bool valid = k.allFinite() && spring.target.allFinite() && (k - k.transpose()).norm() <= 1e-9 * size &&
+                       k.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff() >= -1e-9 * size;
+    if (!valid)
+        throw InvalidInput("the spring at node " + std::to_string(spring.node) +
+                           " needs a finite target and a symmetric positive semi-definite stiffness (mN/mm)");
+}
+
+void sum_springs(const std::vector<Spring>& springs, int node_count, NodalConditions& nodal) {
+    std::map<int, std::pair<Eigen::Matrix3d, Eigen::Vector3d>> sums;
+    for (const Spring& spring : springs) {
+        require_node(spring.node, node_count, "a spring");
+        require_stiffness(spring);
+        auto [entry, fresh] = sums.try_emplace(spring.node, Eigen::Matrix3d::Zero(), Eigen::Vector3d::Zero());
+        entry->second.first += spring.stiffness;
+        entry->second.second += spring.stiffness * spring.target;
+    }
+    const auto count = static_cast<Eigen::Index>(sums.size());
+    nodal.spring_stiffness.resize(6, count);
+    nodal.spring_force.resize(3, count);
+    nodal.spring_node.reserve(sums.size());
+    for (const auto& [node, sum] : sums) {
+        const auto column = static_cast<Eigen::Index>(nodal.spring_node.size());
+        const Eigen::Matrix3d& k = sum.first;
+        nodal.spring_stiffness.col(column) << k(0, 0), k(1, 1), k(2, 2), k(0, 1), k(1, 2), k(2, 0);
+        nodal.spring_force.col(column) = sum.second;
+        nodal.spring_node.push_back(node);
+    }
+}
+
+}  // namespace
+
+NodalConditions nodal_conditions(const Conditions& conditions, int node_count) {
+    NodalConditions nodal;
+    sum_springs(conditions.springs, node_count, nodal);
+    nodal.constrained = Eigen::Matrix<bool, 3, Eigen::Dynamic>::Constant(3, node_count, false);
+    nodal.imposed = Eigen::Matrix3Xd::Zero(3, node_count);
+    for (const PrescribedDisplacement& prescribed : conditions.prescribed) {
+        require_node(prescribed.node, node_count, "a prescribed displacement");
+        for (int c = 0; c < 3; ++c) {
+            if (!prescribed.constrained[static_cast<std::size_t>(c)]) continue;
+            if (nodal.constrained(c, prescribed.node))
+                throw InvalidInput("node " + std::to_string(prescribed.node) + " is prescribed twice");
+            if (!std::isfinite(prescribed.displacement[c]))
+                throw InvalidInput("the displacement prescribed at node " + std::to_string(prescribed.node) +
+                                   " is not finite");
+            nodal.constrained(c, prescribed.node) = true;
+            nodal.imposed(c, prescribed.node) = prescribed.displacement[c];
+        }
+    }
+    nodal.external_force = Eigen::Matrix3Xd::Zero(3, node_count);
+    if (conditions.external_force.size() == 0) return nodal;
+    if (conditions.external_force.cols() != node_count || !conditions.external_force.allFinite())
+        throw InvalidInput("external forces need one finite vector (mN) for each of the " +
+                           std::to_string(node_count) + " nodes");
+    nodal.external_force = conditions.external_force;
+    return nodal;
+}
+
+}  // namespace tissuewarp::tled

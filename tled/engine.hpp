@@ -1,0 +1,71 @@
+#pragma once
+/// Where the time steps run. Both engines advance the same update
+///     u⁺ = u + ρ (u − u⁻) + c M⁻¹ (f_ext + f_spring − f_int(u)),
+/// which is the central-difference step with mass-proportional damping α for c = Δt²/(1 + αΔt/2) and
+/// ρ = (1 − αΔt/2)/(1 + αΔt/2) (Miller et al. 2007, eq. 17), and a step of dynamic relaxation for free ρ, c and M.
+
+#include "tled/conditions.hpp"
+#include "tled/rest_state.hpp"
+
+#include <Eigen/Core>
+
+#include <memory>
+#include <string>
+
+namespace tissuewarp::tled {
+
+struct StepCoefficients {
+    double momentum = 0.0;  ///< ρ
+    double gain = 0.0;      ///< c, s² for a mass in kg; dimensionless for a mass in mN/mm
+};
+
+/// Scalars of the present state, reduced where the engine runs. Sums are over free degrees of freedom.
+struct Observation {
+    double increment_max = 0;      ///< largest |u − u⁻| of a node, mm
+    double residual_max = 0;       ///< largest |residual| of a node, mN
+    double increment_mass = 0;     ///< Σ m (u − u⁻)²
+    double increment_stiffness = 0;///< Σ (u − u⁻)·(r⁻ − r): with increment_mass the Rayleigh quotient of the last step
+    double min_jacobian = 1;       ///< smallest det F of an element
+    int min_jacobian_tet = -1;     ///< its tetrahedron in the mesh
+    bool finite = true;            ///< false when any displacement is not finite
+};
+
+/// State: displacement u and increment u − u⁻ (3 × N, mm), nodal diagonal mass (3 × N), conditions. Copies in and out are
+/// float64 whatever the engine computes in.
+class Engine {
+public:
+    virtual ~Engine() = default;
+
+    /// Replaces all conditions. Imposed displacements take effect at once, with zero increment.
+    virtual void set_conditions(const NodalConditions& conditions) = 0;
+    /// Diagonal mass of every degree of freedom, positive: kg for dynamics, mN/mm for dynamic relaxation.
+    virtual void set_mass(const Eigen::Matrix3Xd& mass) = 0;
+    virtual void set_state(const Eigen::Matrix3Xd& displacement, const Eigen::Matrix3Xd& increment) = 0;
+
+    /// Advances by `steps` without any transfer between host and device.
+    virtual void run(int steps, const StepCoefficients& coefficients) = 0;
+
+    [[nodiscard]] virtual Eigen::Matrix3Xd displacement() const = 0;
+    [[nodiscard]] virtual Eigen::Matrix3Xd increment() const = 0;
+    /// f_ext + f_spring − f_int at the present displacement, mN; zero at constrained degrees of freedom.
+    [[nodiscard]] virtual Eigen::Matrix3Xd residual() = 0;
+    /// f_int at the present displacement, mN, constrained degrees of freedom included (reactions).
+    [[nodiscard]] virtual Eigen::Matrix3Xd internal_force() = 0;
+    [[nodiscard]] virtual Observation observe() = 0;
+
+    /// For reports: "CPU float32, AVX-512, 2 threads", "GPU NVIDIA H100 (OpenGL 4.5)".
+    [[nodiscard]] virtual std::string description() const = 0;
+    /// Unit round-off of the arithmetic that the engine computes in.
+    [[nodiscard]] virtual double precision() const = 0;
+};
+
+enum class Scalar { Float32, Float64 };
+
+/// SIMD over elements (Highway, widest set of the machine), threads by TBB. Same bits for any number of threads.
+std::unique_ptr<Engine> make_cpu_engine(const RestState& rest, Scalar scalar = Scalar::Float32);
+
+/// OpenGL 4.5 compute through EGL, float32. `device` counts EGL devices; −1 takes the first hardware device, or the
+/// software rasteriser when there is none. Throws GpuUnavailable.
+std::unique_ptr<Engine> make_gpu_engine(const RestState& rest, int device = -1);
+
+}  // namespace tissuewarp::tled

@@ -1,0 +1,27 @@
+#pragma once
+/// What is simulated: tissue, without loads and without a place to run it.
+
+#include "meshing/tet_mesh.hpp"
+#include "tled/material.hpp"
+
+namespace tissuewarp::tled {
+
+enum class Element {
+    T4,                  ///< linear tetrahedron; locks as ν → 0.5
+    AveragedPressureT4,  ///< linear tetrahedron, volumetric energy of nodal volumes (NUMERICS in docs/method.md)
+};
+
+struct Model {
+    meshing::TetMesh mesh;
+    MaterialTable materials;           ///< one entry for every label of the mesh
+    Element element = Element::AveragedPressureT4;
+    double density = 1e-6;             ///< kg/mm³
+};
+
+/// Throws InvalidInput when a label has no material, a modulus is not positive, or the mesh is invalid.
+void require_valid(const Model& model);
+
+/// AveragedPressureT4 when any material has ν ≥ 0.45, T4 otherwise: below, T4 does not lock noticeably and costs less.
+Element suggested_element(const MaterialTable& materials);
+
+}  // namespace tissuewarp::tled

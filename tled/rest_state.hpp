@@ -1,0 +1,54 @@
+#pragma once
+/// What total Lagrangian dynamics computes once, in the rest configuration (Miller et al. 2007, section 3): shape-function
+/// derivatives, volumes, lumped mass, and the lists by which nodes gather forces.
+
+#include "tled/model.hpp"
+
+#include <Eigen/Core>
+
+#include <vector>
+
+namespace tissuewarp::tled {
+
+/// Elements [begin, end) of the internal order share one constitutive law.
+struct LawBlock {
+    std::size_t law = 0;  ///< index into the alternatives of Material
+    int begin = 0, end = 0;
+};
+
+/// Node-to-element lists in compressed form: entries [offset[a], offset[a+1]) are 4·element + corner, ascending, in the
+/// internal element order.
+struct Incidence {
+    std::vector<int> offset, entry;
+};
+
+/// Nodes of the averaged pressure: one for each (node, label) pair, so that pressure may jump at an interface.
+struct PressureNodes {
+    Eigen::Matrix4Xi of_element;   ///< 4 × M, pressure node of each corner
+    Eigen::VectorXd volume;        ///< V_a = Σ ¼ V_e, mm³
+    Eigen::VectorXd modulus;       ///< M_a of the label's material, kPa
+    Incidence incidence;           ///< pressure node → 4·element + corner
+    [[nodiscard]] int count() const { return static_cast<int>(volume.size()); }
+};
+
+/// Per-element arrays are in the internal order: grouped by law, otherwise as in the mesh.
+struct RestState {
+    std::vector<int> tet;                               ///< M, internal position → tetrahedron of the mesh
+    std::vector<LawBlock> blocks;
+    Eigen::Matrix4Xi nodes;                             ///< 4 × M
+    Eigen::Matrix<double, 9, Eigen::Dynamic> gradient;  ///< 9 × M: row 3k+j is ∂N_{k+1}/∂X_j, 1/mm; N_0 = −Σ of the others
+    Eigen::VectorXd volume;                             ///< M, mm³
+    Eigen::VectorXd shear_modulus;                      ///< M, μ in kPa
+    Eigen::VectorXd volumetric_modulus;                 ///< M, the part evaluated in the element, kPa: all of it for T4, none for averaged pressure
+    Eigen::VectorXd lumped_mass;                        ///< N, kg
+    Incidence incidence;                                ///< node → 4·element + corner
+    PressureNodes pressure;                             ///< empty for T4
+    int node_count = 0;
+
+    [[nodiscard]] int element_count() const { return static_cast<int>(tet.size()); }
+};
+
+/// Throws InvalidInput through require_valid(model).
+RestState rest_state(const Model& model);
+
+}  // namespace tissuewarp::tled

@@ -1,0 +1,48 @@
+#pragma once
+/// The stiffness at rest K₀, factorised before the operation (CHOLMOD): gives the linear-elastic start, the diagonal mass,
+/// the lowest frequency, and turns a residual into an error in millimetres.
+
+#include "tled/conditions.hpp"
+#include "tled/rest_state.hpp"
+
+#include <Eigen/Core>
+
+#include <memory>
+
+namespace tissuewarp::tled {
+
+/// K₀ + springs of the rest configuration with constrained degrees of freedom removed. Moving targets do not change it.
+/// Free rigid modes are excluded by the springs or prescribed displacements; without them construction throws
+/// InvalidInput ("nothing holds the tissue").
+class RestStiffness {
+public:
+    RestStiffness(const RestState& rest, const NodalConditions& conditions);
+    ~RestStiffness();
+    RestStiffness(RestStiffness&&) noexcept;
+    RestStiffness& operator=(RestStiffness&&) noexcept;
+
+    /// x with K x = f on the free degrees of freedom, zero on the constrained ones (3 × N; f in mN, x in mm). When
+    /// `conditions` carry other springs than those factorised (same constraints), conjugate gradients with the factor as
+    /// preconditioner solve the present system to `relative_tolerance`.
+    [[nodiscard]] Eigen::Matrix3Xd solve(const Eigen::Matrix3Xd& force) const;
+    [[nodiscard]] Eigen::Matrix3Xd solve(const Eigen::Matrix3Xd& force, const NodalConditions& conditions,
+                                         double relative_tolerance) const;
+
+    /// Linear-elastic displacement under the conditions, imposed values included (3 × N, mm).
+    [[nodiscard]] Eigen::Matrix3Xd linear_solution(const NodalConditions& conditions) const;
+
+    /// Diagonal of K₀ + springs of `conditions`, 3 × N, mN/mm; ones where constrained.
+    [[nodiscard]] Eigen::Matrix3Xd diagonal(const NodalConditions& conditions) const;
+
+    /// Smallest λ of K x = λ diag(K) x on the free degrees of freedom, by inverse iteration with the factor.
+    [[nodiscard]] double lowest_eigenvalue() const;
+
+    /// Non-zeros of the factor, for reports.
+    [[nodiscard]] long long factor_nonzeros() const;
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tissuewarp::tled
