@@ -82,8 +82,12 @@ PressureNodes pressure_nodes(const Model& model, const RestState& rest) {
     for (auto& [node_label, number] : index) number = count++;
     pressure.volume = Eigen::VectorXd::Zero(count);
     pressure.modulus.resize(count);
-    for (const auto& [node_label, number] : index)
-        pressure.modulus[number] = volumetric_modulus(model.materials.at(node_label.second));
+    pressure.law.resize(index.size());
+    for (const auto& [node_label, number] : index) {
+        const Material& material = model.materials.at(node_label.second);
+        pressure.modulus[number] = volumetric_modulus(material);
+        pressure.law[static_cast<std::size_t>(number)] = material.index();
+    }
     for (int e = 0; e < rest.element_count(); ++e)
         for (int corner = 0; corner < 4; ++corner) {
             const int number = index.at(key(e, corner));

@@ -27,6 +27,7 @@ struct PressureNodes {
     Eigen::Matrix4Xi of_element;   ///< 4 × M, pressure node of each corner
     Eigen::VectorXd volume;        ///< V_a = Σ ¼ V_e, mm³
     Eigen::VectorXd modulus;       ///< M_a of the label's material, kPa
+    std::vector<std::size_t> law;  ///< index of the label's law into the alternatives of Material
     Incidence incidence;           ///< pressure node → 4·element + corner
     [[nodiscard]] int count() const { return static_cast<int>(volume.size()); }
 };
