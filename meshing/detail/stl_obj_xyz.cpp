@@ -1,0 +1,145 @@
+// The short formats: stereolithography (ascii, binary), Wavefront OBJ, and point lists.
+
+#include "meshing/detail/surface_formats.hpp"
+
+#include <map>
+
+namespace tissuewarp::meshing::detail {
+
+namespace {
+
+/// STL repeats the corners of every triangle; identical coordinates become one node.
+class NodeMerger {
+public:
+    explicit NodeMerger(RawSurface& surface) : surface_(surface) {}
+
+    long long index(const Eigen::Vector3d& position) {
+        const auto [entry, added] = index_.try_emplace(std::array{position[0], position[1], position[2]},
+                                                       static_cast<long long>(surface_.nodes.size()));
+        if (added) surface_.nodes.push_back(position);
+        return entry->second;
+    }
+
+private:
+    RawSurface& surface_;
+    std::map<std::array<double, 3>, long long> index_;
+};
+
+void require_finite(const Eigen::Vector3d& position, const FileReader& file) {
+    if (!position.allFinite()) file.refuse("has a coordinate that is not finite");  // a map cannot order NaN
+}
+
+RawSurface read_binary_stl(FileReader& file, std::size_t count) {
+    RawSurface surface;
+    NodeMerger merger(surface);
+    file.seek(84);
+    for (std::size_t t = 0; t < count; ++t) {
+        file.skip(12);  // the facet's normal
+        std::array<long long, 3> triangle;
+        for (long long& node : triangle) {
+            Eigen::Vector3d position;
+            for (double& x : position) x = file.binary<float>();
+            require_finite(position, file);
+            node = merger.index(position);
+        }
+        surface.triangles.push_back(triangle);
+        file.skip(2);
+    }
+    return surface;
+}
+
+RawSurface read_ascii_stl(FileReader& file) {
+    RawSurface surface;
+    NodeMerger merger(surface);
+    std::vector<long long> corners;
+    bool ended = false;
+    for (std::string_view word = file.token(); !word.empty(); word = file.token()) {
+        if (word == "vertex") {
+            Eigen::Vector3d position;
+            for (double& x : position) x = file.number();
+            require_finite(position, file);
+            corners.push_back(merger.index(position));
+        } else if (word == "endloop") {
+            if (corners.size() != 3) file.fail("has a facet that is no triangle");
+            surface.add_polygon(corners);
+            corners.clear();
+        } else if (word == "endsolid") {
+            ended = true;
+        }
+    }
+    if (!ended || !corners.empty()) file.fail("ends before its data do");
+    return surface;
+}
+
+}  // namespace
+
+RawSurface read_stl(FileReader& file) {
+    // Binary files may begin with "solid" too: their size decides.
+    if (file.text().size() >= 84) {
+        file.seek(80);
+        const std::uint32_t count = file.binary<std::uint32_t>();
+        if (file.text().size() == 84 + 50 * std::size_t{count}) return read_binary_stl(file, count);
+        file.seek(0);
+    }
+    if (!file.text().starts_with("solid")) file.fail("is neither an ascii STL file nor a complete binary one");
+    return read_ascii_stl(file);
+}
+
+RawSurface read_obj(FileReader& file) {
+    RawSurface surface;
+    while (file.remaining() > 0) {
+        const std::string_view line = file.line();
+        if (line.starts_with("v ") || line.starts_with("v\t")) {
+            const std::size_t next = file.position();
+            file.seek(static_cast<std::size_t>(line.data() - file.text().data()) + 1);
+            Eigen::Vector3d position;
+            for (double& x : position) x = file.number();
+            surface.nodes.push_back(position);
+            file.seek(next);
+        } else if (line.starts_with("f ") || line.starts_with("f\t")) {
+            const std::size_t next = file.position();
+            file.seek(static_cast<std::size_t>(line.data() - file.text().data()) + 1);
+            std::vector<long long> corners;
+            for (std::string_view word = file.token(); !word.empty() && word.data() < line.data() + line.size();
+                 word = file.token()) {
+                const long long index = file.to_integer(word.substr(0, word.find('/')));  // v/vt/vn
+                corners.push_back(index > 0 ? index - 1 : index + static_cast<long long>(surface.nodes.size()));
+            }
+            if (corners.size() < 3) file.fail("has a face of fewer than three nodes");
+            surface.add_polygon(corners);
+            file.seek(next);
+        }
+    }
+    return surface;
+}
+
+RawSurface read_point_list(FileReader& file) {
+    RawSurface surface;
+    bool first = true;
+    std::size_t columns = 0;
+    while (file.remaining() > 0) {
+        const std::string_view line = file.line();
+        std::vector<std::string_view> words;
+        for (std::size_t at = 0; (at = line.find_first_not_of(", ;\t", at)) < line.size();) {
+            const std::size_t end = std::min(line.find_first_of(", ;\t", at), line.size());
+            words.push_back(line.substr(at, end - at));
+            at = end;
+        }
+        if (words.empty() || words[0].starts_with('#')) continue;
+        const bool heading = first && words[0].find_first_not_of("+-.0123456789eE") != std::string_view::npos;
+        first = false;
+        if (heading && lower_case(words[0]) != "nan") continue;
+        if (words.size() != 3 && words.size() != 6)
+            file.fail("has a line of " + std::to_string(words.size()) +
+                      " columns; 3 (x,y,z) or 6 (with normal) needed");
+        if (columns != 0 && words.size() != columns) file.fail("has lines of 3 and of 6 columns; use one of them");
+        columns = words.size();
+        std::array<double, 6> values{};
+        for (std::size_t c = 0; c < columns; ++c) values[c] = file.to_number(words[c]);
+        surface.nodes.emplace_back(values[0], values[1], values[2]);
+        if (columns == 6) surface.normals.emplace_back(values[3], values[4], values[5]);
+    }
+    return surface;
+}
+
+}  // namespace tissuewarp::meshing::detail

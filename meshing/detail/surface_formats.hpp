@@ -1,0 +1,29 @@
+#pragma once
+/// One reader per surface format; the checks common to all stand in read_surface.
+
+#include "meshing/detail/file_reader.hpp"
+#include "meshing/mesh_io.hpp"
+
+#include <vector>
+
+namespace tissuewarp::meshing::detail {
+
+/// What a reader collects: triangles with the indices of the file, not yet checked.
+struct RawSurface {
+    std::vector<Eigen::Vector3d> nodes;
+    std::vector<Eigen::Vector3d> normals;  ///< as many as nodes, or none
+    std::vector<std::array<long long, 3>> triangles;
+
+    /// Cuts a polygon into a fan of triangles.
+    void add_polygon(const std::vector<long long>& corners) {
+        for (std::size_t k = 2; k < corners.size(); ++k) triangles.push_back({corners[0], corners[k - 1], corners[k]});
+    }
+};
+
+RawSurface read_ply(FileReader& file);
+RawSurface read_stl(FileReader& file);
+RawSurface read_obj(FileReader& file);
+RawSurface read_vtk_polydata(FileReader& file);
+RawSurface read_point_list(FileReader& file);
+
+}  // namespace tissuewarp::meshing::detail

@@ -1,0 +1,124 @@
+// VTK legacy polydata, ascii and binary (big-endian), up to version 5.1, whose cells are offsets and connectivity.
+
+#include "meshing/detail/surface_formats.hpp"
+
+namespace tissuewarp::meshing::detail {
+
+namespace {
+
+class PolydataReader {
+public:
+    explicit PolydataReader(FileReader& file) : file_(file) {}
+
+    RawSurface read() {
+        if (!file_.line().starts_with("# vtk DataFile")) file_.fail("is no VTK legacy file");
+        file_.line();  // title
+        const std::string_view encoding = file_.token();
+        if (encoding != "ASCII" && encoding != "BINARY") file_.fail("is neither ASCII nor BINARY");
+        binary_ = encoding == "BINARY";
+        if (file_.token() != "DATASET" || file_.token() != "POLYDATA")
+            file_.fail("holds no POLYDATA; write the surface as polydata");
+        while (section()) {
+        }
+        return std::move(surface_);
+    }
+
+private:
+    bool section() {
+        const std::string_view keyword = file_.token();
+        if (keyword.empty()) return false;
+        if (keyword == "POINTS") {
+            const long long count = file_.integer();
+            read_vectors(count, surface_.nodes);
+        } else if (keyword == "POLYGONS") {
+            for (const auto& polygon : read_cells()) surface_.add_polygon(polygon);
+        } else if (keyword == "VERTICES" || keyword == "LINES") {
+            read_cells();
+        } else if (keyword == "TRIANGLE_STRIPS") {
+            file_.fail("has triangle strips; write triangles");
+        } else if (keyword == "METADATA") {
+            file_.line();
+            while (file_.remaining() > 0 && !file_.line().empty()) {
+            }
+        } else if (keyword == "POINT_DATA") {
+            file_.integer();
+            const std::size_t start = file_.position();
+            if (file_.token() != "NORMALS") {
+                file_.seek(start);
+                return false;  // other attributes are of no use here
+            }
+            file_.token();  // name
+            read_vectors(static_cast<long long>(surface_.nodes.size()), surface_.normals);
+        } else {
+            return false;  // cell data, field data: of no use here
+        }
+        return true;
+    }
+
+    double value(const std::string& type) {
+        if (!binary_) return file_.number();
+        if (type == "float") return file_.binary<float>(true);
+        if (type == "double") return file_.binary<double>(true);
+        file_.fail("has values of type '" + type + "'; float and double are read");
+    }
+
+    void read_vectors(long long announced, std::vector<Eigen::Vector3d>& vectors) {
+        const std::string type(file_.token());
+        file_.line();
+        vectors.resize(file_.checked_count(announced, "points", binary_ ? 12 : 6));
+        for (Eigen::Vector3d& vector : vectors)
+            for (double& x : vector) x = value(type);
+    }
+
+    long long index(const std::string& type) {
+        if (!binary_) return file_.integer();
+        if (type == "vtktypeint64") return file_.binary<std::int64_t>(true);
+        return file_.binary<std::int32_t>(true);
+    }
+
+    std::vector<long long> read_indices(long long announced, const std::string& type) {
+        std::vector<long long> indices(file_.checked_count(announced, "indices", binary_ ? 4 : 2));
+        for (long long& entry : indices) entry = index(type);
+        return indices;
+    }
+
+    std::vector<std::vector<long long>> read_cells() {
+        const long long first = file_.integer(), second = file_.integer();
+        file_.line();
+        const std::size_t start = file_.position();
+        if (file_.token() == "OFFSETS") return read_offset_cells(first, second);
+        file_.seek(start);
+        std::vector<std::vector<long long>> cells(file_.checked_count(first, "cells", binary_ ? 4 : 2));
+        for (auto& cell : cells) cell = read_indices(index("int"), "int");
+        return cells;
+    }
+
+    std::vector<std::vector<long long>> read_offset_cells(long long offset_count, long long index_count) {
+        std::string type(file_.token());
+        file_.line();
+        const auto offsets = read_indices(offset_count, type);
+        if (file_.token() != "CONNECTIVITY") file_.fail("has OFFSETS without CONNECTIVITY");
+        type = file_.token();
+        file_.line();
+        const auto indices = read_indices(index_count, type);
+        std::vector<std::vector<long long>> cells;
+        for (std::size_t c = 1; c < offsets.size(); ++c) {
+            if (offsets[c - 1] < 0 || offsets[c] < offsets[c - 1] || offsets[c] > index_count)
+                file_.fail("has cell offsets that leave the connectivity");
+            cells.emplace_back(indices.begin() + offsets[c - 1], indices.begin() + offsets[c]);
+        }
+        return cells;
+    }
+
+    FileReader& file_;
+    RawSurface surface_;
+    bool binary_ = false;
+};
+
+}  // namespace
+
+RawSurface read_vtk_polydata(FileReader& file) {
+    return PolydataReader(file).read();
+}
+
+}  // namespace tissuewarp::meshing::detail

@@ -1,0 +1,157 @@
+#include "core/atomic_file.hpp"
+#include "meshing/detail/surface_formats.hpp"
+#include "meshing/mesh_io.hpp"
+
+#include <charconv>
+#include <cstdint>
+#include <fstream>
+
+namespace tissuewarp::meshing {
+
+namespace {
+
+using detail::FileReader;
+using detail::RawSurface;
+
+RawSurface read_by_extension(const std::filesystem::path& path, FileReader& file) {
+    const std::string extension = detail::extension_of(path);
+    if (extension == ".ply") return detail::read_ply(file);
+    if (extension == ".stl") return detail::read_stl(file);
+    if (extension == ".obj") return detail::read_obj(file);
+    if (extension == ".vtk") return detail::read_vtk_polydata(file);
+    if (extension == ".csv" || extension == ".xyz") return detail::read_point_list(file);
+    file.fail("has the extension '" + extension + "'; surfaces are read from .ply, .stl, .obj, .vtk, .csv and .xyz");
+}
+
+Surface checked(const RawSurface& raw, const FileReader& file) {
+    if (raw.nodes.empty()) file.refuse("has no points; at least one is needed");
+    const auto count = static_cast<long long>(raw.nodes.size());
+    Surface surface;
+    surface.mesh.nodes.resize(3, count);
+    for (long long n = 0; n < count; ++n) {
+        if (!raw.nodes[static_cast<std::size_t>(n)].allFinite())
+            file.refuse("has a coordinate that is not finite at point " + std::to_string(n));
+        surface.mesh.nodes.col(n) = raw.nodes[static_cast<std::size_t>(n)];
+    }
+    surface.mesh.triangles.resize(3, static_cast<Eigen::Index>(raw.triangles.size()));
+    for (std::size_t t = 0; t < raw.triangles.size(); ++t)
+        for (int k = 0; k < 3; ++k) {
+            const long long node = raw.triangles[t][k];
+            if (node < 0 || node >= count)
+                file.refuse("uses point " + std::to_string(node) + "; it has points 0 to " + std::to_string(count - 1));
+            surface.mesh.triangles(k, static_cast<Eigen::Index>(t)) = static_cast<int>(node);
+        }
+    if (raw.normals.size() != raw.nodes.size()) return surface;
+    surface.normals.resize(3, count);
+    for (long long n = 0; n < count; ++n) {
+        const Eigen::Vector3d& normal = raw.normals[static_cast<std::size_t>(n)];
+        if (!normal.allFinite()) file.refuse("has a normal that is not finite at point " + std::to_string(n));
+        surface.normals.col(n) = normal.norm() > 0.0 ? Eigen::Vector3d(normal.normalized()) : normal;
+    }
+    return surface;
+}
+
+template <class T>
+void put(std::string& bytes, T value, bool big_endian = false) {
+    std::array<char, sizeof(T)> raw;
+    std::memcpy(raw.data(), &value, sizeof(T));
+    if (big_endian) std::reverse(raw.begin(), raw.end());
+    bytes.append(raw.data(), raw.size());
+}
+
+/// Shortest decimal form that reads back to the same number.
+void put_text(std::string& text, double value) {
+    std::array<char, 32> buffer;
+    text.append(buffer.data(), std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr);
+}
+
+// "SPACE=LPS" in the free text of a format is how 3D Slicer learns the frame.
+
+std::string ply_document(const SurfaceMesh& surface) {
+    std::string bytes = "ply\nformat binary_little_endian 1.0\ncomment SPACE=LPS mm\nelement vertex " +
+                        std::to_string(surface.node_count()) +
+                        "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
+                        std::to_string(surface.triangle_count()) +
+                        "\nproperty list uchar int vertex_indices\nend_header\n";
+    for (double x : surface.nodes.reshaped()) put(bytes, x);
+    for (int t = 0; t < surface.triangle_count(); ++t) {
+        put(bytes, std::uint8_t{3});
+        for (int node : surface.triangles.col(t)) put(bytes, std::int32_t{node});
+    }
+    return bytes;
+}
+
+std::string stl_document(const SurfaceMesh& surface) {
+    std::string bytes = "tissuewarp SPACE=LPS mm";
+    bytes.resize(80, ' ');
+    put(bytes, static_cast<std::uint32_t>(surface.triangle_count()));
+    for (int t = 0; t < surface.triangle_count(); ++t) {
+        const Eigen::Vector3i nodes = surface.triangles.col(t);
+        const Eigen::Vector3d a = surface.nodes.col(nodes[0]), b = surface.nodes.col(nodes[1]);
+        const Eigen::Vector3d c = surface.nodes.col(nodes[2]);
+        const Eigen::Vector3d cross = (b - a).cross(c - a);
+        const double length = cross.norm();
+        for (double x : cross) put(bytes, static_cast<float>(length > 0.0 ? x / length : 0.0));
+        for (const Eigen::Vector3d& corner : {a, b, c})
+            for (double x : corner) put(bytes, static_cast<float>(x));
+        put(bytes, std::uint16_t{0});
+    }
+    return bytes;
+}
+
+std::string obj_document(const SurfaceMesh& surface) {
+    std::string text = "# SPACE=LPS mm\n";
+    for (int n = 0; n < surface.node_count(); ++n) {
+        text += "v";
+        for (double x : surface.nodes.col(n)) put_text(text += ' ', x);
+        text += "\n";
+    }
+    for (int t = 0; t < surface.triangle_count(); ++t) {
+        text += "f";
+        for (int node : surface.triangles.col(t)) (text += ' ') += std::to_string(node + 1);
+        text += "\n";
+    }
+    return text;
+}
+
+std::string vtk_document(const SurfaceMesh& surface) {
+    const std::string count = std::to_string(surface.triangle_count());
+    std::string bytes = "# vtk DataFile Version 3.0\ntissuewarp SPACE=LPS mm\nBINARY\nDATASET POLYDATA\nPOINTS " +
+                        std::to_string(surface.node_count()) + " double\n";
+    for (double x : surface.nodes.reshaped()) put(bytes, x, true);
+    bytes += "\nPOLYGONS " + count + " " + std::to_string(4LL * surface.triangle_count()) + "\n";
+    for (int t = 0; t < surface.triangle_count(); ++t) {
+        put(bytes, std::int32_t{3}, true);
+        for (int node : surface.triangles.col(t)) put(bytes, std::int32_t{node}, true);
+    }
+    return bytes + "\n";
+}
+
+std::string document(const SurfaceMesh& surface, const std::filesystem::path& path) {
+    const std::string extension = detail::extension_of(path);
+    if (extension == ".ply") return ply_document(surface);
+    if (extension == ".stl") return stl_document(surface);
+    if (extension == ".obj") return obj_document(surface);
+    if (extension == ".vtk") return vtk_document(surface);
+    throw IoError("'" + path.string() + "' has the extension '" + extension +
+                  "'; surfaces are written as .ply, .stl, .obj or .vtk");
+}
+
+}  // namespace
+
+Surface read_surface(const std::filesystem::path& path) {
+    FileReader file(path);
+    return checked(read_by_extension(path, file), file);
+}
+
+void write_surface(const SurfaceMesh& surface, const std::filesystem::path& path) {
+    const std::string content = document(surface, path);
+    AtomicFile file(path);
+    std::ofstream stream(file.path(), std::ios::binary);
+    stream.write(content.data(), static_cast<std::streamsize>(content.size()));
+    stream.close();
+    if (!stream) throw IoError("cannot write '" + path.string() + "'; check the folder, the permission and the space");
+    file.commit();
+}
+
+}  // namespace tissuewarp::meshing

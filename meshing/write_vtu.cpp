@@ -1,0 +1,122 @@
+// VTK XML unstructured grid with raw appended data:
+// https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html
+
+#include "core/atomic_file.hpp"
+#include "core/errors.hpp"
+#include "meshing/mesh_io.hpp"
+
+#include <bit>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+
+namespace tissuewarp::meshing {
+
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "VTU files are written in the machine's byte order");
+
+std::string escaped(const std::string& text) {
+    std::string result;
+    for (char c : text) {
+        switch (c) {
+            case '&':
+                result += "&amp;";
+                break;
+            case '<':
+                result += "&lt;";
+                break;
+            case '>':
+                result += "&gt;";
+                break;
+            case '"':
+                result += "&quot;";
+                break;
+            default:
+                result += c;
+        }
+    }
+    return result;
+}
+
+/// Collects the header's <DataArray> elements and, in the same order, the bytes they refer to.
+class Appended {
+public:
+    template <class T>
+    std::string array(const char* type, const std::string& name, Eigen::Index components,
+                      const std::vector<T>& values) {
+        const std::string element = std::string("<DataArray type=\"") + type + "\" Name=\"" + escaped(name) +
+                                    "\" NumberOfComponents=\"" + std::to_string(components) +
+                                    "\" format=\"appended\" offset=\"" + std::to_string(bytes_.size()) + "\"/>\n";
+        const std::uint64_t size = values.size() * sizeof(T);
+        append(&size, sizeof size);
+        append(values.data(), size);
+        return element;
+    }
+
+    [[nodiscard]] const std::string& bytes() const { return bytes_; }
+
+private:
+    void append(const void* data, std::size_t size) { bytes_.append(static_cast<const char*>(data), size); }
+
+    std::string bytes_;
+};
+
+std::string arrays(Appended& data, const std::vector<MeshArray>& list, Eigen::Index count, const char* what) {
+    std::string elements;
+    for (const MeshArray& array : list) {
+        if (array.values.cols() != count || array.values.rows() == 0)
+            throw InvalidInput("write_vtu: array '" + array.name + "' has " + std::to_string(array.values.cols()) +
+                               " columns for " + std::to_string(count) + " " + what + "; give one column each");
+        const Eigen::MatrixXf values = array.values.cast<float>();
+        elements += data.array("Float32", array.name, values.rows(),
+                               std::vector<float>(values.data(), values.data() + values.size()));
+    }
+    return elements;
+}
+
+std::string document(const TetMesh& mesh, const std::vector<MeshArray>& points, const std::vector<MeshArray>& cells) {
+    const auto count = static_cast<std::size_t>(mesh.tet_count());
+    std::vector<std::int64_t> offsets(count);
+    for (std::size_t t = 0; t < count; ++t) offsets[t] = 4 * static_cast<std::int64_t>(t + 1);
+    constexpr std::uint8_t vtk_tetra = 10;
+
+    Appended data;
+    std::string xml =
+        "<?xml version=\"1.0\"?>\n"
+        "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"
+        "<UnstructuredGrid>\n<Piece NumberOfPoints=\"" +
+        std::to_string(mesh.node_count()) + "\" NumberOfCells=\"" + std::to_string(count) + "\">\n<PointData>\n";
+    xml += arrays(data, points, mesh.nodes.cols(), "nodes");
+    xml += "</PointData>\n<CellData>\n";
+    xml += data.array("Int32", "label", 1, std::vector<std::int32_t>(mesh.labels.begin(), mesh.labels.end()));
+    xml += arrays(data, cells, mesh.tets.cols(), "tetrahedra");
+    xml += "</CellData>\n<Points>\n";
+    xml += data.array("Float64", "Points", 3,
+                      std::vector<double>(mesh.nodes.data(), mesh.nodes.data() + mesh.nodes.size()));
+    xml += "</Points>\n<Cells>\n";
+    xml += data.array("Int64", "connectivity", 1,
+                      std::vector<std::int64_t>(mesh.tets.data(), mesh.tets.data() + mesh.tets.size()));
+    xml += data.array("Int64", "offsets", 1, offsets);
+    xml += data.array("UInt8", "types", 1, std::vector<std::uint8_t>(count, vtk_tetra));
+    xml += "</Cells>\n</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_";
+    return xml + data.bytes() + "\n</AppendedData>\n</VTKFile>\n";
+}
+
+}  // namespace
+
+void write_vtu(const TetMesh& mesh, const std::filesystem::path& path, const std::vector<MeshArray>& point_arrays,
+               const std::vector<MeshArray>& cell_arrays) {
+    if (mesh.labels.size() != mesh.tets.cols())
+        throw InvalidInput("write_vtu: " + std::to_string(mesh.labels.size()) + " labels for " +
+                           std::to_string(mesh.tet_count()) + " tetrahedra; give one label each");
+    const std::string content = document(mesh, point_arrays, cell_arrays);
+    AtomicFile file(path);
+    std::ofstream stream(file.path(), std::ios::binary);
+    stream.write(content.data(), static_cast<std::streamsize>(content.size()));
+    stream.close();
+    if (!stream) throw IoError("cannot write '" + path.string() + "'; check the folder, the permission and the space");
+    file.commit();
+}
+
+}  // namespace tissuewarp::meshing
