@@ -1,0 +1,386 @@
+// The step of total Lagrangian explicit dynamics on the CPU, in the order of Miller et al. (2007), table 1:
+// element forces, gather by node, central-difference update. All sums run in a fixed order.
+
+#include "core/errors.hpp"
+#include "tled/detail/cpu_kernels.hpp"
+#include "tled/engine.hpp"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <cmath>
+#include <limits>
+
+namespace tissuewarp::tled {
+
+namespace {
+
+using detail::batch_width;
+using detail::ElementBatches;
+using detail::Kinematics;
+using detail::record;
+
+struct BatchBlock {
+    std::size_t law;
+    std::size_t begin, end;  // batches
+};
+
+/// Position of internal element e in the padded batches.
+struct BatchLayout {
+    std::vector<BatchBlock> blocks;
+    std::vector<std::size_t> slot;         // element → batch·width + lane
+    std::vector<int> element;              // slot → element, −1 for padding
+};
+
+BatchLayout batch_layout(const RestState& rest) {
+    BatchLayout layout;
+    layout.slot.resize(static_cast<std::size_t>(rest.element_count()));
+    for (const LawBlock& block : rest.blocks) {
+        const std::size_t begin = layout.element.size() / batch_width;
+        for (int e = block.begin; e < block.end; ++e) {
+            layout.slot[static_cast<std::size_t>(e)] = layout.element.size();
+            layout.element.push_back(e);
+        }
+        while (layout.element.size() % batch_width != 0) layout.element.push_back(-1);
+        layout.blocks.push_back({block.law, begin, layout.element.size() / batch_width});
+    }
+    return layout;
+}
+
+template <class T>
+ElementBatches<T> element_batches(const RestState& rest, const BatchLayout& layout) {
+    ElementBatches<T> batches;
+    const std::size_t slots = layout.element.size();
+    const bool averaged = rest.pressure.count() > 0;
+    batches.node.resize(slots * 4);
+    if (averaged) batches.pressure.resize(slots * 4);
+    batches.gradient.resize(slots * 9);
+    batches.volume.assign(slots, T(0));
+    batches.shear_modulus.assign(slots, T(0));
+    batches.volumetric_modulus.assign(slots, T(0));
+    int last = 0;
+    for (std::size_t s = 0; s < slots; ++s) {
+        const bool padding = layout.element[s] < 0;
+        const int e = padding ? last : layout.element[s];
+        last = e;
+        const std::size_t batch = s / batch_width, lane = s % batch_width;
+        for (std::size_t corner = 0; corner < 4; ++corner) {
+            const std::size_t at = (batch * 4 + corner) * batch_width + lane;
+            batches.node[at] = record * rest.nodes(static_cast<int>(corner), e);
+            if (averaged) batches.pressure[at] = rest.pressure.of_element(static_cast<int>(corner), e);
+        }
+        for (std::size_t k = 0; k < 9; ++k)
+            batches.gradient[(batch * 9 + k) * batch_width + lane] = T(rest.gradient(static_cast<int>(k), e));
+        if (padding) continue;
+        batches.volume[s] = T(rest.volume[e]);
+        batches.shear_modulus[s] = T(rest.shear_modulus[e]);
+        batches.volumetric_modulus[s] = T(rest.volumetric_modulus[e]);
+    }
+    return batches;
+}
+
+/// Offsets of corner-force records (or slots, for `corners == false`) that a node gathers.
+std::vector<std::uint32_t> gather_list(const Incidence& incidence, const BatchLayout& layout, bool corners) {
+    std::vector<std::uint32_t> list;
+    list.reserve(incidence.entry.size());
+    for (const int entry : incidence.entry) {
+        const std::size_t slot = layout.slot[static_cast<std::size_t>(entry / 4)];
+        const std::size_t corner = static_cast<std::size_t>(entry % 4);
+        const std::size_t force = (slot / batch_width * 4 + corner) * batch_width + slot % batch_width;
+        list.push_back(static_cast<std::uint32_t>(corners ? force : slot));
+    }
+    return list;
+}
+
+template <class T>
+class CpuEngine final : public Engine {
+public:
+    explicit CpuEngine(const RestState& rest)
+        : layout_(batch_layout(rest)),
+          elements_(element_batches<T>(rest, layout_)),
+          kinematics_(rest.pressure.count() > 0 ? Kinematics::AveragedPressure : Kinematics::T4),
+          node_count_(static_cast<std::size_t>(rest.node_count)),
+          tet_(rest.tet),
+          force_offset_(rest.incidence.offset),
+          force_entry_(gather_list(rest.incidence, layout_, true)) {
+        const std::size_t vector_size = node_count_ * record;
+        displacement_.assign(vector_size, T(0));
+        increment_ = scratch_ = force_load_ = displacement_;
+        inverse_mass_.assign(vector_size, T(0));
+        spring_of_node_.assign(node_count_, -1);
+        corner_force_.assign(elements_.count() * 4 * batch_width * record, T(0));
+        if (kinematics_ == Kinematics::AveragedPressure) prepare_pressure(rest.pressure);
+        free_.assign(vector_size, T(1));
+        for (std::size_t node = 0; node < node_count_; ++node) free_[node * record + 3] = T(0);
+        Eigen::Matrix3Xd mass(3, rest.node_count);
+        for (int c = 0; c < 3; ++c) mass.row(c) = rest.lumped_mass.transpose();
+        set_mass(mass);
+    }
+
+    void set_conditions(const NodalConditions& conditions) override {
+        spring_of_node_.assign(node_count_, -1);
+        springs_.clear();
+        for (std::size_t s = 0; s < conditions.spring_node.size(); ++s) {
+            spring_of_node_[static_cast<std::size_t>(conditions.spring_node[s])] = static_cast<std::int32_t>(s);
+            const auto column = static_cast<Eigen::Index>(s);
+            std::array<T, 9> spring;
+            for (int k = 0; k < 6; ++k) spring[static_cast<std::size_t>(k)] = T(conditions.spring_stiffness(k, column));
+            for (int k = 0; k < 3; ++k) spring[static_cast<std::size_t>(6 + k)] = T(conditions.spring_force(k, column));
+            springs_.push_back(spring);
+        }
+        for (std::size_t node = 0; node < node_count_; ++node)
+            for (std::size_t c = 0; c < 3; ++c) {
+                const auto row = static_cast<Eigen::Index>(c), column = static_cast<Eigen::Index>(node);
+                const std::size_t at = node * record + c;
+                force_load_[at] = T(conditions.external_force(row, column));
+                free_[at] = conditions.constrained(row, column) ? T(0) : T(1);
+                if (free_[at] != T(0)) continue;
+                displacement_[at] = T(conditions.imposed(row, column));
+                increment_[at] = T(0);
+            }
+    }
+
+    void set_mass(const Eigen::Matrix3Xd& mass) override {
+        for (std::size_t node = 0; node < node_count_; ++node)
+            for (std::size_t c = 0; c < 3; ++c) {
+                const double m = mass(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(node));
+                if (!(m > 0) || !std::isfinite(m))
+                    throw InvalidInput("the mass of node " + std::to_string(node) + " is " + std::to_string(m) +
+                                       "; it must be positive");
+                inverse_mass_[node * record + c] = T(1 / m);
+            }
+    }
+
+    void set_state(const Eigen::Matrix3Xd& displacement, const Eigen::Matrix3Xd& increment) override {
+        for (std::size_t node = 0; node < node_count_; ++node)
+            for (std::size_t c = 0; c < 3; ++c) {
+                const std::size_t at = node * record + c;
+                if (free_[at] == T(0)) continue;
+                displacement_[at] = T(displacement(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(node)));
+                increment_[at] = T(increment(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(node)));
+            }
+    }
+
+    void run(int steps, const StepCoefficients& coefficients) override {
+        const T momentum = T(coefficients.momentum), gain = T(coefficients.gain);
+        for (int step = 0; step < steps; ++step) {
+            corner_forces(displacement_.data());
+            for_nodes([&](std::size_t node) {
+                T residual[3];
+                node_residual(node, displacement_.data(), residual);
+                for (std::size_t c = 0; c < 3; ++c) {
+                    const std::size_t at = node * record + c;
+                    increment_[at] = free_[at] * (momentum * increment_[at] + gain * inverse_mass_[at] * residual[c]);
+                    displacement_[at] += increment_[at];
+                }
+            });
+        }
+    }
+
+    [[nodiscard]] Eigen::Matrix3Xd displacement() const override { return to_matrix(displacement_); }
+    [[nodiscard]] Eigen::Matrix3Xd increment() const override { return to_matrix(increment_); }
+
+    [[nodiscard]] Eigen::Matrix3Xd residual() override {
+        corner_forces(displacement_.data());
+        return residual_at(displacement_.data());
+    }
+
+    [[nodiscard]] Eigen::Matrix3Xd internal_force() override {
+        corner_forces(displacement_.data());
+        Eigen::Matrix3Xd force(3, static_cast<Eigen::Index>(node_count_));
+        for_nodes([&](std::size_t node) {
+            T sum[3];
+            gathered_force(node, sum);
+            for (Eigen::Index c = 0; c < 3; ++c) force(c, static_cast<Eigen::Index>(node)) = double(sum[c]);
+        });
+        return force;
+    }
+
+    [[nodiscard]] Observation observe() override {
+        for (std::size_t i = 0; i < scratch_.size(); ++i) scratch_[i] = displacement_[i] - increment_[i];
+        corner_forces(scratch_.data());
+        const Eigen::Matrix3Xd before = residual_at(scratch_.data());
+        corner_forces(displacement_.data());
+        const Eigen::Matrix3Xd now = residual_at(displacement_.data());
+        const Eigen::Matrix3Xd step = increment();
+
+        Observation seen;
+        seen.finite = now.allFinite() && displacement().allFinite();
+        seen.increment_max = std::sqrt(step.colwise().squaredNorm().maxCoeff());
+        seen.residual_max = std::sqrt(now.colwise().squaredNorm().maxCoeff());
+        for (Eigen::Index node = 0; node < step.cols(); ++node)
+            for (Eigen::Index c = 0; c < 3; ++c) {
+                const double v = step(c, node);
+                const std::size_t at = static_cast<std::size_t>(node) * record + static_cast<std::size_t>(c);
+                seen.increment_mass += v * v / double(inverse_mass_[at]);
+                seen.increment_stiffness += v * (before(c, node) - now(c, node));
+            }
+        smallest_jacobian(seen);
+        return seen;
+    }
+
+    [[nodiscard]] std::string description() const override {
+        return std::string("CPU ") + (sizeof(T) == 4 ? "float32" : "float64") + ", " + detail::instruction_set() +
+               ", " + std::to_string(tbb::this_task_arena::max_concurrency()) + " threads";
+    }
+
+    [[nodiscard]] double precision() const override { return double(std::numeric_limits<T>::epsilon()); }
+
+private:
+    BatchLayout layout_;
+    ElementBatches<T> elements_;
+    Kinematics kinematics_;
+    std::size_t node_count_;
+    std::vector<int> tet_;
+
+    std::vector<int> force_offset_;
+    std::vector<std::uint32_t> force_entry_;
+    std::vector<T> corner_force_;
+
+    // averaged pressure
+    std::vector<int> pressure_offset_;
+    std::vector<std::uint32_t> pressure_entry_;
+    std::vector<T> inverse_pressure_volume_, pressure_modulus_, nodal_change_, nodal_pressure_, change_;
+    std::vector<BatchBlock> pressure_runs_;  // runs of pressure nodes that share a law
+
+    // records of four per node
+    std::vector<T> displacement_, increment_, inverse_mass_, force_load_, free_, scratch_;
+    std::vector<std::int32_t> spring_of_node_;
+    std::vector<std::array<T, 9>> springs_;  // xx yy zz xy yz zx, K·target
+
+    void prepare_pressure(const PressureNodes& pressure) {
+        const auto count = static_cast<std::size_t>(pressure.count());
+        pressure_offset_ = pressure.incidence.offset;
+        pressure_entry_ = gather_list(pressure.incidence, layout_, false);
+        inverse_pressure_volume_.resize(count);
+        pressure_modulus_.resize(count);
+        nodal_change_.assign(count, T(0));
+        nodal_pressure_.assign(count, T(0));
+        change_.assign(elements_.count() * batch_width, T(0));
+        for (std::size_t a = 0; a < count; ++a) {
+            inverse_pressure_volume_[a] = T(1 / pressure.volume[static_cast<Eigen::Index>(a)]);
+            pressure_modulus_[a] = T(pressure.modulus[static_cast<Eigen::Index>(a)]);
+            if (pressure_runs_.empty() || pressure_runs_.back().law != pressure.law[a])
+                pressure_runs_.push_back({pressure.law[a], a, a});
+            pressure_runs_.back().end = a + 1;
+        }
+    }
+
+    template <class Body>
+    void for_nodes(const Body& body) const {
+        tbb::parallel_for(
+            tbb::blocked_range<std::size_t>(0, node_count_, 1024),
+            [&](const auto& range) {
+                for (std::size_t node = range.begin(); node != range.end(); ++node) body(node);
+            },
+            tbb::static_partitioner());
+    }
+
+    template <class Body>
+    static void for_batches(std::size_t begin, std::size_t end, const Body& body) {
+        tbb::parallel_for(
+            tbb::blocked_range<std::size_t>(begin, end, 32),
+            [&](const auto& range) { body(range.begin(), range.end()); }, tbb::static_partitioner());
+    }
+
+    /// Element pass: corner forces at displacement `u`, nodal pressures first where the element needs them.
+    void corner_forces(const T* u) {
+        if (kinematics_ == Kinematics::AveragedPressure) average_pressure(u);
+        for (const BatchBlock& block : layout_.blocks)
+            for_batches(block.begin, block.end, [&](std::size_t begin, std::size_t end) {
+                detail::element_forces(block.law, kinematics_, elements_, begin, end, u, nodal_pressure_.data(),
+                                       corner_force_.data());
+            });
+    }
+
+    /// q_a = M_a U'(J_a) with J_a − 1 = Σ ¼ V_e (J_e − 1) / V_a.
+    void average_pressure(const T* u) {
+        for_batches(0, elements_.count(), [&](std::size_t begin, std::size_t end) {
+            detail::volume_changes(elements_, begin, end, u, change_.data());
+        });
+        tbb::parallel_for(
+            tbb::blocked_range<std::size_t>(0, nodal_change_.size(), 1024),
+            [&](const auto& range) {
+                for (std::size_t a = range.begin(); a != range.end(); ++a) {
+                    T sum = 0;
+                    for (int k = pressure_offset_[a]; k < pressure_offset_[a + 1]; ++k) {
+                        const std::uint32_t slot = pressure_entry_[static_cast<std::size_t>(k)];
+                        sum += elements_.volume[slot] * change_[slot];
+                    }
+                    nodal_change_[a] = T(0.25) * sum * inverse_pressure_volume_[a];
+                }
+            },
+            tbb::static_partitioner());
+        for (const BatchBlock& run : pressure_runs_)
+            detail::nodal_pressures(run.law, &pressure_modulus_[run.begin], &nodal_change_[run.begin],
+                                    &nodal_pressure_[run.begin], run.end - run.begin);
+    }
+
+    void gathered_force(std::size_t node, T (&sum)[3]) const {
+        sum[0] = sum[1] = sum[2] = 0;
+        for (int k = force_offset_[node]; k < force_offset_[node + 1]; ++k) {
+            const T* f = &corner_force_[static_cast<std::size_t>(force_entry_[static_cast<std::size_t>(k)]) * record];
+            for (int c = 0; c < 3; ++c) sum[c] += f[c];
+        }
+    }
+
+    /// f_ext + f_spring − f_int, masked by the constraints.
+    void node_residual(std::size_t node, const T* u, T (&residual)[3]) const {
+        T internal[3];
+        gathered_force(node, internal);
+        const std::size_t at = node * record;
+        for (std::size_t c = 0; c < 3; ++c) residual[c] = force_load_[at + c] - internal[c];
+        if (spring_of_node_[node] >= 0) {
+            const std::array<T, 9>& k = springs_[static_cast<std::size_t>(spring_of_node_[node])];
+            const T x = u[at], y = u[at + 1], z = u[at + 2];
+            residual[0] += k[6] - (k[0] * x + k[3] * y + k[5] * z);
+            residual[1] += k[7] - (k[3] * x + k[1] * y + k[4] * z);
+            residual[2] += k[8] - (k[5] * x + k[4] * y + k[2] * z);
+        }
+        for (std::size_t c = 0; c < 3; ++c) residual[c] *= free_[at + c];
+    }
+
+    [[nodiscard]] Eigen::Matrix3Xd residual_at(const T* u) const {
+        Eigen::Matrix3Xd result(3, static_cast<Eigen::Index>(node_count_));
+        for_nodes([&](std::size_t node) {
+            T residual[3];
+            node_residual(node, u, residual);
+            for (Eigen::Index c = 0; c < 3; ++c) result(c, static_cast<Eigen::Index>(node)) = double(residual[c]);
+        });
+        return result;
+    }
+
+    void smallest_jacobian(Observation& seen) {
+        change_.resize(elements_.count() * batch_width);
+        for_batches(0, elements_.count(), [&](std::size_t begin, std::size_t end) {
+            detail::volume_changes(elements_, begin, end, displacement_.data(), change_.data());
+        });
+        seen.min_jacobian = std::numeric_limits<double>::infinity();
+        for (std::size_t e = 0; e < layout_.slot.size(); ++e) {
+            const double jacobian = 1 + double(change_[layout_.slot[e]]);
+            if (!std::isfinite(jacobian)) seen.finite = false;
+            if (jacobian >= seen.min_jacobian) continue;
+            seen.min_jacobian = jacobian;
+            seen.min_jacobian_tet = tet_[e];
+        }
+    }
+
+    [[nodiscard]] Eigen::Matrix3Xd to_matrix(const std::vector<T>& records) const {
+        Eigen::Matrix3Xd matrix(3, static_cast<Eigen::Index>(node_count_));
+        for (std::size_t node = 0; node < node_count_; ++node)
+            for (std::size_t c = 0; c < 3; ++c)
+                matrix(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(node)) =
+                    double(records[node * record + c]);
+        return matrix;
+    }
+};
+
+}  // namespace
+
+std::unique_ptr<Engine> make_cpu_engine(const RestState& rest, Scalar scalar) {
+    if (scalar == Scalar::Float32) return std::make_unique<CpuEngine<float>>(rest);
+    return std::make_unique<CpuEngine<double>>(rest);
+}
+
+}  // namespace tissuewarp::tled

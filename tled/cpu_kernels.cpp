@@ -1,0 +1,315 @@
+// The element pass of total Lagrangian dynamics (Miller et al. 2007, section 3): displacement gradient from precomputed
+// derivatives, first Piola–Kirchhoff stress, corner forces f_a = V P ∂N_a/∂X.
+//
+// Stresses are written in H = F − I and J − 1 = tr H + ½(tr²H − tr H²) + det H, so that float32 keeps small strains.
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "tled/cpu_kernels.cpp"
+#include <hwy/foreach_target.h>  // must come before highway.h
+#include <hwy/contrib/math/math-inl.h>
+#include <hwy/highway.h>
+
+#include "tled/detail/cpu_kernels.hpp"
+#include "tled/material.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace tissuewarp::tled::detail {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+template <class D>
+using Vec = hn::Vec<D>;
+
+/// Kinematics of a batch of elements: H, cof F and J − 1.
+template <class D>
+struct Strain {
+    Vec<D> H[3][3];
+    Vec<D> cof[3][3];
+    Vec<D> change;  // J − 1
+};
+
+template <class D, class T>
+Vec<D> gather(D d, const T* base, const std::int32_t* index) {
+    const hn::RebindToSigned<D> di;
+    if constexpr (sizeof(T) == 4)
+        return hn::GatherIndex(d, base, hn::LoadU(di, index));
+    else
+        return hn::GatherIndex(d, base, hn::PromoteTo(di, hn::LoadU(hn::Rebind<std::int32_t, D>(), index)));
+}
+
+template <class D, class T>
+void displacement_gradient(D d, const ElementBatches<T>& elements, std::size_t batch, int lane, const T* u,
+                           Vec<D> (&H)[3][3]) {
+    const std::int32_t* node = &elements.node[batch * 4 * batch_width + lane];
+    const T* gradient = &elements.gradient[batch * 9 * batch_width + lane];
+    Vec<D> difference[3][3];  // [component][k]: u_{k+1} − u_0
+    for (int c = 0; c < 3; ++c) {
+        const auto u0 = gather(d, u + c, node);
+        for (int k = 0; k < 3; ++k) difference[c][k] = gather(d, u + c, node + (k + 1) * batch_width) - u0;
+    }
+    for (int j = 0; j < 3; ++j) {
+        const auto b0 = hn::LoadU(d, gradient + j * batch_width);
+        const auto b1 = hn::LoadU(d, gradient + (3 + j) * batch_width);
+        const auto b2 = hn::LoadU(d, gradient + (6 + j) * batch_width);
+        for (int i = 0; i < 3; ++i)
+            H[i][j] = hn::MulAdd(difference[i][0], b0, hn::MulAdd(difference[i][1], b1, difference[i][2] * b2));
+    }
+}
+
+template <class D>
+void cofactor(const Vec<D> (&A)[3][3], Vec<D> (&cof)[3][3]) {
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            const int a = (i + 1) % 3, b = (i + 2) % 3, c = (j + 1) % 3, e = (j + 2) % 3;
+            cof[i][j] = hn::MulSub(A[a][c], A[b][e], A[a][e] * A[b][c]);
+        }
+}
+
+/// Fills `cof` with cof F = (1 + tr H) I − Hᵀ + cof H, and `change` with J − 1 = tr H + tr cof H + det H.
+template <class D>
+void finish_strain(D d, Strain<D>& strain) {
+    cofactor<D>(strain.H, strain.cof);  // cof H for now
+    const auto trace = strain.H[0][0] + strain.H[1][1] + strain.H[2][2];
+    const auto second = strain.cof[0][0] + strain.cof[1][1] + strain.cof[2][2];
+    const auto determinant = hn::MulAdd(
+        strain.H[0][0], strain.cof[0][0],
+        hn::MulAdd(strain.H[0][1], strain.cof[0][1], strain.H[0][2] * strain.cof[0][2]));
+    strain.change = trace + second + determinant;
+    const auto diagonal = hn::Set(d, 1) + trace;
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            strain.cof[i][j] = strain.cof[i][j] - strain.H[j][i];
+            if (i == j) strain.cof[i][j] = strain.cof[i][j] + diagonal;
+        }
+}
+
+// A law provides shear_stress: P_Ψ = scale · S with S returned in place, and pressure_factor: U'(J).
+// J F − cof F = J H + (J I − cof F) is formed without the cancelling unit parts: J I − cof F has the entries of
+// (J − 1) I − (cof F − I).
+
+template <class Law>
+struct Response;
+
+template <>
+struct Response<NeoHookeanLnJ> {
+    /// P = μ (F − F^−T) = μ/J (J F − cof F)
+    template <class D>
+    static void shear_stress(D d, const Strain<D>& strain, Vec<D> mu, Vec<D> (&P)[3][3]) {
+        const auto one = hn::Set(d, 1);
+        const auto J = one + strain.change;
+        const auto scale = mu / J;
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j) {
+                auto s = hn::MulSub(J, strain.H[i][j], strain.cof[i][j]);
+                if (i == j) s = hn::MulSub(J, strain.H[i][j], strain.cof[i][j] - one) + strain.change;
+                P[i][j] = scale * s;
+            }
+    }
+    /// U' = ln J / J
+    template <class D>
+    static Vec<D> pressure_factor(D d, Vec<D> change) {
+        return hn::Log1p(d, change) / (hn::Set(d, 1) + change);
+    }
+};
+
+template <>
+struct Response<NeoHookeanIso> {
+    /// P = μ J^(−2/3) (F − tr C/3 F^−T) = μ J^(−5/3) (J F − cof F − (tr C/3 − 1) cof F)
+    template <class D>
+    static void shear_stress(D d, const Strain<D>& strain, Vec<D> mu, Vec<D> (&P)[3][3]) {
+        const auto one = hn::Set(d, 1);
+        const auto J = one + strain.change;
+        auto trace = strain.H[0][0] + strain.H[1][1] + strain.H[2][2];
+        auto excess = trace + trace;  // tr C − 3 = 2 tr H + H : H
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j) excess = hn::MulAdd(strain.H[i][j], strain.H[i][j], excess);
+        const auto third = excess * hn::Set(d, 1.0 / 3);
+        const auto scale = mu * hn::Exp(d, hn::Log1p(d, strain.change) * hn::Set(d, -5.0 / 3));
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j) {
+                auto s = hn::MulSub(J, strain.H[i][j], strain.cof[i][j]);
+                if (i == j) s = hn::MulSub(J, strain.H[i][j], strain.cof[i][j] - one) + strain.change;
+                P[i][j] = scale * hn::NegMulAdd(third, strain.cof[i][j], s);
+            }
+    }
+    /// U' = J − 1
+    template <class D>
+    static Vec<D> pressure_factor(D, Vec<D> change) {
+        return change;
+    }
+};
+
+template <class Law, Kinematics kinematics, class T>
+void element_forces_of(const ElementBatches<T>& elements, std::size_t begin, std::size_t end, const T* u,
+                       const T* pressure, T* force) {
+    const hn::CappedTag<T, batch_width> d;
+    using D = hn::CappedTag<T, batch_width>;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    for (std::size_t batch = begin; batch < end; ++batch)
+        for (int lane = 0; lane < batch_width; lane += lanes) {
+            Strain<D> strain;
+            displacement_gradient(d, elements, batch, lane, u, strain.H);
+            finish_strain(d, strain);
+            const std::size_t scalar = batch * batch_width + static_cast<std::size_t>(lane);
+            const auto volume = hn::LoadU(d, &elements.volume[scalar]);
+            Vec<D> P[3][3];
+            Response<Law>::shear_stress(d, strain, volume * hn::LoadU(d, &elements.shear_modulus[scalar]), P);
+            Vec<D> p;
+            if constexpr (kinematics == Kinematics::AveragedPressure) {
+                const std::int32_t* node = &elements.pressure[batch * 4 * batch_width + static_cast<std::size_t>(lane)];
+                p = gather(d, pressure, node) + gather(d, pressure, node + batch_width) +
+                    gather(d, pressure, node + 2 * batch_width) + gather(d, pressure, node + 3 * batch_width);
+                p = p * hn::Set(d, 0.25);
+            } else {
+                p = hn::LoadU(d, &elements.volumetric_modulus[scalar]) *
+                    Response<Law>::pressure_factor(d, strain.change);
+            }
+            p = p * volume;
+            for (int i = 0; i < 3; ++i)
+                for (int j = 0; j < 3; ++j) P[i][j] = hn::MulAdd(p, strain.cof[i][j], P[i][j]);
+
+            const T* gradient = &elements.gradient[batch * 9 * batch_width + static_cast<std::size_t>(lane)];
+            T* out = force + (batch * 4 * batch_width + static_cast<std::size_t>(lane)) * record;
+            const auto zero = hn::Zero(d);
+            Vec<D> f0[3] = {zero, zero, zero};
+            for (int k = 0; k < 3; ++k) {
+                const auto b0 = hn::LoadU(d, gradient + 3 * k * batch_width);
+                const auto b1 = hn::LoadU(d, gradient + (3 * k + 1) * batch_width);
+                const auto b2 = hn::LoadU(d, gradient + (3 * k + 2) * batch_width);
+                Vec<D> f[3];
+                for (int i = 0; i < 3; ++i) {
+                    f[i] = hn::MulAdd(P[i][0], b0, hn::MulAdd(P[i][1], b1, P[i][2] * b2));
+                    f0[i] = f0[i] - f[i];
+                }
+                hn::StoreInterleaved4(f[0], f[1], f[2], zero, d, out + (k + 1) * batch_width * record);
+            }
+            hn::StoreInterleaved4(f0[0], f0[1], f0[2], zero, d, out);
+        }
+}
+
+template <class T>
+void volume_changes_of(const ElementBatches<T>& elements, std::size_t begin, std::size_t end, const T* u, T* change) {
+    const hn::CappedTag<T, batch_width> d;
+    using D = hn::CappedTag<T, batch_width>;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    for (std::size_t batch = begin; batch < end; ++batch)
+        for (int lane = 0; lane < batch_width; lane += lanes) {
+            Strain<D> strain;
+            displacement_gradient(d, elements, batch, lane, u, strain.H);
+            finish_strain(d, strain);
+            hn::StoreU(strain.change, d, change + batch * batch_width + static_cast<std::size_t>(lane));
+        }
+}
+
+template <class Law, class T>
+void nodal_pressures_of(const T* modulus, const T* change, T* pressure, std::size_t count) {
+    const hn::CappedTag<T, batch_width> d;
+    const std::size_t lanes = hn::Lanes(d);
+    std::size_t i = 0;
+    for (; i + lanes <= count; i += lanes)
+        hn::StoreU(hn::LoadU(d, modulus + i) * Response<Law>::pressure_factor(d, hn::LoadU(d, change + i)), d,
+                   pressure + i);
+    const hn::CappedTag<T, 1> one;
+    for (; i < count; ++i)
+        hn::StoreU(hn::LoadU(one, modulus + i) * Response<Law>::pressure_factor(one, hn::LoadU(one, change + i)), one,
+                   pressure + i);
+}
+
+template <class T>
+void element_forces_any(std::size_t law, Kinematics kinematics, const ElementBatches<T>& elements, std::size_t begin,
+                        std::size_t end, const T* u, const T* pressure, T* force) {
+    const auto run = [&]<class Law>() {
+        if (kinematics == Kinematics::T4)
+            element_forces_of<Law, Kinematics::T4>(elements, begin, end, u, pressure, force);
+        else
+            element_forces_of<Law, Kinematics::AveragedPressure>(elements, begin, end, u, pressure, force);
+    };
+    if (law == 0)
+        run.template operator()<std::variant_alternative_t<0, Material>>();
+    else
+        run.template operator()<std::variant_alternative_t<1, Material>>();
+}
+
+template <class T>
+void nodal_pressures_any(std::size_t law, const T* modulus, const T* change, T* pressure, std::size_t count) {
+    if (law == 0)
+        nodal_pressures_of<std::variant_alternative_t<0, Material>>(modulus, change, pressure, count);
+    else
+        nodal_pressures_of<std::variant_alternative_t<1, Material>>(modulus, change, pressure, count);
+}
+
+// Highway dispatches plain functions: one name for each scalar type.
+void element_forces_f32(std::size_t law, Kinematics kinematics, const ElementBatches<float>& elements,
+                        std::size_t begin, std::size_t end, const float* u, const float* pressure, float* force) {
+    element_forces_any(law, kinematics, elements, begin, end, u, pressure, force);
+}
+void element_forces_f64(std::size_t law, Kinematics kinematics, const ElementBatches<double>& elements,
+                        std::size_t begin, std::size_t end, const double* u, const double* pressure, double* force) {
+    element_forces_any(law, kinematics, elements, begin, end, u, pressure, force);
+}
+void volume_changes_f32(const ElementBatches<float>& elements, std::size_t begin, std::size_t end, const float* u,
+                        float* change) {
+    volume_changes_of(elements, begin, end, u, change);
+}
+void volume_changes_f64(const ElementBatches<double>& elements, std::size_t begin, std::size_t end, const double* u,
+                        double* change) {
+    volume_changes_of(elements, begin, end, u, change);
+}
+void nodal_pressures_f32(std::size_t law, const float* modulus, const float* change, float* out, std::size_t count) {
+    nodal_pressures_any(law, modulus, change, out, count);
+}
+void nodal_pressures_f64(std::size_t law, const double* modulus, const double* change, double* out,
+                         std::size_t count) {
+    nodal_pressures_any(law, modulus, change, out, count);
+}
+const char* target_name() { return hwy::TargetName(HWY_TARGET); }
+
+}  // namespace HWY_NAMESPACE
+}  // namespace tissuewarp::tled::detail
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace tissuewarp::tled::detail {
+
+HWY_EXPORT(element_forces_f32);
+HWY_EXPORT(element_forces_f64);
+HWY_EXPORT(volume_changes_f32);
+HWY_EXPORT(volume_changes_f64);
+HWY_EXPORT(nodal_pressures_f32);
+HWY_EXPORT(nodal_pressures_f64);
+HWY_EXPORT(target_name);
+
+template <>
+void element_forces(std::size_t law, Kinematics kinematics, const ElementBatches<float>& elements, std::size_t begin,
+                    std::size_t end, const float* u, const float* pressure, float* force) {
+    HWY_DYNAMIC_DISPATCH(element_forces_f32)(law, kinematics, elements, begin, end, u, pressure, force);
+}
+template <>
+void element_forces(std::size_t law, Kinematics kinematics, const ElementBatches<double>& elements, std::size_t begin,
+                    std::size_t end, const double* u, const double* pressure, double* force) {
+    HWY_DYNAMIC_DISPATCH(element_forces_f64)(law, kinematics, elements, begin, end, u, pressure, force);
+}
+template <>
+void volume_changes(const ElementBatches<float>& elements, std::size_t begin, std::size_t end, const float* u,
+                    float* change) {
+    HWY_DYNAMIC_DISPATCH(volume_changes_f32)(elements, begin, end, u, change);
+}
+template <>
+void volume_changes(const ElementBatches<double>& elements, std::size_t begin, std::size_t end, const double* u,
+                    double* change) {
+    HWY_DYNAMIC_DISPATCH(volume_changes_f64)(elements, begin, end, u, change);
+}
+template <>
+void nodal_pressures(std::size_t law, const float* modulus, const float* change, float* pressure, std::size_t count) {
+    HWY_DYNAMIC_DISPATCH(nodal_pressures_f32)(law, modulus, change, pressure, count);
+}
+template <>
+void nodal_pressures(std::size_t law, const double* modulus, const double* change, double* pressure,
+                     std::size_t count) {
+    HWY_DYNAMIC_DISPATCH(nodal_pressures_f64)(law, modulus, change, pressure, count);
+}
+
+const char* instruction_set() { return HWY_DYNAMIC_DISPATCH(target_name)(); }
+
+}  // namespace tissuewarp::tled::detail
+#endif  // HWY_ONCE

@@ -1,0 +1,49 @@
+#pragma once
+/// The inner loops of the CPU engine, compiled once per instruction set and chosen at run time (Highway). T is float or
+/// double.
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace tissuewarp::tled::detail {
+
+/// Elements are stored in batches of `batch_width`, structure of arrays within a batch; a law block starts a new batch
+/// and is padded with copies of its last element that have zero volume.
+inline constexpr int batch_width = 16;
+
+enum class Kinematics { T4, AveragedPressure };
+
+/// Nodal vectors are records of four numbers (x, y, z, 0), so that a node is one load.
+inline constexpr int record = 4;
+
+template <class T>
+struct ElementBatches {
+    std::vector<std::int32_t> node;      ///< batch × 4 corners × width: 4·node
+    std::vector<std::int32_t> pressure;  ///< batch × 4 corners × width: pressure node; empty for T4
+    std::vector<T> gradient;             ///< batch × 9 × width, 1/mm
+    std::vector<T> volume;               ///< batch × width, mm³
+    std::vector<T> shear_modulus;        ///< batch × width, kPa
+    std::vector<T> volumetric_modulus;   ///< batch × width, kPa: what the element itself evaluates
+    [[nodiscard]] std::size_t count() const { return volume.size() / batch_width; }
+};
+
+/// det F − 1 of each element of batches [begin, end) at displacement `u` (records).
+template <class T>
+void volume_changes(const ElementBatches<T>& elements, std::size_t begin, std::size_t end, const T* u,
+                    T* jacobian_minus_1);
+
+/// Nodal forces of each element's four corners, one record each at batch·4·width + corner·width + lane. `law` indexes
+/// the alternatives of Material. `pressure` holds M_a U'(J_a) per pressure node and is not read for T4.
+template <class T>
+void element_forces(std::size_t law, Kinematics kinematics, const ElementBatches<T>& elements, std::size_t begin,
+                    std::size_t end, const T* u, const T* pressure, T* force);
+
+/// M U'(J) for J = 1 + `change`, per pressure node of one law.
+template <class T>
+void nodal_pressures(std::size_t law, const T* modulus, const T* change, T* pressure, std::size_t count);
+
+/// The instruction set in use, for reports.
+const char* instruction_set();
+
+}  // namespace tissuewarp::tled::detail
