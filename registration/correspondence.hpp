@@ -1,0 +1,58 @@
+#pragma once
+/// From segmented images to conditions on the mesh: where does each interface node belong in the fixed label map?
+
+#include "imaging/volume.hpp"
+#include "meshing/tet_mesh.hpp"
+
+#include <Eigen/Geometry>
+
+#include <map>
+#include <memory>
+#include <vector>
+
+namespace tissuewarp::registration {
+
+/// A node of the mesh on the interface between two labels. A node where several interfaces meet occurs once for each.
+struct InterfaceNode {
+    int node = -1;
+    int inner = 0, outer = 0;                            ///< labels; 0 is the outside
+    double area = 0;                                     ///< a third of the adjacent interface triangles, mm²
+    Eigen::Vector3d normal = Eigen::Vector3d::Zero();    ///< unit, rest configuration, from inner to outer
+    double offset = 0;                                   ///< mm along the normal from the node to the moving label boundary
+};
+
+/// Interface triangles of a mesh gathered at nodes, and recomputed normals for a deformed state.
+class Interfaces {
+public:
+    explicit Interfaces(const meshing::TetMesh& mesh);
+    [[nodiscard]] const std::vector<InterfaceNode>& nodes() const { return nodes_; }
+    [[nodiscard]] std::vector<InterfaceNode>& nodes() { return nodes_; }
+    /// Unit normals at other node positions (3 × mesh nodes), one column per interface node.
+    [[nodiscard]] Eigen::Matrix3Xd normals(const Eigen::Matrix3Xd& positions) const;
+
+private:
+    std::vector<InterfaceNode> nodes_;
+    std::vector<std::array<int, 3>> faces_;         // mesh nodes
+    std::vector<std::array<int, 3>> face_entries_;  // positions in nodes_
+};
+
+/// Smoothed label indicators of an image, sampled anywhere: a sub-voxel boundary from voxel labels.
+class LabelBoundaryField {
+public:
+    /// `labels` to prepare (0 is the background); Gaussian with `smoothing` voxels standard deviation.
+    LabelBoundaryField(const imaging::Volume& label_map, const std::vector<int>& labels, double smoothing = 1.0);
+    ~LabelBoundaryField();
+    LabelBoundaryField(LabelBoundaryField&&) noexcept;
+    LabelBoundaryField& operator=(LabelBoundaryField&&) noexcept;
+
+    /// Signed distance (mm) along `normal` from `point` to the nearest crossing from `inner` to `outer` within ± range;
+    /// NaN when there is none whose own normal lies within `max_angle_deg` of `normal`. Points and normal in LPS.
+    [[nodiscard]] double crossing(const Eigen::Vector3d& point, const Eigen::Vector3d& normal, int inner, int outer,
+                                  double range_mm, double max_angle_deg) const;
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tissuewarp::registration

@@ -1,0 +1,63 @@
+#pragma once
+/// How good a registration is, in the measures of the field.
+
+#include "imaging/volume.hpp"
+#include "registration/deformation.hpp"
+
+#include <Eigen/Core>
+
+#include <filesystem>
+#include <map>
+#include <vector>
+
+namespace tissuewarp::registration {
+
+struct Summary {
+    int count = 0;
+    double mean = 0, median = 0, percentile_95 = 0, maximum = 0;
+};
+Summary summarise(std::vector<double> values);
+
+/// Corresponding points, LPS mm, 3 × P.
+struct Landmarks {
+    Eigen::Matrix3Xd moving, fixed;
+};
+
+/// Reads a CSV with a header naming pre_x,pre_y,pre_z,intra_x,intra_y,intra_z (further columns ignored), LPS mm.
+/// Throws IoError or InvalidInput with line numbers.
+Landmarks read_landmarks(const std::filesystem::path& path);
+
+/// Reads a pair of elastix/transformix point files ("point", count, then x y z per line), LPS mm.
+Landmarks read_landmarks(const std::filesystem::path& moving, const std::filesystem::path& fixed);
+
+/// Target registration error ‖mapped − fixed‖ in mm.
+struct TargetError {
+    Summary before, after;
+    Summary moved_before, moved_after;  ///< landmarks that truly moved by more than `moved_mm`
+    double moved_mm = 2.0;
+};
+TargetError target_error(const Landmarks& landmarks, const Eigen::Matrix3Xd& mapped, double moved_mm = 2.0);
+
+struct Overlap {
+    double dice = 0;
+    double mean_surface_distance_mm = 0;  ///< symmetric mean
+    double hausdorff_95_mm = 0;           ///< 95th percentile, symmetric maximum of the two directions
+};
+
+/// Overlap of each label present in either map, and under key 0 of their union. Both on one grid.
+std::map<int, Overlap> overlap(const imaging::Volume& labels, const imaging::Volume& reference);
+
+struct JacobianReport {
+    double minimum = 1, percentile_1 = 1, median = 1, percentile_99 = 1, maximum = 1;
+    double folded_mm3 = 0;                        ///< rest volume with det J ≤ 0
+    long long folded = 0;                         ///< tetrahedra or voxels with det J ≤ 0
+    std::vector<Eigen::Vector3d> folded_places;   ///< up to 20 of them, LPS mm
+};
+
+/// det J of the tetrahedra, weighted by rest volume.
+JacobianReport mesh_jacobians(const Deformation& deformation);
+
+/// det J of a forward field on its grid, every voxel, or those of a mask.
+JacobianReport field_jacobians(const imaging::Volume& moving_to_fixed, const imaging::Volume* mask = nullptr);
+
+}  // namespace tissuewarp::registration

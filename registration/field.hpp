@@ -1,0 +1,51 @@
+#pragma once
+/// Displacement fields on image grids, in both directions.
+///
+/// Inside the mesh the forward field is the finite-element field, and the backward field its exact inverse: the deformed
+/// tetrahedra are rasterised over the grid and each voxel centre is carried back through its barycentric coordinates.
+/// Outside the mesh both continue it: equal to the field on the surface, and from there harmonically into the rigid
+/// placement, which is reached `fade_mm` away from the organ.
+
+#include "core/observer.hpp"
+#include "imaging/volume.hpp"
+#include "registration/deformation.hpp"
+
+#include <memory>
+
+namespace tissuewarp::registration {
+
+struct FieldOptions {
+    double fade_mm = 60.0;  ///< distance from the mesh at which only the rigid placement is left
+};
+
+/// Where preoperative points go: y − X on a grid of the moving image, three channels float32, LPS mm.
+imaging::Volume displacement_moving_to_fixed(const Deformation& deformation, const imaging::Geometry& moving_grid,
+                                             const FieldOptions& options = {}, Observer& observer = silent_observer());
+
+/// Where intraoperative points came from: X − y on a grid of the fixed image, three channels float32, LPS mm; what
+/// ITK's, ANTs' and elastix' resamplers take.
+imaging::Volume displacement_fixed_to_moving(const Deformation& deformation, const imaging::Geometry& fixed_grid,
+                                             const FieldOptions& options = {}, Observer& observer = silent_observer());
+
+/// The forward map at arbitrary points, the continuation included.
+class PointTransform {
+public:
+    explicit PointTransform(const Deformation& deformation, const FieldOptions& options = {});
+    ~PointTransform();
+    PointTransform(PointTransform&&) noexcept;
+    PointTransform& operator=(PointTransform&&) noexcept;
+
+    /// y for points X of the moving frame, 3 × P.
+    [[nodiscard]] Eigen::Matrix3Xd operator()(const Eigen::Matrix3Xd& points) const;
+    /// Whether each point lies in the mesh, where the map is the simulation's and not the continuation's.
+    [[nodiscard]] std::vector<bool> inside(const Eigen::Matrix3Xd& points) const;
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+/// det(∂y/∂X) of a forward field by central differences, one channel float32 (one-sided at the border of the grid).
+imaging::Volume jacobian_determinant(const imaging::Volume& displacement);
+
+}  // namespace tissuewarp::registration

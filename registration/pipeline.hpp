@@ -1,0 +1,94 @@
+#pragma once
+/// The method: prepare the patient's model before the operation, update it from what is seen during it.
+
+#include "core/observer.hpp"
+#include "imaging/volume.hpp"
+#include "meshing/mesher.hpp"
+#include "registration/alignment.hpp"
+#include "registration/correspondence.hpp"
+#include "registration/deformation.hpp"
+#include "tled/equilibrium.hpp"
+#include "tled/model.hpp"
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace tissuewarp::registration {
+
+/// Seconds spent in a named stage.
+struct StageTime {
+    std::string stage;
+    double seconds = 0;
+};
+
+struct PrepareOptions {
+    meshing::MeshingOptions meshing;
+    tled::MaterialTable materials;                ///< labels without an entry take `default_material`
+    tled::Material default_material = tled::neo_hookean_lnj(3.0, 0.45);
+    std::optional<tled::Element> element;         ///< default: tled::suggested_element
+    double data_stiffness = 3.0;                  ///< kPa/mm along the normal per interface area, at full weight
+    double tangential_ratio = 0.02;               ///< stiffness along the surface over stiffness along the normal
+};
+
+/// Everything that does not depend on intraoperative data.
+struct PreparedModel {
+    tled::Model model;                            ///< mesh in LPS mm of the preoperative image
+    imaging::Volume labels;                       ///< the preoperative label map it came from
+    PrepareOptions options;
+    Interfaces interfaces;
+    tled::RestState rest;
+    tled::RestStiffness stiffness;                ///< K₀ with all interface springs at full weight
+    std::vector<StageTime> times;
+};
+
+/// Label map → mesh → rest state → factor. Throws InvalidInput, Cancelled.
+PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions& options = {},
+                      Observer& observer = silent_observer());
+
+/// The same for a mesh that exists already.
+PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_labels, const PrepareOptions& options = {},
+                      Observer& observer = silent_observer());
+
+enum class Device { Auto, Cpu, Gpu };
+
+struct UpdateOptions {
+    AlignmentOptions alignment;
+    bool align = true;                            ///< false: the images are in one frame already
+    int rematches = 8;                            ///< rounds of correspondence and equilibrium
+    double first_range_mm = 25.0;                 ///< correspondence search range of the first round
+    double last_range_mm = 4.0;                   ///< and of the last, geometric in between
+    double max_angle_deg = 50.0;                  ///< between mesh normal and image boundary normal
+    double residual_scale_mm = 1.0;               ///< Geman–McClure scale of the last round for what the model cannot follow
+    tled::EquilibriumOptions equilibrium;
+    Device device = Device::Auto;
+    int gpu_index = -1;                           ///< EGL device, −1: the first with hardware
+};
+
+/// What a round of correspondence and equilibrium did.
+struct Round {
+    double range_mm = 0;
+    int matched = 0, interface_nodes = 0;
+    double mean_residual_mm = 0;                  ///< along the normal, after equilibrium, weighted
+    double largest_change_mm = 0;                 ///< of a node since the round before
+    int force_evaluations = 0;
+    double estimated_error_mm = 0;                ///< lifted residual at acceptance
+};
+
+struct UpdateResult {
+    Deformation deformation;
+    Alignment alignment;
+    std::vector<Round> rounds;
+    std::string engine;                           ///< description of the device that solved
+    double min_jacobian = 1;
+    std::vector<StageTime> times;
+    std::vector<std::string> doubts;              ///< reasons not to trust the result, empty when there are none
+};
+
+/// Registers the prepared model to a segmented intraoperative volume. Throws InvalidInput when the volumes share no label
+/// or do not meet, SolverFailure when no trustworthy equilibrium is found, GpuUnavailable when a GPU was demanded.
+UpdateResult update(const PreparedModel& prepared, const imaging::Volume& fixed_labels,
+                    const UpdateOptions& options = {}, Observer& observer = silent_observer());
+
+}  // namespace tissuewarp::registration

@@ -1,0 +1,144 @@
+#include "tled/reference.hpp"
+
+#include <Eigen/LU>
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include <numeric>
+#include <string>
+
+#include "core/errors.hpp"
+#include "tled/detail/kinematics.hpp"
+#include "tled/detail/stiffness.hpp"
+
+namespace tissuewarp::tled {
+
+using Eigen::Matrix3d;
+using Eigen::Matrix3Xd;
+using Eigen::VectorXd;
+
+namespace detail {
+
+Eigen::Matrix<double, 3, 4> shape_gradients(const RestState& rest, int element) {
+    Eigen::Matrix<double, 3, 4> result;
+    result.rightCols<3>() = rest.gradient.col(element).reshaped(3, 3);
+    result.col(0) = -result.rightCols<3>().rowwise().sum();
+    return result;
+}
+
+Matrix3d deformation_gradient(const RestState& rest, const Matrix3Xd& displacement, int element) {
+    const Eigen::Vector4i nodes = rest.nodes.col(element);
+    Matrix3d edges;
+    for (int k = 0; k < 3; ++k) edges.col(k) = displacement.col(nodes[k + 1]) - displacement.col(nodes[0]);
+    return Matrix3d::Identity() + edges * rest.gradient.col(element).reshaped(3, 3).transpose();
+}
+
+std::vector<std::size_t> law_of_elements(const RestState& rest) {
+    std::vector<std::size_t> result(rest.tet.size());
+    for (const LawBlock& block : rest.blocks) {
+        std::fill(result.begin() + block.begin, result.begin() + block.end, block.law);
+    }
+    return result;
+}
+
+VectorXd element_jacobians(const RestState& rest, const Matrix3Xd& displacement) {
+    VectorXd result(rest.element_count());
+    tbb::parallel_for(0, rest.element_count(),
+                      [&](int e) { result[e] = deformation_gradient(rest, displacement, e).determinant(); });
+    return result;
+}
+
+std::vector<VolumetricFunction> nodal_volumetric(const RestState& rest, const VectorXd& jacobian) {
+    const std::vector<std::size_t> law = law_of_elements(rest);
+    std::vector<VolumetricFunction> result(rest.pressure.count());
+    tbb::parallel_for(0, rest.pressure.count(), [&](int a) {
+        const Incidence& incidence = rest.pressure.incidence;
+        double volume = 0.0;
+        for (int k = incidence.offset[a]; k < incidence.offset[a + 1]; ++k) {
+            const int e = incidence.entry[k] / 4;
+            volume += 0.25 * rest.volume[e] * jacobian[e];
+        }
+        // One label, so one law, in all elements of a pressure node.
+        const int first = incidence.entry[incidence.offset[a]] / 4;
+        const double modulus = rest.pressure.modulus[a];
+        const VolumetricFunction U =
+            volumetric_function(material_of_law(law[first], 0.0, modulus), volume / rest.pressure.volume[a]);
+        result[a] = {modulus * U.energy, modulus * U.first, modulus * U.second};
+    });
+    return result;
+}
+
+double element_pressure(const RestState& rest, int element, const Material& material, double J,
+                        const std::vector<VolumetricFunction>& nodal) {
+    double pressure = rest.volumetric_modulus[element] * volumetric_function(material, J).first;
+    if (nodal.empty()) return pressure;
+    for (int corner = 0; corner < 4; ++corner)
+        pressure += 0.25 * nodal[rest.pressure.of_element(corner, element)].first;
+    return pressure;
+}
+
+void require_positive(const RestState& rest, const VectorXd& jacobian) {
+    for (int e = 0; e < jacobian.size(); ++e) {
+        if (jacobian[e] > 0.0) continue;
+        throw SolverFailure("tetrahedron " + std::to_string(rest.tet[e]) +
+                            " has det F = " + std::to_string(jacobian[e]) +
+                            ", which must be positive for a stress: apply the load in smaller steps");
+    }
+}
+
+}  // namespace detail
+
+double elastic_energy(const RestState& rest, const Matrix3Xd& displacement) {
+    const std::vector<std::size_t> law = detail::law_of_elements(rest);
+    VectorXd energy(rest.element_count()), jacobian(rest.element_count());
+    tbb::parallel_for(0, rest.element_count(), [&](int e) {
+        const Material material = material_of_law(law[e], rest.shear_modulus[e], rest.volumetric_modulus[e]);
+        const Matrix3d F = detail::deformation_gradient(rest, displacement, e);
+        jacobian[e] = F.determinant();
+        energy[e] = rest.volume[e] * strain_energy(material, F);
+    });
+    double sum = std::accumulate(energy.begin(), energy.end(), 0.0);
+    const std::vector<VolumetricFunction> nodal = detail::nodal_volumetric(rest, jacobian);
+    for (int a = 0; a < rest.pressure.count(); ++a) sum += rest.pressure.volume[a] * nodal[a].energy;
+    return sum;
+}
+
+Matrix3Xd internal_force(const RestState& rest, const Matrix3Xd& displacement) {
+    const VectorXd jacobian = detail::element_jacobians(rest, displacement);
+    detail::require_positive(rest, jacobian);
+    const std::vector<VolumetricFunction> nodal = detail::nodal_volumetric(rest, jacobian);
+    const std::vector<std::size_t> law = detail::law_of_elements(rest);
+
+    Matrix3Xd corner_force(3, 4 * rest.element_count());
+    tbb::parallel_for(0, rest.element_count(), [&](int e) {
+        const Material material = material_of_law(law[e], rest.shear_modulus[e], rest.volumetric_modulus[e]);
+        const Matrix3d F = detail::deformation_gradient(rest, displacement, e);
+        const double pressure = detail::element_pressure(rest, e, material, jacobian[e], nodal);
+        const Matrix3d P = shear_stress(material, F) + pressure * cofactor(F);
+        corner_force.middleCols<4>(4 * e) = rest.volume[e] * P * detail::shape_gradients(rest, e);
+    });
+
+    Matrix3Xd force = Matrix3Xd::Zero(3, rest.node_count);
+    tbb::parallel_for(0, rest.node_count, [&](int a) {
+        for (int k = rest.incidence.offset[a]; k < rest.incidence.offset[a + 1]; ++k) {
+            force.col(a) += corner_force.col(rest.incidence.entry[k]);
+        }
+    });
+    return force;
+}
+
+Eigen::SparseMatrix<double> tangent_stiffness(const RestState& rest, const Matrix3Xd& displacement) {
+    std::vector<int> all(3 * static_cast<std::size_t>(rest.node_count));
+    std::iota(all.begin(), all.end(), 0);
+    const detail::Stiffness K = detail::stiffness(rest, displacement);
+    return detail::scalar_matrix(detail::assembled(K, detail::Triangle::Full), all, detail::Triangle::Full);
+}
+
+VectorXd jacobians(const RestState& rest, const Matrix3Xd& displacement) {
+    const VectorXd internal = detail::element_jacobians(rest, displacement);
+    VectorXd result(internal.size());
+    for (int e = 0; e < internal.size(); ++e) result[rest.tet[e]] = internal[e];
+    return result;
+}
+
+}  // namespace tissuewarp::tled
