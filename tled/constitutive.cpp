@@ -90,7 +90,9 @@ Matrix3d shear_stress(const Material& material, const Matrix3d& F) {
 }
 
 Tangent shear_tangent(const Material& material, const Matrix3d& F) {
-    Tangent tangent{.F = F, .G = F.inverse().transpose()};
+    Tangent tangent;
+    tangent.F = F;
+    tangent.G = F.inverse().transpose();
     std::visit([&](const auto& law) { set_shear_tangent(law, F.determinant(), tangent); }, material);
     return tangent;
 }

@@ -49,7 +49,6 @@ VectorXd element_jacobians(const RestState& rest, const Matrix3Xd& displacement)
 }
 
 std::vector<VolumetricFunction> nodal_volumetric(const RestState& rest, const VectorXd& jacobian) {
-    const std::vector<std::size_t> law = law_of_elements(rest);
     std::vector<VolumetricFunction> result(rest.pressure.count());
     tbb::parallel_for(0, rest.pressure.count(), [&](int a) {
         const Incidence& incidence = rest.pressure.incidence;
@@ -58,11 +57,9 @@ std::vector<VolumetricFunction> nodal_volumetric(const RestState& rest, const Ve
             const int e = incidence.entry[k] / 4;
             volume += 0.25 * rest.volume[e] * jacobian[e];
         }
-        // One label, so one law, in all elements of a pressure node.
-        const int first = incidence.entry[incidence.offset[a]] / 4;
         const double modulus = rest.pressure.modulus[a];
-        const VolumetricFunction U =
-            volumetric_function(material_of_law(law[first], 0.0, modulus), volume / rest.pressure.volume[a]);
+        const Material material = material_of_law(rest.pressure.law[a], 0.0, modulus);
+        const VolumetricFunction U = volumetric_function(material, volume / rest.pressure.volume[a]);
         result[a] = {modulus * U.energy, modulus * U.first, modulus * U.second};
     });
     return result;

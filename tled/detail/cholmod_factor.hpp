@@ -1,0 +1,37 @@
+#pragma once
+/// Sparse Cholesky factorisation: CHOLMOD (Chen, Davis, Hager, Rajamanickam 2008) behind RAII.
+
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+
+#include <memory>
+#include <vector>
+
+namespace tissuewarp::tled::detail {
+
+/// Supernodal L Lᵀ of a symmetric positive definite matrix given by its lower triangle. The symbolic analysis is kept
+/// over factorisations of one pattern.
+class CholmodFactor {
+public:
+    /// Orders and analyses. The degrees of freedom of a node share all their neighbours, so the graph of the nodes is
+    /// ordered and the permutation expanded: `node_of[d]` is the node of degree of freedom d, ascending.
+    CholmodFactor(const Eigen::SparseMatrix<double>& lower, const std::vector<int>& node_of);
+    ~CholmodFactor();
+    CholmodFactor(CholmodFactor&&) noexcept;
+    CholmodFactor& operator=(CholmodFactor&&) noexcept;
+
+    /// False when the matrix is not positive definite. The pattern must be the one analysed.
+    [[nodiscard]] bool factorize(const Eigen::SparseMatrix<double>& lower);
+
+    /// x with A x = b. Precondition: the last factorize() returned true.
+    [[nodiscard]] Eigen::VectorXd solve(const Eigen::VectorXd& b) const;
+
+    /// Entries of L.
+    [[nodiscard]] long long nonzeros() const;
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tissuewarp::tled::detail

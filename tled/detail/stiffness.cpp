@@ -1,0 +1,315 @@
+#include "tled/detail/stiffness.hpp"
+
+#include <oneapi/tbb/enumerable_thread_specific.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+#include <string>
+
+#include "core/errors.hpp"
+#include "tled/detail/kinematics.hpp"
+
+namespace tissuewarp::tled::detail {
+
+using Eigen::Matrix3d;
+using Eigen::Matrix3Xd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+namespace {
+
+using Matrix34 = Eigen::Matrix<double, 3, 4>;
+
+// With g = G ∇N and f = F ∇N (3 × 4, a column per corner) the block of corners a, b of V ∂P/∂F contracted with ∇N is
+// V [a (∇N_a·∇N_b) 1 + b (f_a g_bᵀ + g_a f_bᵀ) + c g_a g_bᵀ + d g_b g_aᵀ], from the form of Tangent.
+struct ElementTerms {
+    Matrix34 gradient, f, g;
+    double a, b, c, d;  // times V_e
+
+    ElementTerms(const Tangent& tangent, const Matrix34& shape_gradient, double volume)
+        : gradient(shape_gradient),
+          f(tangent.F * shape_gradient),
+          g(tangent.G * shape_gradient),
+          a(volume * tangent.a),
+          b(volume * tangent.b),
+          c(volume * tangent.c),
+          d(volume * tangent.d) {}
+
+    [[nodiscard]] Matrix3d block(int row, int column) const {
+        const auto f_r = f.col(row), f_c = f.col(column), g_r = g.col(row), g_c = g.col(column);
+        Matrix3d result =
+            b * (f_r * g_c.transpose() + g_r * f_c.transpose()) + c * g_r * g_c.transpose() + d * g_c * g_r.transpose();
+        result.diagonal().array() += a * gradient.col(row).dot(gradient.col(column));
+        return result;
+    }
+};
+
+// Turns counts at [i + 1] into offsets.
+void accumulate_counts(std::vector<int>& offset) {
+    std::int64_t sum = 0;
+    for (int& entry : offset) {
+        sum += entry;
+        if (sum > std::numeric_limits<int>::max()) {
+            throw InvalidInput("the stiffness has more than 2147483647 blocks: use a coarser mesh");
+        }
+        entry = static_cast<int>(sum);
+    }
+}
+
+// Columns of a row gathered without order or repetition, then sorted; `slot` finds the place of a column.
+struct RowGatherer {
+    std::vector<int> slot, columns;
+
+    explicit RowGatherer(int size) : slot(size, -1) {}
+    void insert(int column) {
+        if (slot[column] >= 0) return;
+        slot[column] = 0;
+        columns.push_back(column);
+    }
+    void sort() {
+        std::sort(columns.begin(), columns.end());
+        for (std::size_t k = 0; k < columns.size(); ++k) slot[columns[k]] = static_cast<int>(k);
+    }
+    void clear() {
+        for (int column : columns) slot[column] = -1;
+        columns.clear();
+    }
+};
+
+using Gatherers = tbb::enumerable_thread_specific<RowGatherer>;
+
+// Sparsity of rows × columns: gather(row, gatherer) inserts the columns of a row.
+template <typename Gather>
+void build_pattern(int rows, int columns, const Gather& gather, std::vector<int>& offset, std::vector<int>& column) {
+    Gatherers gatherers([&] { return RowGatherer(columns); });
+    offset.assign(rows + 1, 0);
+    tbb::parallel_for(0, rows, [&](int row) {
+        RowGatherer& gatherer = gatherers.local();
+        gather(row, gatherer);
+        offset[row + 1] = static_cast<int>(gatherer.columns.size());
+        gatherer.clear();
+    });
+    accumulate_counts(offset);
+    column.resize(offset[rows]);
+    tbb::parallel_for(0, rows, [&](int row) {
+        RowGatherer& gatherer = gatherers.local();
+        gather(row, gatherer);
+        std::sort(gatherer.columns.begin(), gatherer.columns.end());
+        std::copy(gatherer.columns.begin(), gatherer.columns.end(), column.begin() + offset[row]);
+        gatherer.clear();
+    });
+}
+
+BlockRows element_rows(const RestState& rest, const std::vector<ElementTerms>& terms) {
+    BlockRows result;
+    const auto gather = [&](int node, RowGatherer& gatherer) {
+        gatherer.insert(node);  // a node without tetrahedra keeps a zero block on the diagonal
+        for (int k = rest.incidence.offset[node]; k < rest.incidence.offset[node + 1]; ++k) {
+            for (int neighbour : rest.nodes.col(rest.incidence.entry[k] / 4)) gatherer.insert(neighbour);
+        }
+    };
+    build_pattern(rest.node_count, rest.node_count, gather, result.offset, result.column);
+
+    result.block.assign(result.column.size(), Matrix3d::Zero());
+    tbb::parallel_for(0, rest.node_count, [&](int node) {
+        const int *begin = &result.column[result.offset[node]],
+                  *end = begin + result.offset[node + 1] - result.offset[node];
+        Matrix3d* blocks = &result.block[result.offset[node]];
+        for (int k = rest.incidence.offset[node]; k < rest.incidence.offset[node + 1]; ++k) {
+            const int e = rest.incidence.entry[k] / 4, corner = rest.incidence.entry[k] % 4;
+            for (int other = 0; other < 4; ++other) {
+                const int* place = std::lower_bound(begin, end, rest.nodes(other, e));
+                blocks[place - begin] += terms[e].block(corner, other);
+            }
+        }
+    });
+    return result;
+}
+
+// node → entries of the pressure rows that hold it.
+void transpose_rows(int node_count, PressureRows& rows) {
+    rows.row.resize(rows.node.size());
+    rows.node_offset.assign(node_count + 1, 0);
+    for (int a = 0; a < rows.rows(); ++a) {
+        for (int k = rows.offset[a]; k < rows.offset[a + 1]; ++k) {
+            rows.row[k] = a;
+            ++rows.node_offset[rows.node[k] + 1];
+        }
+    }
+    accumulate_counts(rows.node_offset);
+    std::vector<int> next = rows.node_offset;
+    rows.node_entry.resize(rows.node.size());
+    for (std::size_t k = 0; k < rows.node.size(); ++k) rows.node_entry[next[rows.node[k]]++] = static_cast<int>(k);
+}
+
+PressureRows pressure_rows(const RestState& rest, const std::vector<ElementTerms>& terms, const VectorXd& jacobian,
+                           const std::vector<VolumetricFunction>& nodal) {
+    PressureRows result;
+    const PressureNodes& pressure = rest.pressure;
+    const Incidence& incidence = pressure.incidence;
+    const auto gather = [&](int a, RowGatherer& gatherer) {
+        for (int k = incidence.offset[a]; k < incidence.offset[a + 1]; ++k) {
+            for (int node : rest.nodes.col(incidence.entry[k] / 4)) gatherer.insert(node);
+        }
+    };
+    build_pattern(pressure.count(), rest.node_count, gather, result.offset, result.node);
+
+    result.stiffness.resize(pressure.count());
+    result.gradient.assign(result.node.size(), Vector3d::Zero());
+    tbb::parallel_for(0, pressure.count(), [&](int a) {
+        result.stiffness[a] = pressure.volume[a] * nodal[a].second;
+        const auto begin = result.node.begin() + result.offset[a], end = result.node.begin() + result.offset[a + 1];
+        for (int k = incidence.offset[a]; k < incidence.offset[a + 1]; ++k) {
+            const int e = incidence.entry[k] / 4;
+            const double weight = 0.25 * rest.volume[e] * jacobian[e] / pressure.volume[a];  // cof F ∇N = J G ∇N
+            for (int corner = 0; corner < 4; ++corner) {
+                const auto place = std::lower_bound(begin, end, rest.nodes(corner, e));
+                result.gradient[place - result.node.begin()] += weight * terms[e].g.col(corner);
+            }
+        }
+    });
+    transpose_rows(rest.node_count, result);
+    return result;
+}
+
+}  // namespace
+
+Stiffness stiffness(const RestState& rest, const Matrix3Xd& displacement) {
+    const VectorXd jacobian = element_jacobians(rest, displacement);
+    require_positive(rest, jacobian);
+    const std::vector<VolumetricFunction> nodal = nodal_volumetric(rest, jacobian);
+    const std::vector<std::size_t> law = law_of_elements(rest);
+
+    std::vector<ElementTerms> terms(rest.element_count(), ElementTerms(Tangent{}, Matrix34::Zero(), 0.0));
+    tbb::parallel_for(0, rest.element_count(), [&](int e) {
+        const Material material = material_of_law(law[e], rest.shear_modulus[e], rest.volumetric_modulus[e]);
+        Tangent tangent = shear_tangent(material, deformation_gradient(rest, displacement, e));
+        add_volumetric_tangent(tangent, element_pressure(rest, e, material, jacobian[e], nodal),
+                               rest.volumetric_modulus[e] * volumetric_function(material, jacobian[e]).second);
+        terms[e] = ElementTerms(tangent, shape_gradients(rest, e), rest.volume[e]);
+    });
+
+    Stiffness result;
+    result.elements = element_rows(rest, terms);
+    result.pressure = pressure_rows(rest, terms, jacobian, nodal);
+    return result;
+}
+
+Matrix3Xd Stiffness::multiply(const Matrix3Xd& x) const {
+    VectorXd rate(pressure.rows());  // stiffness_a ∇J_a·x
+    tbb::parallel_for(0, pressure.rows(), [&](int a) {
+        double sum = 0.0;
+        for (int k = pressure.offset[a]; k < pressure.offset[a + 1]; ++k) {
+            sum += pressure.gradient[k].dot(x.col(pressure.node[k]));
+        }
+        rate[a] = pressure.stiffness[a] * sum;
+    });
+    Matrix3Xd y(3, elements.rows());
+    tbb::parallel_for(0, elements.rows(), [&](int i) {
+        Vector3d sum = Vector3d::Zero();
+        for (int k = elements.offset[i]; k < elements.offset[i + 1]; ++k) {
+            sum += elements.block[k] * x.col(elements.column[k]);
+        }
+        for (int k = pressure.node_offset[i]; k < pressure.node_offset[i + 1]; ++k) {
+            const int entry = pressure.node_entry[k];
+            sum += rate[pressure.row[entry]] * pressure.gradient[entry];
+        }
+        y.col(i) = sum;
+    });
+    return y;
+}
+
+std::vector<Matrix3d> Stiffness::diagonal_blocks() const {
+    std::vector<Matrix3d> result(elements.rows());
+    tbb::parallel_for(0, elements.rows(), [&](int i) {
+        const auto begin = elements.column.begin() + elements.offset[i],
+                   end = elements.column.begin() + elements.offset[i + 1];
+        result[i] = elements.block[std::lower_bound(begin, end, i) - elements.column.begin()];
+        for (int k = pressure.node_offset[i]; k < pressure.node_offset[i + 1]; ++k) {
+            const int entry = pressure.node_entry[k];
+            const Vector3d& gradient = pressure.gradient[entry];
+            result[i] += pressure.stiffness[pressure.row[entry]] * gradient * gradient.transpose();
+        }
+    });
+    return result;
+}
+
+BlockRows assembled(const Stiffness& stiffness, Triangle triangle) {
+    const BlockRows& elements = stiffness.elements;
+    const PressureRows& pressure = stiffness.pressure;
+    const auto gather = [&](int i, RowGatherer& gatherer) {
+        const int first = triangle == Triangle::Lower ? i : 0;
+        const auto insert = [&](int j) {
+            if (j >= first) gatherer.insert(j);
+        };
+        for (int k = elements.offset[i]; k < elements.offset[i + 1]; ++k) insert(elements.column[k]);
+        for (int k = pressure.node_offset[i]; k < pressure.node_offset[i + 1]; ++k) {
+            const int a = pressure.row[pressure.node_entry[k]];
+            for (int m = pressure.offset[a]; m < pressure.offset[a + 1]; ++m) insert(pressure.node[m]);
+        }
+    };
+    BlockRows result;
+    build_pattern(elements.rows(), elements.rows(), gather, result.offset, result.column);
+
+    result.block.assign(result.column.size(), Matrix3d::Zero());
+    Gatherers gatherers([&] { return RowGatherer(elements.rows()); });
+    tbb::parallel_for(0, elements.rows(), [&](int i) {
+        RowGatherer& gatherer = gatherers.local();
+        for (int k = result.offset[i]; k < result.offset[i + 1]; ++k) gatherer.insert(result.column[k]);
+        gatherer.sort();
+        Matrix3d* blocks = &result.block[result.offset[i]];
+        for (int k = elements.offset[i]; k < elements.offset[i + 1]; ++k) {
+            const int slot = gatherer.slot[elements.column[k]];
+            if (slot >= 0) blocks[slot] += elements.block[k];
+        }
+        for (int k = pressure.node_offset[i]; k < pressure.node_offset[i + 1]; ++k) {
+            const int entry = pressure.node_entry[k], a = pressure.row[entry];
+            const Vector3d own = pressure.stiffness[a] * pressure.gradient[entry];
+            for (int m = pressure.offset[a]; m < pressure.offset[a + 1]; ++m) {
+                const int slot = gatherer.slot[pressure.node[m]];
+                if (slot >= 0) blocks[slot] += own * pressure.gradient[m].transpose();
+            }
+        }
+        gatherer.clear();
+    });
+    return result;
+}
+
+Eigen::SparseMatrix<double> scalar_matrix(const BlockRows& matrix, const std::vector<int>& index, Triangle triangle) {
+    // The blocks are symmetric as a whole, so row i of blocks is read as column i. Within a column the rows ascend with
+    // the degree of freedom because `index` does.
+    const auto visit = [&](int column, const auto& visitor) {
+        const int i = column / 3;
+        for (int k = matrix.offset[i]; k < matrix.offset[i + 1]; ++k) {
+            for (int c = 0; c < 3; ++c) {
+                const int row = 3 * matrix.column[k] + c;
+                if (index[row] < 0 || (triangle == Triangle::Lower && row < column)) continue;
+                visitor(index[row], matrix.block[k](column % 3, c));
+            }
+        }
+    };
+    const int size = static_cast<int>(std::count_if(index.begin(), index.end(), [](int i) { return i >= 0; }));
+    Eigen::SparseMatrix<double> result(size, size);
+    std::vector<int> offset(size + 1, 0);
+    const int columns = static_cast<int>(index.size());
+    tbb::parallel_for(0, columns, [&](int column) {
+        if (index[column] < 0) return;
+        visit(column, [&](int, double) { ++offset[index[column] + 1]; });
+    });
+    accumulate_counts(offset);
+    result.resizeNonZeros(offset[size]);
+    std::copy(offset.begin(), offset.end(), result.outerIndexPtr());
+    tbb::parallel_for(0, columns, [&](int column) {
+        if (index[column] < 0) return;
+        int place = offset[index[column]];
+        visit(column, [&](int row, double value) {
+            result.innerIndexPtr()[place] = row;
+            result.valuePtr()[place++] = value;
+        });
+    });
+    return result;
+}
+
+}  // namespace tissuewarp::tled::detail

@@ -1,0 +1,207 @@
+#include "tled/rest_stiffness.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "core/errors.hpp"
+#include "tled/detail/cholmod_factor.hpp"
+#include "tled/detail/held_tissue.hpp"
+#include "tled/detail/stiffness.hpp"
+
+namespace tissuewarp::tled {
+
+using Eigen::Matrix3d;
+using Eigen::Matrix3Xd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+namespace {
+
+Matrix3d spring_matrix(const NodalConditions& conditions, int spring) {
+    const auto k = conditions.spring_stiffness.col(spring);  // xx yy zz xy yz zx
+    Matrix3d result;
+    result << k[0], k[3], k[5], k[3], k[1], k[4], k[5], k[4], k[2];
+    return result;
+}
+
+// y += springs · x.
+void add_springs(const NodalConditions& conditions, const Matrix3Xd& x, Matrix3Xd& y) {
+    for (std::size_t s = 0; s < conditions.spring_node.size(); ++s) {
+        const int node = conditions.spring_node[s];
+        y.col(node) += spring_matrix(conditions, static_cast<int>(s)) * x.col(node);
+    }
+}
+
+bool same_springs(const NodalConditions& a, const NodalConditions& b) {
+    return a.spring_node == b.spring_node && a.spring_stiffness.cols() == b.spring_stiffness.cols() &&
+           a.spring_stiffness == b.spring_stiffness;
+}
+
+}  // namespace
+
+struct RestStiffness::Impl {
+    NodalConditions conditions;  // those factorised
+    detail::Stiffness elastic;   // K₀ without springs, all degrees of freedom
+    std::unique_ptr<detail::CholmodFactor> factor;
+    std::vector<int> index;  // degree of freedom 3·node + component → free number or −1
+    int free_count = 0;
+
+    [[nodiscard]] VectorXd reduced(const Matrix3Xd& x) const {
+        VectorXd result(free_count);
+        for (std::size_t d = 0; d < index.size(); ++d) {
+            if (index[d] >= 0) result[index[d]] = x.data()[d];
+        }
+        return result;
+    }
+    [[nodiscard]] Matrix3Xd expanded(const VectorXd& x) const {
+        Matrix3Xd result = Matrix3Xd::Zero(3, static_cast<Eigen::Index>(index.size()) / 3);
+        for (std::size_t d = 0; d < index.size(); ++d) {
+            if (index[d] >= 0) result.data()[d] = x[index[d]];
+        }
+        return result;
+    }
+    [[nodiscard]] Matrix3Xd multiply(const Matrix3Xd& x, const NodalConditions& present) const {
+        Matrix3Xd y = elastic.multiply(x);
+        add_springs(present, x, y);
+        return y;
+    }
+    void require_compatible(const NodalConditions& present) const;
+    [[nodiscard]] VectorXd conjugate_gradients(const VectorXd& force, const NodalConditions& present,
+                                               double relative_tolerance) const;
+};
+
+void RestStiffness::Impl::require_compatible(const NodalConditions& present) const {
+    if (present.constrained.cols() != conditions.constrained.cols() ||
+        (present.constrained.array() != conditions.constrained.array()).any()) {
+        throw InvalidInput(
+            "the prescribed degrees of freedom differ from those of the factorised stiffness: construct another "
+            "RestStiffness for them");
+    }
+}
+
+// Preconditioned conjugate gradients (Saad, Iterative Methods for Sparse Linear Systems, algorithm 9.1). The error is
+// measured in the norm of the preconditioner, √(r·z), relative to its start.
+VectorXd RestStiffness::Impl::conjugate_gradients(const VectorXd& force, const NodalConditions& present,
+                                                  double relative_tolerance) const {
+    constexpr int max_iterations = 2000;
+    VectorXd x = VectorXd::Zero(free_count), r = force, z = factor->solve(r), p = z;
+    double rz = r.dot(z);
+    const double limit = relative_tolerance * relative_tolerance * rz;
+    for (int iteration = 0; rz > limit; ++iteration) {
+        const VectorXd Kp = reduced(multiply(expanded(p), present));
+        const double curvature = p.dot(Kp);
+        if (iteration == max_iterations || !(curvature > 0.0)) {
+            throw SolverFailure("conjugate gradients stopped at a relative residual of " +
+                                std::to_string(relative_tolerance * std::sqrt(rz / limit)) + " after " +
+                                std::to_string(iteration) +
+                                " iterations: factorise the stiffness again with the present springs");
+        }
+        const double step = rz / curvature;
+        x += step * p;
+        r -= step * Kp;
+        z = factor->solve(r);
+        const double next = r.dot(z);
+        p = z + next / rz * p;
+        rz = next;
+    }
+    return x;
+}
+
+RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& conditions)
+    : impl_(std::make_unique<Impl>()) {
+    detail::require_held(rest, conditions);
+    impl_->conditions = conditions;
+    impl_->elastic = detail::stiffness(rest, Matrix3Xd::Zero(3, rest.node_count));
+    std::vector<int> node_of;
+    impl_->index.assign(3 * static_cast<std::size_t>(rest.node_count), -1);
+    for (int d = 0; d < 3 * rest.node_count; ++d) {
+        if (conditions.constrained.data()[d]) continue;
+        impl_->index[d] = impl_->free_count++;
+        node_of.push_back(d / 3);
+    }
+    if (impl_->free_count == 0) return;
+
+    detail::BlockRows K = detail::assembled(impl_->elastic, detail::Triangle::Lower);
+    for (std::size_t s = 0; s < conditions.spring_node.size(); ++s) {
+        K.block[K.offset[conditions.spring_node[s]]] +=
+            spring_matrix(conditions, static_cast<int>(s));  // diagonal first
+    }
+    const Eigen::SparseMatrix<double> lower = detail::scalar_matrix(K, impl_->index, detail::Triangle::Lower);
+    K = {};
+    impl_->factor = std::make_unique<detail::CholmodFactor>(lower, node_of);
+    if (!impl_->factor->factorize(lower)) {
+        throw InvalidInput(
+            "the stiffness at rest is not positive definite: a node without tetrahedra, or tissue that the springs and "
+            "prescribed displacements hold too weakly; hold it at more nodes or with stiffer springs");
+    }
+}
+
+RestStiffness::~RestStiffness() = default;
+RestStiffness::RestStiffness(RestStiffness&&) noexcept = default;
+RestStiffness& RestStiffness::operator=(RestStiffness&&) noexcept = default;
+
+Matrix3Xd RestStiffness::solve(const Matrix3Xd& force) const {
+    if (impl_->free_count == 0) return Matrix3Xd::Zero(3, force.cols());
+    return impl_->expanded(impl_->factor->solve(impl_->reduced(force)));
+}
+
+Matrix3Xd RestStiffness::solve(const Matrix3Xd& force, const NodalConditions& conditions,
+                               double relative_tolerance) const {
+    impl_->require_compatible(conditions);
+    if (same_springs(conditions, impl_->conditions) || impl_->free_count == 0) return solve(force);
+    return impl_->expanded(impl_->conjugate_gradients(impl_->reduced(force), conditions, relative_tolerance));
+}
+
+Matrix3Xd RestStiffness::linear_solution(const NodalConditions& conditions) const {
+    // K_ff u_f = f_f + springs' targets − K_fc u_c: the imposed values enter with the residual of u = (0, u_c).
+    constexpr double tolerance = 1e-10;
+    Matrix3Xd force = -impl_->multiply(conditions.imposed, conditions);
+    if (conditions.external_force.size() > 0) force += conditions.external_force;
+    for (std::size_t s = 0; s < conditions.spring_node.size(); ++s) {
+        force.col(conditions.spring_node[s]) += conditions.spring_force.col(static_cast<Eigen::Index>(s));
+    }
+    return conditions.imposed + solve(force, conditions, tolerance);
+}
+
+Matrix3Xd RestStiffness::diagonal(const NodalConditions& conditions) const {
+    impl_->require_compatible(conditions);
+    std::vector<Matrix3d> blocks = impl_->elastic.diagonal_blocks();
+    for (std::size_t s = 0; s < conditions.spring_node.size(); ++s) {
+        blocks[conditions.spring_node[s]] += spring_matrix(conditions, static_cast<int>(s));
+    }
+    Matrix3Xd result(3, static_cast<Eigen::Index>(blocks.size()));
+    for (std::size_t i = 0; i < blocks.size(); ++i) result.col(i) = blocks[i].diagonal();
+    return conditions.constrained.select(Matrix3Xd::Ones(3, result.cols()), result);
+}
+
+double RestStiffness::lowest_eigenvalue() const {
+    if (impl_->free_count == 0) return std::numeric_limits<double>::infinity();
+    // Inverse iteration on K x = λ D x from a fixed vector without symmetry; the Rayleigh quotient errs by the square
+    // of the vector's error.
+    constexpr int max_iterations = 50;
+    constexpr double tolerance = 1e-8;
+    const VectorXd D = impl_->reduced(diagonal(impl_->conditions));
+    VectorXd x(impl_->free_count);
+    for (int i = 0; i < x.size(); ++i) x[i] = 1.0 + 0.5 * std::sin(0.7 * i);
+    double lambda = 0.0;
+    for (int iteration = 0; iteration < max_iterations; ++iteration) {
+        x /= std::sqrt(x.dot(D.cwiseProduct(x)));
+        const VectorXd Dx = D.cwiseProduct(x);
+        const VectorXd y = impl_->factor->solve(Dx);  // y = K⁻¹ D x, so y·K y = y·D x
+        const double next = y.dot(Dx) / y.dot(D.cwiseProduct(y));
+        x = y;
+        if (std::abs(next - lambda) <= tolerance * next) return next;
+        lambda = next;
+    }
+    return lambda;
+}
+
+long long RestStiffness::factor_nonzeros() const {
+    return impl_->factor ? impl_->factor->nonzeros() : 0;
+}
+
+}  // namespace tissuewarp::tled
