@@ -1,0 +1,113 @@
+#include "shaders/catalogue.hpp"
+
+#include <utility>
+
+namespace tissuewarp::shaders {
+namespace {
+
+// 128 invocations keep enough registers for the element kernels on all hardware known to us; 256 lanes of 24 bytes are
+// far below the 32 KiB of shared memory that OpenGL guarantees.
+constexpr const char* workgroup_size = "128";
+constexpr const char* observe_workgroup_size = "256";
+
+/// A string of one character rather than a literal: g++ 12 warns of an overlapping copy in the literal's assignment
+/// (GCC bug 105651).
+std::string flag(bool on) {
+    return std::string(1, on ? '1' : '0');
+}
+
+std::string chunk(Law law) {
+    return law == Law::NeoHookeanIso ? "law.neo_hookean_iso" : "law.neo_hookean_lnj";
+}
+
+ProgramSource node_program(std::string kernel, const NodeEffects& effects) {
+    ProgramSource source{std::move(kernel), {"index", "bindings", "node"}, {}, {}};
+    if (effects.springs) source.chunks.emplace_back("node.springs");
+    if (effects.external_force) source.chunks.emplace_back("node.external_force");
+    source.chunks.emplace_back("node.residual");
+    source.defines = {{"WORKGROUP_SIZE", workgroup_size},
+                      {"HAS_SPRINGS", flag(effects.springs)},
+                      {"HAS_EXTERNAL_FORCE", flag(effects.external_force)}};
+    return source;
+}
+
+}  // namespace
+
+ProgramSource element_force_program(Law law, PressureRule rule) {
+    ProgramSource source{"element_force", {"index", "bindings", "numbers", "element", chunk(law)}, {}, {}};
+    source.defines = {{"WORKGROUP_SIZE", workgroup_size}, {"USES_SHEAR", "1"}};
+    if (rule == PressureRule::Element) {
+        source.chunks.emplace_back("pressure.element");
+    } else {
+        source.chunks.emplace_back("pressure.averaged");
+        source.defines["HAS_ELEMENT_PRESSURE"] = flag(rule == PressureRule::AveragedWithElementPart);
+    }
+    return source;
+}
+
+ProgramSource element_volume_program() {
+    return {"element_volume", {"index", "bindings", "element"}, {{"WORKGROUP_SIZE", workgroup_size}}, {}};
+}
+
+ProgramSource nodal_pressure_program(Law law) {
+    return {"nodal_pressure",
+            {"index", "bindings", "numbers", chunk(law)},
+            {{"WORKGROUP_SIZE", workgroup_size}, {"USES_SHEAR", "0"}},
+            {}};
+}
+
+ProgramSource node_step_program(const NodeEffects& effects, StoreResidual store) {
+    ProgramSource source = node_program("node_step", effects);
+    source.defines["STORES_RESIDUAL"] = flag(store == StoreResidual::Yes);
+    return source;
+}
+
+ProgramSource node_residual_program(const NodeEffects& effects, MaskConstrained mask) {
+    ProgramSource source = node_program("node_residual", effects);
+    source.defines["MASKS_CONSTRAINED"] = flag(mask == MaskConstrained::Yes);
+    return source;
+}
+
+ProgramSource impose_program() {
+    return {"impose", {"index", "bindings"}, {{"WORKGROUP_SIZE", workgroup_size}}, {}};
+}
+
+ProgramSource previous_displacement_program() {
+    return {"previous_displacement", {"index", "bindings"}, {{"WORKGROUP_SIZE", workgroup_size}}, {}};
+}
+
+ProgramSource observe_nodes_program() {
+    return {"observe_nodes",
+            {"index", "bindings", "numbers"},
+            {{"WORKGROUP_SIZE", observe_workgroup_size}, {"PARTIALS", std::to_string(observe_partials) + "u"}},
+            {}};
+}
+
+ProgramSource observe_elements_program() {
+    ProgramSource source = observe_nodes_program();
+    source.kernel = "observe_elements";
+    source.chunks.emplace_back("element");
+    return source;
+}
+
+std::vector<ProgramSource> every_program() {
+    std::vector<ProgramSource> all{element_volume_program(), impose_program(), previous_displacement_program(),
+                                   observe_nodes_program(), observe_elements_program()};
+    for (const Law law : {Law::NeoHookeanIso, Law::NeoHookeanLnJ}) {
+        for (const PressureRule rule :
+             {PressureRule::Element, PressureRule::Averaged, PressureRule::AveragedWithElementPart})
+            all.push_back(element_force_program(law, rule));
+        all.push_back(nodal_pressure_program(law));
+    }
+    for (const bool springs : {false, true})
+        for (const bool external_force : {false, true}) {
+            const NodeEffects effects{springs, external_force};
+            for (const StoreResidual store : {StoreResidual::No, StoreResidual::Yes})
+                all.push_back(node_step_program(effects, store));
+            for (const MaskConstrained mask : {MaskConstrained::No, MaskConstrained::Yes})
+                all.push_back(node_residual_program(effects, mask));
+        }
+    return all;
+}
+
+}  // namespace tissuewarp::shaders

@@ -1,0 +1,46 @@
+#pragma once
+/// The programs that kernels and chunks make: which chunks and flags each kernel takes.
+
+#include "shaders/program_source.hpp"
+
+#include <string>
+#include <vector>
+
+namespace tissuewarp::shaders {
+
+/// Chunks law.*.glsl.
+enum class Law { NeoHookeanIso, NeoHookeanLnJ };
+
+/// Where the volumetric stress is evaluated: chunks pressure.*.glsl.
+enum class PressureRule {
+    Element,                  ///< in each element
+    Averaged,                 ///< at nodes
+    AveragedWithElementPart,  ///< at nodes, and a part in each element
+};
+
+/// Effects that act on nodes; what is absent costs no read and no instruction.
+struct NodeEffects {
+    bool springs = false;
+    bool external_force = false;
+};
+
+enum class StoreResidual { No, Yes };
+enum class MaskConstrained { No, Yes };
+
+ProgramSource element_force_program(Law law, PressureRule rule);
+ProgramSource element_volume_program();
+ProgramSource nodal_pressure_program(Law law);
+ProgramSource node_step_program(const NodeEffects& effects, StoreResidual store);
+ProgramSource node_residual_program(const NodeEffects& effects, MaskConstrained mask);
+ProgramSource impose_program();
+ProgramSource previous_displacement_program();
+
+/// Workgroups of the observing programs, each of which leaves one partial result.
+inline constexpr int observe_partials = 128;
+ProgramSource observe_nodes_program();
+ProgramSource observe_elements_program();
+
+/// Every program that the functions above can make, for checking them all.
+std::vector<ProgramSource> every_program();
+
+}  // namespace tissuewarp::shaders

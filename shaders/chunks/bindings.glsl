@@ -1,0 +1,26 @@
+// Gives: the binding of every storage block. The passes of a step use different numbers, so that one binding serves a
+// whole run; at most 16, which every driver of OpenGL 4.5 that is known to us offers. The host asks the linked program
+// for its blocks and never repeats these numbers.
+
+#define BINDING_DISPLACEMENT 0         // mm, xyz of node
+#define BINDING_INCREMENT 1            // u - u⁻, mm, xyz of node
+#define BINDING_INVERSE_MASS 2         // xyz of node, zero where constrained
+#define BINDING_ELEMENT_NODES 3
+#define BINDING_ELEMENT_REST 4
+#define BINDING_CORNER_FORCE 5         // mN
+#define BINDING_NODE_INCIDENCE 6
+#define BINDING_EXTERNAL_FORCE 7       // mN, xyz of node
+#define BINDING_SPRING_INDEX 8
+#define BINDING_SPRINGS 9
+#define BINDING_RESIDUAL 10            // mN, xyz of node, zero where constrained
+#define BINDING_VOLUME_CHANGE 11
+#define BINDING_PRESSURE 12            // kPa
+#define BINDING_PRESSURE_CORNERS 13
+#define BINDING_PRESSURE_REST 14
+#define BINDING_PRESSURE_INCIDENCE 15
+
+// Outside of a step, these take the place of blocks that the kernel at hand does not use.
+#define BINDING_PARTIAL 6
+#define BINDING_PREVIOUS_RESIDUAL 7
+#define BINDING_PREVIOUS_DISPLACEMENT 8
+#define BINDING_IMPOSED 9

@@ -1,0 +1,24 @@
+// Gives: what float32 needs care for.
+
+/// Looks at the bits, because compilers may assume that no NaN occurs.
+bool is_finite(float x) { return (floatBitsToUint(x) & 0x7f800000u) != 0x7f800000u; }
+bool is_finite(vec3 x) { return is_finite(x.x) && is_finite(x.y) && is_finite(x.z); }
+
+float not_a_number() { return uintBitsToFloat(0x7fc00000u); }
+
+/// ln(1 + x) to a few units of the last place, NaN for x <= -1. GLSL's log() is only good to 2⁻²¹ absolutely near 1, which
+/// the large volumetric modulus turns into noise; near 1 use ln(1 + x) = 2 artanh(x / (2 + x)), whose terms past s¹³ are
+/// below 2e-8 of the sum for |x| <= 1/2.
+float log_one_plus(float x) {
+    if (!(x > -1.0)) return not_a_number();
+    if (abs(x) > 0.5) return log(1.0 + x);
+    float s = x / (2.0 + x);
+    float s2 = s * s;
+    float series = 1.0 / 13.0;
+    series = series * s2 + 1.0 / 11.0;
+    series = series * s2 + 1.0 / 9.0;
+    series = series * s2 + 1.0 / 7.0;
+    series = series * s2 + 1.0 / 5.0;
+    series = series * s2 + 1.0 / 3.0;
+    return 2.0 * s + 2.0 * s * s2 * series;
+}

@@ -1,0 +1,96 @@
+#include "shaders/program_source.hpp"
+
+#include "core/errors.hpp"
+
+#include <regex>
+#include <set>
+#include <sstream>
+
+namespace tissuewarp::shaders {
+namespace {
+
+constexpr std::size_t lines_per_file = 10000;
+
+const std::string& file(const SourceLibrary& library, const std::string& name) {
+    const auto found = library.find(name);
+    if (found == library.end()) throw InvalidInput("no GLSL file " + name + " in shaders/");
+    return found->second;
+}
+
+/// Names that a file declares by lines `//! define NAME`.
+void collect_declared_names(const std::string& text, std::set<std::string>& names) {
+    constexpr std::string_view mark = "//! define ";
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);)
+        if (line.starts_with(mark)) {
+            std::istringstream rest(line.substr(mark.size()));
+            std::string name;
+            rest >> name;
+            names.insert(name);
+        }
+}
+
+void require_defines(const ProgramSource& source, const std::set<std::string>& declared) {
+    for (const std::string& name : declared)
+        if (!source.defines.contains(name))
+            throw InvalidInput("kernel " + source.kernel + " needs a value for " + name +
+                               ", which a file of it declares");
+    for (const auto& [name, value] : source.defines)
+        if (!declared.contains(name))
+            throw InvalidInput("kernel " + source.kernel + " is given " + name +
+                               ", which no file of it declares by `//! define`");
+}
+
+}  // namespace
+
+ComposedSource compose(const ProgramSource& source, const SourceLibrary& library) {
+    ComposedSource composed;
+    composed.files = {"prolog"};
+    for (const std::string& chunk : source.chunks) composed.files.push_back("chunks/" + chunk + ".glsl");
+    composed.files.push_back("kernels/" + source.kernel + ".comp");
+
+    std::set<std::string> declared;
+    for (std::size_t k = 1; k < composed.files.size(); ++k)
+        collect_declared_names(file(library, composed.files[k]), declared);
+    require_defines(source, declared);
+
+    std::string& text = composed.text;
+    text = "#version 450 core\n";
+    for (const std::string& extension : source.extensions) text += "#extension " + extension + " : require\n";
+    for (const auto& [name, value] : source.defines) text += "#define " + name + " " + value + "\n";
+    for (std::size_t k = 1; k < composed.files.size(); ++k) {
+        text += "#line " + std::to_string(k * lines_per_file + 1) + " " + std::to_string(k) + "\n" +
+                file(library, composed.files[k]);
+        if (!text.ends_with('\n')) text += '\n';
+    }
+    return composed;
+}
+
+std::string program_key(const ProgramSource& source) {
+    std::string key = source.kernel;
+    for (const std::string& chunk : source.chunks) key += "+" + chunk;
+    for (const auto& [name, value] : source.defines) key += ";" + name + "=" + value;
+    for (const std::string& extension : source.extensions) key += ";" + extension;
+    return key;
+}
+
+std::string readable_log(std::string_view log, const std::vector<std::string>& files) {
+    // Mesa writes "1:23(5): error", NVIDIA "1(23) : error", AMD and glslang "ERROR: 1:23:".
+    static const std::regex position(R"((^|ERROR: |WARNING: )\d+(?::(\d+)(?:\(\d+\))?|\((\d+)\)))");
+    std::istringstream lines{std::string(log)};
+    std::string readable;
+    for (std::string line; std::getline(lines, line);) {
+        std::smatch match;
+        if (std::regex_search(line, match, position)) {
+            const std::size_t number = std::stoul(match[2].matched ? match[2] : match[3]);
+            const std::size_t file_number = number / lines_per_file;
+            if (file_number > 0 && file_number < files.size())
+                line = match.prefix().str() + match[1].str() + files[file_number] + ":" +
+                       std::to_string(number % lines_per_file) + match.suffix().str();
+        }
+        readable += line + "\n";
+    }
+    return readable;
+}
+
+}  // namespace tissuewarp::shaders

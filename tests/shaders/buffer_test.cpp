@@ -1,0 +1,73 @@
+#include "shaders/buffer.hpp"
+#include "core/errors.hpp"
+
+#include <gmock/gmock.h>
+
+#include <numeric>
+
+namespace tissuewarp::shaders {
+namespace {
+
+class BufferTest : public ::testing::Test {
+protected:
+    Device device;
+    CurrentContext current = device.make_current();
+};
+
+TEST_F(BufferTest, IsZeroAtFirst) {
+    const Buffer<float> buffer(device, 1000, "values");
+    EXPECT_THAT(buffer.download(), ::testing::Each(0.0F));
+}
+
+TEST_F(BufferTest, GivesBackWhatWasWritten) {
+    std::vector<int> values(10000);
+    std::iota(values.begin(), values.end(), -5000);
+    const Buffer<int> buffer(device, values, "values");
+    EXPECT_EQ(buffer.download(), values);
+}
+
+TEST_F(BufferTest, WritesAndReadsARange) {
+    Buffer<int> buffer(device, std::vector<int>{0, 1, 2, 3, 4}, "values");
+    buffer.upload(std::vector<int>{20, 30}, 2);
+    EXPECT_EQ(buffer.download(), (std::vector<int>{0, 1, 20, 30, 4}));
+    std::vector<int> tail(2);
+    buffer.download(tail, 3);
+    EXPECT_EQ(tail, (std::vector<int>{30, 4}));
+}
+
+TEST_F(BufferTest, CopiesAndClears) {
+    const Buffer<int> from(device, std::vector<int>{7, 8, 9}, "from");
+    Buffer<int> to(device, 3, "to");
+    to.copy_from(from, 2 * sizeof(int));
+    EXPECT_EQ(to.download(), (std::vector<int>{7, 8, 0}));
+    to.clear();
+    EXPECT_EQ(to.download(), (std::vector<int>{0, 0, 0}));
+}
+
+TEST_F(BufferTest, RefusesARangeOutsideItself) {
+    Buffer<int> buffer(device, 3, "values");
+    EXPECT_THROW(buffer.upload(std::vector<int>{1, 2}, 2), InvalidInput);
+    std::vector<int> two(2);
+    EXPECT_THROW(buffer.download(two, 2), InvalidInput);
+    Buffer<int> larger(device, 4, "larger");
+    EXPECT_THROW(buffer.copy_from(larger, larger.bytes()), InvalidInput);
+}
+
+TEST_F(BufferTest, MayBeEmpty) {
+    const Buffer<int> buffer(device, 0, "nothing");
+    EXPECT_TRUE(buffer.download().empty());
+}
+
+TEST_F(BufferTest, RefusesMoreThanAStorageBlockHoldsAndSaysSo) {
+    const std::size_t bytes = device.limits().storage_buffer_bytes + 4;
+    try {
+        const Buffer<std::byte> buffer(device, bytes, "corner forces");
+        FAIL() << "accepted";
+    } catch (const GpuUnavailable& error) {
+        EXPECT_THAT(error.what(), ::testing::HasSubstr("corner forces take"));
+        EXPECT_THAT(error.what(), ::testing::HasSubstr("MiB"));
+    }
+}
+
+}  // namespace
+}  // namespace tissuewarp::shaders

@@ -1,0 +1,110 @@
+/// Composition of GLSL: text only, no device.
+#include "core/errors.hpp"
+#include "shaders/catalogue.hpp"
+#include "shaders/program_source.hpp"
+
+#include <gmock/gmock.h>
+
+#include <set>
+
+namespace tissuewarp::shaders {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+const SourceLibrary library{
+    {"kernels/k.comp", "//! define WITH_A\n#if WITH_A\nint x = a();\n#endif\nvoid main() {}\n"},
+    {"chunks/a.glsl", "//! define SIZE\nint a() { return SIZE; }"},
+    {"chunks/b.glsl", "int b() { return 2; }\n"},
+};
+
+TEST(Composition, PutsVersionDefinesChunksAndKernelInOrder) {
+    const ComposedSource composed = compose({"k", {"a", "b"}, {{"WITH_A", "1"}, {"SIZE", "3"}}, {}}, library);
+    EXPECT_EQ(composed.text,
+              "#version 450 core\n#define SIZE 3\n#define WITH_A 1\n"
+              "#line 10001 1\n//! define SIZE\nint a() { return SIZE; }\n"
+              "#line 20001 2\nint b() { return 2; }\n"
+              "#line 30001 3\n//! define WITH_A\n#if WITH_A\nint x = a();\n#endif\nvoid main() {}\n");
+    EXPECT_THAT(composed.files, ::testing::ElementsAre("prolog", "chunks/a.glsl", "chunks/b.glsl", "kernels/k.comp"));
+}
+
+TEST(Composition, PutsExtensionsBehindTheVersion) {
+    const ComposedSource composed = compose({"k", {}, {{"WITH_A", "0"}}, {"GL_KHR_shader_subgroup_basic"}}, library);
+    EXPECT_TRUE(composed.text.starts_with(
+        "#version 450 core\n#extension GL_KHR_shader_subgroup_basic : require\n#define WITH_A 0\n"));
+}
+
+TEST(Composition, RefusesAFlagWithoutAValue) {
+    EXPECT_THROW(compose({"k", {}, {}, {}}, library), InvalidInput);
+    EXPECT_THROW(compose({"k", {"a"}, {{"WITH_A", "1"}}, {}}, library), InvalidInput);
+}
+
+TEST(Composition, RefusesAValueThatNoFileDeclares) {
+    try {
+        compose({"k", {"b"}, {{"WITH_A", "0"}, {"WITH_AA", "1"}}, {}}, library);
+        FAIL() << "accepted";
+    } catch (const InvalidInput& error) {
+        EXPECT_THAT(error.what(), HasSubstr("WITH_AA"));
+    }
+}
+
+TEST(Composition, RefusesAnUnknownFileByName) {
+    try {
+        compose({"k", {"nowhere"}, {{"WITH_A", "0"}}, {}}, library);
+        FAIL() << "accepted";
+    } catch (const InvalidInput& error) {
+        EXPECT_THAT(error.what(), HasSubstr("chunks/nowhere.glsl"));
+    }
+}
+
+TEST(Composition, KeyTellsProgramsApart) {
+    std::set<std::string> keys;
+    std::set<std::string> texts;
+    for (const ProgramSource& source : every_program()) {
+        keys.insert(program_key(source));
+        texts.insert(compose(source).text);
+    }
+    EXPECT_EQ(keys.size(), every_program().size());
+    EXPECT_EQ(texts.size(), every_program().size());
+    EXPECT_EQ(program_key(impose_program()), program_key(impose_program()));
+}
+
+TEST(Composition, LogsOfAllDriversAreMadeReadable) {
+    const std::vector<std::string> files{"prolog", "chunks/a.glsl", "kernels/k.comp"};
+    EXPECT_EQ(readable_log("1:10023(5): error: no function\n", files), "chunks/a.glsl:23: error: no function\n");
+    EXPECT_EQ(readable_log("0:10023(5): error: source forgotten", files),
+              "chunks/a.glsl:23: error: source forgotten\n");
+    EXPECT_EQ(readable_log("2(20007) : error C1008: undefined variable", files),
+              "kernels/k.comp:7 : error C1008: undefined variable\n");
+    EXPECT_EQ(readable_log("ERROR: 1:10004: '' : syntax error", files), "ERROR: chunks/a.glsl:4: '' : syntax error\n");
+    EXPECT_EQ(readable_log("0:4(1): error: in the prolog", files), "0:4(1): error: in the prolog\n");
+    EXPECT_EQ(readable_log("9:90004(1): error: beyond the table", files), "9:90004(1): error: beyond the table\n");
+    EXPECT_EQ(readable_log("no position here", files), "no position here\n");
+}
+
+TEST(Composition, EveryKernelAndChunkIsUsedByAProgram) {
+    std::set<std::string> used;
+    for (const ProgramSource& source : every_program())
+        for (const std::string& file : compose(source).files) used.insert(file);
+    for (const auto& [name, text] : embedded_sources()) EXPECT_TRUE(used.contains(name)) << name;
+}
+
+TEST(Composition, EveryEmbeddedFileOpensWithItsContract) {
+    EXPECT_GE(embedded_sources().size(), 18U);
+    for (const auto& [name, text] : embedded_sources()) EXPECT_TRUE(text.starts_with("//")) << name;
+}
+
+TEST(Composition, ChunksOfAbsentEffectsAreAbsent) {
+    const std::string text = compose(node_step_program({}, StoreResidual::No)).text;
+    EXPECT_THAT(text, Not(HasSubstr("buffer Springs")));
+    EXPECT_THAT(text, Not(HasSubstr("buffer ExternalForce")));
+    EXPECT_THAT(text, HasSubstr("#define HAS_SPRINGS 0\n"));
+    const std::string with = compose(node_step_program({true, true}, StoreResidual::No)).text;
+    EXPECT_THAT(with, HasSubstr("buffer Springs"));
+    EXPECT_THAT(with, HasSubstr("buffer ExternalForce"));
+    EXPECT_THAT(with, HasSubstr("#define HAS_SPRINGS 1\n"));
+}
+
+}  // namespace
+}  // namespace tissuewarp::shaders

@@ -1,0 +1,143 @@
+#include "shaders/program.hpp"
+#include "core/errors.hpp"
+#include "shaders/buffer.hpp"
+#include "shaders/catalogue.hpp"
+
+#include <gmock/gmock.h>
+
+#include <numeric>
+
+namespace tissuewarp::shaders {
+namespace {
+
+using ::testing::HasSubstr;
+
+SourceLibrary doubling_library() {
+    SourceLibrary library = embedded_sources();
+    library["chunks/factor.glsl"] = "// Gives: twice(x).\nint twice(int x) { return 2 * x; }\n";
+    library["kernels/double.comp"] =
+        "layout(location = 0) uniform uint count;\n"
+        "layout(location = 1) uniform float offset;\n"
+        "layout(std430, binding = 3) buffer Values { int values[]; };\n"
+        "void main() {\n"
+        "    uint i = invocation_index();\n"
+        "    if (i < count) values[i] = twice(values[i]) + int(offset);\n"
+        "}\n";
+    return library;
+}
+
+const ProgramSource doubling{"double", {"index", "factor"}, {{"WORKGROUP_SIZE", "64"}}, {}};
+
+class ProgramTest : public ::testing::Test {
+protected:
+    Device device{-1, Debugging::On};
+    CurrentContext current = device.make_current();
+};
+
+TEST_F(ProgramTest, RunsAKernelOverEveryIndexOnce) {
+    const Program program(device, compose(doubling, doubling_library()));
+    std::vector<int> values(1000);
+    std::iota(values.begin(), values.end(), 0);
+    Buffer<int> buffer(device, values, "values");
+    buffer.bind(3);
+    program.set(0, 999U);
+    program.set(1, 1.0F);
+    program.dispatch(999);
+    const std::vector<int> result = buffer.download();
+    for (int i = 0; i < 999; ++i) ASSERT_EQ(result[static_cast<std::size_t>(i)], 2 * i + 1);
+    EXPECT_EQ(result[999], 999);
+    check_errors("test");
+}
+
+TEST_F(ProgramTest, DispatchesMoreWorkgroupsThanARowHolds) {
+    const ProgramSource narrow{"double", {"index", "factor"}, {{"WORKGROUP_SIZE", "1"}}, {}};
+    const Program program(device, compose(narrow, doubling_library()));
+    const std::size_t count = 70001;
+    Buffer<int> buffer(device, std::vector<int>(count, 1), "values");
+    buffer.bind(3);
+    program.set(0, static_cast<std::uint32_t>(count));
+    program.set(1, 0.0F);
+    program.dispatch(count);
+    EXPECT_THAT(buffer.download(), ::testing::Each(2));
+}
+
+TEST_F(ProgramTest, ListsItsStorageBlocksInTheOrderOfTheirBindings) {
+    const Program program(device, compose(observe_elements_program()));
+    std::vector<std::string> names;
+    std::vector<int> bindings;
+    for (const StorageBlock& block : program.storage_blocks()) {
+        names.push_back(block.name);
+        bindings.push_back(block.binding);
+    }
+    EXPECT_THAT(names, ::testing::ElementsAre("Displacement", "ElementNodes", "ElementRest", "Partial"));
+    EXPECT_THAT(bindings, ::testing::ElementsAre(0, 3, 4, 6));
+}
+
+TEST_F(ProgramTest, KnowsItsWorkgroupSize) {
+    EXPECT_EQ(Program(device, compose(doubling, doubling_library())).workgroup_size(), 64);
+}
+
+TEST_F(ProgramTest, ReportsAnErrorInAChunkByFileAndLine) {
+    SourceLibrary library = doubling_library();
+    library["chunks/factor.glsl"] = "// Line 1.\n// Line 2.\nint twice(int x) { return 2 * nonsense; }\n";
+    try {
+        const Program program(device, compose(doubling, library));
+        FAIL() << "accepted";
+    } catch (const GpuUnavailable& error) {
+        EXPECT_THAT(error.what(), HasSubstr("chunks/factor.glsl:3"));
+        EXPECT_THAT(error.what(), HasSubstr("nonsense"));
+    }
+}
+
+TEST_F(ProgramTest, ReportsAnErrorInAKernelByFileAndLine) {
+    SourceLibrary library = doubling_library();
+    library["kernels/double.comp"] = "void main() {\n    int x = nonsense;\n}\n";
+    try {
+        const Program program(device, compose(doubling, library));
+        FAIL() << "accepted";
+    } catch (const GpuUnavailable& error) {
+        EXPECT_THAT(error.what(), HasSubstr("kernels/double.comp:2"));
+    }
+}
+
+TEST_F(ProgramTest, EveryProgramOfTheCatalogueCompilesOnThisDevice) {
+    for (const ProgramSource& source : every_program()) EXPECT_NO_THROW(Program(device, compose(source)));
+}
+
+TEST_F(ProgramTest, TheCacheCompilesOnce) {
+    ProgramCache cache(device);
+    const Program& first = cache.get(impose_program());
+    EXPECT_EQ(&cache.get(impose_program()), &first);
+    EXPECT_EQ(cache.size(), 1U);
+    EXPECT_NE(&cache.get(element_volume_program()), &first);
+    EXPECT_EQ(cache.size(), 2U);
+}
+
+TEST_F(ProgramTest, StorageBlocksOfAbsentEffectsAreNotBound) {
+    const auto names = [&](const NodeEffects& effects) {
+        const Program program(device, compose(node_step_program(effects, StoreResidual::No)));
+        std::vector<std::string> found;
+        for (const StorageBlock& block : program.storage_blocks()) found.push_back(block.name);
+        return found;
+    };
+    EXPECT_THAT(names({}), ::testing::UnorderedElementsAre("Displacement", "Increment", "InverseMass", "NodeIncidence",
+                                                           "CornerForce"));
+    EXPECT_THAT(names({true, false}),
+                ::testing::UnorderedElementsAre("Displacement", "Increment", "InverseMass", "NodeIncidence",
+                                                "CornerForce", "SpringIndex", "Springs"));
+}
+
+TEST_F(ProgramTest, AMisuseOfOpenGLBecomesAnException) {
+    const Program program(device, compose(doubling, doubling_library()));
+    program.set(77, 1.0F);
+    try {
+        check_errors("the test's misuse");
+        FAIL() << "unnoticed";
+    } catch (const GpuUnavailable& error) {
+        EXPECT_THAT(error.what(), HasSubstr("the test's misuse: GL_INVALID_OPERATION ("));
+    }
+    EXPECT_NO_THROW(check_errors("afterwards"));
+}
+
+}  // namespace
+}  // namespace tissuewarp::shaders
