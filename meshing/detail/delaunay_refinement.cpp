@@ -1,0 +1,169 @@
+#include "meshing/detail/delaunay_refinement.hpp"
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Labeled_mesh_domain_3.h>
+#include <CGAL/Mesh_complex_3_in_triangulation_3.h>
+#include <CGAL/Mesh_criteria_3.h>
+#include <CGAL/Mesh_triangulation_3.h>
+#include <CGAL/make_mesh_3.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <unordered_map>
+
+namespace tissuewarp::meshing::detail {
+
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Domain = CGAL::Labeled_mesh_domain_3<Kernel>;
+using Triangulation = CGAL::Mesh_triangulation_3<Domain, Kernel, CGAL::Sequential_tag>::type;
+using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation>;
+using Point = Kernel::Point_3;
+
+/// CGAL's criteria, but facets whose surface ball is already small stay as they are: where interfaces meet in sharp
+/// edges, or labels are one voxel thin, angle and distance bounds would otherwise refine down to elements whose size
+/// then limits the time step of the whole model. (CGAL 6 calls this facet_min_size.)
+class FacetCriteria : public CGAL::Mesh_facet_criteria_3<Triangulation> {
+    using Base = CGAL::Mesh_facet_criteria_3<Triangulation>;
+
+public:
+    template <class Size>
+    FacetCriteria(double angle, const Size& size, double distance, double smallest)
+        : Base(angle, size, distance, CGAL::FACET_VERTICES_ON_SURFACE), smallest_squared_(smallest * smallest) {}
+
+    Is_facet_bad operator()(const Triangulation& triangulation, const Triangulation::Facet& facet) const {
+        const auto& [cell, corner] = facet;
+        bool on_surface = true;
+        for (int k = 1; k < 4; ++k) on_surface = on_surface && cell->vertex((corner + k) & 3)->in_dimension() < 3;
+        const double squared_radius = CGAL::squared_distance(triangulation.point(cell, (corner + 1) & 3).point(),
+                                                             cell->get_facet_surface_center(corner));
+        if (on_surface && squared_radius < smallest_squared_) return {};
+        return Base::operator()(triangulation, facet);
+    }
+
+private:
+    double smallest_squared_;
+};
+
+using Criteria = CGAL::Mesh_criteria_3<Triangulation, CGAL::Mesh_edge_criteria_3<Triangulation>, FacetCriteria>;
+
+/// Target size of facets and cells: that of their label, the finer one on an interface.
+struct SizeField {
+    using FT = Kernel::FT;
+    using Index = Domain::Index;
+
+    const Domain* domain;
+    const std::vector<double>* edge_length;
+    double scale;
+
+    FT operator()(const Point&, int dimension, const Index& index) const {
+        if (dimension == 3) return scale * size(domain->subdomain_index(index));
+        const auto [a, b] = domain->surface_patch_index(index);
+        return scale * std::min(size(a), size(b));
+    }
+    [[nodiscard]] double size(int label) const { return (*edge_length)[static_cast<std::size_t>(label)]; }
+};
+
+/// Calls of the label function between two polls of the observer: a few milliseconds.
+constexpr int calls_between_polls = 1 << 14;
+
+Domain make_domain(const RefinementInput& input, Observer& observer) {
+    const auto label = [&input, &observer, calls = 0](const Point& p) mutable {
+        if (++calls == calls_between_polls) {
+            calls = 0;
+            if (observer.cancel_requested()) throw Cancelled();
+        }
+        return input.field(Eigen::Array3d(p.x(), p.y(), p.z()));
+    };
+    const Eigen::Array3d extent =
+        input.grid.spacing * Eigen::Array3d(input.grid.size[0] - 1, input.grid.size[1] - 1, input.grid.size[2] - 1);
+    const double accuracy = 0.02 * input.grid.spacing.minCoeff();  // mm, of points on interfaces
+    return {label, CGAL::Bbox_3(0, 0, 0, extent[0], extent[1], extent[2]),
+            CGAL::parameters::relative_error_bound = accuracy / extent.matrix().norm()};
+}
+
+void insert_seeds(const RefinementInput& input, const Domain& domain, Complex& complex) {
+    const auto intersection = domain.construct_intersection_object();
+    const auto point = [](const Eigen::Array3d& p) { return Point(p[0], p[1], p[2]); };
+    for (const SurfaceSeed& seed : input.seeds) {
+        const auto [place, index, dimension] = intersection(Kernel::Segment_3(point(seed.inside), point(seed.outside)));
+        if (dimension == 0) continue;
+        const auto vertex = complex.triangulation().insert(Triangulation::Weighted_point(place));
+        if (vertex == Triangulation::Vertex_handle()) continue;
+        complex.set_dimension(vertex, 2);
+        complex.set_index(vertex, index);
+    }
+}
+
+RefinedMesh extract(const Complex& complex) {
+    RefinedMesh result;
+    TetMesh& mesh = result.mesh;
+    const auto count = static_cast<Eigen::Index>(complex.number_of_cells_in_complex());
+    mesh.tets.resize(4, count);
+    mesh.labels.resize(count);
+    std::unordered_map<const void*, int> index;
+    std::vector<Point> points;
+    Eigen::Index next = 0;
+    for (auto cell = complex.cells_in_complex_begin(); cell != complex.cells_in_complex_end(); ++cell, ++next) {
+        mesh.labels[next] = complex.subdomain_index(cell);
+        for (int c = 0; c < 4; ++c) {
+            const auto vertex = cell->vertex(c);
+            const auto [entry, added] = index.try_emplace(&*vertex, static_cast<int>(points.size()));
+            if (added) {
+                points.push_back(vertex->point().point());
+                result.on_surface.push_back(complex.in_dimension(vertex) < 3);
+            }
+            mesh.tets(c, next) = entry->second;
+        }
+    }
+    mesh.nodes.resize(3, static_cast<Eigen::Index>(points.size()));
+    for (std::size_t n = 0; n < points.size(); ++n)
+        mesh.nodes.col(static_cast<Eigen::Index>(n)) << points[n].x(), points[n].y(), points[n].z();
+    return result;
+}
+
+}  // namespace
+
+static double env(const char* n, double d) {
+    const char* s = std::getenv(n);
+    return s ? std::atof(s) : d;
+}
+static void lap(const char* what) {
+    static auto t = std::chrono::steady_clock::now();
+    auto n = std::chrono::steady_clock::now();
+    std::fprintf(stderr, "  [%s %.2f s]\n", what, std::chrono::duration<double>(n - t).count());
+    t = n;
+}
+
+RefinedMesh refine(const RefinementInput& input, Observer& observer) {
+    namespace p = CGAL::parameters;
+    const MeshingOptions& options = input.options;
+    const Domain domain = make_domain(input, observer);
+    const SizeField facet_size{&domain, &input.edge_length, env("FS", .77)},
+        cell_size{&domain, &input.edge_length, env("CS", .77)};
+    const Criteria criteria(FacetCriteria(options.facet_angle, facet_size, input.facet_distance,
+                                          env("MIN", 0.3) * input.options.edge_length),
+                            Criteria::Cell_criteria(options.radius_edge_ratio, cell_size));
+    Complex complex;
+    lap("before");
+    insert_seeds(input, domain, complex);
+    lap("seeds");
+    observer.checkpoint("refining the mesh", 0.1);
+    CGAL::refine_mesh_3(complex, domain, criteria, p::no_exude(), p::no_perturb(), p::no_odt(), p::no_lloyd(),
+                        p::no_reset_c3t3());
+    lap("refine");
+    observer.checkpoint("perturbing slivers", 0.6);
+    if (options.perturb_seconds > 0.0)
+        CGAL::perturb_mesh_3(complex, domain, p::time_limit = options.perturb_seconds,
+                             p::sliver_bound = options.min_dihedral_deg);
+    lap("perturb");
+    observer.checkpoint("exuding slivers", 0.8);
+    if (options.exude_seconds > 0.0)
+        CGAL::exude_mesh_3(complex, p::time_limit = options.exude_seconds, p::sliver_bound = options.min_dihedral_deg);
+    lap("exude");
+    return extract(complex);
+}
+
+}  // namespace tissuewarp::meshing::detail

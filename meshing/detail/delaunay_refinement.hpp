@@ -1,0 +1,28 @@
+#pragma once
+/// The one place that knows CGAL: Delaunay refinement of a label field (Boissonnat and Oudot 2005; Jamin et al. 2015).
+
+#include "core/observer.hpp"
+#include "meshing/detail/label_field.hpp"
+#include "meshing/detail/surface_seeds.hpp"
+#include "meshing/mesher.hpp"
+
+namespace tissuewarp::meshing::detail {
+
+struct RefinementInput {
+    const LabelGrid& grid;
+    const LabelField& field;
+    const std::vector<SurfaceSeed>& seeds;
+    const std::vector<double>& edge_length;  ///< mm, per class
+    double facet_distance;                   ///< mm
+    const MeshingOptions& options;
+};
+
+/// Tetrahedra in the local frame; their labels are classes.
+struct RefinedMesh {
+    TetMesh mesh;
+    std::vector<char> on_surface;  ///< per node: lies on an interface
+};
+
+RefinedMesh refine(const RefinementInput& input, Observer& observer);
+
+}  // namespace tissuewarp::meshing::detail

@@ -1,0 +1,19 @@
+#pragma once
+/// Where to look first: pairs of points on either side of every connected piece's surface, so that none is missed.
+
+#include "meshing/detail/label_field.hpp"
+
+namespace tissuewarp::meshing::detail {
+
+struct SurfaceSeed {
+    Eigen::Array3d inside, outside;  ///< adjacent voxel centres of different class, local frame, mm
+};
+
+/// A few pairs per connected piece of every class, background cavities included, spread over its surface. `edge_length`
+/// is the target edge of each class (mm); pieces get up to six pairs 0.25 edges apart, then
+/// more as long as they lie 0.7 edges apart. Seeds of neighbouring pieces keep the same distances, for a close pair
+/// would force tiny elements.
+std::vector<SurfaceSeed> surface_seeds(const LabelGrid& grid, const LabelField& field,
+                                       const std::vector<double>& edge_length);
+
+}  // namespace tissuewarp::meshing::detail

@@ -1,0 +1,108 @@
+#include "meshing/mesher.hpp"
+
+#include "meshing/detail/delaunay_refinement.hpp"
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace tissuewarp::meshing {
+
+namespace {
+
+using detail::LabelGrid;
+
+constexpr double most_tets = 5e7;  // about 20 GB inside CGAL
+
+/// Volume of the regular tetrahedron.
+double tet_volume(double edge) {
+    return edge * edge * edge / (6.0 * std::sqrt(2.0));
+}
+
+void require_options(const MeshingOptions& options) {
+    const auto require = [](bool good, const char* name, double value, const char* remedy) {
+        if (!good)
+            throw InvalidInput(std::string("mesh_labels: ") + name + " is " + std::to_string(value) + "; " + remedy);
+    };
+    require(options.edge_length > 0.0 && std::isfinite(options.edge_length), "edge_length", options.edge_length,
+            "give a positive length in mm");
+    for (const auto& [label, edge] : options.label_edge_length)
+        require(edge > 0.0 && std::isfinite(edge), "label_edge_length", edge, "give a positive length in mm");
+    require(options.facet_distance >= 0.0, "facet_distance", options.facet_distance, "give mm, or 0 for the default");
+    require(options.facet_angle >= 0.0 && options.facet_angle <= 30.0, "facet_angle", options.facet_angle,
+            "give 0 to 30 degrees: refinement may not end beyond");
+    require(options.radius_edge_ratio >= 2.0, "radius_edge_ratio", options.radius_edge_ratio,
+            "give 2 or more: refinement may not end below");
+    require(options.smoothing >= 0.0 && options.smoothing <= 3.0, "smoothing", options.smoothing, "give 0 to 3 voxels");
+}
+
+/// Target edge of each class, mm; of background the coarsest.
+std::vector<double> edge_lengths(const LabelGrid& grid, const MeshingOptions& options) {
+    std::vector<double> edges(grid.values.size(), options.edge_length);
+    for (std::size_t c = 1; c < edges.size(); ++c) {
+        const auto own = options.label_edge_length.find(grid.values[c]);
+        if (own != options.label_edge_length.end()) edges[c] = own->second;
+    }
+    edges[0] = *std::max_element(edges.begin() + 1, edges.end());
+    return edges;
+}
+
+void require_affordable(const LabelGrid& grid, const std::vector<double>& edges) {
+    std::vector<double> voxels(edges.size(), 0.0);
+    for (std::uint16_t c : grid.classes) voxels[c] += 1.0;
+    double tets = 0.0;
+    for (std::size_t c = 1; c < edges.size(); ++c) tets += voxels[c] * grid.spacing.prod() / tet_volume(edges[c]);
+    if (tets <= most_tets) return;
+    throw InvalidInput("mesh_labels: these edge lengths ask for about " + std::to_string(std::llround(tets / 1e6)) +
+                       " million tetrahedra; at most " + std::to_string(std::llround(most_tets / 1e6)) +
+                       " million are made: use an edge of " +
+                       std::to_string(*std::min_element(edges.begin(), edges.end()) * std::cbrt(tets / most_tets)) +
+                       " mm or more");
+}
+
+/// Pieces below half a tetrahedron of the target size cannot be shown by the mesh and would only force tiny elements.
+void drop_specks(LabelGrid& grid, const std::vector<double>& edges, Observer& observer) {
+    std::vector<double> voxels(edges.size());
+    for (std::size_t c = 0; c < edges.size(); ++c) voxels[c] = 0.5 * tet_volume(edges[c]) / grid.spacing.prod();
+    if (const int removed = detail::remove_specks(grid, voxels); removed > 0)
+        observer.note("meshing: " + std::to_string(removed) +
+                      " disconnected pieces of labels or cavities, each smaller than half an element, were given to "
+                      "their surroundings");
+}
+
+/// Local frame → LPS, classes → label values, orientation repaired where the image's axes are left-handed.
+void place(TetMesh& mesh, const LabelGrid& grid, const imaging::Geometry& geometry) {
+    const Eigen::Vector3d corner = geometry.point(Eigen::Vector3d(grid.origin[0], grid.origin[1], grid.origin[2]));
+    mesh.nodes = (geometry.direction * mesh.nodes).colwise() + corner;
+    if (geometry.direction.determinant() < 0.0) mesh.tets.row(2).swap(mesh.tets.row(3));
+    for (int& label : mesh.labels) label = grid.values[static_cast<std::size_t>(label)];
+}
+
+}  // namespace
+
+TetMesh mesh_labels(const imaging::Volume& labels, const MeshingOptions& options, Observer& observer) {
+    require_options(options);
+    observer.checkpoint("reading the labels", 0.0);
+    const int padding = 1 + std::max(1, static_cast<int>(std::ceil(2.5 * options.smoothing)));
+    LabelGrid grid = detail::make_label_grid(labels, options.labels, padding);
+    const std::vector<double> edges = edge_lengths(grid, options);
+    require_affordable(grid, edges);
+    drop_specks(grid, edges, observer);
+
+    observer.checkpoint("smoothing the labels", 0.02);
+    const detail::LabelField field(grid, options.smoothing);
+    const auto seeds = detail::surface_seeds(grid, field, edges);
+    const double shortest = *std::min_element(edges.begin() + 1, edges.end());
+    const double distance = options.facet_distance > 0.0
+                                ? options.facet_distance
+                                : std::max(0.12 * shortest, 0.25 * std::cbrt(grid.spacing.prod()));
+    detail::RefinedMesh refined = detail::refine({grid, field, seeds, edges, distance, options}, observer);
+    place(refined.mesh, grid, labels.geometry);
+    require_valid(refined.mesh, "mesh_labels");
+    observer.progress("meshing", 1.0);
+    return std::move(refined.mesh);
+}
+
+}  // namespace tissuewarp::meshing
