@@ -125,8 +125,9 @@ VolumetricFunction volumetric_function(const Material& material, double J) {
 }
 
 double strain_energy(const Material& material, const Matrix3d& F) {
-    return shear_energy(material, F) +
-           volumetric_modulus(material) * volumetric_function(material, F.determinant()).energy;
+    const double J = F.determinant();
+    if (!(J > 0.0)) return infinity;  // not 0 · ∞ where the modulus is zero
+    return shear_energy(material, F) + volumetric_modulus(material) * volumetric_function(material, J).energy;
 }
 
 Matrix3d first_piola_kirchhoff_stress(const Material& material, const Matrix3d& F) {

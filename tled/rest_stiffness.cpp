@@ -1,8 +1,5 @@
 #include "tled/rest_stiffness.hpp"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-
 #include <cmath>
 #include <limits>
 #include <string>
@@ -10,31 +7,16 @@
 #include "core/errors.hpp"
 #include "tled/detail/cholmod_factor.hpp"
 #include "tled/detail/held_tissue.hpp"
+#include "tled/detail/springs.hpp"
 #include "tled/detail/stiffness.hpp"
 
 namespace tissuewarp::tled {
 
 using Eigen::Matrix3d;
 using Eigen::Matrix3Xd;
-using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 namespace {
-
-Matrix3d spring_matrix(const NodalConditions& conditions, int spring) {
-    const auto k = conditions.spring_stiffness.col(spring);  // xx yy zz xy yz zx
-    Matrix3d result;
-    result << k[0], k[3], k[5], k[3], k[1], k[4], k[5], k[4], k[2];
-    return result;
-}
-
-// y += springs · x.
-void add_springs(const NodalConditions& conditions, const Matrix3Xd& x, Matrix3Xd& y) {
-    for (std::size_t s = 0; s < conditions.spring_node.size(); ++s) {
-        const int node = conditions.spring_node[s];
-        y.col(node) += spring_matrix(conditions, static_cast<int>(s)) * x.col(node);
-    }
-}
 
 bool same_springs(const NodalConditions& a, const NodalConditions& b) {
     return a.spring_node == b.spring_node && a.spring_stiffness.cols() == b.spring_stiffness.cols() &&
@@ -66,7 +48,7 @@ struct RestStiffness::Impl {
     }
     [[nodiscard]] Matrix3Xd multiply(const Matrix3Xd& x, const NodalConditions& present) const {
         Matrix3Xd y = elastic.multiply(x);
-        add_springs(present, x, y);
+        detail::add_spring_resistance(present, x, y);
         return y;
     }
     void require_compatible(const NodalConditions& present) const;
@@ -127,8 +109,7 @@ RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& condi
 
     detail::BlockRows K = detail::assembled(impl_->elastic, detail::Triangle::Lower);
     for (std::size_t s = 0; s < conditions.spring_node.size(); ++s) {
-        K.block[K.offset[conditions.spring_node[s]]] +=
-            spring_matrix(conditions, static_cast<int>(s));  // diagonal first
+        K.diagonal(conditions.spring_node[s]) += detail::spring_matrix(conditions, static_cast<int>(s));
     }
     const Eigen::SparseMatrix<double> lower = detail::scalar_matrix(K, impl_->index, detail::Triangle::Lower);
     K = {};
@@ -159,11 +140,7 @@ Matrix3Xd RestStiffness::solve(const Matrix3Xd& force, const NodalConditions& co
 Matrix3Xd RestStiffness::linear_solution(const NodalConditions& conditions) const {
     // K_ff u_f = f_f + springs' targets − K_fc u_c: the imposed values enter with the residual of u = (0, u_c).
     constexpr double tolerance = 1e-10;
-    Matrix3Xd force = -impl_->multiply(conditions.imposed, conditions);
-    if (conditions.external_force.size() > 0) force += conditions.external_force;
-    for (std::size_t s = 0; s < conditions.spring_node.size(); ++s) {
-        force.col(conditions.spring_node[s]) += conditions.spring_force.col(static_cast<Eigen::Index>(s));
-    }
+    const Matrix3Xd force = detail::applied_force(conditions) - impl_->multiply(conditions.imposed, conditions);
     return conditions.imposed + solve(force, conditions, tolerance);
 }
 
@@ -171,7 +148,7 @@ Matrix3Xd RestStiffness::diagonal(const NodalConditions& conditions) const {
     impl_->require_compatible(conditions);
     std::vector<Matrix3d> blocks = impl_->elastic.diagonal_blocks();
     for (std::size_t s = 0; s < conditions.spring_node.size(); ++s) {
-        blocks[conditions.spring_node[s]] += spring_matrix(conditions, static_cast<int>(s));
+        blocks[conditions.spring_node[s]] += detail::spring_matrix(conditions, static_cast<int>(s));
     }
     Matrix3Xd result(3, static_cast<Eigen::Index>(blocks.size()));
     for (std::size_t i = 0; i < blocks.size(); ++i) result.col(i) = blocks[i].diagonal();

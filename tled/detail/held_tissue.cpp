@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/errors.hpp"
+#include "tled/detail/springs.hpp"
 
 namespace tissuewarp::tled::detail {
 
@@ -69,10 +70,7 @@ Eigen::Matrix<double, 6, 6> rigid_resistance(const Piece& piece, const NodalCond
         const int node = piece.nodes[n];
         Matrix3d hold = conditions.constrained.col(node).cast<double>().asDiagonal();
         if (spring_of[node] >= 0) {
-            const auto k = conditions.spring_stiffness.col(spring_of[node]);
-            Matrix3d spring;
-            spring << k[0], k[3], k[5], k[3], k[1], k[4], k[5], k[4], k[2];
-            hold += spring / spring_scale;
+            hold += spring_matrix(conditions, spring_of[node]) / spring_scale;
         }
         if (hold.isZero(0.0)) continue;
         const Vector3d x = radius > 0.0 ? Vector3d((piece.positions[n] - centre) / radius) : Vector3d::Zero();

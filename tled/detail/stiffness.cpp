@@ -176,6 +176,15 @@ PressureRows pressure_rows(const RestState& rest, const std::vector<ElementTerms
 
 }  // namespace
 
+Matrix3d& BlockRows::diagonal(int i) {
+    const auto place = std::lower_bound(column.begin() + offset[i], column.begin() + offset[i + 1], i);
+    return block[place - column.begin()];
+}
+
+const Matrix3d& BlockRows::diagonal(int i) const {
+    return const_cast<BlockRows*>(this)->diagonal(i);
+}
+
 Stiffness stiffness(const RestState& rest, const Matrix3Xd& displacement) {
     const VectorXd jacobian = element_jacobians(rest, displacement);
     require_positive(rest, jacobian);
@@ -224,9 +233,7 @@ Matrix3Xd Stiffness::multiply(const Matrix3Xd& x) const {
 std::vector<Matrix3d> Stiffness::diagonal_blocks() const {
     std::vector<Matrix3d> result(elements.rows());
     tbb::parallel_for(0, elements.rows(), [&](int i) {
-        const auto begin = elements.column.begin() + elements.offset[i],
-                   end = elements.column.begin() + elements.offset[i + 1];
-        result[i] = elements.block[std::lower_bound(begin, end, i) - elements.column.begin()];
+        result[i] = elements.diagonal(i);
         for (int k = pressure.node_offset[i]; k < pressure.node_offset[i + 1]; ++k) {
             const int entry = pressure.node_entry[k];
             const Vector3d& gradient = pressure.gradient[entry];

@@ -15,6 +15,9 @@ struct BlockRows {
     std::vector<int> offset, column;
     std::vector<Eigen::Matrix3d> block;  ///< mN/mm
     [[nodiscard]] int rows() const { return static_cast<int>(offset.size()) - 1; }
+    /// Block (i, i).
+    [[nodiscard]] Eigen::Matrix3d& diagonal(int i);
+    [[nodiscard]] const Eigen::Matrix3d& diagonal(int i) const;
 };
 
 /// ∇J_a of the pressure nodes: row a holds the nodes on which J_a depends and ∂J_a/∂u, 1/mm.
