@@ -6,8 +6,6 @@
 
 #include <Eigen/Geometry>
 
-#include <vector>
-
 namespace tissuewarp::registration {
 
 struct AlignmentOptions {
@@ -21,15 +19,9 @@ struct Alignment {
     double mean_distance_mm = 0;  ///< mean truncated distance of moving boundaries to the fixed ones
 };
 
-/// Boundary points of a label map, one list per label, LPS mm: centres of voxel faces between the label and others.
-struct LabelBoundary {
-    int label = 0;
-    Eigen::Matrix3Xd points;
-};
-std::vector<LabelBoundary> label_boundaries(const imaging::Volume& labels, int most_points_per_label);
-
-/// Minimises the mean truncated distance from the moving boundary of each label to the fixed boundary of the same label
-/// (distance maps), by BOBYQA from several starts: as the headers say, centroids matched, and rotations about them.
+/// Minimises the mean truncated distance from the moving boundary to the fixed one (distance maps), of all labels together
+/// and of the four largest that both maps hold, by BOBYQA (Powell 2009) from several starts: as the headers say, centroids
+/// matched, and rotations about them.
 /// Throws InvalidInput when the maps share no label.
 Alignment align_labels(const imaging::Volume& moving_labels, const imaging::Volume& fixed_labels,
                        const AlignmentOptions& options = {}, Observer& observer = silent_observer());

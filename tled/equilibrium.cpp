@@ -67,7 +67,7 @@ public:
     Relaxation(Engine& engine, const RestStiffness& stiffness, const NodalConditions& conditions,
                const EquilibriumOptions& options, Observer& observer)
         : engine_(engine), stiffness_(stiffness), conditions_(conditions), options_(options), observer_(observer),
-          mass_(stiffness.diagonal(conditions)) {
+          mass_(stiffness.diagonal(conditions)), preset_(stiffness.lowest_eigenvalue()) {
         engine_.set_conditions(conditions);
         engine_.set_mass(mass_);
     }
@@ -116,6 +116,7 @@ private:
     const EquilibriumOptions& options_;
     Observer& observer_;
     Eigen::Matrix3Xd mass_;
+    double preset_;                  // lowest eigenvalue at rest
     Spectrum spectrum_;
     Eigen::Matrix3Xd good_;          // last state that was trustworthy
     double good_residual_ = 0;
@@ -141,7 +142,7 @@ private:
     void estimate_spectrum() {
         spectrum_.highest = step_safety * highest_eigenvalue(engine_, mass_, good_, power_iterations);
         result_.force_evaluations += power_iterations + 1;
-        spectrum_.lowest = std::min(stiffness_.lowest_eigenvalue(), spectrum_.highest / 4);
+        spectrum_.lowest = std::min(preset_, spectrum_.highest / 4);
     }
 
     /// The lifted residual ‖K₀⁻¹ r‖∞: displacement error in mm to first order.
@@ -185,9 +186,8 @@ private:
     /// Rayleigh quotient of the last step: as the fast modes die it falls to the lowest frequency of the present state.
     void adapt_damping(const Observation& seen) {
         if (!(seen.increment_mass > 0) || !(seen.increment_stiffness > 0)) return;
-        const double preset = stiffness_.lowest_eigenvalue();
         const double quotient = seen.increment_stiffness / seen.increment_mass;
-        spectrum_.lowest = std::clamp(quotient, 0.5 * preset, std::min(4 * preset, spectrum_.highest / 4));
+        spectrum_.lowest = std::clamp(quotient, 0.5 * preset_, std::min(4 * preset_, spectrum_.highest / 4));
     }
 
     void require_steps_left(double error) const {

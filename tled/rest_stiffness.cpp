@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <mutex>
 #include <string>
 
 #include "core/errors.hpp"
@@ -54,6 +55,31 @@ struct RestStiffness::Impl {
     void require_compatible(const NodalConditions& present) const;
     [[nodiscard]] VectorXd conjugate_gradients(const VectorXd& force, const NodalConditions& present,
                                                double relative_tolerance) const;
+
+    /// Smallest λ of K x = λ D x for the diagonal D.
+    [[nodiscard]] double inverse_iteration(const Matrix3Xd& diagonal) const {
+        // Inverse iteration on K x = λ D x from a fixed vector without symmetry; the Rayleigh quotient errs by the square
+        // of the vector's error.
+        constexpr int max_iterations = 50;
+        constexpr double tolerance = 1e-6;
+        const VectorXd D = reduced(diagonal);
+        VectorXd x(free_count);
+        for (int i = 0; i < x.size(); ++i) x[i] = 1.0 + 0.5 * std::sin(0.7 * i);
+        double lambda = 0.0;
+        for (int iteration = 0; iteration < max_iterations; ++iteration) {
+            x /= std::sqrt(x.dot(D.cwiseProduct(x)));
+            const VectorXd Dx = D.cwiseProduct(x);
+            const VectorXd y = factor->solve(Dx);  // y = K⁻¹ D x, so y·K y = y·D x
+            const double next = y.dot(Dx) / y.dot(D.cwiseProduct(y));
+            x = y;
+            if (std::abs(next - lambda) <= tolerance * next) return next;
+            lambda = next;
+        }
+        return lambda;
+    }
+
+    std::once_flag lowest_known;
+    double lowest = 0.0;
 };
 
 void RestStiffness::Impl::require_compatible(const NodalConditions& present) const {
@@ -157,24 +183,8 @@ Matrix3Xd RestStiffness::diagonal(const NodalConditions& conditions) const {
 
 double RestStiffness::lowest_eigenvalue() const {
     if (impl_->free_count == 0) return std::numeric_limits<double>::infinity();
-    // Inverse iteration on K x = λ D x from a fixed vector without symmetry; the Rayleigh quotient errs by the square
-    // of the vector's error.
-    constexpr int max_iterations = 50;
-    constexpr double tolerance = 1e-8;
-    const VectorXd D = impl_->reduced(diagonal(impl_->conditions));
-    VectorXd x(impl_->free_count);
-    for (int i = 0; i < x.size(); ++i) x[i] = 1.0 + 0.5 * std::sin(0.7 * i);
-    double lambda = 0.0;
-    for (int iteration = 0; iteration < max_iterations; ++iteration) {
-        x /= std::sqrt(x.dot(D.cwiseProduct(x)));
-        const VectorXd Dx = D.cwiseProduct(x);
-        const VectorXd y = impl_->factor->solve(Dx);  // y = K⁻¹ D x, so y·K y = y·D x
-        const double next = y.dot(Dx) / y.dot(D.cwiseProduct(y));
-        x = y;
-        if (std::abs(next - lambda) <= tolerance * next) return next;
-        lambda = next;
-    }
-    return lambda;
+    std::call_once(impl_->lowest_known, [this] { impl_->lowest = impl_->inverse_iteration(diagonal(impl_->conditions)); });
+    return impl_->lowest;
 }
 
 long long RestStiffness::factor_nonzeros() const {

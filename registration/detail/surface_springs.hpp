@@ -1,0 +1,29 @@
+#pragma once
+/// Correspondences as springs: stiff along the normal, soft along the surface, so that tissue may slide.
+
+#include "registration/pipeline.hpp"
+#include "tled/conditions.hpp"
+
+namespace tissuewarp::registration::detail {
+
+/// K = stiffness · area · weight · (n nᵀ + ratio (I − n nᵀ)), mN/mm.
+Eigen::Matrix3d spring_stiffness(const InterfaceNode& node, const Eigen::Vector3d& normal, double weight,
+                                 const PrepareOptions& options);
+
+/// Springs of every interface node at weight one with target zero: what the factor of K₀ is made with.
+tled::Conditions full_weight_springs(const Interfaces& interfaces, const PrepareOptions& options);
+
+/// Where one interface node is drawn to.
+struct Match {
+    bool found = false;
+    double distance_mm = 0;  ///< along the normal, from the node's material boundary to the image's boundary
+    double weight = 0;       ///< in [0, 1]
+};
+
+/// Springs from `displacement` (3 × N, moving frame) along `normals` (one column per interface node) to the matches. A
+/// node without a match keeps a spring of tangential stiffness to where it is, so that no piece of tissue floats.
+tled::Conditions matched_springs(const Interfaces& interfaces, const std::vector<Match>& matches,
+                                 const Eigen::Matrix3Xd& normals, const Eigen::Matrix3Xd& displacement,
+                                 const PrepareOptions& options);
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,62 @@
+// Before the operation: label map → mesh → rest state → factor of the rest stiffness.
+
+#include "registration/detail/stopwatch.hpp"
+#include "registration/detail/surface_springs.hpp"
+#include "registration/pipeline.hpp"
+
+#include "imaging/labels.hpp"
+
+#include <cmath>
+#include <set>
+
+namespace tissuewarp::registration {
+
+namespace {
+
+tled::Model model_of(meshing::TetMesh mesh, const PrepareOptions& options) {
+    tled::Model model{std::move(mesh), options.materials, tled::Element::T4};
+    for (const int label : model.mesh.labels) model.materials.try_emplace(label, options.default_material);
+    model.element = options.element.value_or(tled::suggested_element(model.materials));
+    return model;
+}
+
+/// Distance along the normal from each interface node to the boundary in the moving labels themselves, so that a
+/// registration of an image to itself is the identity. NaN marks faces that are no tissue boundary: cuts by the image's
+/// border.
+void measure_offsets(Interfaces& interfaces, const meshing::TetMesh& mesh, const LabelBoundaryField& moving) {
+    constexpr double range_mm = 4.0, max_angle_deg = 60.0;
+    for (InterfaceNode& node : interfaces.nodes())
+        node.offset =
+            moving.crossing(mesh.nodes.col(node.node), node.normal, node.inner, node.outer, range_mm, max_angle_deg);
+}
+
+}  // namespace
+
+PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions& options, Observer& observer) {
+    detail::Stopwatch stopwatch;
+    meshing::TetMesh mesh = meshing::mesh_labels(moving_labels, options.meshing, observer);
+    const StageTime meshing_time = stopwatch.lap("meshing");
+    PreparedModel prepared = prepare(std::move(mesh), moving_labels, options, observer);
+    prepared.times.insert(prepared.times.begin(), meshing_time);
+    return prepared;
+}
+
+PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_labels, const PrepareOptions& options,
+                      Observer& observer) {
+    detail::Stopwatch stopwatch;
+    std::vector<StageTime> times;
+    tled::Model model = model_of(std::move(mesh), options);
+    tled::RestState rest = tled::rest_state(model);
+    const std::set<int> labels(model.mesh.labels.begin(), model.mesh.labels.end());
+    Interfaces interfaces(model.mesh);
+    measure_offsets(interfaces, model.mesh, LabelBoundaryField(moving_labels, {labels.begin(), labels.end()}));
+    times.push_back(stopwatch.lap("rest state"));
+    observer.checkpoint("factor of the rest stiffness", 0.0);
+    const auto springs = tled::nodal_conditions(detail::full_weight_springs(interfaces, options), rest.node_count);
+    tled::RestStiffness stiffness(rest, springs);
+    times.push_back(stopwatch.lap("factor"));
+    return {std::move(model), moving_labels,        options,         std::move(interfaces),
+            std::move(rest),  std::move(stiffness), std::move(times)};
+}
+
+}  // namespace tissuewarp::registration
