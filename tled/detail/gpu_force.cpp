@@ -1,0 +1,117 @@
+#include "tled/detail/gpu_force.hpp"
+
+#include "shaders/catalogue.hpp"
+
+#include <stdexcept>
+
+namespace tissuewarp::tled::detail {
+namespace {
+
+using shaders::Law;
+
+static_assert(std::is_same_v<std::variant_alternative_t<0, Material>, NeoHookeanIso>);
+static_assert(std::is_same_v<std::variant_alternative_t<1, Material>, NeoHookeanLnJ>);
+static_assert(std::variant_size_v<Material> == 2, "a new law needs its chunk in law_chunk()");
+
+Law law_chunk(std::size_t law) {
+    return law == 0 ? Law::NeoHookeanIso : Law::NeoHookeanLnJ;
+}
+
+std::uint32_t unsigned_count(std::size_t count) {
+    return static_cast<std::uint32_t>(count);
+}
+
+/// Range and total, uniforms 0 to 2 of the element and pressure kernels.
+Pass ranged(const shaders::Program& program, const LawBlock& block, std::size_t total) {
+    program.set(0, static_cast<std::uint32_t>(block.begin));
+    program.set(1, static_cast<std::uint32_t>(block.end));
+    program.set(2, unsigned_count(total));
+    return {&program, static_cast<std::size_t>(block.end - block.begin)};
+}
+
+}  // namespace
+
+void BlockBuffers::bind(const shaders::Program& program) const {
+    for (const shaders::StorageBlock& block : program.storage_blocks()) {
+        const auto found = buffers_.find(block.name);
+        if (found == buffers_.end()) throw std::logic_error("no buffer serves the storage block " + block.name);
+        found->second->bind(block.binding);
+    }
+}
+
+GpuForce::Pressure::Pressure(const shaders::Device& device, const GpuPressure& layout, std::size_t element_count)
+    : volume_change(device, element_count, "volume changes"),
+      value(device, layout.rest.size(), "nodal pressures"),
+      corners(device, layout.corners, "pressure nodes of elements"),
+      rest(device, layout.rest, "rest data of pressure nodes"),
+      incidence(device, layout.incidence, "elements of pressure nodes") {}
+
+GpuForce::GpuForce(const shaders::Device& device, shaders::ProgramCache& programs, const RestState& rest,
+                   BlockBuffers& blocks)
+    : element_count_(static_cast<std::size_t>(rest.element_count())),
+      corner_force_(device, 4 * element_count_, "corner forces") {
+    const shaders::CurrentContext current = device.make_current();
+    {
+        const GpuElements layout = gpu_elements(rest);
+        nodes_.emplace(device, layout.nodes, "nodes of elements");
+        rest_.emplace(device, layout.rest, "rest data of elements");
+        incidence_.emplace(device, layout.node_incidence, "corners of nodes");
+    }
+    blocks.set("ElementNodes", *nodes_);
+    blocks.set("ElementRest", *rest_);
+    blocks.set("NodeIncidence", *incidence_);
+    blocks.set("CornerForce", corner_force_);
+    std::vector<LawBlock> pressure_blocks;
+    if (rest.pressure.count() > 0) {
+        const GpuPressure layout = gpu_pressure(rest);
+        pressure_blocks = layout.blocks;
+        pressure_.emplace(device, layout, element_count_);
+        blocks.set("VolumeChange", pressure_->volume_change);
+        blocks.set("Pressure", pressure_->value);
+        blocks.set("PressureCorners", pressure_->corners);
+        blocks.set("PressureRest", pressure_->rest);
+        blocks.set("PressureIncidence", pressure_->incidence);
+    }
+    make_stages(programs, rest, pressure_blocks);
+}
+
+void GpuForce::make_stages(shaders::ProgramCache& programs, const RestState& rest,
+                           const std::vector<LawBlock>& pressure) {
+    using shaders::PressureRule;
+    PressureRule rule = PressureRule::Element;
+    if (!pressure.empty()) {
+        rule = rest.volumetric_modulus.cwiseAbs().maxCoeff() > 0 ? PressureRule::AveragedWithElementPart
+                                                                 : PressureRule::Averaged;
+        const LawBlock all{0, 0, rest.element_count()};
+        stages_.push_back({ranged(programs.get(shaders::element_volume_program()), all, element_count_)});
+        Stage nodal;
+        for (const LawBlock& block : pressure)
+            nodal.push_back(ranged(programs.get(shaders::nodal_pressure_program(law_chunk(block.law))), block,
+                                   static_cast<std::size_t>(rest.pressure.count())));
+        stages_.push_back(nodal);
+    }
+    // Laws are grouped, so each has one block and its program keeps one range.
+    Stage force;
+    for (const LawBlock& block : rest.blocks)
+        force.push_back(
+            ranged(programs.get(shaders::element_force_program(law_chunk(block.law), rule)), block, element_count_));
+    stages_.push_back(force);
+}
+
+void GpuForce::bind(const BlockBuffers& blocks) const {
+    for (const Stage& stage : stages_)
+        for (const Pass& pass : stage) blocks.bind(*pass.program);
+}
+
+void GpuForce::dispatch() const {
+    for (const Stage& stage : stages_) {
+        for (const Pass& pass : stage) pass.program->dispatch(pass.invocations);
+        shaders::storage_barrier();
+    }
+}
+
+void GpuForce::set_all_elements(const shaders::Program& program) const {
+    ranged(program, {0, 0, static_cast<int>(element_count_)}, element_count_);
+}
+
+}  // namespace tissuewarp::tled::detail

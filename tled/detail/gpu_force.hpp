@@ -1,0 +1,66 @@
+#pragma once
+/// The element side of the GPU engine: rest data on the device and the passes that leave corner forces. Needs the
+/// device's context current, except construction.
+
+#include "shaders/buffer.hpp"
+#include "shaders/program.hpp"
+#include "tled/detail/gpu_layout.hpp"
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace tissuewarp::tled::detail {
+
+/// Storage buffers by the name of the block that they serve.
+class BlockBuffers {
+public:
+    void set(const std::string& block, const shaders::StorageBuffer& buffer) { buffers_[block] = &buffer; }
+    /// Binds what the program declares; throws std::logic_error when a block has no buffer.
+    void bind(const shaders::Program& program) const;
+
+private:
+    std::map<std::string, const shaders::StorageBuffer*> buffers_;
+};
+
+/// Dispatches that may run at the same time.
+struct Pass {
+    const shaders::Program* program;
+    std::size_t invocations;
+};
+using Stage = std::vector<Pass>;
+
+class GpuForce {
+public:
+    GpuForce(const shaders::Device& device, shaders::ProgramCache& programs, const RestState& rest,
+             BlockBuffers& blocks);
+
+    void bind(const BlockBuffers& blocks) const;
+    /// Corner forces of whatever is bound as Displacement, each stage followed by a barrier.
+    void dispatch() const;
+    /// Sets the range of a program over all elements, as chunks/element.glsl has it.
+    void set_all_elements(const shaders::Program& program) const;
+
+private:
+    void make_stages(shaders::ProgramCache& programs, const RestState& rest, const std::vector<LawBlock>& pressure);
+
+    /// The buffers of the averaged pressure; absent for T4.
+    struct Pressure {
+        Pressure(const shaders::Device& device, const GpuPressure& layout, std::size_t element_count);
+        shaders::Buffer<float> volume_change, value;
+        shaders::Buffer<Uint4> corners;
+        shaders::Buffer<Float2> rest;
+        shaders::Buffer<std::uint32_t> incidence;
+    };
+
+    std::size_t element_count_;
+    std::optional<shaders::Buffer<Uint4>> nodes_;
+    std::optional<shaders::Buffer<Float4>> rest_;
+    std::optional<shaders::Buffer<std::uint32_t>> incidence_;
+    shaders::Buffer<Float4> corner_force_;
+    std::optional<Pressure> pressure_;
+    std::vector<Stage> stages_;
+};
+
+}  // namespace tissuewarp::tled::detail

@@ -1,0 +1,324 @@
+// The step of total Lagrangian explicit dynamics on a GPU in two passes (Taylor, Cheng, Ourselin 2008): elements leave
+// the forces of their corners, nodes gather them in a fixed order and advance. Nothing crosses to the host between
+// steps.
+
+#include "core/errors.hpp"
+#include "shaders/catalogue.hpp"
+#include "tled/detail/gpu_force.hpp"
+#include "tled/engine.hpp"
+
+#include <cmath>
+#include <limits>
+
+namespace tissuewarp::tled {
+namespace {
+
+using detail::BlockBuffers;
+using detail::Float4;
+using Eigen::Matrix3Xd;
+using shaders::Buffer;
+using shaders::CurrentContext;
+using shaders::MaskConstrained;
+using shaders::NodeEffects;
+using shaders::Program;
+using shaders::StoreResidual;
+using Mask = Eigen::Matrix<bool, 3, Eigen::Dynamic>;
+
+/// Recorded steps are handed over in portions of this many, so that the device starts while the host still records.
+constexpr int steps_per_flush = 64;
+
+/// What shaders/kernels/observe_nodes.comp leaves per workgroup.
+struct NodePartial {
+    float increment_squared_max, residual_squared_max, increment_mass, increment_stiffness;
+    std::uint32_t bad_displacements, bad_residuals;
+};
+/// What shaders/kernels/observe_elements.comp leaves per workgroup.
+struct ElementPartial {
+    float volume_change;
+    std::uint32_t element;
+};
+
+void require_shape(const Matrix3Xd& matrix, int node_count, const char* what) {
+    if (matrix.cols() != node_count)
+        throw InvalidInput(std::string(what) + " has " + std::to_string(matrix.cols()) + " columns; the model has " +
+                           std::to_string(node_count) + " nodes");
+}
+
+void require_limits(const shaders::Device& device) {
+    // node_step with all effects declares nine blocks; chunks/bindings.glsl counts to 16.
+    if (device.limits().storage_blocks < 9 || device.limits().storage_bindings < 16)
+        throw GpuUnavailable(device.renderer() + " offers " + std::to_string(device.limits().storage_blocks) +
+                             " storage blocks per shader and " + std::to_string(device.limits().storage_bindings) +
+                             " bindings; the solver needs 9 and 16; take the CPU engine");
+}
+
+/// Springs and external forces on the device, each only when the scene has it.
+struct Effects {
+    NodeEffects flags;
+    std::optional<Buffer<Float4>> external_force;
+    std::optional<Buffer<std::int32_t>> spring_index;
+    std::optional<Buffer<detail::GpuSpring>> springs;
+};
+
+class GpuEngine final : public Engine {
+public:
+    GpuEngine(const RestState& rest, int device)
+        : device_(device),
+          programs_((require_limits(device_), device_)),
+          node_count_(rest.node_count),
+          tet_(rest.tet),
+          force_(device_, programs_, rest, blocks_),
+          displacement_(node_vectors("displacements")),
+          increment_(node_vectors("increments")),
+          inverse_mass_(node_vectors("inverse masses")),
+          residual_(node_vectors("residuals")),
+          previous_residual_(node_vectors("previous residuals")),
+          previous_displacement_(node_vectors("previous displacements")),
+          imposed_(node_vectors("imposed displacements")),
+          node_partials_(device_, shaders::observe_partials, "partial results of nodes"),
+          element_partials_(device_, shaders::observe_partials, "partial results of elements"),
+          mass_(rest.lumped_mass.transpose().replicate(3, 1)),
+          constrained_(Mask::Constant(3, rest.node_count, false)) {
+        const CurrentContext current = device_.make_current();
+        blocks_.set("Increment", increment_);
+        blocks_.set("InverseMass", inverse_mass_);
+        blocks_.set("PreviousResidual", previous_residual_);
+        blocks_.set("PreviousDisplacement", previous_displacement_);
+        blocks_.set("Imposed", imposed_);
+        upload_inverse_mass();
+    }
+
+    void set_conditions(const NodalConditions& conditions) override {
+        if (conditions.constrained.cols() != node_count_)
+            throw InvalidInput("the conditions are for " + std::to_string(conditions.constrained.cols()) +
+                               " nodes; the model has " + std::to_string(node_count_));
+        require_shape(conditions.imposed, node_count_, "the imposed displacement");
+        const CurrentContext current = device_.make_current();
+        set_effects(conditions);
+        constrained_ = conditions.constrained;
+        upload_inverse_mass();
+        imposed_.upload(detail::packed(conditions.imposed));
+        impose();
+        previous_residual_known_ = false;
+    }
+
+    void set_mass(const Matrix3Xd& mass) override {
+        require_shape(mass, node_count_, "the mass");
+        for (Eigen::Index i = 0; i < mass.size(); ++i)
+            if (const double m = mass.reshaped()[i]; !(m > 0) || !std::isfinite(m))
+                throw InvalidInput("the mass of node " + std::to_string(i / 3) + " is " + std::to_string(m) +
+                                   "; it must be positive");
+        const CurrentContext current = device_.make_current();
+        mass_ = mass;
+        upload_inverse_mass();
+    }
+
+    void set_state(const Matrix3Xd& displacement, const Matrix3Xd& increment) override {
+        require_shape(displacement, node_count_, "the displacement");
+        require_shape(increment, node_count_, "the increment");
+        const CurrentContext current = device_.make_current();
+        displacement_.upload(detail::packed(displacement));
+        increment_.upload(detail::packed(increment));
+        impose();
+        previous_residual_known_ = false;
+    }
+
+    void run(int steps, const StepCoefficients& coefficients) override {
+        if (steps <= 0) return;
+        const CurrentContext current = device_.make_current();
+        const Program& step = node_program(shaders::node_step_program(effects_.flags, StoreResidual::No));
+        const Program& last = node_program(shaders::node_step_program(effects_.flags, StoreResidual::Yes));
+        for (const Program* program : {&step, &last}) {
+            program->set(1, static_cast<float>(coefficients.momentum));
+            program->set(2, static_cast<float>(coefficients.gain));
+        }
+        blocks_.set("Displacement", displacement_);
+        blocks_.set("Residual", previous_residual_);
+        force_.bind(blocks_);
+        blocks_.bind(last);
+        for (int i = 1; i <= steps; ++i) {
+            force_.dispatch();
+            (i < steps ? step : last).dispatch(nodes());
+            shaders::storage_barrier();
+            if (i % steps_per_flush == 0) shaders::flush();
+        }
+        previous_residual_known_ = true;
+        shaders::check_errors("time steps");
+    }
+
+    [[nodiscard]] Matrix3Xd displacement() const override { return downloaded(displacement_); }
+    [[nodiscard]] Matrix3Xd increment() const override { return downloaded(increment_); }
+
+    [[nodiscard]] Matrix3Xd residual() override {
+        const CurrentContext current = device_.make_current();
+        evaluate(displacement_, effects_.flags, MaskConstrained::Yes, residual_);
+        return downloaded(residual_);
+    }
+
+    [[nodiscard]] Matrix3Xd internal_force() override {
+        const CurrentContext current = device_.make_current();
+        evaluate(displacement_, {}, MaskConstrained::No, residual_);
+        return -downloaded(residual_);
+    }
+
+    [[nodiscard]] Observation observe() override {
+        const CurrentContext current = device_.make_current();
+        if (!previous_residual_known_) find_previous_residual();
+        evaluate(displacement_, effects_.flags, MaskConstrained::Yes, residual_);
+        reduce(node_program(shaders::observe_nodes_program()), node_partials_);
+        const Program& elements = programs_.get(shaders::observe_elements_program());
+        force_.set_all_elements(elements);
+        reduce(elements, element_partials_);
+        Observation seen;
+        summarise_nodes(seen);
+        summarise_elements(seen);
+        return seen;
+    }
+
+    [[nodiscard]] std::string description() const override {
+        return "GPU " + device_.renderer() + " (OpenGL " + device_.version().substr(0, 3) + ")";
+    }
+
+    [[nodiscard]] double precision() const override {
+        return static_cast<double>(std::numeric_limits<float>::epsilon());
+    }
+
+private:
+    [[nodiscard]] std::size_t nodes() const { return static_cast<std::size_t>(node_count_); }
+    [[nodiscard]] Buffer<Float4> node_vectors(const char* what) const { return {device_, nodes(), what}; }
+
+    [[nodiscard]] Matrix3Xd downloaded(const Buffer<Float4>& buffer) const {
+        const CurrentContext current = device_.make_current();
+        return detail::unpacked(buffer.download());
+    }
+
+    /// A program over nodes, whose uniform 0 is their number.
+    const Program& node_program(const shaders::ProgramSource& source) {
+        const Program& program = programs_.get(source);
+        program.set(0, static_cast<std::uint32_t>(node_count_));
+        return program;
+    }
+
+    /// Inverse mass zero holds a component: it needs no mask and no branch in the step.
+    void upload_inverse_mass() {
+        const Matrix3Xd inverse = constrained_.select(Matrix3Xd::Zero(3, node_count_), mass_.cwiseInverse());
+        inverse_mass_.upload(detail::packed(inverse));
+    }
+
+    void set_effects(const NodalConditions& conditions) {
+        const Matrix3Xd& force = conditions.external_force;
+        effects_.external_force.reset();
+        effects_.spring_index.reset();
+        effects_.springs.reset();
+        effects_.flags.springs = !conditions.spring_node.empty();
+        effects_.flags.external_force = force.size() > 0 && !force.isZero(0.0);
+        if (effects_.flags.external_force) {
+            require_shape(force, node_count_, "the external force");
+            effects_.external_force.emplace(device_, detail::packed(force), "external forces");
+            blocks_.set("ExternalForce", *effects_.external_force);
+        }
+        if (effects_.flags.springs) {
+            const detail::GpuSprings springs = detail::gpu_springs(conditions, node_count_);
+            effects_.spring_index.emplace(device_, springs.index, "springs of nodes");
+            effects_.springs.emplace(device_, springs.springs, "springs");
+            blocks_.set("SpringIndex", *effects_.spring_index);
+            blocks_.set("Springs", *effects_.springs);
+        }
+    }
+
+    void run_over_nodes(const Program& program) {
+        blocks_.bind(program);
+        program.dispatch(nodes());
+        shaders::storage_barrier();
+    }
+
+    void impose() {
+        if (!constrained_.any()) return;
+        blocks_.set("Displacement", displacement_);
+        run_over_nodes(node_program(shaders::impose_program()));
+        shaders::check_errors("imposed displacements");
+    }
+
+    /// f_ext + f_spring − f_int at `displacement`, with the effects named, into `result`.
+    void evaluate(const Buffer<Float4>& displacement, const NodeEffects& effects, MaskConstrained mask,
+                  const Buffer<Float4>& result) {
+        blocks_.set("Displacement", displacement);
+        blocks_.set("Residual", result);
+        force_.bind(blocks_);
+        force_.dispatch();
+        run_over_nodes(node_program(shaders::node_residual_program(effects, mask)));
+        shaders::check_errors("residual");
+    }
+
+    /// run() keeps the residual of its last step; without one it is evaluated at u − v.
+    void find_previous_residual() {
+        blocks_.set("Displacement", displacement_);
+        run_over_nodes(node_program(shaders::previous_displacement_program()));
+        evaluate(previous_displacement_, effects_.flags, MaskConstrained::Yes, previous_residual_);
+        previous_residual_known_ = true;
+    }
+
+    void reduce(const Program& program, const shaders::StorageBuffer& partials) {
+        blocks_.set("Displacement", displacement_);
+        blocks_.set("Residual", residual_);
+        blocks_.set("Partial", partials);
+        blocks_.bind(program);
+        program.dispatch(static_cast<std::size_t>(shaders::observe_partials * program.workgroup_size()));
+        shaders::storage_barrier();
+    }
+
+    void summarise_nodes(Observation& seen) const {
+        double increment_squared = 0;
+        double residual_squared = 0;
+        std::uint64_t bad_displacements = 0;
+        std::uint64_t bad_residuals = 0;
+        for (const NodePartial& part : node_partials_.download()) {
+            increment_squared = std::max(increment_squared, static_cast<double>(part.increment_squared_max));
+            residual_squared = std::max(residual_squared, static_cast<double>(part.residual_squared_max));
+            seen.increment_mass += static_cast<double>(part.increment_mass);
+            seen.increment_stiffness += static_cast<double>(part.increment_stiffness);
+            bad_displacements += part.bad_displacements;
+            bad_residuals += part.bad_residuals;
+        }
+        constexpr double infinite = std::numeric_limits<double>::infinity();
+        seen.increment_max = bad_displacements > 0 ? infinite : std::sqrt(increment_squared);
+        seen.residual_max = bad_displacements + bad_residuals > 0 ? infinite : std::sqrt(residual_squared);
+        seen.finite = bad_displacements + bad_residuals == 0;
+    }
+
+    void summarise_elements(Observation& seen) const {
+        float least = std::numeric_limits<float>::max();
+        std::uint32_t element = std::numeric_limits<std::uint32_t>::max();
+        for (const ElementPartial& part : element_partials_.download())
+            if (part.volume_change < least || (part.volume_change == least && part.element < element)) {
+                least = part.volume_change;
+                element = part.element;
+            }
+        if (element == std::numeric_limits<std::uint32_t>::max()) return;  // no J is finite, which `finite` says
+        seen.min_jacobian = 1.0 + static_cast<double>(least);
+        seen.min_jacobian_tet = tet_[element];
+    }
+
+    shaders::Device device_;
+    shaders::ProgramCache programs_;
+    int node_count_;
+    std::vector<int> tet_;
+    BlockBuffers blocks_;
+    detail::GpuForce force_;
+    Buffer<Float4> displacement_, increment_, inverse_mass_, residual_, previous_residual_, previous_displacement_,
+        imposed_;
+    Buffer<NodePartial> node_partials_;
+    Buffer<ElementPartial> element_partials_;
+    Effects effects_;
+    Matrix3Xd mass_;  ///< 3 × N
+    Mask constrained_;
+    bool previous_residual_known_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Engine> make_gpu_engine(const RestState& rest, int device) {
+    return std::make_unique<GpuEngine>(rest, device);
+}
+
+}  // namespace tissuewarp::tled
