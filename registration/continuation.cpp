@@ -1,0 +1,231 @@
+#include "registration/detail/continuation.hpp"
+
+#include "imaging/filters.hpp"
+#include "registration/detail/rasterisation.hpp"
+#include "registration/detail/surface_proximity.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <cstdint>
+#include <optional>
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+using Vec4 = Eigen::Array4f;  // x, y, z and an unused fourth lane, so that one node is one SIMD register
+
+constexpr double finest_spacing = 2.5;   // mm; finer grids change the field by less than the layer corrects
+constexpr double most_nodes = 1.2e6;     // larger organs get a coarser grid
+constexpr double blend_spacings = 1.75;  // thickness of the correcting layer at the surface, in grid spacings
+
+/// Node values on a regular grid; fixed nodes are Dirichlet data.
+struct Level {
+    std::array<int, 3> size{};
+    std::vector<Vec4> value;
+    std::vector<std::uint8_t> fixed;
+
+    explicit Level(const std::array<int, 3>& nodes) : size(nodes) {
+        const std::size_t count =
+            static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(size[2]);
+        value.assign(count, Vec4::Zero());
+        fixed.assign(count, 0);
+    }
+    [[nodiscard]] std::size_t at(int i, int j, int k) const {
+        return static_cast<std::size_t>(i) +
+               static_cast<std::size_t>(size[0]) *
+                   (static_cast<std::size_t>(j) + static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(k));
+    }
+};
+
+/// One red-black sweep of successive over-relaxation on the seven-point Laplacian; the border of the grid stays.
+void relax(Level& level, float omega) {
+    const std::size_t row = static_cast<std::size_t>(level.size[0]);
+    const std::size_t slice = row * static_cast<std::size_t>(level.size[1]);
+    for (int colour = 0; colour < 2; ++colour) {
+        tbb::parallel_for(1, level.size[2] - 1, [&](int k) {
+            for (int j = 1; j < level.size[1] - 1; ++j) {
+                for (int i = 1 + (j + k + colour) % 2; i < level.size[0] - 1; i += 2) {
+                    const std::size_t n = level.at(i, j, k);
+                    if (level.fixed[n]) continue;
+                    const Vec4* v = level.value.data() + n;
+                    const Vec4 mean = (v[-1] + v[1] + *(v - row) + v[row] + *(v - slice) + v[slice]) * (1.0F / 6.0F);
+                    level.value[n] += omega * (mean - *v);
+                }
+            }
+        });
+    }
+}
+
+Level coarsened(const Level& fine) {
+    Level coarse({(fine.size[0] + 1) / 2, (fine.size[1] + 1) / 2, (fine.size[2] + 1) / 2});
+    for (int k = 0; k < coarse.size[2]; ++k)
+        for (int j = 0; j < coarse.size[1]; ++j)
+            for (int i = 0; i < coarse.size[0]; ++i) {
+                const std::size_t from = fine.at(2 * i, 2 * j, 2 * k), to = coarse.at(i, j, k);
+                coarse.fixed[to] = fine.fixed[from];
+                coarse.value[to] = fine.value[from];
+            }
+    return coarse;
+}
+
+/// Free nodes of the fine grid from the coarse one, trilinear.
+void prolong(const Level& coarse, Level& fine) {
+    tbb::parallel_for(0, fine.size[2], [&](int k) {
+        for (int j = 0; j < fine.size[1]; ++j) {
+            for (int i = 0; i < fine.size[0]; ++i) {
+                const std::size_t n = fine.at(i, j, k);
+                if (fine.fixed[n]) continue;
+                Vec4 sum = Vec4::Zero();
+                for (int corner = 0; corner < 8; ++corner) {
+                    const auto half = [&](int index, int bit, int axis) {
+                        return std::min((index + (corner >> bit & 1)) / 2, coarse.size[axis] - 1);
+                    };
+                    sum += coarse.value[coarse.at(half(i, 0, 0), half(j, 1, 1), half(k, 2, 2))];
+                }
+                fine.value[n] = 0.125F * sum;
+            }
+        }
+    });
+}
+
+/// Cascadic multigrid (Bornemann and Deuflhard 1996): solved coarse to fine, each level starting from the one below. A
+/// few sweeps a level suffice, because what is left is small and smooth.
+void solve_laplace(Level& level) {
+    const bool coarsest = *std::min_element(level.size.begin(), level.size.end()) < 16;
+    if (!coarsest) {
+        Level coarse = coarsened(level);
+        solve_laplace(coarse);
+        prolong(coarse, level);
+    }
+    const int sweeps = coarsest ? 60 : 10;
+    for (int sweep = 0; sweep < sweeps; ++sweep) relax(level, coarsest ? 1.7F : 1.4F);
+}
+
+}  // namespace
+
+struct Continuation::Impl {
+    Eigen::Vector3d lower;
+    double spacing;
+    Level grid;
+    SurfaceProximity surface;
+
+    Impl(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tets, const meshing::BoundarySurface& boundary,
+         const Eigen::Matrix3Xd& values, double fade_mm)
+        : spacing(spacing_for(nodes, fade_mm)),
+          grid(size_for(nodes, fade_mm)),
+          surface(nodes, boundary, values, blend_spacings * spacing) {
+        lower = nodes.rowwise().minCoeff().array() - fade_mm - 2.0 * spacing;
+        const Eigen::Matrix3Xd index = (nodes.colwise() - lower) / spacing;
+        fix_inside(index, tets, values);
+        fix_thin_parts(index, boundary);
+        fix_far(index, boundary, fade_mm);
+        solve_laplace(grid);
+    }
+
+    static Eigen::Array3d extent_for(const Eigen::Matrix3Xd& nodes, double fade_mm) {
+        return (nodes.rowwise().maxCoeff() - nodes.rowwise().minCoeff()).array() + 2.0 * fade_mm;
+    }
+    static double spacing_for(const Eigen::Matrix3Xd& nodes, double fade_mm) {
+        return std::max(std::min(finest_spacing, fade_mm / 4.0),
+                        std::cbrt(extent_for(nodes, fade_mm).prod() / most_nodes));
+    }
+    [[nodiscard]] std::array<int, 3> size_for(const Eigen::Matrix3Xd& nodes, double fade_mm) const {
+        const Eigen::Array3d extent = extent_for(nodes, fade_mm) / spacing;
+        const auto along = [&](int axis) { return static_cast<int>(std::ceil(extent[axis])) + 5; };
+        return {along(0), along(1), along(2)};
+    }
+
+    /// Grid nodes inside the mesh take the finite-element field.
+    void fix_inside(const Eigen::Matrix3Xd& index, const Eigen::Matrix4Xi& tets, const Eigen::Matrix3Xd& values) {
+        rasterise(index, tets, grid.size, [&](const TetRow& row) {
+            const Eigen::Matrix<double, 3, 4> corners = values(Eigen::all, tets.col(row.tet));
+            for (int i = row.first; i <= row.last; ++i) {
+                const std::size_t n = grid.at(i, row.j, row.k);
+                if (grid.fixed[n]) continue;
+                grid.fixed[n] = 1;
+                set(n, corners * (row.at_first + row.step * (i - row.first)));
+            }
+        });
+    }
+
+    /// A part of the mesh thinner than the spacing may hold no grid node: there the nearest ones take surface values.
+    void fix_thin_parts(const Eigen::Matrix3Xd& index, const meshing::BoundarySurface& boundary) {
+        std::vector<std::size_t> thin;
+        for (const int node : boundary.node_of) {
+            const Eigen::Vector3i nearest = index.col(node).array().round().cast<int>();
+            const std::size_t n = grid.at(nearest[0], nearest[1], nearest[2]);
+            bool alone = true;
+            for (int k = -1; k <= 1; ++k)
+                for (int j = -1; j <= 1; ++j)
+                    for (int i = -1; i <= 1; ++i)
+                        alone = alone && !grid.fixed[grid.at(nearest[0] + i, nearest[1] + j, nearest[2] + k)];
+            if (!alone) continue;
+            if (const auto hit = surface.closest(point_of(nearest))) {
+                set(n, hit->value);
+                thin.push_back(n);
+            }
+        }
+        for (const std::size_t n : thin) grid.fixed[n] = 1;
+    }
+
+    /// Zero from the fade distance on.
+    void fix_far(const Eigen::Matrix3Xd& index, const meshing::BoundarySurface& boundary, double fade_mm) {
+        imaging::Geometry geometry;
+        geometry.size = grid.size;
+        geometry.spacing.setConstant(spacing);
+        imaging::Volume mesh(geometry, CV_8UC1);
+        std::copy(grid.fixed.begin(), grid.fixed.end(), mesh.data<std::uint8_t>());
+        for (const int node : boundary.node_of) {  // a mesh between grid nodes has a distance too
+            const Eigen::Vector3i nearest = index.col(node).array().round().cast<int>();
+            mesh.data<std::uint8_t>()[grid.at(nearest[0], nearest[1], nearest[2])] = 1;
+        }
+        const imaging::Volume distance = imaging::signed_distance(mesh);
+        for (std::size_t n = 0; n < grid.fixed.size(); ++n)
+            if (distance.data<float>()[n] >= fade_mm) grid.fixed[n] = 1;
+    }
+
+    void set(std::size_t n, const Eigen::Vector3d& value) { grid.value[n].head<3>() = value.cast<float>(); }
+    [[nodiscard]] Eigen::Vector3d point_of(const Eigen::Vector3i& node) const {
+        return lower + spacing * node.cast<double>();
+    }
+
+    /// Trilinear value; zero outside the grid.
+    [[nodiscard]] Eigen::Vector3d interpolated(const Eigen::Vector3d& point) const {
+        const Eigen::Array3d index = (point - lower).array() / spacing;
+        const Eigen::Array3d last(grid.size[0] - 1, grid.size[1] - 1, grid.size[2] - 1);
+        if (!((index >= 0.0).all() && (index < last).all())) return Eigen::Vector3d::Zero();
+        const Eigen::Array3i cell = index.cast<int>();
+        const Eigen::Array3f f = (index - cell.cast<double>()).cast<float>();
+        const std::size_t row = static_cast<std::size_t>(grid.size[0]);
+        const std::size_t slice = row * static_cast<std::size_t>(grid.size[1]);
+        const Vec4* v = grid.value.data() + grid.at(cell[0], cell[1], cell[2]);
+        const auto along_i = [&](const Vec4* p) -> Vec4 { return p[0] + f[0] * (p[1] - p[0]); };
+        const auto along_j = [&](const Vec4* p) -> Vec4 {
+            const Vec4 near = along_i(p);
+            return near + f[1] * (along_i(p + row) - near);
+        };
+        const Vec4 near = along_j(v);
+        const Vec4 value = near + f[2] * (along_j(v + slice) - near);
+        return value.head<3>().matrix().cast<double>();
+    }
+};
+
+Continuation::Continuation(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tets,
+                           const meshing::BoundarySurface& boundary, const Eigen::Matrix3Xd& values, double fade_mm)
+    : impl_(std::make_unique<Impl>(nodes, tets, boundary, values, fade_mm)) {}
+Continuation::~Continuation() = default;
+Continuation::Continuation(Continuation&&) noexcept = default;
+Continuation& Continuation::operator=(Continuation&&) noexcept = default;
+
+Eigen::Vector3d Continuation::operator()(const Eigen::Vector3d& point) const {
+    Eigen::Vector3d value = impl_->interpolated(point);
+    if (const auto hit = impl_->surface.closest(point)) {
+        const double t = hit->distance / impl_->surface.reach();
+        const double weight = (1.0 - t) * (1.0 - t) * (1.0 + 2.0 * t);  // 1 at the surface, slope 0 at both ends
+        value += weight * (hit->value - impl_->interpolated(hit->point));
+    }
+    return value;
+}
+
+}  // namespace tissuewarp::registration::detail

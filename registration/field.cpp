@@ -1,0 +1,221 @@
+#include "registration/field.hpp"
+
+#include "core/errors.hpp"
+#include "meshing/point_location.hpp"
+#include "registration/detail/continuation.hpp"
+#include "registration/detail/rasterisation.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <string>
+
+// Everything is computed in the moving frame, before the placement P: forward y = P (X + u(X)); backward, with
+// z = P⁻¹ y = X + u(X), the same mesh at its deformed nodes carries w(z) = −u, and X = z + w(z).
+
+namespace tissuewarp::registration {
+
+namespace {
+
+using imaging::Geometry;
+using imaging::Volume;
+
+void require_usable(const Deformation& deformation, const FieldOptions& options) {
+    meshing::require_valid(deformation.mesh, "deformation");
+    if (deformation.displacement.cols() != deformation.mesh.nodes.cols())
+        throw InvalidInput("deformation: " + std::to_string(deformation.displacement.cols()) + " displacements for " +
+                           std::to_string(deformation.mesh.node_count()) + " nodes; give one each");
+    for (Eigen::Index n = 0; n < deformation.displacement.cols(); ++n)
+        if (!deformation.displacement.col(n).allFinite())
+            throw InvalidInput("deformation: the displacement of node " + std::to_string(n) + " is not finite");
+    if (!deformation.placement.matrix().allFinite())
+        throw InvalidInput("deformation: the placement is not finite; give a rigid motion");
+    if (!(options.fade_mm >= 1.0 && options.fade_mm <= 1e4))
+        throw InvalidInput("fade distance " + std::to_string(options.fade_mm) + " mm; give one from 1 to 10000 mm");
+}
+
+/// Relative displacements on a grid, and which voxels the mesh covers.
+struct Raster {
+    Volume values;                     // three channels float32, mm
+    std::vector<std::uint8_t> inside;  // one per voxel
+    detail::RasterCount count;
+};
+
+Raster rasterise_mesh(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tets, const Eigen::Matrix3Xd& values,
+                      const Geometry& grid) {
+    Raster raster{Volume(grid, CV_32FC3), std::vector<std::uint8_t>(static_cast<std::size_t>(grid.voxel_count())), {}};
+    const Eigen::Matrix3Xd index = grid.point_to_index() * (nodes.colwise() - grid.origin);
+    auto* target = raster.values.data<cv::Vec3f>();
+    raster.count = detail::rasterise(index, tets, grid.size, [&](const detail::TetRow& row) {
+        const Eigen::Matrix<double, 3, 4> corners = values(Eigen::all, tets.col(row.tet));
+        for (int i = row.first; i <= row.last; ++i) {
+            const std::int64_t voxel = grid.size[0] * (row.j + std::int64_t{grid.size[1]} * row.k) + i;
+            if (raster.inside[static_cast<std::size_t>(voxel)]) continue;
+            raster.inside[static_cast<std::size_t>(voxel)] = 1;
+            const Eigen::Vector3d value = corners * (row.at_first + row.step * (i - row.first));
+            for (int c = 0; c < 3; ++c) target[voxel][c] = static_cast<float>(value[c]);
+        }
+    });
+    return raster;
+}
+
+/// Replaces v by `rotation` v + `linear` p + `constant` at every voxel centre p of `grid`, in double precision; voxels
+/// outside the mesh first take `outside(q)`, q being the voxel centre in the moving frame.
+template <class Outside>
+void complete(Raster& raster, const Geometry& grid, const Eigen::Matrix3d& rotation, const Eigen::Matrix3d& linear,
+              const Eigen::Vector3d& constant, const Outside& outside) {
+    const Geometry moving = raster.values.geometry;
+    auto* values = raster.values.data<cv::Vec3f>();
+    tbb::parallel_for(0, grid.size[1] * grid.size[2], [&](int row) {
+        const int j = row % grid.size[1], k = row / grid.size[1];
+        for (int i = 0; i < grid.size[0]; ++i) {
+            const std::int64_t voxel = raster.values.offset(i, j, k);
+            const Eigen::Vector3d index(i, j, k);
+            Eigen::Vector3d value(values[voxel][0], values[voxel][1], values[voxel][2]);
+            if (!raster.inside[static_cast<std::size_t>(voxel)]) value = outside(moving.point(index));
+            const Eigen::Vector3d total = rotation * value + (linear * grid.point(index) + constant);
+            for (int c = 0; c < 3; ++c) values[voxel][c] = static_cast<float>(total[c]);
+        }
+    });
+    raster.values.geometry = grid;
+}
+
+/// X − z with X + u(X) = z, u the continued forward field: fixed-point steps from the continued inverse, as long as
+/// they bring the residual down (they do where the field does not fold).
+Eigen::Vector3d inverted(const detail::Continuation& forward, const Eigen::Vector3d& z, Eigen::Vector3d w) {
+    constexpr double negligible = 0.01;  // mm
+    constexpr int steps = 3;
+    if (w.squaredNorm() < negligible * negligible) return w;
+    Eigen::Vector3d residual = w + forward(z + w);
+    for (int step = 0; step < steps && residual.squaredNorm() > negligible * negligible; ++step) {
+        const Eigen::Vector3d next = w - residual;
+        const Eigen::Vector3d next_residual = next + forward(z + next);
+        if (next_residual.squaredNorm() >= residual.squaredNorm()) break;
+        w = next;
+        residual = next_residual;
+    }
+    return w;
+}
+
+}  // namespace
+
+Volume displacement_moving_to_fixed(const Deformation& deformation, const Geometry& moving_grid,
+                                    const FieldOptions& options, Observer& observer) {
+    constexpr auto stage = "field moving to fixed";
+    imaging::require_valid(moving_grid, "moving grid");
+    require_usable(deformation, options);
+    const auto& mesh = deformation.mesh;
+    observer.checkpoint(stage, 0.0);
+    Raster raster = rasterise_mesh(mesh.nodes, mesh.tets, deformation.displacement, moving_grid);
+    observer.checkpoint(stage, 0.2);
+    const detail::Continuation continuation(mesh.nodes, mesh.tets, meshing::boundary_surface(mesh),
+                                            deformation.displacement, options.fade_mm);
+    observer.checkpoint(stage, 0.6);
+    const Eigen::Matrix3d rotation = deformation.placement.linear();
+    complete(raster, moving_grid, rotation, rotation - Eigen::Matrix3d::Identity(), deformation.placement.translation(),
+             continuation);
+    observer.progress(stage, 1.0);
+    return raster.values;
+}
+
+Volume displacement_fixed_to_moving(const Deformation& deformation, const Geometry& fixed_grid,
+                                    const FieldOptions& options, Observer& observer) {
+    constexpr auto stage = "field fixed to moving";
+    imaging::require_valid(fixed_grid, "fixed grid");
+    require_usable(deformation, options);
+    const auto& mesh = deformation.mesh;
+    const Eigen::Isometry3d to_moving = deformation.placement.inverse();
+    Geometry grid = fixed_grid;  // the fixed grid seen from the moving frame
+    grid.origin = to_moving * fixed_grid.origin;
+    grid.direction = to_moving.linear() * fixed_grid.direction;
+
+    observer.checkpoint(stage, 0.0);
+    const Eigen::Matrix3Xd deformed = mesh.nodes + deformation.displacement, inverse = -deformation.displacement;
+    Raster raster = rasterise_mesh(deformed, mesh.tets, inverse, grid);
+    if (raster.count.inverted + raster.count.flat > 0)
+        observer.note("field fixed to moving: " + std::to_string(raster.count.inverted) + " inverted and " +
+                      std::to_string(raster.count.flat) + " flat tetrahedra; the field folds there");
+    observer.checkpoint(stage, 0.15);
+    const meshing::BoundarySurface boundary = meshing::boundary_surface(mesh);
+    const detail::Continuation forward(mesh.nodes, mesh.tets, boundary, deformation.displacement, options.fade_mm);
+    observer.checkpoint(stage, 0.4);
+    const detail::Continuation backward(deformed, mesh.tets, boundary, inverse, options.fade_mm);
+    observer.checkpoint(stage, 0.6);
+    complete(raster, fixed_grid, Eigen::Matrix3d::Identity(), to_moving.linear() - Eigen::Matrix3d::Identity(),
+             to_moving.translation(), [&](const Eigen::Vector3d& z) { return inverted(forward, z, backward(z)); });
+    observer.progress(stage, 1.0);
+    return raster.values;
+}
+
+struct PointTransform::Impl {
+    Deformation deformation;
+    meshing::PointLocator locator;
+    detail::Continuation continuation;
+
+    Impl(const Deformation& given, const FieldOptions& options)
+        : deformation(given),
+          locator(given.mesh),
+          continuation(given.mesh.nodes, given.mesh.tets, meshing::boundary_surface(given.mesh), given.displacement,
+                       options.fade_mm) {}
+
+    [[nodiscard]] Eigen::Vector3d operator()(const Eigen::Vector3d& point) const {
+        const auto location = locator.find(point);
+        const Eigen::Vector3d displacement =
+            location ? Eigen::Vector3d(deformation.displacement(Eigen::all, deformation.mesh.tets.col(location->tet)) *
+                                       location->barycentric)
+                     : continuation(point);
+        return deformation.placement * (point + displacement);
+    }
+};
+
+PointTransform::PointTransform(const Deformation& deformation, const FieldOptions& options) {
+    require_usable(deformation, options);
+    impl_ = std::make_unique<Impl>(deformation, options);
+}
+PointTransform::~PointTransform() = default;
+PointTransform::PointTransform(PointTransform&&) noexcept = default;
+PointTransform& PointTransform::operator=(PointTransform&&) noexcept = default;
+
+Eigen::Matrix3Xd PointTransform::operator()(const Eigen::Matrix3Xd& points) const {
+    if (!points.allFinite()) throw InvalidInput("point transform: a coordinate is not finite; remove that point");
+    Eigen::Matrix3Xd mapped(3, points.cols());
+    tbb::parallel_for(Eigen::Index{0}, points.cols(), [&](Eigen::Index p) { mapped.col(p) = (*impl_)(points.col(p)); });
+    return mapped;
+}
+
+std::vector<bool> PointTransform::inside(const Eigen::Matrix3Xd& points) const {
+    std::vector<bool> result;
+    for (const auto& point : points.colwise()) result.push_back(impl_->locator.find(point).has_value());
+    return result;
+}
+
+Volume jacobian_determinant(const Volume& displacement) {
+    if (displacement.voxels.type() != CV_32FC3)
+        throw InvalidInput("Jacobian: the field must have three channels of float32; give a displacement field");
+    const Geometry& grid = displacement.geometry;
+    const Eigen::Matrix3d to_index = grid.point_to_index();
+    const std::array<std::int64_t, 3> stride{1, grid.size[0], std::int64_t{grid.size[0]} * grid.size[1]};
+    const auto* field = displacement.data<cv::Vec3f>();
+    Volume result(grid, CV_32FC1);
+    auto* target = result.data<float>();
+    tbb::parallel_for(0, grid.size[2], [&](int k) {
+        for (int j = 0; j < grid.size[1]; ++j) {
+            for (int i = 0; i < grid.size[0]; ++i) {
+                const std::array<int, 3> index{i, j, k};
+                const std::int64_t voxel = displacement.offset(i, j, k);
+                Eigen::Matrix3d gradient;  // ∂d/∂index; zero along an axis of one voxel
+                for (int axis = 0; axis < 3; ++axis) {
+                    const int back = index[axis] > 0, ahead = index[axis] + 1 < grid.size[axis];
+                    const cv::Vec3f& from = field[voxel - back * stride[axis]];
+                    const cv::Vec3f& to = field[voxel + ahead * stride[axis]];
+                    const double scale = 1.0 / std::max(back + ahead, 1);
+                    for (int c = 0; c < 3; ++c) gradient(c, axis) = scale * (double{to[c]} - from[c]);
+                }
+                const Eigen::Matrix3d F = Eigen::Matrix3d::Identity() + gradient * to_index;
+                target[voxel] = static_cast<float>(F.determinant());
+            }
+        }
+    });
+    return result;
+}
+
+}  // namespace tissuewarp::registration
