@@ -20,7 +20,8 @@ ElementPartial smaller(ElementPartial a, ElementPartial b) {
 void main() {
     uint local = gl_LocalInvocationID.x;
     ElementPartial least = ElementPartial(uintBitsToFloat(0x7f7fffffu), 0xffffffffu);
-    for (uint e = gl_WorkGroupID.x * WORKGROUP_SIZE + local; e < element_count; e += PARTIALS * WORKGROUP_SIZE) {
+    for (uint e = first_element + gl_WorkGroupID.x * WORKGROUP_SIZE + local; e < end_element;
+         e += PARTIALS * WORKGROUP_SIZE) {
         float volume_change = deformation(displacement_gradient(e, rest_element(e))).volume_change;
         if (is_finite(volume_change)) least = smaller(least, ElementPartial(volume_change, e));
     }

@@ -1,0 +1,219 @@
+// Time of a step on the GPU, and how far its float32 strays from the float64 CPU engine. The cube of Taylor, Cheng and
+// Ourselin (2008): edge 100 mm, ends bonded, stretched by 20 %, mu = 1.007 kPa, lambda = 49.329 kPa, 1000 kg/m³.
+//     gpu_step_bench [--list] [--device N] [--cells 14,24,55,128] [--steps N] [--repeats N] [--compare-limit ELEMENTS]
+//                    [--element t4|averaged] [--law lnj|iso]
+// Without options: on hardware 14, 24, 55 and 128 cells an edge and 1000 steps, on a software rasteriser 14 and 24
+// cells and 50 steps; five repeats, the median is printed; both elements, both laws. The float64 engine runs the same
+// steps where the mesh has no more than --compare-limit elements (1 100 000).
+
+#include "core/errors.hpp"
+#include "meshing/primitives.hpp"
+#include "shaders/device.hpp"
+#include "tled/engine.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <sstream>
+#include <string>
+#include <vector>
+
+using namespace tissuewarp;
+using Eigen::Matrix3Xd;
+
+namespace {
+
+constexpr double edge = 100;       // mm
+constexpr double shear = 1.007;    // kPa
+constexpr double lambda = 49.329;  // kPa
+constexpr double stretch = 0.2;
+
+struct Options {
+    int device = -1;
+    std::vector<int> cells;
+    int steps = 0;
+    int repeats = 5;
+    int compare_limit = 1100000;
+    std::string element, law;  // empty: both
+};
+
+double now() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+double median(std::vector<double> values) {
+    std::sort(values.begin(), values.end());
+    return values[values.size() / 2];
+}
+
+/// The stretched cube with its ends held: the state in which the run begins, and what holds it.
+struct Scene {
+    meshing::TetMesh mesh;
+    tled::NodalConditions conditions;
+    Matrix3Xd start;
+};
+
+Scene stretched_cube(int cells) {
+    Scene scene;
+    scene.mesh = meshing::box_mesh({edge, edge, edge}, {cells, cells, cells});
+    const int count = scene.mesh.node_count();
+    scene.start = Matrix3Xd::Zero(3, count);
+    tled::Conditions conditions;
+    for (int node = 0; node < count; ++node) {
+        const double z = scene.mesh.nodes(2, node);
+        scene.start(2, node) = stretch * z;
+        if (z < 1e-9 || z > edge - 1e-9)
+            conditions.prescribed.push_back({node, {true, true, true}, scene.start.col(node)});
+    }
+    scene.conditions = tled::nodal_conditions(conditions, count);
+    return scene;
+}
+
+/// The same rest state under the other law of the same moduli at rest.
+void use_law(tled::RestState& rest, const tled::Material& material) {
+    for (tled::LawBlock& block : rest.blocks) block.law = material.index();
+    const double modulus = tled::volumetric_modulus(material);
+    if (rest.pressure.count() == 0) rest.volumetric_modulus.setConstant(modulus);
+    rest.pressure.modulus.setConstant(modulus);
+    std::fill(rest.pressure.law.begin(), rest.pressure.law.end(), material.index());
+}
+
+/// 0.9 of the step that the element bound allows, ω² ≤ 4 (λ + 2μ)/ρ Σ |grad N|², damped by α with α Δt/2 = 0.01.
+tled::StepCoefficients coefficients(const tled::RestState& rest, double density) {
+    double sum = 0;
+    for (int e = 0; e < rest.element_count(); ++e) {
+        const auto gradient = rest.gradient.col(e).reshaped(3, 3);
+        sum = std::max(sum, gradient.squaredNorm() + gradient.rowwise().sum().squaredNorm());
+    }
+    const double time_step = 0.9 * 2 / std::sqrt(4 * (lambda + 2 * shear) / density * sum);  // s
+    return {(1 - 0.01) / (1 + 0.01), time_step * time_step / (1 + 0.01)};
+}
+
+void prepare(tled::Engine& engine, const Scene& scene) {
+    engine.set_conditions(scene.conditions);
+    engine.set_state(scene.start, Matrix3Xd::Zero(3, scene.start.cols()));
+}
+
+/// Seconds per step: the download that waits for the device is timed again alone and taken off.
+double timed_steps(tled::Engine& engine, int steps, const tled::StepCoefficients& step, Matrix3Xd& result) {
+    const double begin = now();
+    engine.run(steps, step);
+    result = engine.displacement();
+    const double middle = now();
+    result = engine.displacement();
+    return ((middle - begin) - (now() - middle)) / steps;
+}
+
+void report(const Scene& scene, const tled::RestState& rest, const std::string& name, int cells,
+            const Options& options) {
+    const tled::StepCoefficients step = coefficients(rest, 1e-6);
+    const double begin = now();
+    const auto gpu = tled::make_gpu_engine(rest, options.device);
+    const double start_seconds = now() - begin;
+    Matrix3Xd result;
+    prepare(*gpu, scene);
+    timed_steps(*gpu, std::min(options.steps, 50), step, result);
+    std::vector<double> seconds;
+    for (int repeat = 0; repeat < options.repeats; ++repeat) {
+        prepare(*gpu, scene);
+        seconds.push_back(timed_steps(*gpu, options.steps, step, result));
+    }
+    const tled::Observation seen = gpu->observe();
+    const double per_step = median(seconds);
+    std::printf("| %-12s | %4d | %9d | %9.2f | %9.1f | %6.2f | %6.3f ", name.c_str(), cells, rest.element_count(),
+                per_step * 1e6, per_step / rest.element_count() * 1e12, start_seconds, seen.min_jacobian);
+    if (!seen.finite) {
+        std::printf("| not finite |\n");
+    } else if (rest.element_count() > options.compare_limit) {
+        std::printf("| – |\n");
+    } else {
+        const auto cpu = tled::make_cpu_engine(rest, tled::Scalar::Float64);
+        prepare(*cpu, scene);
+        cpu->run(options.steps, step);
+        const Matrix3Xd exact = cpu->displacement();
+        std::printf("| %.1e |\n", (result - exact).cwiseAbs().maxCoeff() / exact.cwiseAbs().maxCoeff());
+    }
+    std::fflush(stdout);
+}
+
+void measure(int cells, const Options& options) {
+    const Scene scene = stretched_cube(cells);
+    const tled::NeoHookeanLnJ lnj{shear, lambda};
+    const tled::NeoHookeanIso iso{shear, lambda + 2 * shear / 3};
+    for (const bool averaged : {false, true}) {
+        if (!options.element.empty() && (options.element == "averaged") != averaged) continue;
+        tled::Model model;
+        model.mesh = scene.mesh;
+        model.materials[1] = lnj;
+        model.element = averaged ? tled::Element::AveragedPressureT4 : tled::Element::T4;
+        tled::RestState rest = tled::rest_state(model);
+        const std::string element = averaged ? "averaged " : "T4 ";
+        if (options.law != "iso") report(scene, rest, element + "lnJ", cells, options);
+        if (options.law == "lnj") continue;
+        use_law(rest, iso);
+        report(scene, rest, element + "iso", cells, options);
+    }
+}
+
+void list_devices() {
+    for (const shaders::DeviceInfo& device : shaders::list_devices())
+        std::printf("%d: %s, %s%s%s\n", device.index, device.name.c_str(), device.hardware ? "hardware" : "software",
+                    device.problem.empty() ? "" : ", unusable: ", device.problem.c_str());
+}
+
+Options parsed(int argc, char** argv) {
+    Options options;
+    for (int i = 1; i < argc; ++i) {
+        const std::string name = argv[i];
+        if (++i == argc) throw InvalidInput(name + " needs a value");
+        const std::string value = argv[i];
+        if (name == "--device")
+            options.device = std::stoi(value);
+        else if (name == "--steps")
+            options.steps = std::stoi(value);
+        else if (name == "--repeats")
+            options.repeats = std::max(1, std::stoi(value));
+        else if (name == "--compare-limit")
+            options.compare_limit = std::stoi(value);
+        else if (name == "--element")
+            options.element = value;
+        else if (name == "--law")
+            options.law = value;
+        else if (name == "--cells") {
+            std::istringstream list(value);
+            for (std::string cells; std::getline(list, cells, ',');) options.cells.push_back(std::stoi(cells));
+        } else
+            throw InvalidInput("unknown option " + name + "; the head of gpu_step_bench.cpp lists them");
+    }
+    return options;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+    if (argc > 1 && std::strcmp(argv[1], "--list") == 0) {
+        list_devices();
+        return 0;
+    }
+    Options options = parsed(argc, argv);
+    bool hardware = false;
+    {
+        const shaders::Device device(options.device);
+        hardware = device.hardware();
+        std::printf("device %d: %s, %s, OpenGL %s, %s\n", device.index(), device.renderer().c_str(),
+                    device.vendor().c_str(), device.version().c_str(), hardware ? "hardware" : "software");
+    }
+    if (options.cells.empty()) options.cells = hardware ? std::vector<int>{14, 24, 55, 128} : std::vector<int>{14, 24};
+    if (options.steps <= 0) options.steps = hardware ? 1000 : 50;
+    std::printf("%d steps, median of %d runs\n\n", options.steps, options.repeats);
+    std::printf(
+        "| element, law | cells | elements | µs/step | ps/element-step | start s | min J | largest difference to "
+        "float64 / largest displacement |\n|---|---|---|---|---|---|---|---|\n");
+    for (const int cells : options.cells) measure(cells, options);
+    return 0;
+} catch (const std::exception& error) {
+    std::fprintf(stderr, "gpu_step_bench: %s\n", error.what());
+    return 1;
+}
