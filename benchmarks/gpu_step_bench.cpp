@@ -158,7 +158,9 @@ void measure(int cells, const Options& options) {
 }
 
 void list_devices() {
-    for (const shaders::DeviceInfo& device : shaders::list_devices())
+    const auto devices = shaders::list_devices();
+    if (devices.empty()) std::printf("no EGL device\n");
+    for (const shaders::DeviceInfo& device : devices)
         std::printf("%d: %s, %s%s%s\n", device.index, device.name.c_str(), device.hardware ? "hardware" : "software",
                     device.problem.empty() ? "" : ", unusable: ", device.problem.c_str());
 }

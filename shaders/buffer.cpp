@@ -12,6 +12,11 @@ std::string mebibytes(std::size_t bytes) {
     return std::to_string((bytes + (1U << 20U) - 1) >> 20U) + " MiB";
 }
 
+/// What dispatches wrote is complete before the transfer that follows.
+void transfer_barrier() {
+    glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+}
+
 }  // namespace
 
 StorageBuffer::StorageBuffer(const Device& device, std::size_t bytes, std::string what)
@@ -51,6 +56,7 @@ void StorageBuffer::require_range(std::size_t offset, std::size_t bytes) const {
 void StorageBuffer::write(std::size_t offset, std::span<const std::byte> bytes) {
     require_range(offset, bytes.size());
     if (bytes.empty()) return;
+    transfer_barrier();
     glNamedBufferSubData(id_, static_cast<GLintptr>(offset), static_cast<GLsizeiptr>(bytes.size()), bytes.data());
     check_errors("upload of " + what_);
 }
@@ -58,12 +64,13 @@ void StorageBuffer::write(std::size_t offset, std::span<const std::byte> bytes) 
 void StorageBuffer::read(std::size_t offset, std::span<std::byte> bytes) const {
     require_range(offset, bytes.size());
     if (bytes.empty()) return;
-    storage_barrier();
+    transfer_barrier();
     glGetNamedBufferSubData(id_, static_cast<GLintptr>(offset), static_cast<GLsizeiptr>(bytes.size()), bytes.data());
     check_errors("download of " + what_);
 }
 
 void StorageBuffer::clear() {
+    transfer_barrier();
     glClearNamedBufferData(id_, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
     check_errors("clearing of " + what_);
 }
@@ -72,7 +79,7 @@ void StorageBuffer::copy_from(const StorageBuffer& source, std::size_t bytes) {
     source.require_range(0, bytes);
     require_range(0, bytes);
     if (bytes == 0) return;
-    storage_barrier();
+    transfer_barrier();
     glCopyNamedBufferSubData(source.id_, id_, 0, 0, static_cast<GLsizeiptr>(bytes));
     check_errors("copy of " + source.what_);
 }

@@ -87,7 +87,7 @@ private:
 void finish();
 /// Hands what was recorded to the device without waiting.
 void flush();
-/// Storage written by earlier dispatches is visible to later dispatches and downloads.
+/// Storage written by earlier dispatches is visible to later dispatches. Buffers order their own transfers.
 void storage_barrier();
 /// Throws GpuUnavailable for an error pending in the current context; `where` names the operation for the message.
 void check_errors(std::string_view where);

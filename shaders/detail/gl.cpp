@@ -74,7 +74,7 @@ void flush() {
     glFlush();
 }
 void storage_barrier() {
-    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
 }
 
 }  // namespace tissuewarp::shaders

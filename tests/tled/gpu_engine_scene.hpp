@@ -1,0 +1,119 @@
+#pragma once
+/// The scenes of the GPU engine's tests, and the step in plain float64.
+
+#include "meshing/primitives.hpp"
+#include "tled/engine.hpp"
+#include "tled/reference.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tissuewarp::tled::scene {
+
+using Eigen::Matrix3d;
+using Eigen::Matrix3Xd;
+using Eigen::Vector3d;
+
+enum class Laws { Iso, LnJ, Mixed };
+
+/// A jittered cube of 30 mm, label 1 in front and 2 behind a diagonal plane, so that blocks and pressure nodes mix.
+inline Model cube(int cells, Element element, Laws laws) {
+    Model model;
+    model.mesh = meshing::box_mesh({30, 30, 30}, {cells, cells, cells}, 0.1, 3);
+    for (int t = 0; t < model.mesh.tet_count(); ++t) {
+        Vector3d sum = Vector3d::Zero();
+        for (const int node : model.mesh.tets.col(t)) sum += model.mesh.nodes.col(node);
+        model.mesh.labels[t] = sum.x() + sum.y() < 110 ? 1 : 2;
+    }
+    const NeoHookeanIso soft_iso{1.007, 50.0};
+    const NeoHookeanLnJ soft_lnj{1.007, 49.329};
+    model.materials[1] = laws == Laws::Iso ? Material(soft_iso) : Material(soft_lnj);
+    model.materials[2] = laws == Laws::LnJ ? Material(NeoHookeanLnJ{3.0, 20.0}) : Material(NeoHookeanIso{2.5, 30.0});
+    model.element = element;
+    return model;
+}
+
+/// Smooth, with strains of about 10 %; mm.
+inline Matrix3Xd wavy(const Matrix3Xd& X, double amplitude = 1.0) {
+    Matrix3Xd u(3, X.cols());
+    for (Eigen::Index i = 0; i < X.cols(); ++i)
+        u.col(i) = amplitude * Vector3d(std::sin(0.11 * X(1, i) + 0.05 * X(2, i)), 0.8 * std::cos(0.13 * X(0, i)),
+                                        0.7 * std::sin(0.1 * X(0, i) - 0.08 * X(2, i)));
+    return u;
+}
+
+/// The bottom held, the top's x and z imposed, springs on two sides of which one node has two, a body force.
+inline Conditions mixed_conditions(const meshing::TetMesh& mesh) {
+    Conditions conditions;
+    conditions.external_force = Matrix3Xd::Zero(3, mesh.node_count());
+    Matrix3d stiffness;
+    stiffness << 5, 1, 0.5, 1, 4, -0.3, 0.5, -0.3, 3;
+    for (int node = 0; node < mesh.node_count(); ++node) {
+        const Vector3d X = mesh.nodes.col(node);
+        conditions.external_force.col(node) = Vector3d(0.02, -0.3, 0.1 * X.x() / 30);
+        if (X.z() < 1e-9)
+            conditions.prescribed.push_back({node, {true, true, true}, {0, 0, 0}});
+        else if (X.z() > 30 - 1e-9)
+            conditions.prescribed.push_back({node, {true, false, true}, {0.6, 0, -1.5}});
+        else if (X.x() < 1e-9)
+            conditions.springs.push_back({node, stiffness, {0.4, -0.2, 0.3}});
+    }
+    conditions.springs.push_back({conditions.springs.front().node, Matrix3d::Identity(), {1, 1, 1}});
+    return conditions;
+}
+
+/// c well inside the stability bound c ω² < 4 by ω² ≤ 4 (λ + 2μ)/ρ Σ |grad N|² of an element.
+inline StepCoefficients stable_coefficients(const Model& model, const RestState& rest) {
+    double omega_squared = 0;
+    for (int e = 0; e < rest.element_count(); ++e) {
+        const auto gradient = rest.gradient.col(e).reshaped(3, 3);
+        const double sum = gradient.squaredNorm() + gradient.rowwise().sum().squaredNorm();
+        const Material& material = model.materials.at(model.mesh.labels[rest.tet[static_cast<std::size_t>(e)]]);
+        omega_squared = std::max(omega_squared, 4 * p_wave_modulus(material) / model.density * sum);
+    }
+    return {0.98, 2 / omega_squared};
+}
+
+/// The residual of the interface's comment in plain float64.
+inline Matrix3Xd plain_residual(const RestState& rest, const NodalConditions& conditions, const Matrix3Xd& u) {
+    Matrix3Xd residual = conditions.external_force - internal_force(rest, u);
+    for (std::size_t s = 0; s < conditions.spring_node.size(); ++s) {
+        const auto column = static_cast<Eigen::Index>(s);
+        const auto k = conditions.spring_stiffness.col(column);
+        Matrix3d K;
+        K << k[0], k[3], k[5], k[3], k[1], k[4], k[5], k[4], k[2];
+        const int node = conditions.spring_node[s];
+        residual.col(node) += conditions.spring_force.col(column) - K * u.col(node);
+    }
+    return conditions.constrained.select(Matrix3Xd::Zero(3, rest.node_count), residual);
+}
+
+struct PlainState {
+    Matrix3Xd u, v, previous_residual;
+};
+
+/// The update of the interface's comment in plain float64.
+inline PlainState plain_steps(const RestState& rest, const NodalConditions& conditions, const Matrix3Xd& mass,
+                              Matrix3Xd u, Matrix3Xd v, int steps, const StepCoefficients& coefficients) {
+    const Matrix3Xd zero = Matrix3Xd::Zero(3, rest.node_count);
+    u = conditions.constrained.select(conditions.imposed, u).eval();
+    v = conditions.constrained.select(zero, v).eval();
+    PlainState state{u, v, zero};
+    for (int step = 0; step < steps; ++step) {
+        state.previous_residual = plain_residual(rest, conditions, state.u);
+        state.v =
+            coefficients.momentum * state.v + coefficients.gain * state.previous_residual.cwiseQuotient(mass).eval();
+        state.u += state.v;
+    }
+    return state;
+}
+
+inline double largest(const Matrix3Xd& vectors) {
+    return vectors.cwiseAbs().maxCoeff();
+}
+
+inline Matrix3Xd lumped(const RestState& rest) {
+    return rest.lumped_mass.transpose().replicate(3, 1);
+}
+
+}  // namespace tissuewarp::tled::scene
