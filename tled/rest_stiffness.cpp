@@ -58,10 +58,10 @@ struct RestStiffness::Impl {
 
     /// Smallest λ of K x = λ D x for the diagonal D.
     [[nodiscard]] double inverse_iteration(const Matrix3Xd& diagonal) const {
-        // Inverse iteration on K x = λ D x from a fixed vector without symmetry; the Rayleigh quotient errs by the square
-        // of the vector's error.
-        constexpr int max_iterations = 50;
-        constexpr double tolerance = 1e-6;
+        // Inverse iteration on K x = λ D x from a fixed vector without symmetry; the Rayleigh quotient errs by the
+        // square of the vector's error.
+        constexpr int max_iterations = 20;
+        constexpr double tolerance = 1e-4;  // damping presets and frequencies, its users, follow √λ
         const VectorXd D = reduced(diagonal);
         VectorXd x(free_count);
         for (int i = 0; i < x.size(); ++i) x[i] = 1.0 + 0.5 * std::sin(0.7 * i);
@@ -183,7 +183,8 @@ Matrix3Xd RestStiffness::diagonal(const NodalConditions& conditions) const {
 
 double RestStiffness::lowest_eigenvalue() const {
     if (impl_->free_count == 0) return std::numeric_limits<double>::infinity();
-    std::call_once(impl_->lowest_known, [this] { impl_->lowest = impl_->inverse_iteration(diagonal(impl_->conditions)); });
+    std::call_once(impl_->lowest_known,
+                   [this] { impl_->lowest = impl_->inverse_iteration(diagonal(impl_->conditions)); });
     return impl_->lowest;
 }
 

@@ -147,7 +147,7 @@ TEST_P(RestStiffnessTest, DiagonalAndLowestEigenvalueAgreeWithADenseSolver) {
 
     const Eigen::VectorXd scale = K.diagonal().cwiseSqrt().cwiseInverse();
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(scale.asDiagonal() * K * scale.asDiagonal());
-    EXPECT_NEAR(stiffness.lowest_eigenvalue(), modes.eigenvalues()[0], 1e-5 * modes.eigenvalues()[0]);
+    EXPECT_NEAR(stiffness.lowest_eigenvalue(), modes.eigenvalues()[0], 1e-3 * modes.eigenvalues()[0]);
 }
 
 TEST_P(RestStiffnessTest, UnheldTissueIsRefusedByName) {
