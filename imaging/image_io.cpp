@@ -73,8 +73,11 @@ void require_finite(const Volume& volume, const fs::path& path) {
 
 /// Vectors of intent 1006 are in NIfTI's RAS world: x and y change sign in LPS.
 void turn_ras_vectors(Volume& volume) {
-    cv::Mat flat = volume.voxels.reshape(1, static_cast<int>(volume.voxels.total()));
-    flat.colRange(0, 2) *= -1.0;
+    const auto [nx, ny, nz] = volume.geometry.size;
+    for (int k = 0; k < nz; ++k) {
+        cv::Mat components(nx * ny, 3, volume.voxels.depth(), volume.voxels.ptr(k));
+        components.colRange(0, 2) *= -1.0;
+    }
 }
 
 /// The geometry that a NIfTI matrix (voxel to RAS mm) states.
@@ -235,6 +238,8 @@ void write_volume(const Volume& volume, const fs::path& path) {
         throw InvalidInput(
             "cannot write '" + path.string() +
             "': the volume is one voxel thick, which formats store as two-dimensional; keep two or more");
+    if (!path.parent_path().empty() && !fs::is_directory(path.parent_path()))
+        throw IoError("cannot write '" + path.string() + "': the folder does not exist; create it first");
     AtomicFile file(path);
     if (name.ends_with(".nii.gz")) {
         write_compressed_nifti(volume, path, file.path());

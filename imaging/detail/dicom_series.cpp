@@ -6,6 +6,9 @@
 #include <itkGDCMImageIO.h>
 #include <itkGDCMSeriesFileNames.h>
 
+#include <gdcmReader.h>
+#include <gdcmTrace.h>
+
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -48,19 +51,34 @@ std::vector<std::string> files_of_the_series(const fs::path& folder) {
     return names->GetFileNames(series[0]);
 }
 
+/// GDCM fills a truncated slice with what it finds and goes on. Skipping the pixel data by their stated length must not
+/// lead beyond the end of the file.
+void require_whole_slice(const std::string& file) {
+    gdcm::Reader reader;
+    reader.SetFileName(file.c_str());
+    const gdcm::Tag pixel_data(0x7fe0, 0x0010), just_before(0x7fe0, 0x000f);
+    if (!reader.ReadUpToTag(just_before, {pixel_data}))
+        throw IoError("cannot read '" + file + "' as DICOM; copy the file again");
+    const auto& syntax = reader.GetFile().GetHeader().GetDataSetTransferSyntax();
+    // Compressed frames carry their own lengths, which the decoder checks; deflated files have no positions.
+    if (syntax.IsEncapsulated() || syntax == gdcm::TransferSyntax::DeflatedExplicitVRLittleEndian) return;
+    const std::uint64_t expected = reader.GetStreamCurrentPosition(), found = fs::file_size(file);
+    if (found < expected)
+        throw IoError("'" + file + "' is cut short: " + std::to_string(found) + " bytes of " +
+                      std::to_string(expected) + "; copy the file again");
+}
+
 Slice read_slice(const std::string& file) {
+    require_whole_slice(file);
     const auto io = itk::GDCMImageIO::New();
     io->SetFileName(file);
     io->ReadImageInformation();
     if (io->GetNumberOfComponents() != 1)
         throw InvalidInput("cannot use '" + file + "': it is a colour image; give a grey one");
-    itk::ImageIORegion region(io->GetNumberOfDimensions());
-    for (unsigned axis = 0; axis < io->GetNumberOfDimensions(); ++axis) region.SetSize(axis, io->GetDimensions(axis));
-    io->SetIORegion(region);
     Slice slice;
     slice.file = file;
     slice.geometry = geometry_of(*io);
-    slice.voxels = read_voxels(*io, {slice.geometry.size[2], slice.geometry.size[1], slice.geometry.size[0]}, file);
+    slice.voxels = read_voxels(*io, slice.geometry, file);
     return slice;
 }
 
@@ -135,6 +153,10 @@ Volume stacked(std::vector<Slice>& slices, double distance) {
 }  // namespace
 
 Volume read_dicom_series(const fs::path& folder) {
+    // What these libraries would print becomes an exception here, or is repaired by the sorting below.
+    itk::Object::SetGlobalWarningDisplay(false);
+    gdcm::Trace::WarningOff();
+    gdcm::Trace::ErrorOff();
     try {
         std::vector<Slice> slices;
         for (const std::string& file : files_of_the_series(folder)) slices.push_back(read_slice(file));

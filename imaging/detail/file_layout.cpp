@@ -20,7 +20,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr double most_voxels = 8589934592.0;  // 2^33, 34 GB of float32: beyond any patient's image
+/// OpenCV counts in int. 2^31 values are 8 GB of float32, beyond any patient's image.
+constexpr double most_values = 2147483647.0;
 
 enum class Packing { Raw, Gzip, Zlib };
 
@@ -49,9 +50,9 @@ std::uint64_t values_of(const fs::path& path, const std::vector<double>& sizes) 
         if (!(size >= 1.0)) throw unusable(path, "its size " + text_of(sizes) + " is not positive; correct the header");
         product *= size;
     }
-    if (product > most_voxels)
+    if (product > most_values)
         throw unusable(path, "its header promises " + text_of(sizes) + " values, limit " +
-                                 std::to_string(static_cast<long long>(most_voxels)) + "; the header is damaged");
+                                 std::to_string(static_cast<long long>(most_values)) + "; the header is damaged");
     return static_cast<std::uint64_t>(product);
 }
 
@@ -105,6 +106,9 @@ void require_bytes(const fs::path& path, const Payload& payload) {
     }
     const std::uint64_t found = inflated_size(payload.file, payload.offset, payload.bytes);
     if (found < payload.bytes) refuse(found);
+    if (found > payload.bytes)
+        throw IoError("'" + path.string() + "' is damaged: more data unpack than the " + std::to_string(payload.bytes) +
+                      " bytes that its header promises; copy the file again");
 }
 
 void check_nifti(const fs::path& path) {
@@ -119,6 +123,13 @@ void check_nifti(const fs::path& path) {
     require_three_dimensions(path, sizes, sizes.size());
     if (sizes.size() > 3 && sizes[3] > 1)
         throw unusable(path, "it holds " + std::to_string(header.dim[4]) + " time points; extract one of them");
+    const double components = sizes.size() > 4 ? sizes[4] : 1.0;
+    if ((components != 1.0 && components != 3.0) ||
+        std::any_of(sizes.begin() + std::min<std::ptrdiff_t>(5, static_cast<std::ptrdiff_t>(sizes.size())), sizes.end(),
+                    [](double size) { return size > 1.0; }))
+        throw unusable(path, "its size " + text_of(sizes) +
+                                 " is neither a scalar image nor vectors of three components; "
+                                 "extract one volume");
     for (std::size_t axis = 1; axis <= 3; ++axis) require_spacing(path, header.pixdim[axis], axis - 1);
 
     Payload payload{path, 0, 0, Packing::Raw};

@@ -2,6 +2,8 @@
 
 #include "core/errors.hpp"
 #include "imaging/detail/itk_voxels.hpp"
+#include "imaging/detail/nifti_voxels.hpp"
+#include "imaging/detail/wide_integers.hpp"
 
 #include <itkMetaImageIO.h>
 #include <itkNiftiImageIO.h>
@@ -77,11 +79,11 @@ Component itk_component(int depth) {
 
 /// Integers of a type that OpenCV lacks.
 template <class Wide>
-cv::Mat narrowed(itk::ImageIOBase& io, const std::vector<int>& sizes, int channels) {
+cv::Mat narrowed(itk::ImageIOBase& io, const std::array<int, 3>& sizes, int channels) {
     std::vector<Wide> buffer(static_cast<std::size_t>(io.GetImageSizeInComponents()));
     io.Read(buffer.data());
-    const bool fits = std::all_of(buffer.begin(), buffer.end(), [](Wide value) { return std::in_range<int>(value); });
-    cv::Mat voxels(static_cast<int>(sizes.size()), sizes.data(), CV_MAKETYPE(fits ? CV_32S : CV_64F, channels));
+    const bool fits = all_fit_int32(buffer);
+    cv::Mat voxels(3, sizes.data(), CV_MAKETYPE(fits ? CV_32S : CV_64F, channels));
     if (fits)
         std::transform(buffer.begin(), buffer.end(), voxels.ptr<int>(), [](Wide v) { return static_cast<int>(v); });
     else
@@ -114,7 +116,9 @@ std::string one_line(const itk::ExceptionObject& error) {
 
 Geometry geometry_of(const itk::ImageIOBase& io) {
     Geometry geometry;
-    for (unsigned axis = 0; axis < 3; ++axis) {
+    const unsigned dimensions = std::min(io.GetNumberOfDimensions(), 3U);
+    geometry.size = {1, 1, 1};
+    for (unsigned axis = 0; axis < dimensions; ++axis) {
         geometry.size[axis] = static_cast<int>(io.GetDimensions(axis));
         geometry.origin[axis] = io.GetOrigin(axis);
         geometry.spacing[axis] = io.GetSpacing(axis);
@@ -124,10 +128,18 @@ Geometry geometry_of(const itk::ImageIOBase& io) {
     return geometry;
 }
 
-cv::Mat read_voxels(itk::ImageIOBase& io, const std::vector<int>& sizes, const std::filesystem::path& path) {
+cv::Mat read_voxels(itk::ImageIOBase& io, const Geometry& geometry, const std::filesystem::path& path) {
+    for (unsigned axis = 3; axis < io.GetNumberOfDimensions(); ++axis)
+        if (io.GetDimensions(axis) > 1)
+            throw InvalidInput("cannot use '" + path.string() + "': it has " + std::to_string(io.GetDimensions(axis)) +
+                               " volumes along axis " + std::to_string(axis) + "; extract one of them");
+    itk::ImageIORegion region(io.GetNumberOfDimensions());
+    for (unsigned axis = 0; axis < io.GetNumberOfDimensions(); ++axis) region.SetSize(axis, io.GetDimensions(axis));
+    io.SetIORegion(region);
+    const std::array<int, 3> sizes{geometry.size[2], geometry.size[1], geometry.size[0]};
     const auto channels = static_cast<int>(io.GetNumberOfComponents());
     if (const int depth = opencv_depth(io.GetComponentType()); depth >= 0) {
-        cv::Mat voxels(static_cast<int>(sizes.size()), sizes.data(), CV_MAKETYPE(depth, channels));
+        cv::Mat voxels(3, sizes.data(), CV_MAKETYPE(depth, channels));
         io.Read(voxels.data);
         return voxels;
     }
@@ -154,24 +166,13 @@ Volume read_through_itk(const std::filesystem::path& path, Format format) {
         const ImageIo io = make_image_io(format);
         io->SetFileName(path.string());
         io->ReadImageInformation();
-        require_scalar_or_vector(*io, path);
-        for (unsigned axis = 3; axis < io->GetNumberOfDimensions(); ++axis)
-            if (io->GetDimensions(axis) > 1)
-                throw InvalidInput("cannot use '" + path.string() + "': it has " +
-                                   std::to_string(io->GetDimensions(axis)) + " volumes along axis " +
-                                   std::to_string(axis) + "; extract one of them");
-        if (io->GetNumberOfDimensions() < 3)
-            throw InvalidInput("cannot use '" + path.string() + "': it has " +
-                               std::to_string(io->GetNumberOfDimensions()) + " dimensions; give a volume of three");
-        itk::ImageIORegion region(io->GetNumberOfDimensions());
-        for (unsigned axis = 0; axis < io->GetNumberOfDimensions(); ++axis)
-            region.SetSize(axis, io->GetDimensions(axis));
-        io->SetIORegion(region);
         const Geometry geometry = geometry_of(*io);
         require_valid(geometry, path.c_str());
-        return {geometry, read_voxels(*io, {geometry.size[2], geometry.size[1], geometry.size[0]}, path)};
+        if (format == Format::Nifti) return {geometry, read_nifti_voxels(path, read_nifti_header(path))};
+        require_scalar_or_vector(*io, path);
+        return {geometry, read_voxels(*io, geometry, path)};
     } catch (const itk::ExceptionObject& error) {
-        throw IoError("cannot read '" + path.string() + "': " + one_line(error));
+        throw IoError("cannot read '" + path.string() + "': " + one_line(error) + "; check or convert the file");
     } catch (const std::bad_alloc&) {
         throw IoError("cannot read '" + path.string() + "': it does not fit into memory");
     }

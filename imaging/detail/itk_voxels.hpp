@@ -9,11 +9,11 @@
 
 namespace tissuewarp::imaging::detail {
 
-/// Reads what `io` has been pointed at (ReadImageInformation done): `sizes` as OpenCV orders them, slice first.
-/// Integers wider than int32 become int32 when every value fits and float64 otherwise.
-cv::Mat read_voxels(itk::ImageIOBase& io, const std::vector<int>& sizes, const std::filesystem::path& path);
+/// Reads what `io` has been pointed at (ReadImageInformation done). Integers wider than int32 become int32 when every
+/// value fits and float64 otherwise. Throws InvalidInput on more than one volume and on other voxel types.
+cv::Mat read_voxels(itk::ImageIOBase& io, const Geometry& geometry, const std::filesystem::path& path);
 
-/// Origin, spacing and direction of the first three axes.
+/// Size, origin, spacing and direction of the first three axes.
 Geometry geometry_of(const itk::ImageIOBase& io);
 
 /// An ITK exception's message on one line, without ITK's file names and line numbers.

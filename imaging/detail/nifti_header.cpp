@@ -63,6 +63,7 @@ NiftiHeader read_nifti_header(const std::filesystem::path& path) {
 
     const Fields fields{bytes, leading != 348};
     NiftiHeader header;
+    header.swapped = fields.swapped;
     for (std::size_t i = 0; i < 8; ++i) {
         header.dim[i] = fields.at<std::int16_t>(40 + 2 * i);
         header.pixdim[i] = fields.at<float>(76 + 4 * i);

@@ -10,6 +10,7 @@
 namespace tissuewarp::imaging::detail {
 
 struct NiftiHeader {
+    bool swapped = false;      ///< the file's byte order is not this machine's
     std::array<int, 8> dim{};  ///< dim[0] is the number of dimensions
     int intent_code = 0;
     int datatype = 0, bits_per_voxel = 0;
