@@ -1,6 +1,7 @@
 #include "meshing/mesher.hpp"
 
 #include "meshing/detail/delaunay_refinement.hpp"
+#include "meshing/detail/relaxation.hpp"
 
 #include <Eigen/Dense>
 
@@ -98,11 +99,13 @@ TetMesh mesh_labels(const imaging::Volume& labels, const MeshingOptions& options
     const double distance = options.facet_distance > 0.0
                                 ? options.facet_distance
                                 : std::max(0.12 * shortest, 0.25 * std::cbrt(grid.spacing.prod()));
-    detail::RefinedMesh refined = detail::refine({grid, field, seeds, edges, distance, options}, observer);
-    place(refined.mesh, grid, labels.geometry);
-    require_valid(refined.mesh, "mesh_labels");
+    TetMesh mesh = detail::refine({grid, field, seeds, edges, distance, options}, observer);
+    observer.checkpoint("relaxing the mesh", 0.9);
+    detail::relax(mesh, {field, edges, grid.spacing.minCoeff(), distance, options.min_dihedral_deg});
+    place(mesh, grid, labels.geometry);
+    require_valid(mesh, "mesh_labels");
     observer.progress("meshing", 1.0);
-    return std::move(refined.mesh);
+    return mesh;
 }
 
 }  // namespace tissuewarp::meshing

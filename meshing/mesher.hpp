@@ -18,16 +18,20 @@ struct MeshingOptions {
     double facet_angle = 25.0;  ///< degrees, lower bound on triangle angles, at most 30
     double radius_edge_ratio = 2.0;  ///< upper bound on circumradius over shortest edge
     double smoothing = 0.8;  ///< voxels, Gaussian that turns voxel steps into smooth interfaces; 0 keeps the steps
-    double min_dihedral_deg = 10.0;  ///< sliver bound that perturbation and exudation work towards
-    double perturb_seconds = 3.0;    ///< time limit, 0 skips
-    double exude_seconds = 3.0;      ///< time limit, 0 skips
+    double min_dihedral_deg = 12.0;  ///< sliver bound that perturbation and exudation work towards
+    double perturb_seconds = 60.0;   ///< safety limit; reaching it ties the mesh to the machine; 0 skips
+    double exude_seconds = 60.0;     ///< safety limit, likewise; 0 skips
     std::vector<int> labels;         ///< labels to mesh; empty: all but 0
 };
 
 /// Meshes the labels of an int32 label volume. Smooth conforming interfaces: each label's indicator is smoothed and a
 /// point belongs to the label with the largest value. The result lies in LPS mm whatever the image's axes, is
-/// positively oriented, keeps label values, and has no unused nodes. Throws InvalidInput (no voxel of a requested
-/// label, edge length not positive or finer than a memory guard) and Cancelled.
+/// positively oriented, keeps label values, and has no unused nodes. Disconnected pieces smaller than half an element
+/// go to their surroundings (noted to the observer) unless a label has nothing larger. After refinement nodes move so
+/// that facets straddle the interfaces (no loss of volume) and the worst elements allow a longer time step.
+///
+/// Refinement is sequential: equal input gives the equal mesh, and a head takes seconds. Throws InvalidInput (no voxel
+/// of a requested label, edge length not positive or finer than a memory guard) and Cancelled.
 TetMesh mesh_labels(const imaging::Volume& labels, const MeshingOptions& options = {},
                     Observer& observer = silent_observer());
 

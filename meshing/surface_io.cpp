@@ -2,6 +2,8 @@
 #include "meshing/detail/surface_formats.hpp"
 #include "meshing/mesh_io.hpp"
 
+#include <Eigen/Dense>
+
 #include <charconv>
 #include <cstdint>
 #include <fstream>

@@ -7,9 +7,7 @@
 #include <CGAL/Mesh_triangulation_3.h>
 #include <CGAL/make_mesh_3.h>
 
-#include <chrono>
-#include <cstdio>
-#include <cstdlib>
+#include <algorithm>
 #include <unordered_map>
 
 namespace tissuewarp::meshing::detail {
@@ -49,21 +47,28 @@ private:
 
 using Criteria = CGAL::Mesh_criteria_3<Triangulation, CGAL::Mesh_edge_criteria_3<Triangulation>, FacetCriteria>;
 
-/// Target size of facets and cells: that of their label, the finer one on an interface.
+/// Bound on circumradii over target edge: measured on heads and balls, this makes the median edge the target.
+constexpr double radius_over_edge = 0.77;
+
+/// Facets whose surface ball is below this part of the target edge are left alone.
+constexpr double smallest_facet = 0.3;
+
+/// Bound on the circumradius of facets and cells: that of their label, the finer one on an interface.
 struct SizeField {
     using FT = Kernel::FT;
     using Index = Domain::Index;
 
     const Domain* domain;
     const std::vector<double>* edge_length;
-    double scale;
 
     FT operator()(const Point&, int dimension, const Index& index) const {
-        if (dimension == 3) return scale * size(domain->subdomain_index(index));
+        if (dimension == 3) return radius(domain->subdomain_index(index));
         const auto [a, b] = domain->surface_patch_index(index);
-        return scale * std::min(size(a), size(b));
+        return std::min(radius(a), radius(b));
     }
-    [[nodiscard]] double size(int label) const { return (*edge_length)[static_cast<std::size_t>(label)]; }
+    [[nodiscard]] double radius(int label) const {
+        return radius_over_edge * (*edge_length)[static_cast<std::size_t>(label)];
+    }
 };
 
 /// Calls of the label function between two polls of the observer: a few milliseconds.
@@ -97,9 +102,8 @@ void insert_seeds(const RefinementInput& input, const Domain& domain, Complex& c
     }
 }
 
-RefinedMesh extract(const Complex& complex) {
-    RefinedMesh result;
-    TetMesh& mesh = result.mesh;
+TetMesh extract(const Complex& complex) {
+    TetMesh mesh;
     const auto count = static_cast<Eigen::Index>(complex.number_of_cells_in_complex());
     mesh.tets.resize(4, count);
     mesh.labels.resize(count);
@@ -111,58 +115,38 @@ RefinedMesh extract(const Complex& complex) {
         for (int c = 0; c < 4; ++c) {
             const auto vertex = cell->vertex(c);
             const auto [entry, added] = index.try_emplace(&*vertex, static_cast<int>(points.size()));
-            if (added) {
-                points.push_back(vertex->point().point());
-                result.on_surface.push_back(complex.in_dimension(vertex) < 3);
-            }
+            if (added) points.push_back(vertex->point().point());
             mesh.tets(c, next) = entry->second;
         }
     }
     mesh.nodes.resize(3, static_cast<Eigen::Index>(points.size()));
     for (std::size_t n = 0; n < points.size(); ++n)
         mesh.nodes.col(static_cast<Eigen::Index>(n)) << points[n].x(), points[n].y(), points[n].z();
-    return result;
+    return mesh;
 }
 
 }  // namespace
 
-static double env(const char* n, double d) {
-    const char* s = std::getenv(n);
-    return s ? std::atof(s) : d;
-}
-static void lap(const char* what) {
-    static auto t = std::chrono::steady_clock::now();
-    auto n = std::chrono::steady_clock::now();
-    std::fprintf(stderr, "  [%s %.2f s]\n", what, std::chrono::duration<double>(n - t).count());
-    t = n;
-}
-
-RefinedMesh refine(const RefinementInput& input, Observer& observer) {
+TetMesh refine(const RefinementInput& input, Observer& observer) {
     namespace p = CGAL::parameters;
     const MeshingOptions& options = input.options;
     const Domain domain = make_domain(input, observer);
-    const SizeField facet_size{&domain, &input.edge_length, env("FS", .77)},
-        cell_size{&domain, &input.edge_length, env("CS", .77)};
-    const Criteria criteria(FacetCriteria(options.facet_angle, facet_size, input.facet_distance,
-                                          env("MIN", 0.3) * input.options.edge_length),
-                            Criteria::Cell_criteria(options.radius_edge_ratio, cell_size));
+    const SizeField size{&domain, &input.edge_length};
+    const double shortest = *std::min_element(input.edge_length.begin() + 1, input.edge_length.end());
+    const Criteria criteria(FacetCriteria(options.facet_angle, size, input.facet_distance, smallest_facet * shortest),
+                            Criteria::Cell_criteria(options.radius_edge_ratio, size));
     Complex complex;
-    lap("before");
     insert_seeds(input, domain, complex);
-    lap("seeds");
     observer.checkpoint("refining the mesh", 0.1);
     CGAL::refine_mesh_3(complex, domain, criteria, p::no_exude(), p::no_perturb(), p::no_odt(), p::no_lloyd(),
                         p::no_reset_c3t3());
-    lap("refine");
     observer.checkpoint("perturbing slivers", 0.6);
     if (options.perturb_seconds > 0.0)
         CGAL::perturb_mesh_3(complex, domain, p::time_limit = options.perturb_seconds,
                              p::sliver_bound = options.min_dihedral_deg);
-    lap("perturb");
     observer.checkpoint("exuding slivers", 0.8);
     if (options.exude_seconds > 0.0)
         CGAL::exude_mesh_3(complex, p::time_limit = options.exude_seconds, p::sliver_bound = options.min_dihedral_deg);
-    lap("exude");
     return extract(complex);
 }
 

@@ -17,12 +17,7 @@ struct RefinementInput {
     const MeshingOptions& options;
 };
 
-/// Tetrahedra in the local frame; their labels are classes.
-struct RefinedMesh {
-    TetMesh mesh;
-    std::vector<char> on_surface;  ///< per node: lies on an interface
-};
-
-RefinedMesh refine(const RefinementInput& input, Observer& observer);
+/// Tetrahedra in the local frame; their labels are classes. Sequential, so that equal input gives equal meshes.
+TetMesh refine(const RefinementInput& input, Observer& observer);
 
 }  // namespace tissuewarp::meshing::detail

@@ -1,0 +1,254 @@
+#include "meshing/detail/relaxation.hpp"
+
+#include "meshing/detail/faces.hpp"
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+namespace tissuewarp::meshing::detail {
+
+namespace {
+
+constexpr int fitting_rounds = 3, relaxing_rounds = 12;
+/// 1/√(Σ|∇N|²) over the target edge is 0.41 in the regular tetrahedron and about 0.2 at the median of a refined mesh;
+/// elements below this are worth improving.
+constexpr double wanted_step = 0.16;
+/// Fitting may not make an element worse than this.
+constexpr double least_step = 0.08;
+/// Below this even nodes move at which several interfaces or sharp edges meet.
+constexpr double desperate_step = 0.04;
+
+/// The worst of the elements around a node.
+struct Worst {
+    double step = 0.0;    ///< smallest 1/√(Σ|∇N|²) over target edge; 0 when one is inverted
+    double cosine = 1.0;  ///< of the smallest dihedral angle
+    int tet = -1;
+};
+
+class Relaxation {
+public:
+    Relaxation(TetMesh& mesh, const RelaxationInput& input)
+        : mesh_(mesh), input_(input), largest_cosine_(std::cos(input.min_dihedral_deg * std::numbers::pi / 180.0)) {
+        index_tets();
+        faces_ = interface_faces(mesh_);
+        active_.assign(static_cast<std::size_t>(mesh_.node_count()), true);
+    }
+
+    void run() {
+        for (int round = 0; round < fitting_rounds; ++round) fit();
+        for (int round = 0; round < relaxing_rounds; ++round)
+            if (relax_worst() == 0) break;
+        fit();
+    }
+
+private:
+    void index_tets() {
+        start_.assign(static_cast<std::size_t>(mesh_.node_count()) + 1, 0);
+        for (int node : mesh_.tets.reshaped()) ++start_[static_cast<std::size_t>(node) + 1];
+        for (std::size_t n = 1; n < start_.size(); ++n) start_[n] += start_[n - 1];
+        tets_.resize(static_cast<std::size_t>(start_.back()));
+        std::vector<int> next(start_.begin(), start_.end() - 1);
+        for (int t = 0; t < mesh_.tet_count(); ++t)
+            for (int node : mesh_.tets.col(t))
+                tets_[static_cast<std::size_t>(next[static_cast<std::size_t>(node)]++)] = t;
+    }
+
+    void measure(int t, Worst& worst) const {
+        Eigen::Matrix<double, 3, 4> areas;
+        const auto nodes = mesh_.tets.col(t);
+        for (int corner = 0; corner < 4; ++corner) {
+            const auto& c = face_corners[corner];
+            const Eigen::Vector3d origin = mesh_.nodes.col(nodes[c[0]]);
+            const Eigen::Vector3d a = mesh_.nodes.col(nodes[c[1]]) - origin, b = mesh_.nodes.col(nodes[c[2]]) - origin;
+            areas.col(corner) = 0.5 * a.cross(b);
+        }
+        const Eigen::Vector3d edge = mesh_.nodes.col(nodes[0]) - mesh_.nodes.col(nodes[1]);
+        const double volume = areas.col(0).dot(-edge) / 3.0;  // outward area times height of corner 0, below its face
+        if (!(volume > 0.0)) {
+            worst = {0.0, 1.0, t};
+            return;
+        }
+        const double step = 3.0 * volume / areas.norm() / input_.edge_length[static_cast<std::size_t>(mesh_.labels[t])];
+        if (step < worst.step) {
+            worst.step = step;
+            worst.tet = t;
+        }
+        for (const auto& [i, j] : edge_corners)
+            worst.cosine =
+                std::max(worst.cosine, -areas.col(i).dot(areas.col(j)) / (areas.col(i).norm() * areas.col(j).norm()));
+    }
+
+    [[nodiscard]] Worst around(int node) const {
+        Worst worst{1e300, -1.0, -1};
+        for (int e = start_[static_cast<std::size_t>(node)]; e < start_[static_cast<std::size_t>(node) + 1]; ++e) {
+            measure(tets_[static_cast<std::size_t>(e)], worst);
+            if (worst.step == 0.0) return worst;
+        }
+        return worst;
+    }
+
+    [[nodiscard]] bool angles_kept(const Worst& before, const Worst& after) const {
+        return after.step > 0.0 && after.cosine <= std::max(before.cosine, largest_cosine_);
+    }
+
+    /// Signed distance along `normal` from a point of a face to where its inner label ends; 0 when it is not near.
+    [[nodiscard]] double offset(const Eigen::Vector3d& point, const Eigen::Vector3d& normal, int inner) const {
+        const double limit = std::max(2.0 * input_.facet_distance, input_.voxel), step = 0.25 * input_.voxel;
+        const bool inside = input_.field(point) == inner;
+        const double side = inside ? 1.0 : -1.0;
+        double near = 0.0;
+        for (double far = step; near < limit; near = far, far += step) {
+            if ((input_.field(point + side * far * normal) == inner) == inside) continue;
+            for (int cut = 0; cut < 5; ++cut) {
+                const double middle = 0.5 * (near + far);
+                ((input_.field(point + side * middle * normal) == inner) == inside ? near : far) = middle;
+            }
+            return side * 0.5 * (near + far);
+        }
+        return 0.0;
+    }
+
+    void fit() {
+        Eigen::Matrix3Xd shift = Eigen::Matrix3Xd::Zero(3, mesh_.node_count());
+        Eigen::VectorXd weight = Eigen::VectorXd::Zero(mesh_.node_count());
+        for (const InterfaceFace& face : faces_) {
+            const Eigen::Matrix3d x = mesh_.nodes(Eigen::all, face.nodes);
+            const Eigen::Vector3d cross = (x.col(1) - x.col(0)).cross(x.col(2) - x.col(0));
+            const double twice_area = cross.norm();
+            if (!(twice_area > 0.0)) continue;
+            const Eigen::Vector3d normal = cross / twice_area;
+            double mean = 0.0;  // the three-point rule, exact for quadratic surfaces
+            for (int k = 0; k < 3; ++k)
+                mean += offset(x * (Eigen::Vector3d::Constant(1.0 / 6.0) + 0.5 * Eigen::Vector3d::Unit(k)), normal,
+                               face.inner) /
+                        3.0;
+            for (int node : face.nodes) {
+                shift.col(node) += twice_area * mean * normal;
+                weight[node] += twice_area;
+            }
+        }
+        for (int node = 0; node < mesh_.node_count(); ++node) {
+            if (!(weight[node] > 0.0)) continue;
+            const Worst before = around(node);
+            const Eigen::Vector3d home = mesh_.nodes.col(node), full = shift.col(node) / weight[node];
+            bool moved = false;
+            for (double part : {1.0, 0.5, 0.25}) {
+                mesh_.nodes.col(node) = home + part * full;
+                const Worst after = around(node);
+                moved = angles_kept(before, after) && after.step >= std::min(before.step, least_step);
+                if (moved) break;
+            }
+            if (!moved) mesh_.nodes.col(node) = home;
+        }
+    }
+
+    /// Unit normal of each interface node; NaN where several interfaces or a sharp edge meet, zero inside.
+    [[nodiscard]] Eigen::Matrix3Xd interface_normals() const {
+        Eigen::Matrix3Xd normals = Eigen::Matrix3Xd::Zero(3, mesh_.node_count());
+        Eigen::VectorXd area = Eigen::VectorXd::Zero(mesh_.node_count());
+        std::vector<std::pair<int, int>> labels(static_cast<std::size_t>(mesh_.node_count()), {-1, -1});
+        for (const InterfaceFace& face : faces_) {
+            const Eigen::Matrix3d x = mesh_.nodes(Eigen::all, face.nodes);
+            const Eigen::Vector3d cross = (x.col(1) - x.col(0)).cross(x.col(2) - x.col(0));
+            for (int node : face.nodes) {
+                auto& own = labels[static_cast<std::size_t>(node)];
+                const std::pair here{face.inner, face.outer};
+                if (own.first < 0) own = here;
+                if (own != here) normals.col(node).setConstant(std::nan(""));
+                normals.col(node) += cross;
+                area[node] += cross.norm();
+            }
+        }
+        for (int node = 0; node < mesh_.node_count(); ++node) {
+            if (!(area[node] > 0.0)) continue;
+            const bool smooth = normals.col(node).norm() > 0.8 * area[node];
+            if (smooth)
+                normals.col(node).normalize();
+            else
+                normals.col(node).setConstant(std::nan(""));
+        }
+        return normals;
+    }
+
+    /// Returns how many nodes moved.
+    int relax_worst() {
+        const Eigen::Matrix3Xd normals = interface_normals();
+        int moved = 0;
+        for (int node = 0; node < mesh_.node_count(); ++node) {
+            // A node fails again where nothing around it has changed.
+            if (!active_[static_cast<std::size_t>(node)]) continue;
+            active_[static_cast<std::size_t>(node)] = false;
+            Worst best = around(node);
+            Eigen::Vector3d normal = normals.col(node);
+            if (best.step >= (normal.allFinite() ? wanted_step : desperate_step)) continue;
+            if (!normal.allFinite()) normal.setZero();
+            const Worst before = best;
+            const Eigen::Vector3d home = mesh_.nodes.col(node);
+            Eigen::Vector3d place = home;
+            const double edge = input_.edge_length[static_cast<std::size_t>(mesh_.labels[best.tet])];
+            for (const Eigen::Vector3d& direction : directions(node, best.tet)) {
+                Eigen::Vector3d along = direction - direction.dot(normal) * normal;
+                if (along.norm() < 1e-12) continue;
+                along.normalize();
+                for (double length : {0.16, 0.08, 0.04, 0.02}) {
+                    mesh_.nodes.col(node) = home + length * edge * along;
+                    const Worst after = around(node);
+                    if (after.step <= best.step || !angles_kept(before, after)) continue;
+                    best = after;
+                    place = mesh_.nodes.col(node);
+                }
+            }
+            mesh_.nodes.col(node) = place;
+            if (place == home) continue;
+            ++moved;
+            for (int e = start_[static_cast<std::size_t>(node)]; e < start_[static_cast<std::size_t>(node) + 1]; ++e)
+                for (int neighbour : mesh_.tets.col(tets_[static_cast<std::size_t>(e)]))
+                    active_[static_cast<std::size_t>(neighbour)] = true;
+        }
+        return moved;
+    }
+
+    /// Towards the centroid of the neighbours, both ways across each edge's plane of the worst element, along the axes.
+    [[nodiscard]] std::array<Eigen::Vector3d, 10> directions(int node, int worst) const {
+        Eigen::Vector3d centroid = Eigen::Vector3d::Zero();
+        for (int e = start_[static_cast<std::size_t>(node)]; e < start_[static_cast<std::size_t>(node) + 1]; ++e)
+            centroid += mesh_.nodes(Eigen::all, mesh_.tets.col(tets_[static_cast<std::size_t>(e)])).rowwise().mean();
+        centroid /= start_[static_cast<std::size_t>(node) + 1] - start_[static_cast<std::size_t>(node)];
+        std::array<Eigen::Vector3d, 10> result;
+        result[0] = centroid - mesh_.nodes.col(node);
+        const auto nodes = mesh_.tets.col(worst);
+        for (int corner = 0; corner < 4; ++corner) {
+            if (nodes[corner] != node) continue;
+            const auto& c = face_corners[corner];  // away from the opposite face raises the height and the volume
+            const Eigen::Vector3d origin = mesh_.nodes.col(nodes[c[0]]);
+            const Eigen::Vector3d a = mesh_.nodes.col(nodes[c[1]]) - origin, b = mesh_.nodes.col(nodes[c[2]]) - origin;
+            result[1] = -a.cross(b);
+            result[2] = a.cross(b);
+            result[3] = result[0].normalized() + result[1].normalized();
+        }
+        for (int axis = 0; axis < 3; ++axis) {
+            result[static_cast<std::size_t>(4 + 2 * axis)] = Eigen::Vector3d::Unit(axis);
+            result[static_cast<std::size_t>(5 + 2 * axis)] = -Eigen::Vector3d::Unit(axis);
+        }
+        return result;
+    }
+
+    TetMesh& mesh_;
+    const RelaxationInput& input_;
+    double largest_cosine_;
+    std::vector<int> start_, tets_;  ///< tetrahedra around each node
+    std::vector<InterfaceFace> faces_;
+    std::vector<bool> active_;  ///< nodes worth trying to move
+};
+
+}  // namespace
+
+void relax(TetMesh& mesh, const RelaxationInput& input) {
+    Relaxation(mesh, input).run();
+}
+
+}  // namespace tissuewarp::meshing::detail
