@@ -4,6 +4,7 @@
 #include "meshing/primitives.hpp"
 
 #include <gtest/gtest.h>
+#include <oneapi/tbb/global_control.h>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
@@ -153,6 +154,17 @@ TEST_P(Reference, JacobiansFollowTheOrderOfTheMesh) {
     meshing::TetMesh deformed = model.mesh;
     deformed.nodes += u;
     EXPECT_LT((J.array() - meshing::tet_volumes(deformed).array() / before.array()).abs().maxCoeff(), 1e-12);
+}
+
+TEST_P(Reference, OneThreadAndManyGiveTheSameBits) {
+    const Matrix3Xd u = wavy(X);
+    const Matrix3Xd force = internal_force(rest, u);
+    const Eigen::SparseMatrix<double> K = tangent_stiffness(rest, u);
+    const double energy = elastic_energy(rest, u);
+    const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
+    EXPECT_EQ(force, internal_force(rest, u));
+    EXPECT_EQ(energy, elastic_energy(rest, u));
+    EXPECT_EQ((K - tangent_stiffness(rest, u)).norm(), 0.0);
 }
 
 TEST_P(Reference, InvertedTetrahedronIsInfiniteInEnergyAndRefusedInForce) {

@@ -1,6 +1,7 @@
 #include "tled/detail/cholmod_factor.hpp"
 
 #include <cholmod.h>
+#include <dlfcn.h>
 
 #include <algorithm>
 #include <string>
@@ -29,6 +30,29 @@ cholmod_sparse view(const Eigen::SparseMatrix<double>& lower) {
     return A;
 }
 
+// OpenBLAS's threads wait for each other by spinning: on small supernodes this costs more than it gives, and on busy
+// cores it multiplies the time. One thread while this lives, where `active` and where the BLAS is OpenBLAS.
+class SingleBlasThread {
+public:
+    explicit SingleBlasThread(bool active) {
+        static const auto get = reinterpret_cast<int (*)()>(dlsym(RTLD_DEFAULT, "openblas_get_num_threads"));
+        static const auto set = reinterpret_cast<void (*)(int)>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads"));
+        if (!active || !get || !set) return;
+        set_ = set;
+        before_ = get();
+        set(1);
+    }
+    ~SingleBlasThread() {
+        if (set_) set_(before_);
+    }
+    SingleBlasThread(const SingleBlasThread&) = delete;
+    SingleBlasThread& operator=(const SingleBlasThread&) = delete;
+
+private:
+    void (*set_)(int) = nullptr;
+    int before_ = 1;
+};
+
 // Lower triangle of the node graph of a matrix, as a pattern with unit values.
 Eigen::SparseMatrix<double> node_graph(const Eigen::SparseMatrix<double>& lower, const std::vector<int>& node_of,
                                        int node_count) {
@@ -56,6 +80,7 @@ struct CholmodFactor::Impl {
     mutable cholmod_common common{};
     cholmod_factor* L = nullptr;
     mutable cholmod_dense *x = nullptr, *y = nullptr, *e = nullptr;  // workspaces of cholmod_solve2
+    bool small = false;                                              // too little work for two BLAS threads
 
     Impl() {
         cholmod_start(&common);
@@ -122,6 +147,8 @@ CholmodFactor::CholmodFactor(const Eigen::SparseMatrix<double>& lower, const std
     cholmod_sparse matrix = view(lower);
     impl_->L = cholmod_analyze_p(&matrix, order.data(), nullptr, 0, &common);
     impl_->require_success("analyse");
+    constexpr double small_flops = 5e9;  // a third of a second on one core
+    impl_->small = common.fl < small_flops;
 }
 
 CholmodFactor::~CholmodFactor() = default;
@@ -131,6 +158,7 @@ CholmodFactor& CholmodFactor::operator=(CholmodFactor&&) noexcept = default;
 bool CholmodFactor::factorize(const Eigen::SparseMatrix<double>& lower) {
     cholmod_sparse matrix = view(lower);
     impl_->common.status = CHOLMOD_OK;
+    const SingleBlasThread single(impl_->small);
     cholmod_factorize(&matrix, impl_->L, &impl_->common);
     impl_->require_success("factorise");
     return impl_->common.status != CHOLMOD_NOT_POSDEF;
@@ -143,6 +171,7 @@ Eigen::VectorXd CholmodFactor::solve(const Eigen::VectorXd& b) const {
     right.x = const_cast<double*>(b.data());
     right.xtype = CHOLMOD_REAL;
     right.dtype = CHOLMOD_DOUBLE;
+    const SingleBlasThread single(impl_->small);
     cholmod_solve2(CHOLMOD_A, impl_->L, &right, nullptr, &impl_->x, nullptr, &impl_->y, &impl_->e, &impl_->common);
     impl_->require_success("solve with");
     return Eigen::Map<const Eigen::VectorXd>(static_cast<const double*>(impl_->x->x), b.size());

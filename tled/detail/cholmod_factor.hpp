@@ -23,7 +23,7 @@ public:
     /// False when the matrix is not positive definite. The pattern must be the one analysed.
     [[nodiscard]] bool factorize(const Eigen::SparseMatrix<double>& lower);
 
-    /// x with A x = b. Precondition: the last factorize() returned true.
+    /// x with A x = b. Precondition: the last factorize() returned true. Uses workspaces: one thread at a time.
     [[nodiscard]] Eigen::VectorXd solve(const Eigen::VectorXd& b) const;
 
     /// Entries of L.
