@@ -22,10 +22,16 @@ using detail::Match;
 /// Elements below which one step on the CPU costs less than the GPU's dispatches.
 constexpr int least_elements_for_gpu = 20000;
 
+bool has_gpu() {
+    const auto devices = shaders::list_devices();
+    return std::any_of(devices.begin(), devices.end(),
+                       [](const shaders::DeviceInfo& device) { return device.hardware && device.problem.empty(); });
+}
+
 std::unique_ptr<tled::Engine> make_engine(const PreparedModel& prepared, const UpdateOptions& options) {
     if (options.device == Device::Gpu) return tled::make_gpu_engine(prepared.rest, options.gpu_index);
-    const bool gpu = options.device == Device::Auto && shaders::has_hardware_device() &&
-                     prepared.rest.element_count() >= least_elements_for_gpu;
+    const bool gpu = options.device == Device::Auto && prepared.rest.element_count() >= least_elements_for_gpu &&
+                     has_gpu();
     if (gpu) return tled::make_gpu_engine(prepared.rest, options.gpu_index);
     return tled::make_cpu_engine(prepared.rest, tled::Scalar::Float32);
 }
@@ -39,10 +45,11 @@ double range_of(const UpdateOptions& options, int round) {
 
 /// Matches every interface node of the deformed mesh to the fixed boundary along its normal. `scale_mm` is that of the
 /// Geman–McClure weight (σ²/(σ² + d²))², which lowers what the model did not follow; infinite in the first round.
+/// `most_mm` bounds the distance that a round asks for, so that elements are not turned over.
 std::vector<Match> match_interfaces(const PreparedModel& prepared, const LabelBoundaryField& fixed,
                                     const Eigen::Isometry3d& placement, const Eigen::Matrix3Xd& displacement,
                                     const Eigen::Matrix3Xd& normals, double range_mm, double max_angle_deg,
-                                    double scale_mm) {
+                                    double scale_mm, double most_mm) {
     const auto& nodes = prepared.interfaces.nodes();
     std::vector<Match> matches(nodes.size());
     tbb::parallel_for(std::size_t{0}, nodes.size(), [&](std::size_t i) {
@@ -54,7 +61,7 @@ std::vector<Match> match_interfaces(const PreparedModel& prepared, const LabelBo
         const double distance = fixed.crossing(point, normal, node.inner, node.outer, range_mm, max_angle_deg);
         if (std::isnan(distance)) return;
         matches[i].found = true;
-        matches[i].distance_mm = distance - node.offset;
+        matches[i].distance_mm = std::clamp(distance - node.offset, -most_mm, most_mm);
         const double squared = scale_mm * scale_mm;
         matches[i].weight =
             std::isinf(scale_mm) ? 1.0 : std::pow(squared / (squared + std::pow(matches[i].distance_mm, 2)), 2);
@@ -120,7 +127,7 @@ UpdateResult update(const PreparedModel& prepared, const imaging::Volume& fixed_
         const Eigen::Matrix3Xd normals = interfaces.normals(prepared.model.mesh.nodes + u);
         const double scale = round == 0 ? INFINITY : std::max(options.residual_scale_mm, record.range_mm / 3);
         const std::vector<Match> matches =
-            match_interfaces(prepared, fixed, placement, u, normals, record.range_mm, options.max_angle_deg, scale);
+            match_interfaces(prepared, fixed, placement, u, normals, record.range_mm, options.max_angle_deg, scale, options.most_step_mm);
         const auto conditions = tled::nodal_conditions(
             detail::matched_springs(interfaces, matches, normals, u, prepared.options), prepared.rest.node_count);
         record.interface_nodes = static_cast<int>(matches.size());

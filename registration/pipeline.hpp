@@ -57,7 +57,8 @@ struct UpdateOptions {
     AlignmentOptions alignment;
     bool align = true;                            ///< false: the images are in one frame already
     int rematches = 8;                            ///< rounds of correspondence and equilibrium
-    double first_range_mm = 25.0;                 ///< correspondence search range of the first round
+    double most_step_mm = 6.0;                    ///< most that one round asks a surface node to move
+    double first_range_mm = 15.0;                 ///< correspondence search range of the first round
     double last_range_mm = 4.0;                   ///< and of the last, geometric in between
     double max_angle_deg = 50.0;                  ///< between mesh normal and image boundary normal
     double residual_scale_mm = 1.0;               ///< Geman–McClure scale of the last round for what the model cannot follow

@@ -60,6 +60,7 @@ double highest_eigenvalue(Engine& engine, const Eigen::Matrix3Xd& mass, const Ei
 }
 
 constexpr int power_iterations = 20;
+constexpr double least_starting_jacobian = 0.1;
 constexpr double step_safety = 1.15;  // on λ_max: power iteration approaches from below, stiffness grows under load
 
 class Relaxation {
@@ -123,14 +124,17 @@ private:
     int restarts_ = 0;
     EquilibriumResult result_;
 
-    /// Starts from the given displacement, or from the part of it that leaves no element inverted.
+    /// Starts from `start` plus the linear-elastic answer to the residual there, or as much of that answer as leaves no
+    /// element inverted: loads applied at once would tear the nodes next to them.
     void begin_from(const Eigen::Matrix3Xd& start) {
-        double scale = 1;
-        for (int halving = 0; halving < 8; ++halving, scale *= 0.5) {
-            engine_.set_state(scale * start, Eigen::Matrix3Xd::Zero(3, start.cols()));
+        const Eigen::Matrix3Xd still = Eigen::Matrix3Xd::Zero(3, start.cols());
+        engine_.set_state(start, still);
+        const Eigen::Matrix3Xd correction = lifted();
+        for (double part = 1; part > 0.01; part *= 0.7) {
+            engine_.set_state(start + part * correction, still);
             const Observation seen = engine_.observe();
             result_.force_evaluations += 2;
-            if (!seen.finite || seen.min_jacobian <= 0.05) continue;
+            if (!seen.finite || seen.min_jacobian <= least_starting_jacobian) continue;
             good_ = engine_.displacement();
             good_residual_ = seen.residual_max;
             estimate_spectrum();
@@ -145,12 +149,13 @@ private:
         spectrum_.lowest = std::min(preset_, spectrum_.highest / 4);
     }
 
-    /// The lifted residual ‖K₀⁻¹ r‖∞: displacement error in mm to first order.
-    double lifted_residual() {
+    /// The lifted residual K₀⁻¹ r, mm: to first order the displacement still missing.
+    Eigen::Matrix3Xd lifted() {
         ++result_.lifted_residuals;
         ++result_.force_evaluations;
-        return largest_norm(stiffness_.solve(engine_.residual(), conditions_, 1e-2));
+        return stiffness_.solve(engine_.residual(), conditions_, 1e-2);
     }
+    double lifted_residual() { return largest_norm(lifted()); }
 
     /// The motion decays by √ρ per step, so what remains is about the last increment over 1 − √ρ.
     [[nodiscard]] double expected_error(const Observation& seen) const {
