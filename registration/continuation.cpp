@@ -17,15 +17,30 @@ using Vec4 = Eigen::Array4f;  // x, y, z and an unused fourth lane, so that one 
 
 constexpr double finest_spacing = 2.5;   // mm; finer grids change the field by less than the layer corrects
 constexpr double most_nodes = 1.2e6;     // larger organs get a coarser grid
+constexpr double stiffening = 0.2;       // |∇u| from which the continuation resists steeper gradients
 constexpr double blend_spacings = 1.75;  // thickness of the correcting layer at the surface, in grid spacings
+
+/// Why a node is fixed; 0 is free.
+enum : std::uint8_t { in_mesh = 1, on_sheet, at_rest };
+
+/// How the six neighbours of a free node beside the mesh are seen: a neighbour inside is replaced by the surface,
+/// `fraction` of the spacing away (Shortley and Weller 1938).
+struct SurfaceLinks {
+    std::array<float, 6> fraction{1, 1, 1, 1, 1, 1};
+    std::array<Vec4, 6> value{};  // where fraction < 1
+};
 
 /// Node values on a regular grid; fixed nodes are Dirichlet data.
 struct Level {
     std::array<int, 3> size{};
+    double spacing;
     std::vector<Vec4> value;
     std::vector<std::uint8_t> fixed;
+    std::vector<float> stiffness;  // of free nodes; 0 where fixed
+    std::vector<int> links_of;     // index into `links` or −1; empty when no node has links
+    std::vector<SurfaceLinks> links;
 
-    explicit Level(const std::array<int, 3>& nodes) : size(nodes) {
+    Level(const std::array<int, 3>& nodes, double spacing_mm) : size(nodes), spacing(spacing_mm) {
         const std::size_t count =
             static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(size[2]);
         value.assign(count, Vec4::Zero());
@@ -36,29 +51,79 @@ struct Level {
                static_cast<std::size_t>(size[0]) *
                    (static_cast<std::size_t>(j) + static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(k));
     }
+    /// Offsets to the neighbours −i, +i, −j, +j, −k, +k.
+    [[nodiscard]] std::array<std::ptrdiff_t, 6> neighbours() const {
+        const std::ptrdiff_t row = size[0], slice = row * size[1];
+        return {-1, 1, -row, row, -slice, slice};
+    }
+    [[nodiscard]] const SurfaceLinks* links_at(std::size_t n) const {
+        return links.empty() || links_of[n] < 0 ? nullptr : &links[static_cast<std::size_t>(links_of[n])];
+    }
 };
 
-/// One red-black sweep of successive over-relaxation on the seven-point Laplacian; the border of the grid stays.
+/// Calls visit(n) for the inner free nodes of one colour (0, 1) or of both (−1), in parallel.
+template <class Visit>
+void for_each_free(const Level& level, int colour, const Visit& visit) {
+    tbb::parallel_for(1, level.size[2] - 1, [&](int k) {
+        for (int j = 1; j < level.size[1] - 1; ++j) {
+            const int first = colour < 0 ? 1 : 1 + (j + k + colour) % 2;
+            for (int i = first; i < level.size[0] - 1; i += colour < 0 ? 1 : 2)
+                if (const std::size_t n = level.at(i, j, k); !level.fixed[n]) visit(n);
+        }
+    });
+}
+
+/// 1 + (|∇u| / s)² at the free nodes, |∇u|² from the mean of the one-sided differences; averaged with the value before,
+/// without which the alternation of weights and values oscillates.
+void update_stiffness(Level& level) {
+    const auto neighbours = level.neighbours();
+    const float scale = static_cast<float>(0.5 / (level.spacing * level.spacing * stiffening * stiffening));
+    level.stiffness.resize(level.value.size(), 0.0F);
+    for_each_free(level, -1, [&](std::size_t n) {
+        const Vec4* v = level.value.data() + n;
+        const SurfaceLinks* links = level.links_at(n);
+        Vec4 sum = Vec4::Zero();
+        for (std::size_t e = 0; e < 6; ++e) {
+            const bool cut = links && links->fraction[e] < 1.0F;
+            const Vec4 difference =
+                cut ? Vec4((links->value[e] - *v) / links->fraction[e]) : Vec4(v[neighbours[e]] - *v);
+            sum += difference.square();
+        }
+        const float relative = scale * (sum[0] + sum[1] + sum[2]);
+        const float wanted = 1.0F + relative;
+        level.stiffness[n] = level.stiffness[n] > 0.0F ? 0.5F * (level.stiffness[n] + wanted) : wanted;
+    });
+}
+
+/// One red-black sweep of successive over-relaxation; the border of the grid stays. An edge has the mean stiffness of
+/// its ends, or of its free end.
 void relax(Level& level, float omega) {
-    const std::size_t row = static_cast<std::size_t>(level.size[0]);
-    const std::size_t slice = row * static_cast<std::size_t>(level.size[1]);
+    const auto neighbours = level.neighbours();
     for (int colour = 0; colour < 2; ++colour) {
-        tbb::parallel_for(1, level.size[2] - 1, [&](int k) {
-            for (int j = 1; j < level.size[1] - 1; ++j) {
-                for (int i = 1 + (j + k + colour) % 2; i < level.size[0] - 1; i += 2) {
-                    const std::size_t n = level.at(i, j, k);
-                    if (level.fixed[n]) continue;
-                    const Vec4* v = level.value.data() + n;
-                    const Vec4 mean = (v[-1] + v[1] + *(v - row) + v[row] + *(v - slice) + v[slice]) * (1.0F / 6.0F);
-                    level.value[n] += omega * (mean - *v);
+        for_each_free(level, colour, [&](std::size_t n) {
+            const Vec4* v = level.value.data() + n;
+            const float* stiffness = level.stiffness.data() + n;
+            const SurfaceLinks* links = level.links_at(n);
+            Vec4 sum = Vec4::Zero();
+            float weights = 0.0F;
+            for (std::size_t e = 0; e < 6; ++e) {
+                const float other = stiffness[neighbours[e]];
+                float weight = *stiffness + (other > 0.0F ? other : *stiffness);
+                if (links && links->fraction[e] < 1.0F) {
+                    weight /= links->fraction[e];
+                    sum += weight * links->value[e];
+                } else {
+                    sum += weight * v[neighbours[e]];
                 }
+                weights += weight;
             }
+            level.value[n] += omega * (sum / weights - *v);
         });
     }
 }
 
 Level coarsened(const Level& fine) {
-    Level coarse({(fine.size[0] + 1) / 2, (fine.size[1] + 1) / 2, (fine.size[2] + 1) / 2});
+    Level coarse({(fine.size[0] + 1) / 2, (fine.size[1] + 1) / 2, (fine.size[2] + 1) / 2}, 2.0 * fine.spacing);
     for (int k = 0; k < coarse.size[2]; ++k)
         for (int j = 0; j < coarse.size[1]; ++j)
             for (int i = 0; i < coarse.size[0]; ++i) {
@@ -89,17 +154,22 @@ void prolong(const Level& coarse, Level& fine) {
     });
 }
 
-/// Cascadic multigrid (Bornemann and Deuflhard 1996): solved coarse to fine, each level starting from the one below. A
-/// few sweeps a level suffice, because what is left is small and smooth.
-void solve_laplace(Level& level) {
+/// Minimises ∫ ½ |∇u|² + |∇u|⁴ / (4 s²): harmonic where gradients are small, and where harmonic functions would be
+/// steep enough to fold (beside edges and narrow bumps) closer to the extension of least slope. Cascadic multigrid
+/// (Bornemann and Deuflhard 1996): solved coarse to fine, each level starting from the one below. A few sweeps a level
+/// suffice, because what is left is small and smooth.
+void solve(Level& level) {
     const bool coarsest = *std::min_element(level.size.begin(), level.size.end()) < 16;
     if (!coarsest) {
         Level coarse = coarsened(level);
-        solve_laplace(coarse);
+        solve(coarse);
         prolong(coarse, level);
     }
-    const int sweeps = coarsest ? 60 : 10;
-    for (int sweep = 0; sweep < sweeps; ++sweep) relax(level, coarsest ? 1.7F : 1.4F);
+    const int rounds = coarsest ? 20 : 4;
+    for (int round = 0; round < rounds; ++round) {
+        update_stiffness(level);
+        for (int sweep = 0; sweep < 3; ++sweep) relax(level, 1.4F);
+    }
 }
 
 }  // namespace
@@ -113,14 +183,15 @@ struct Continuation::Impl {
     Impl(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tets, const meshing::BoundarySurface& boundary,
          const Eigen::Matrix3Xd& values, double fade_mm)
         : spacing(spacing_for(nodes, fade_mm)),
-          grid(size_for(nodes, fade_mm)),
+          grid(size_for(nodes, fade_mm), spacing),
           surface(nodes, boundary, values, blend_spacings * spacing) {
         lower = nodes.rowwise().minCoeff().array() - fade_mm - 2.0 * spacing;
         const Eigen::Matrix3Xd index = (nodes.colwise() - lower) / spacing;
         fix_inside(index, tets, values);
         fix_thin_parts(index, boundary);
         fix_far(index, boundary, fade_mm);
-        solve_laplace(grid);
+        link_surface();
+        solve(grid);
     }
 
     static Eigen::Array3d extent_for(const Eigen::Matrix3Xd& nodes, double fade_mm) {
@@ -143,7 +214,7 @@ struct Continuation::Impl {
             for (int i = row.first; i <= row.last; ++i) {
                 const std::size_t n = grid.at(i, row.j, row.k);
                 if (grid.fixed[n]) continue;
-                grid.fixed[n] = 1;
+                grid.fixed[n] = in_mesh;
                 set(n, corners * (row.at_first + row.step * (i - row.first)));
             }
         });
@@ -166,7 +237,42 @@ struct Continuation::Impl {
                 thin.push_back(n);
             }
         }
-        for (const std::size_t n : thin) grid.fixed[n] = 1;
+        for (const std::size_t n : thin) grid.fixed[n] = on_sheet;
+    }
+
+    /// Cuts the edges from free nodes into the mesh at the surface.
+    void link_surface() {
+        const auto neighbours = grid.neighbours();
+        std::vector<std::size_t> nodes;
+        for (int k = 1; k < grid.size[2] - 1; ++k)
+            for (int j = 1; j < grid.size[1] - 1; ++j)
+                for (int i = 1; i < grid.size[0] - 1; ++i) {
+                    const std::size_t n = grid.at(i, j, k);
+                    if (grid.fixed[n]) continue;
+                    bool beside = false;
+                    for (const auto offset : neighbours) beside = beside || grid.fixed[n + offset] == in_mesh;
+                    if (beside) nodes.push_back(n);
+                }
+        grid.links_of.assign(grid.value.size(), -1);
+        grid.links.resize(nodes.size());
+        tbb::parallel_for(std::size_t{0}, nodes.size(), [&](std::size_t l) {
+            const std::size_t n = nodes[l];
+            const Eigen::Vector3d point = point_of(index_of(n));
+            const auto free_end = surface.closest(point);
+            for (std::size_t e = 0; free_end && e < 6; ++e) {
+                if (grid.fixed[n + neighbours[e]] != in_mesh) continue;
+                const Eigen::Vector3d edge = point_of(index_of(n + neighbours[e])) - point;
+                const auto fixed_end = surface.closest(point + edge);
+                if (!fixed_end) continue;
+                // Where the distance to the surface, linear along the edge, vanishes.
+                const double fraction = free_end->distance / std::max(free_end->distance + fixed_end->distance, 1e-9);
+                const auto crossing = surface.closest(point + fraction * edge);
+                if (!crossing) continue;
+                grid.links[l].fraction[e] = static_cast<float>(std::clamp(fraction, 0.1, 0.999));
+                grid.links[l].value[e].head<3>() = crossing->value.cast<float>();
+            }
+            grid.links_of[n] = static_cast<int>(l);
+        });
     }
 
     /// Zero from the fade distance on.
@@ -182,12 +288,17 @@ struct Continuation::Impl {
         }
         const imaging::Volume distance = imaging::signed_distance(mesh);
         for (std::size_t n = 0; n < grid.fixed.size(); ++n)
-            if (distance.data<float>()[n] >= fade_mm) grid.fixed[n] = 1;
+            if (distance.data<float>()[n] >= fade_mm) grid.fixed[n] = at_rest;
     }
 
     void set(std::size_t n, const Eigen::Vector3d& value) { grid.value[n].head<3>() = value.cast<float>(); }
     [[nodiscard]] Eigen::Vector3d point_of(const Eigen::Vector3i& node) const {
         return lower + spacing * node.cast<double>();
+    }
+
+    [[nodiscard]] Eigen::Vector3i index_of(std::size_t n) const {
+        const std::size_t row = static_cast<std::size_t>(grid.size[0]), rows = static_cast<std::size_t>(grid.size[1]);
+        return Eigen::Array<std::size_t, 3, 1>(n % row, n / row % rows, n / row / rows).cast<int>().matrix();
     }
 
     /// Trilinear value; zero outside the grid.

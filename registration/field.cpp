@@ -79,18 +79,26 @@ void complete(Raster& raster, const Geometry& grid, const Eigen::Matrix3d& rotat
     raster.values.geometry = grid;
 }
 
-/// X − z with X + u(X) = z, u the continued forward field: fixed-point steps from the continued inverse, as long as
-/// they bring the residual down (they do where the field does not fold).
+/// w = X − z with X + u(X) = z, u the continued forward field: Broyden steps (his first method, Math. Comp. 19, 1965)
+/// from the continued inverse, shortened until the residual falls, which it does where the field does not fold.
+/// The gradient just outside the mesh is close to a rank-one matrix, ∂u/∂n ⊗ n, which one update learns.
 Eigen::Vector3d inverted(const detail::Continuation& forward, const Eigen::Vector3d& z, Eigen::Vector3d w) {
     constexpr double negligible = 0.01;  // mm
-    constexpr int steps = 3;
-    if (w.squaredNorm() < negligible * negligible) return w;
+    constexpr int most_steps = 6, most_halvings = 3;
+    Eigen::Matrix3d inverse_gradient = Eigen::Matrix3d::Identity();
     Eigen::Vector3d residual = w + forward(z + w);
-    for (int step = 0; step < steps && residual.squaredNorm() > negligible * negligible; ++step) {
-        const Eigen::Vector3d next = w - residual;
-        const Eigen::Vector3d next_residual = next + forward(z + next);
-        if (next_residual.squaredNorm() >= residual.squaredNorm()) break;
-        w = next;
+    for (int step = 0; step < most_steps && residual.squaredNorm() > negligible * negligible; ++step) {
+        Eigen::Vector3d change = -inverse_gradient * residual, next_residual;
+        int halvings = 0;
+        for (;; ++halvings, change *= 0.5) {
+            next_residual = w + change + forward(z + w + change);
+            if (next_residual.squaredNorm() < residual.squaredNorm() || halvings == most_halvings) break;
+        }
+        if (halvings == most_halvings) break;
+        const Eigen::Vector3d predicted = inverse_gradient * (next_residual - residual);
+        if (const double scale = change.dot(predicted); std::abs(scale) > 1e-12)
+            inverse_gradient += (change - predicted) * (change.transpose() * inverse_gradient) / scale;
+        w += change;
         residual = next_residual;
     }
     return w;

@@ -1,10 +1,12 @@
 #pragma once
 /// Displacement fields on image grids, in both directions.
 ///
-/// Inside the mesh the forward field is the finite-element field, and the backward field its exact inverse: the deformed
-/// tetrahedra are rasterised over the grid and each voxel centre is carried back through its barycentric coordinates.
-/// Outside the mesh both continue it: equal to the field on the surface, and from there harmonically into the rigid
-/// placement, which is reached `fade_mm` away from the organ.
+/// Inside the mesh the forward field is the finite-element field, and the backward field its exact inverse: the
+/// deformed tetrahedra are rasterised over the grid and each voxel centre is carried back through its barycentric
+/// coordinates. Outside the mesh both continue it: equal to the field on the surface, and from there smoothly
+/// (harmonically where it is gentle, with less slope where that would fold) into the rigid placement, reached `fade_mm`
+/// away from the organ. There the backward field inverts the forward one numerically, to about 0.01 mm where the field
+/// does not fold.
 
 #include "core/observer.hpp"
 #include "imaging/volume.hpp"

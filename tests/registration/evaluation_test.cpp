@@ -1,0 +1,282 @@
+#include "registration/evaluation.hpp"
+
+#include "core/errors.hpp"
+#include "shapes.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+
+namespace tissuewarp::registration {
+namespace {
+
+using imaging::Geometry;
+using imaging::Volume;
+using test::for_each_voxel;
+using ::testing::HasSubstr;
+
+TEST(Summary, TakesPercentilesLinearlyBetweenOrderStatistics) {
+    const Summary summary = summarise({4.0, 1.0, 3.0, 2.0});
+    EXPECT_EQ(summary.count, 4);
+    EXPECT_DOUBLE_EQ(summary.mean, 2.5);
+    EXPECT_DOUBLE_EQ(summary.median, 2.5);
+    EXPECT_DOUBLE_EQ(summary.percentile_95, 3.85);  // numpy.percentile([1, 2, 3, 4], 95)
+    EXPECT_DOUBLE_EQ(summary.maximum, 4.0);
+}
+
+TEST(Summary, OfOneValueAndOfNone) {
+    const Summary one = summarise({7.0});
+    EXPECT_EQ(one.median, 7.0);
+    EXPECT_EQ(one.percentile_95, 7.0);
+    EXPECT_EQ(summarise({}).count, 0);
+    EXPECT_THROW(summarise({1.0, std::nan("")}), InvalidInput);
+}
+
+TEST(TargetError, SeparatesLandmarksThatMoved) {
+    Landmarks landmarks{Eigen::Matrix3Xd::Zero(3, 3), Eigen::Matrix3Xd::Zero(3, 3)};
+    landmarks.fixed.row(0) << 0.0, 3.0, 5.0;
+    Eigen::Matrix3Xd mapped = Eigen::Matrix3Xd::Zero(3, 3);
+    mapped.row(0) << 0.0, 3.0, 4.0;
+    mapped.row(1) << 1.0, 0.0, 0.0;
+    const TargetError error = target_error(landmarks, mapped, 2.0);
+    EXPECT_DOUBLE_EQ(error.before.mean, 8.0 / 3.0);
+    EXPECT_DOUBLE_EQ(error.after.mean, 2.0 / 3.0);
+    EXPECT_EQ(error.moved_after.count, 2);
+    EXPECT_DOUBLE_EQ(error.moved_before.mean, 4.0);
+    EXPECT_DOUBLE_EQ(error.moved_after.mean, 0.5);
+    EXPECT_THROW(target_error(landmarks, Eigen::Matrix3Xd::Zero(3, 2)), InvalidInput);
+}
+
+/// Voxels whose index satisfies `inside` get the label.
+template <class Inside>
+void paint(Volume& labels, int label, const Inside& inside) {
+    for_each_voxel(labels, [&](const Eigen::Vector3d& index, std::int64_t n) {
+        if (inside(index)) labels.data<std::int32_t>()[n] = label;
+    });
+}
+
+auto box(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper) {
+    return [=](const Eigen::Vector3d& i) {
+        return (i.array() >= lower.array()).all() && (i.array() < upper.array()).all();
+    };
+}
+
+TEST(Overlap, OfAMapWithItselfIsPerfect) {
+    Volume labels(test::oblique_grid({0, 0, 0}, {20, 20, 20}, {1, 2, 3}), CV_32SC1);
+    paint(labels, 2, box({3, 3, 3}, {12, 12, 12}));
+    paint(labels, 5, box({12, 3, 3}, {17, 12, 12}));
+    const auto result = overlap(labels, labels);
+    ASSERT_EQ(result.size(), 3U);
+    for (const int label : {0, 2, 5}) {
+        EXPECT_DOUBLE_EQ(result.at(label).dice, 1.0);
+        EXPECT_EQ(result.at(label).mean_surface_distance_mm, 0.0);
+        EXPECT_EQ(result.at(label).hausdorff_95_mm, 0.0);
+    }
+}
+
+TEST(Overlap, OfShiftedBoxesHasTheValuesCountedByHand) {
+    // Two cubes of 10 voxels, 2 apart along an axis with spacing 1.5 mm: Dice 8/10. Of the 600 faces of a cube the 100
+    // at either end lie 3 mm from the other cube, and 2 columns × 40 side faces stick out: their centres are 0.5 or 1.5
+    // voxels beyond the other cube's end face in x, and √(0.5² + …) away from its nearest face centre.
+    Geometry grid = test::plain_grid({24, 16, 16});
+    grid.spacing = {1.5, 1.0, 1.0};
+    Volume a(grid, CV_32SC1), b(grid, CV_32SC1);
+    paint(a, 1, box({4, 3, 3}, {14, 13, 13}));
+    paint(b, 1, box({6, 3, 3}, {16, 13, 13}));
+    const Overlap result = overlap(a, b).at(1);
+    EXPECT_DOUBLE_EQ(result.dice, 0.8);
+    // End face of a, x = 3.5 (voxels): b's end face is 3 mm away, but faces near the rim of a's end may lie closer to
+    // b's side faces, whose first centres are at x = 6: hypot(2.5·1.5, 0.5) > 3, so 3 mm it is for all 100. The other
+    // end of a, x = 13.5, lies inside b: nearest are b's side faces at depth d and b's end at 3 mm.
+    double sum = 100 * 3.0, largest = 3.0;
+    for (int y = 0; y < 10; ++y)
+        for (int z = 0; z < 10; ++z) {  // depth from the side to the face centre, and half a voxel along x to centres
+            const double depth = 0.5 + std::min({y, z, 9 - y, 9 - z});
+            sum += std::min(3.0, std::hypot(depth, 0.75));
+        }
+    for (const double x : {1.5, 0.5})  // protruding side columns: to b's side centre at x + 0.5 … or its end face rim
+        sum += 40 * std::min(std::hypot(x * 1.5, 0.5), (x + 0.5) * 1.5);
+    EXPECT_NEAR(result.mean_surface_distance_mm, sum / 600.0, 1e-9);
+    EXPECT_DOUBLE_EQ(result.hausdorff_95_mm, largest);
+}
+
+TEST(Overlap, OfConcentricBallsIsTheDifferenceOfTheirRadii) {
+    const Geometry grid = test::plain_grid({64, 64, 64}, 0.5);
+    Volume a(grid, CV_16UC1), b(grid, CV_8UC1);
+    for_each_voxel(a, [&](const Eigen::Vector3d& index, std::int64_t n) {
+        const double r = (grid.point(index) - Eigen::Vector3d::Constant(15.75)).norm();
+        a.data<std::uint16_t>()[n] = r < 10.0 ? 3 : 0;
+        b.data<std::uint8_t>()[n] = r < 13.0 ? 3 : 0;
+    });
+    const Overlap result = overlap(a, b).at(3);
+    EXPECT_NEAR(result.dice, 2.0 * 1000.0 / (1000.0 + 2197.0), 0.003);
+    EXPECT_NEAR(result.mean_surface_distance_mm, 3.0, 0.15);
+    EXPECT_NEAR(result.hausdorff_95_mm, 3.0, 0.35);  // voxel steps of 0.5 mm
+}
+
+TEST(Overlap, OfALabelMissingInOneMapIsZeroAndInfinitelyFar) {
+    Volume a(test::plain_grid({12, 12, 12}), CV_32SC1), b = a.clone();
+    paint(a, 1, box({2, 2, 2}, {8, 8, 8}));
+    paint(a, 4, box({3, 3, 3}, {5, 5, 5}));
+    paint(b, 1, box({2, 2, 2}, {8, 8, 8}));
+    for (const auto& result : {overlap(a, b), overlap(b, a)}) {
+        EXPECT_EQ(result.at(4).dice, 0.0);
+        EXPECT_TRUE(std::isinf(result.at(4).hausdorff_95_mm));
+        EXPECT_DOUBLE_EQ(result.at(0).dice, 1.0);  // the union does not see the inner label
+        EXPECT_EQ(result.at(0).hausdorff_95_mm, 0.0);
+    }
+}
+
+TEST(Overlap, OfDifferentGridsIsRefused) {
+    Volume a(test::plain_grid({12, 12, 12}), CV_32SC1), b(test::plain_grid({12, 12, 12}, 1.01), CV_32SC1);
+    EXPECT_THROW(overlap(a, b), InvalidInput);
+    EXPECT_THROW(overlap(a, Volume(a.geometry, CV_32FC1)), InvalidInput);
+}
+
+TEST(MeshJacobians, OfAStretchIsItsFactorAndWeighsByVolume) {
+    meshing::TetMesh mesh = meshing::box_mesh({10, 10, 20}, {1, 1, 2});
+    // The lower cell keeps its height, the upper one doubles.
+    const Deformation deformation =
+        test::deformed_by(mesh, [](const auto& X) { return Eigen::Vector3d(0, 0, std::max(X[2] - 10.0, 0.0)); });
+    const JacobianReport report = mesh_jacobians(deformation);
+    EXPECT_NEAR(report.minimum, 1.0, 1e-12);
+    EXPECT_NEAR(report.maximum, 2.0, 1e-12);
+    EXPECT_NEAR(report.median, 1.5, 1e-12);  // halfway between the two halves of equal volume
+    EXPECT_EQ(report.folded, 0);
+
+    meshing::TetMesh uneven = meshing::box_mesh({10, 10, 20}, {1, 1, 2});
+    for (auto node : uneven.nodes.colwise())
+        if (node[2] == 10.0) node[2] = 18.0;
+    const JacobianReport weighted = mesh_jacobians(
+        test::deformed_by(uneven, [](const auto& X) { return Eigen::Vector3d(0, 0, std::max(X[2] - 18.0, 0.0)); }));
+    EXPECT_NEAR(weighted.median, 1.0, 1e-12);  // nine tenths of the volume
+    EXPECT_NEAR(weighted.percentile_99, 2.0, 1e-12);
+}
+
+TEST(MeshJacobians, FindsAMirroredElement) {
+    const meshing::TetMesh mesh = test::box_at({100, 0, 0}, {10, 10, 10}, {1, 1, 1});
+    const Deformation deformation =
+        test::deformed_by(mesh, [](const auto& X) { return Eigen::Vector3d(-2.0 * (X[0] - 100.0), 0, 0); });
+    const JacobianReport report = mesh_jacobians(deformation);
+    EXPECT_NEAR(report.maximum, -1.0, 1e-12);
+    EXPECT_EQ(report.folded, 6);
+    EXPECT_NEAR(report.folded_mm3, 1000.0, 1e-9);
+    ASSERT_EQ(report.folded_places.size(), 6U);
+    for (const auto& place : report.folded_places) EXPECT_NEAR(place[0], 105.0, 5.0);  // rest positions
+}
+
+TEST(FieldJacobians, FindsAFoldItsVolumeAndItsPlace) {
+    const Geometry grid = test::oblique_grid({0, 0, 0}, {21, 5, 5}, {2.0, 1.0, 1.5});
+    Volume field(grid, CV_32FC3);
+    // Along axis i the points of voxels 10 and 11 change order: d jumps by −3 voxels between them.
+    for_each_voxel(field, [&](const Eigen::Vector3d& index, std::int64_t n) {
+        const Eigen::Vector3d d =
+            index[0] > 10 ? Eigen::Vector3d(-6.0 * grid.direction.col(0)) : Eigen::Vector3d::Zero();
+        for (int c = 0; c < 3; ++c) field.data<cv::Vec3f>()[n][c] = static_cast<float>(d[c]);
+    });
+    const JacobianReport report = field_jacobians(field);
+    EXPECT_NEAR(report.minimum, 1.0 - 1.5, 1e-5);  // central difference: −6 mm over 4 mm
+    EXPECT_EQ(report.folded, 2 * 25);
+    EXPECT_NEAR(report.folded_mm3, 50 * 3.0, 1e-9);
+    ASSERT_EQ(report.folded_places.size(), 20U);
+    for (const auto& place : report.folded_places) EXPECT_NEAR(grid.index(place)[0], 10.5, 0.5 + 1e-9);
+    EXPECT_NEAR(report.median, 1.0, 1e-5);
+
+    Volume mask(grid, CV_8UC1);
+    for_each_voxel(mask,
+                   [&](const Eigen::Vector3d& index, std::int64_t n) { mask.data<std::uint8_t>()[n] = index[0] < 5; });
+    EXPECT_EQ(field_jacobians(field, &mask).folded, 0);
+    mask.voxels.setTo(0);
+    EXPECT_THROW(field_jacobians(field, &mask), InvalidInput);
+    field.data<cv::Vec3f>()[30][1] = std::nanf("");
+    EXPECT_THROW(field_jacobians(field), InvalidInput);
+}
+
+class LandmarkFile : public ::testing::Test {
+protected:
+    std::filesystem::path write(const std::string& name, const std::string& text) {
+        const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+        const auto path = std::filesystem::path(::testing::TempDir()) / (std::string(test->name()) + "_" + name);
+        std::ofstream(path, std::ios::binary) << text;
+        written_.push_back(path);
+        return path;
+    }
+    /// The message with which reading is refused.
+    template <class Read>
+    std::string refusal(const Read& read) {
+        try {
+            read();
+        } catch (const Error& error) {
+            return error.what();
+        }
+        return "accepted";
+    }
+    std::string csv_refusal(const std::string& text) {
+        const auto path = write("bad.csv", text);
+        return refusal([&] { read_landmarks(path); });
+    }
+    void TearDown() override {
+        for (const auto& path : written_) std::filesystem::remove(path);
+    }
+
+private:
+    std::vector<std::filesystem::path> written_;
+};
+
+TEST_F(LandmarkFile, ReadsColumnsByNameInAnyOrder) {
+    const auto path = write("good.csv",
+                            "\xEF\xBB\xBFname, intra_x,intra_y,intra_z,pre_x,pre_y,pre_z\r\n"
+                            "\"tip\",4,5,6.5,1,-2e0,+3\r\n\r\n"
+                            "# a remark\r\n"
+                            "base,0,0,0,7,8,9\r\n");
+    const Landmarks landmarks = read_landmarks(path);
+    ASSERT_EQ(landmarks.moving.cols(), 2);
+    EXPECT_EQ(landmarks.moving.col(0), Eigen::Vector3d(1, -2, 3));
+    EXPECT_EQ(landmarks.fixed.col(0), Eigen::Vector3d(4, 5, 6.5));
+    EXPECT_EQ(landmarks.moving.col(1), Eigen::Vector3d(7, 8, 9));
+}
+
+TEST_F(LandmarkFile, RefusesBadTablesWithTheLine) {
+    const std::string header = "pre_x,pre_y,pre_z,intra_x,intra_y,intra_z\n";
+    EXPECT_THAT(csv_refusal(""), HasSubstr("empty"));
+    EXPECT_THAT(csv_refusal("pre_x,pre_y,pre_z,intra_x,intra_y\n1,2,3,4,5\n"), HasSubstr("bad.csv:1: the header lacks "
+                                                                                         "the column intra_z"));
+    EXPECT_THAT(csv_refusal(header), HasSubstr("no landmark"));
+    EXPECT_THAT(csv_refusal(header + "1,2,3,4,5,6\n1,2,3,4,5\n"), HasSubstr("bad.csv:3: 5 fields"));
+    EXPECT_THAT(csv_refusal(header + "1,2,3,4,left,6\n"), HasSubstr("bad.csv:2: intra_y is 'left'"));
+    EXPECT_THAT(csv_refusal(header + "1,2,3,4,5mm,6\n"), HasSubstr("bad.csv:2: intra_y is '5mm'"));
+    EXPECT_THAT(csv_refusal(header + "1,,3,4,5,6\n"), HasSubstr("bad.csv:2: pre_y is ''"));
+    EXPECT_THAT(csv_refusal(header + "1,nan,3,4,5,6\n"), HasSubstr("bad.csv:2: pre_y is nan"));
+    EXPECT_THAT(csv_refusal(header + "1,2,3,4,5,inf\n"), HasSubstr("bad.csv:2: intra_z is inf"));
+    EXPECT_THROW(read_landmarks("no such file.csv"), IoError);
+    EXPECT_THROW(read_landmarks(::testing::TempDir()), IoError);
+}
+
+TEST_F(LandmarkFile, ReadsPointFilesOfElastix) {
+    const auto moving = write("moving.txt", "point\n2\n-40.94 -47.022 -1169.5\n-98.991 -56.584 -1249.5\n");
+    const auto fixed = write("fixed.txt", "point\n2\n1 2 3\n4\t5  6\n");
+    const Landmarks landmarks = read_landmarks(moving, fixed);
+    ASSERT_EQ(landmarks.fixed.cols(), 2);
+    EXPECT_EQ(landmarks.moving.col(0), Eigen::Vector3d(-40.94, -47.022, -1169.5));
+    EXPECT_EQ(landmarks.fixed.col(1), Eigen::Vector3d(4, 5, 6));
+}
+
+TEST_F(LandmarkFile, RefusesBadPointFilesWithTheLine) {
+    const auto good = write("good.txt", "point\n1\n1 2 3\n");
+    const auto refused = [&](const std::string& text) {
+        const auto path = write("bad.txt", text);
+        return refusal([&] { read_landmarks(path, good); });
+    };
+    EXPECT_THAT(refused(""), HasSubstr("empty"));
+    EXPECT_THAT(refused("index\n1\n1 2 3\n"), HasSubstr("bad.txt:1: starts with 'index'"));
+    EXPECT_THAT(refused("point\nmany\n1 2 3\n"), HasSubstr("bad.txt:2: the second line"));
+    EXPECT_THAT(refused("point\n2\n1 2 3\n"), HasSubstr("promises 2"));
+    EXPECT_THAT(refused("point\n1\n1 2\n"), HasSubstr("bad.txt:3: 2 numbers"));
+    EXPECT_THAT(refused("point\n1\n1 2 z\n"), HasSubstr("bad.txt:3: z is 'z'"));
+    EXPECT_THAT(refused("point\n2\n1 2 3\n1 2 3\n"), HasSubstr("equal numbers"));
+}
+
+}  // namespace
+}  // namespace tissuewarp::registration
