@@ -1,4 +1,5 @@
 /// Filters and files on the sizes of a head scan: imaging_bench [--benchmark_filter=...]
+/// The column CPU is the time of all threads together.
 
 #include "imaging/filters.hpp"
 #include "imaging/image_io.hpp"
@@ -113,7 +114,7 @@ void write_and_read(benchmark::State& state, const char* extension, bool write) 
 
 }  // namespace
 
-#define MEASURED(name) BENCHMARK(name)->Unit(benchmark::kMillisecond)->UseRealTime()
+#define MEASURED(name) BENCHMARK(name)->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime()
 MEASURED(smooth_256);
 MEASURED(resample_256);
 MEASURED(gradient_256);
@@ -121,10 +122,28 @@ MEASURED(signed_distance_256);
 MEASURED(dilate_256);
 MEASURED(connected_components_256);
 MEASURED(linear_sampler_million);
-BENCHMARK_CAPTURE(write_and_read, write_nii_gz, ".nii.gz", true)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(write_and_read, read_nii_gz, ".nii.gz", false)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(write_and_read, write_nrrd, ".nrrd", true)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(write_and_read, read_nrrd, ".nrrd", false)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(write_and_read, write_mha, ".mha", true)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(write_and_read, read_mha, ".mha", false)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(write_and_read, write_nii_gz, ".nii.gz", true)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime()
+    ->MeasureProcessCPUTime();
+BENCHMARK_CAPTURE(write_and_read, read_nii_gz, ".nii.gz", false)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime()
+    ->MeasureProcessCPUTime();
+BENCHMARK_CAPTURE(write_and_read, write_nrrd, ".nrrd", true)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime()
+    ->MeasureProcessCPUTime();
+BENCHMARK_CAPTURE(write_and_read, read_nrrd, ".nrrd", false)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime()
+    ->MeasureProcessCPUTime();
+BENCHMARK_CAPTURE(write_and_read, write_mha, ".mha", true)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime()
+    ->MeasureProcessCPUTime();
+BENCHMARK_CAPTURE(write_and_read, read_mha, ".mha", false)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime()
+    ->MeasureProcessCPUTime();
 BENCHMARK_MAIN();

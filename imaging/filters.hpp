@@ -29,9 +29,10 @@ Volume open(const Volume& mask, double radius_mm);
 Volume close(const Volume& mask, double radius_mm);
 
 /// Signed Euclidean distance in mm to the boundary of voxels != 0: negative inside, positive outside, the boundary
-/// lying halfway between voxel centres along the grid: the distance to the nearest midpoint of a grid edge that crosses
-/// it. Exact Euclidean transform (Felzenszwalb and Huttenlocher 2012) with anisotropic spacing. Result float32. Where the
-/// mask meets the edge of the image there is no boundary. Throws InvalidInput when the mask is empty or full.
+/// lying halfway between voxel centres along the grid: the distance to the nearest midpoint of a grid edge that
+/// crosses it. Exact Euclidean transform (Felzenszwalb and Huttenlocher 2012) with anisotropic spacing. Result
+/// float32. Where the mask meets the edge of the image there is no boundary. Throws InvalidInput when the mask is
+/// empty or full.
 Volume signed_distance(const Volume& mask);
 
 /// Cuts the box of voxels [lower, upper) out of an image, geometry following.

@@ -19,10 +19,11 @@ struct ReadResult {
 /// Reads a scalar or three-component volume. Integer types wider than OpenCV's become int32 when every value fits and
 /// float64 otherwise; NIfTI slope and intercept are applied.
 /// Vectors in NIfTI: intent 1007 (vector) holds LPS components, as ITK and ANTs write them; intent 1006 (displacement)
-/// holds RAS components, as ITK reads them from version 5.3 on, and is turned to LPS, with a note. A file of intent 1006
-/// that holds LPS components must be relabelled 1007. When sform and qform disagree, ITK's choice is taken and noted.
-/// Throws IoError (missing, truncated, damaged, unreadable) or InvalidInput (2-D, one voxel thick, time series, zero or
-/// infinite spacing, skewed axes, non-finite voxels, more than 2^31 values, several DICOM series, missing slices).
+/// holds RAS components, as ITK reads them from version 5.3 on, and is turned to LPS, with a note. A file of intent
+/// 1006 that holds LPS components must be relabelled 1007. When sform and qform disagree, ITK's choice is taken and
+/// noted. Throws IoError (missing, truncated, damaged, unreadable) or InvalidInput (2-D, one voxel thick, time series,
+/// zero or infinite spacing, skewed axes, non-finite voxels, more than 2^31 values, several DICOM series, missing
+/// slices).
 ReadResult read_volume_with_notes(const std::filesystem::path& path);
 
 /// As above, without the notes.

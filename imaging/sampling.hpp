@@ -98,8 +98,8 @@ private:
     std::array<std::int64_t, 3> stride_{};
 };
 
-/// Value of the voxel nearest to an LPS point (mm) in a scalar volume of type T, or `outside` beyond the voxels' box. The geometry is
-/// inverted on every call: not for inner loops.
+/// Value of the voxel nearest to an LPS point (mm) in a scalar volume of type T, or `outside` beyond the voxels' box.
+/// The geometry is inverted on every call: not for inner loops.
 template <class T>
 [[nodiscard]] T nearest_value(const Volume& volume, const Eigen::Vector3d& point, T outside = T{}) {
     const Eigen::Vector3d index = volume.geometry.index(point);
