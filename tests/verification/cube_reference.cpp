@@ -110,7 +110,7 @@ CubeSolution solve_cube(const CubeReference& reference, tled::Element element, i
     }
     const tled::RestState rest = tled::rest_state(model);
     const tled::NewtonResult found =
-        tled::newton_equilibrium(rest, tled::nodal_conditions(conditions, rest.node_count), {.tolerance_mm = 1e-6});
+        tled::newton_equilibrium(rest, tled::nodal_conditions(conditions, rest.node_count), {.tolerance_mm = 1e-4});
 
     CubeSolution result;
     result.cells = cells;
