@@ -1,0 +1,100 @@
+/// The method as a whole on a small organ.
+#include "registration/pipeline.hpp"
+
+#include "registration/evaluation.hpp"
+#include "registration/field.hpp"
+#include "tests/support/label_shapes.hpp"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+namespace tissuewarp::registration {
+namespace {
+
+using shapes::organ_labels;
+
+PrepareOptions coarse() {
+    PrepareOptions options;
+    options.meshing.edge_length = 9;
+    return options;
+}
+
+UpdateOptions on_cpu() {
+    UpdateOptions options;
+    options.device = Device::Cpu;
+    return options;
+}
+
+double largest(const Eigen::Matrix3Xd& x) { return std::sqrt(x.colwise().squaredNorm().maxCoeff()); }
+
+TEST(Pipeline, AnImageRegisteredToItselfDoesNotMove) {
+    const auto labels = organ_labels({});
+    UpdateOptions options = on_cpu();
+    options.align = false;
+    const auto result = update(prepare(labels, coarse()), labels, options);
+    EXPECT_LT(largest(result.deformation.displacement), 0.05);
+    EXPECT_TRUE(result.doubts.empty());
+}
+
+TEST(Pipeline, ARigidMotionIsFoundWithoutStrain) {
+    const auto truth = shapes::motion(12, {1, 1, 0}, {6, -4, 5});
+    const auto prepared = prepare(organ_labels({}), coarse());
+    const auto result = update(prepared, organ_labels({}, truth), on_cpu());
+    const Eigen::Matrix3Xd expected = truth * prepared.model.mesh.nodes;
+    const Eigen::Matrix3Xd error = result.deformation.deformed_nodes() - expected;
+    EXPECT_LT(std::sqrt(error.colwise().squaredNorm().mean()), 0.4);  // voxels of 1.5 mm
+    EXPECT_GT(result.min_jacobian, 0.9);
+}
+
+TEST(Pipeline, AnOrganPressedFlatIsFollowed) {
+    shapes::Organ pressed;
+    pressed.semi_axes = {47.5, 36.5, 27.5};  // 8 % thinner, wider, of nearly the same volume
+    pressed.inclusion = shapes::Organ{}.inclusion.cwiseProduct(pressed.semi_axes).cwiseQuotient(shapes::Organ{}.semi_axes);
+    UpdateOptions options = on_cpu();
+    options.align = false;
+    const auto prepared = prepare(organ_labels({}), coarse());
+    const auto result = update(prepared, organ_labels(pressed), options);
+    const Eigen::Vector3d stretch = pressed.semi_axes.cwiseQuotient(shapes::Organ{}.semi_axes);
+    const Eigen::Matrix3Xd error = result.deformation.deformed_nodes() - stretch.asDiagonal() * prepared.model.mesh.nodes;
+    EXPECT_LT(error.colwise().norm().mean(), 0.8);
+    EXPECT_LT(result.rounds.back().mean_residual_mm, 0.3);
+    EXPECT_EQ(mesh_jacobians(result.deformation).folded, 0);
+}
+
+TEST(Pipeline, SameBitsForOneThreadAndMany) {
+    const auto moving = organ_labels({}), fixed = organ_labels({}, shapes::motion(5, {0, 0, 1}, {2, 1, 0}));
+    const auto solve = [&](std::size_t threads) {
+        const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+        return update(prepare(moving, coarse()), fixed, on_cpu()).deformation.deformed_nodes();
+    };
+    const Eigen::Matrix3Xd one = solve(1), two = solve(2);
+    ASSERT_EQ(one.cols(), two.cols());
+    EXPECT_EQ(one, two);
+}
+
+TEST(Pipeline, TheGpuEngineGivesTheSameAnswer) {
+    const auto moving = organ_labels({}), fixed = organ_labels({}, shapes::motion(5, {0, 0, 1}, {2, 1, 0}));
+    const auto prepared = prepare(moving, coarse());
+    UpdateOptions gpu = on_cpu();
+    gpu.device = Device::Gpu;
+    const Eigen::Matrix3Xd a = update(prepared, fixed, on_cpu()).deformation.displacement;
+    const Eigen::Matrix3Xd b = update(prepared, fixed, gpu).deformation.displacement;
+    EXPECT_LT(largest(a - b), 0.05);
+}
+
+TEST(Pipeline, LabelsWithoutAnythingInCommonAreRefused) {
+    const auto prepared = prepare(organ_labels({}), coarse());
+    auto fixed = organ_labels({});
+    fixed.voxels.setTo(7, fixed.voxels > 0);
+    EXPECT_THROW(update(prepared, fixed, on_cpu()), InvalidInput);
+}
+
+TEST(Pipeline, StopsWhenAsked) {
+    struct Impatient : Observer {
+        bool cancel_requested() override { return true; }
+    } impatient;
+    EXPECT_THROW(prepare(organ_labels({}), coarse(), impatient), Cancelled);
+}
+
+}  // namespace
+}  // namespace tissuewarp::registration
