@@ -73,6 +73,33 @@ void drop_specks(LabelGrid& grid, const std::vector<double>& edges, Observer& ob
                       "their surroundings");
 }
 
+/// Refines, and again with a finer edge for classes that are thinner than their elements and got none.
+TetMesh refine_every_label(const LabelGrid& grid, const detail::LabelField& field, std::vector<double> edges,
+                           double facet_distance, const MeshingOptions& options, Observer& observer) {
+    constexpr int most_attempts = 5;  // the last one with a sixteenth of the edge
+    std::vector<char> thin(edges.size(), 0);
+    for (int attempt = 1;; ++attempt) {
+        const auto seeds = detail::surface_seeds(grid, field, edges, thin);
+        TetMesh mesh = detail::refine({grid, field, seeds, edges, facet_distance, options}, observer);
+        std::vector<char> missing(edges.size(), 1);
+        missing[0] = 0;
+        for (int label : mesh.labels) missing[static_cast<std::size_t>(label)] = 0;
+        if (std::count(missing.begin(), missing.end(), 1) == 0) return mesh;
+        for (std::size_t c = 1; c < edges.size(); ++c) {
+            if (!missing[c]) continue;
+            edges[c] *= 0.5;
+            thin[c] = 1;
+            const std::string label = "meshing: label " + std::to_string(grid.values[c]);
+            observer.note(attempt < most_attempts
+                              ? label + " is thinner than its elements; its edge length becomes " +
+                                    std::to_string(edges[c]) + " mm"
+                              : label + " is too thin to be meshed and is absent; give it a label_edge_length below " +
+                                    std::to_string(edges[c]) + " mm or thicken it");
+        }
+        if (attempt == most_attempts) return mesh;
+    }
+}
+
 /// Local frame → LPS, classes → label values, orientation repaired where the image's axes are left-handed.
 void place(TetMesh& mesh, const LabelGrid& grid, const imaging::Geometry& geometry) {
     const Eigen::Vector3d corner = geometry.point(Eigen::Vector3d(grid.origin[0], grid.origin[1], grid.origin[2]));
@@ -94,12 +121,12 @@ TetMesh mesh_labels(const imaging::Volume& labels, const MeshingOptions& options
 
     observer.checkpoint("smoothing the labels", 0.02);
     const detail::LabelField field(grid, options.smoothing);
-    const auto seeds = detail::surface_seeds(grid, field, edges);
     const double shortest = *std::min_element(edges.begin() + 1, edges.end());
     const double distance = options.facet_distance > 0.0
                                 ? options.facet_distance
                                 : std::max(0.12 * shortest, 0.25 * std::cbrt(grid.spacing.prod()));
-    TetMesh mesh = detail::refine({grid, field, seeds, edges, distance, options}, observer);
+    TetMesh mesh = refine_every_label(grid, field, edges, distance, options, observer);
+    require_valid(mesh, "refined labels");
     observer.checkpoint("relaxing the mesh", 0.9);
     detail::relax(mesh, {field, edges, grid.spacing.minCoeff(), distance, options.min_dihedral_deg});
     place(mesh, grid, labels.geometry);

@@ -43,6 +43,20 @@ public:
         }
     }
 
+    /// Every face within two voxels of one in the middle of the list.
+    void add_cluster(const std::vector<Face>& faces) {
+        const auto place = [&](const Face& face) -> Eigen::Array3d {
+            return 0.5 * (centre(face.voxel) + centre(face.neighbour));
+        };
+        const Eigen::Array3d middle = place(faces[faces.size() / 2]);
+        for (const Face& face : faces) {
+            const Eigen::Array3d here = place(face);
+            if (((here - middle) / grid_.spacing).matrix().norm() > 2.0) continue;
+            chosen_.push_back(face);
+            places_.push_back(here);
+        }
+    }
+
     [[nodiscard]] std::vector<SurfaceSeed> seeds() const {
         std::vector<SurfaceSeed> result;
         for (const Face& face : chosen_) result.push_back({centre(face.voxel), centre(face.neighbour)});
@@ -84,7 +98,7 @@ std::vector<std::vector<Face>> faces_of_pieces(const LabelGrid& grid, const std:
 }  // namespace
 
 std::vector<SurfaceSeed> surface_seeds(const LabelGrid& grid, const LabelField& field,
-                                       const std::vector<double>& edge_length) {
+                                       const std::vector<double>& edge_length, const std::vector<char>& thin) {
     const Components components = connected_components(grid, field.classes());
     const auto faces = faces_of_pieces(grid, field.classes(), components);
     std::vector<std::int64_t> largest(grid.values.size(), 0);
@@ -105,6 +119,7 @@ std::vector<SurfaceSeed> surface_seeds(const LabelGrid& grid, const LabelField& 
         const double volume = static_cast<double>(components.voxels[c]) * grid.spacing.prod();
         // Smoothing may leave crumbs: below half a regular tetrahedron of that edge they are not looked for.
         if (volume < 0.059 * edge * edge * edge && components.voxels[c] < largest[components.class_of[c]]) continue;
+        if (thin[components.class_of[c]] && !faces[c].empty()) sampler.add_cluster(faces[c]);
         sampler.sample(piece, faces[c], edge);
     }
     return sampler.seeds();

@@ -13,7 +13,9 @@ struct SurfaceSeed {
 /// is the target edge of each class (mm); pieces get up to six pairs 0.25 edges apart, then
 /// more as long as they lie 0.7 edges apart. Seeds of neighbouring pieces keep the same distances, for a close pair
 /// would force tiny elements.
+/// Pieces of the classes marked in `thin` get a dense cluster at one place besides: refinement looks for an interface
+/// where the two ends of a Voronoi edge differ, and long edges pass through a membrane from outside to outside.
 std::vector<SurfaceSeed> surface_seeds(const LabelGrid& grid, const LabelField& field,
-                                       const std::vector<double>& edge_length);
+                                       const std::vector<double>& edge_length, const std::vector<char>& thin);
 
 }  // namespace tissuewarp::meshing::detail
