@@ -23,4 +23,5 @@ configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/tissuewarpConfig.cmake
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/tissuewarpConfigVersion.cmake
   COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/tissuewarpConfig.cmake ${PROJECT_BINARY_DIR}/tissuewarpConfigVersion.cmake
+  ${PROJECT_SOURCE_DIR}/cmake/FindSuiteSparse.cmake
   DESTINATION ${config_dir})
