@@ -18,7 +18,7 @@ using Vec4 = Eigen::Array4f;  // x, y, z and an unused fourth lane, so that one 
 constexpr double finest_spacing = 2.5;   // mm; finer grids change the field by less than the layer corrects
 constexpr double most_nodes = 1.2e6;     // larger organs get a coarser grid
 constexpr double stiffening = 0.2;       // |∇u| from which the continuation resists steeper gradients
-constexpr double blend_spacings = 1.75;  // thickness of the correcting layer at the surface, in grid spacings
+constexpr double blend_spacings = 1.25;  // thickness of the correcting layer at the surface, in grid spacings
 
 /// Why a node is fixed; 0 is free.
 enum : std::uint8_t { in_mesh = 1, on_sheet, at_rest };

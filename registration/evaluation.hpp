@@ -44,7 +44,9 @@ struct Overlap {
     double hausdorff_95_mm = 0;           ///< 95th percentile, symmetric maximum of the two directions
 };
 
-/// Overlap of each label present in either map, and under key 0 of their union. Both on one grid.
+/// Overlap of each label present in either map, and under key 0 of their union. Distances run from the centres of the
+/// voxel faces between a label and others (not those at the edge of the image) to the nearest such centre of the other
+/// map; infinite for a label that one map lacks. Throws InvalidInput unless both are integer maps on one grid.
 std::map<int, Overlap> overlap(const imaging::Volume& labels, const imaging::Volume& reference);
 
 struct JacobianReport {
