@@ -70,7 +70,8 @@ TEST(CubeVerification, StretchT4LocksAndConvergesToTheSameForce) {
     EXPECT_NEAR(study.force(2).value, 6085.2, 0.02 * 6085.2);
 }
 
-// The reference's own uncertainty is 30 mN (0.5 %): its edges fold, and so do ours: the order falls from 1.5 here to 1.2 at 8, 12, 18 cells.
+// The reference's own uncertainty is 30 mN (0.5 %): its edges fold, and so do ours. The order falls from 1.5 here to 1.2
+// at 8, 12 and 18 cells.
 TEST(CubeVerification, CompressionAveragedPressure) {
     const Study study("p2_cube_compress_mild", Law::Iso, Element::AveragedPressureT4, {4, 6, 9});
     const double mesh_error = std::abs(study.force(2).value - study.fine.force[2]);

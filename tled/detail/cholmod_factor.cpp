@@ -87,8 +87,8 @@ struct CholmodFactor::Impl {
         common.print = 0;
         common.supernodal = CHOLMOD_SUPERNODAL;
         common.quick_return_if_not_posdef = 1;
-        // Supernodes of nodes with three components: merge more of the small ones, waste less in the large ones. 5–15 %
-        // faster than the defaults on boxes of 25 k to 120 k tetrahedra.
+        // Supernodes of nodes with three components: merge more of the small ones, waste less in the large ones. About
+        // 10 % faster than the defaults on a box of 48 k tetrahedra.
         for (std::size_t& columns : common.nrelax) columns *= 4;
         for (double& waste : common.zrelax) waste *= 0.5;
     }
@@ -128,8 +128,8 @@ CholmodFactor::CholmodFactor(const Eigen::SparseMatrix<double>& lower, const std
     const Eigen::SparseMatrix<double> graph = node_graph(lower, compact, node_count);
     cholmod_sparse graph_view = view(graph);
     std::vector<int> node_order(node_count), order;
-    // Nested dissection beats minimum degree by a factor 1.4–2 in factor time on boxes of 25 k to 120 k tetrahedra, but
-    // gains nothing on tiny graphs.
+    // Nested dissection factorises a box of 48 k tetrahedra 1.6 (T4) and 1.3 times (averaged pressure) as fast as minimum
+    // degree, but gains nothing on tiny graphs.
     if (node_count < 200) {
         cholmod_amd(&graph_view, nullptr, 0, node_order.data(), &common);
     } else {
