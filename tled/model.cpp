@@ -27,7 +27,8 @@ void require_valid(const Model& model) {
             throw InvalidInput("label " + std::to_string(label) + " of the mesh has no material; add it to the table");
         const std::string of_label = " of label " + std::to_string(label);
         require_positive(shear_modulus(material->second), "shear modulus" + of_label, "kPa");
-        require_positive(volumetric_modulus(material->second), "bulk or Lamé modulus" + of_label, "kPa");
+        const double bulk_modulus = p_wave_modulus(material->second) - 4 * shear_modulus(material->second) / 3;
+        require_positive(bulk_modulus, "bulk modulus at rest" + of_label, "kPa");
     }
 }
 
