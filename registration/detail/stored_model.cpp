@@ -1,0 +1,114 @@
+#include "registration/detail/stored_model.hpp"
+
+#include "core/errors.hpp"
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+constexpr const char* element_names[] = {"T4", "AveragedPressureT4"};        // order of tled::Element
+constexpr const char* law_names[] = {"neo_hookean_iso", "neo_hookean_lnj"};  // order of tled::Material
+
+tled::Element element_named(const std::string& name) {
+    for (int k = 0; k < 2; ++k)
+        if (name == element_names[k]) return static_cast<tled::Element>(k);
+    throw InvalidInput("unknown element '" + name + "'; known are T4 and AveragedPressureT4");
+}
+
+/// The laws keep exactly what they hold: μ and the modulus of the volumetric part.
+tled::Material material_of(const std::string& law, double shear, double volumetric) {
+    if (law == law_names[0]) return tled::NeoHookeanIso{shear, volumetric};
+    if (law == law_names[1]) return tled::NeoHookeanLnJ{shear, volumetric};
+    throw InvalidInput("unknown material law '" + law + "'; known are neo_hookean_iso and neo_hookean_lnj");
+}
+
+}  // namespace
+
+void write_materials(Hdf5Output& file, const std::string& group, const tled::MaterialTable& materials) {
+    const auto count = static_cast<Eigen::Index>(materials.size());
+    Eigen::VectorXi label(count);
+    Eigen::VectorXd shear(count), volumetric(count);
+    std::vector<std::string> law;
+    Eigen::Index row = 0;
+    for (const auto& [key, material] : materials) {
+        label[row] = key;
+        shear[row] = tled::shear_modulus(material);
+        volumetric[row++] = tled::volumetric_modulus(material);
+        law.emplace_back(law_names[material.index()]);
+    }
+    file.vector<int>(group + "/label", label, "1");
+    file.texts(group + "/law", law);
+    file.vector<double>(group + "/shear_modulus", shear, "kPa");
+    file.vector<double>(group + "/volumetric_modulus", volumetric, "kPa");
+}
+
+tled::MaterialTable read_materials(const Hdf5Input& file, const std::string& group) {
+    const Eigen::VectorXi label = file.vector<int>(group + "/label");
+    const Eigen::VectorXd shear = file.vector<double>(group + "/shear_modulus", label.size());
+    const Eigen::VectorXd volumetric = file.vector<double>(group + "/volumetric_modulus", label.size());
+    const std::vector<std::string> law = file.texts(group + "/law");
+    if (law.size() != static_cast<std::size_t>(label.size()))
+        throw InvalidInput("'" + group + "' names " + std::to_string(law.size()) + " laws for " +
+                           std::to_string(label.size()) + " labels");
+    tled::MaterialTable materials;
+    for (Eigen::Index row = 0; row < label.size(); ++row)
+        if (!materials.emplace(label[row], material_of(law[static_cast<std::size_t>(row)], shear[row], volumetric[row]))
+                 .second)
+            throw InvalidInput("'" + group + "' holds label " + std::to_string(label[row]) + " twice");
+    return materials;
+}
+
+void write_model(Hdf5Output& file, const tled::Model& model) {
+    file.columns<double>("mesh/nodes", model.mesh.nodes, "mm");
+    file.attribute("mesh/nodes", "frame", "moving image, LPS");
+    file.columns<int>("mesh/tetrahedra", model.mesh.tets, "1");
+    file.vector<int>("mesh/labels", model.mesh.labels, "1");
+    write_materials(file, "materials", model.materials);
+    file.texts("element", {element_names[static_cast<int>(model.element)]});
+    file.scalar<double>("density", model.density, "kg/mm^3");
+}
+
+tled::Model read_model(const Hdf5Input& file) {
+    tled::Model model;
+    model.mesh.nodes = file.columns<double>("mesh/nodes", 3);
+    model.mesh.tets = file.columns<int>("mesh/tetrahedra", 4);
+    model.mesh.labels = file.vector<int>("mesh/labels", model.mesh.tets.cols());
+    model.materials = read_materials(file, "materials");
+    model.element = element_named(file.text("element"));
+    model.density = file.scalar<double>("density");
+    tled::require_valid(model);
+    return model;
+}
+
+void write_grid(Hdf5Output& file, const std::string& group, const imaging::Geometry& grid) {
+    file.vector<int>(group + "/size", Eigen::Vector3i(grid.size[0], grid.size[1], grid.size[2]), "voxel");
+    file.vector<double>(group + "/origin", grid.origin, "mm");
+    file.vector<double>(group + "/spacing", grid.spacing, "mm");
+    file.columns<double>(group + "/direction", grid.direction.transpose(), "1");
+    file.attribute(group + "/direction", "meaning", "columns are the unit axes i, j, k in LPS");
+}
+
+imaging::Geometry read_grid(const Hdf5Input& file, const std::string& group) {
+    imaging::Geometry grid;
+    const Eigen::VectorXi size = file.vector<int>(group + "/size", 3);
+    grid.size = {size[0], size[1], size[2]};
+    grid.origin = file.vector<double>(group + "/origin", 3);
+    grid.spacing = file.vector<double>(group + "/spacing", 3);
+    file.array<double>(group + "/direction", grid.direction.data(), {3, 3});
+    grid.direction.transposeInPlace();
+    imaging::require_valid(grid, group.c_str());
+    return grid;
+}
+
+void write_stages(Hdf5Output& file, const std::string& group, const std::vector<StageTime>& times) {
+    std::vector<std::string> names;
+    Eigen::VectorXd seconds(static_cast<Eigen::Index>(times.size()));
+    for (const StageTime& time : times) {
+        seconds[static_cast<Eigen::Index>(names.size())] = time.seconds;
+        names.push_back(time.stage);
+    }
+    file.texts(group + "/stage", names);
+    file.vector<double>(group + "/seconds", seconds, "s");
+}
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,26 @@
+#pragma once
+/// The parts that prepared models and records have in common, in HDF5 (docs/record.md).
+
+#include "imaging/geometry.hpp"
+#include "registration/detail/hdf5.hpp"
+#include "registration/pipeline.hpp"
+
+namespace tissuewarp::registration::detail {
+
+/// Groups /mesh, /materials, and /element, /density.
+void write_model(Hdf5Output& file, const tled::Model& model);
+/// Throws InvalidInput when the model is not valid (tled::require_valid).
+tled::Model read_model(const Hdf5Input& file);
+
+/// A group with size, origin, spacing, direction.
+void write_grid(Hdf5Output& file, const std::string& group, const imaging::Geometry& grid);
+imaging::Geometry read_grid(const Hdf5Input& file, const std::string& group);
+
+/// Groups with one row per material: label, law, shear_modulus, volumetric_modulus.
+void write_materials(Hdf5Output& file, const std::string& group, const tled::MaterialTable& materials);
+tled::MaterialTable read_materials(const Hdf5Input& file, const std::string& group);
+
+/// Columns as one dataset each.
+void write_stages(Hdf5Output& file, const std::string& group, const std::vector<StageTime>& times);
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,113 @@
+#include "registration/prepared_io.hpp"
+
+#include "registration/detail/stored_model.hpp"
+
+#include "core/atomic_file.hpp"
+
+namespace tissuewarp::registration {
+
+namespace {
+
+constexpr const char* format = "tissuewarp prepared model";
+constexpr int version = 1;
+
+std::vector<hsize_t> voxel_shape(const imaging::Geometry& grid) {
+    return {static_cast<hsize_t>(grid.size[2]), static_cast<hsize_t>(grid.size[1]), static_cast<hsize_t>(grid.size[0])};
+}
+
+void write_labels(detail::Hdf5Output& file, const imaging::Volume& labels) {
+    if (labels.empty() || labels.channels() != 1)
+        throw InvalidInput("the prepared model holds no label map of one component");
+    const imaging::Volume integers = labels.as(CV_32S);
+    detail::write_grid(file, "moving_labels/grid", labels.geometry);
+    file.array<int>("moving_labels/voxels", integers.data<int>(), voxel_shape(labels.geometry), "1");
+}
+
+imaging::Volume read_label_map(const detail::Hdf5Input& file) {
+    const imaging::Geometry grid = detail::read_grid(file, "moving_labels/grid");
+    file.require_shape("moving_labels/voxels", voxel_shape(grid));
+    imaging::Volume labels(grid, CV_32SC1);
+    file.array<int>("moving_labels/voxels", labels.data<int>(), voxel_shape(grid));
+    return labels;
+}
+
+void write_meshing(detail::Hdf5Output& file, const meshing::MeshingOptions& options) {
+    file.scalar<double>("options/meshing/edge_length", options.edge_length, "mm");
+    Eigen::VectorXi label(static_cast<Eigen::Index>(options.label_edge_length.size()));
+    Eigen::VectorXd length(label.size());
+    Eigen::Index row = 0;
+    for (const auto& [key, value] : options.label_edge_length) {
+        label[row] = key;
+        length[row++] = value;
+    }
+    file.vector<int>("options/meshing/label_edge_length/label", label, "1");
+    file.vector<double>("options/meshing/label_edge_length/length", length, "mm");
+    file.scalar<double>("options/meshing/facet_distance", options.facet_distance, "mm");
+    file.scalar<double>("options/meshing/facet_angle", options.facet_angle, "degree");
+    file.scalar<double>("options/meshing/radius_edge_ratio", options.radius_edge_ratio, "1");
+    file.scalar<double>("options/meshing/smoothing", options.smoothing, "voxel");
+    file.scalar<double>("options/meshing/min_dihedral_deg", options.min_dihedral_deg, "degree");
+    file.scalar<double>("options/meshing/perturb_seconds", options.perturb_seconds, "s");
+    file.scalar<double>("options/meshing/exude_seconds", options.exude_seconds, "s");
+    file.vector<int>("options/meshing/labels",
+                     Eigen::VectorXi::Map(options.labels.data(), static_cast<Eigen::Index>(options.labels.size())),
+                     "1");
+}
+
+meshing::MeshingOptions read_meshing(const detail::Hdf5Input& file) {
+    meshing::MeshingOptions options;
+    options.edge_length = file.scalar<double>("options/meshing/edge_length");
+    const Eigen::VectorXi label = file.vector<int>("options/meshing/label_edge_length/label");
+    const Eigen::VectorXd length = file.vector<double>("options/meshing/label_edge_length/length", label.size());
+    for (Eigen::Index row = 0; row < label.size(); ++row) options.label_edge_length[label[row]] = length[row];
+    options.facet_distance = file.scalar<double>("options/meshing/facet_distance");
+    options.facet_angle = file.scalar<double>("options/meshing/facet_angle");
+    options.radius_edge_ratio = file.scalar<double>("options/meshing/radius_edge_ratio");
+    options.smoothing = file.scalar<double>("options/meshing/smoothing");
+    options.min_dihedral_deg = file.scalar<double>("options/meshing/min_dihedral_deg");
+    options.perturb_seconds = file.scalar<double>("options/meshing/perturb_seconds");
+    options.exude_seconds = file.scalar<double>("options/meshing/exude_seconds");
+    const Eigen::VectorXi labels = file.vector<int>("options/meshing/labels");
+    options.labels.assign(labels.begin(), labels.end());
+    return options;
+}
+
+tled::Material only_material(const detail::Hdf5Input& file, const std::string& group) {
+    const tled::MaterialTable table = detail::read_materials(file, group);
+    if (table.size() != 1)
+        throw InvalidInput("'" + group + "' holds " + std::to_string(table.size()) + " materials, not 1");
+    return table.begin()->second;
+}
+
+}  // namespace
+
+void write_prepared(const PreparedModel& prepared, const std::filesystem::path& path) {
+    AtomicFile target(path);
+    detail::Hdf5Output file(target.path(), format, version);
+    detail::write_model(file, prepared.model);
+    write_labels(file, prepared.labels);
+    write_meshing(file, prepared.options.meshing);
+    detail::write_materials(file, "options/default_material", {{0, prepared.options.default_material}});
+    file.scalar<double>("options/data_stiffness", prepared.options.data_stiffness, "kPa/mm");
+    file.scalar<double>("options/tangential_ratio", prepared.options.tangential_ratio, "1");
+    detail::write_stages(file, "stages/prepare", prepared.times);
+    file.close();
+    target.commit();
+}
+
+PreparedModel read_prepared(const std::filesystem::path& path, Observer& observer) {
+    const detail::Hdf5Input file(path, format, version);
+    tled::Model model = detail::read_model(file);
+    PrepareOptions options;
+    options.meshing = read_meshing(file);
+    options.materials = model.materials;
+    options.default_material = only_material(file, "options/default_material");
+    options.element = model.element;
+    options.data_stiffness = file.scalar<double>("options/data_stiffness");
+    options.tangential_ratio = file.scalar<double>("options/tangential_ratio");
+    if (!(options.data_stiffness > 0) || !(options.tangential_ratio > 0))
+        throw InvalidInput("'" + path.string() + "': the stiffness of the data must be positive");
+    return prepare(std::move(model.mesh), read_label_map(file), options, observer);
+}
+
+}  // namespace tissuewarp::registration

@@ -1,0 +1,129 @@
+#include "registration/record.hpp"
+
+#include "registration/detail/stored_model.hpp"
+
+#include "core/atomic_file.hpp"
+
+#include <algorithm>
+
+namespace tissuewarp::registration {
+
+namespace {
+
+constexpr const char* format = "tissuewarp registration record";
+constexpr int version = 1;
+
+/// det F of every tetrahedron; the placement is rigid and has no part in it.
+Eigen::VectorXd jacobians(const Deformation& deformation) {
+    const meshing::TetMesh& mesh = deformation.mesh;
+    const meshing::TetMesh deformed{mesh.nodes + deformation.displacement, mesh.tets, mesh.labels};
+    return meshing::tet_volumes(deformed).cwiseQuotient(meshing::tet_volumes(mesh));
+}
+
+void require_consistent(const Deformation& deformation) {
+    if (deformation.displacement.cols() != deformation.mesh.nodes.cols())
+        throw InvalidInput("a displacement of " + std::to_string(deformation.displacement.cols()) +
+                           " nodes does not belong to a mesh of " + std::to_string(deformation.mesh.node_count()));
+    if (!deformation.displacement.allFinite()) throw InvalidInput("the displacement holds values that are not finite");
+    const Eigen::Matrix4d& placement = deformation.placement.matrix();
+    const Eigen::Matrix3d rotation = placement.topLeftCorner<3, 3>();
+    const double error = (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+    constexpr double rounding = 1e-6;
+    if (!placement.allFinite() || !(error <= rounding) || rotation.determinant() < 0 ||
+        placement.row(3) != Eigen::RowVector4d(0, 0, 0, 1))
+        throw InvalidInput("the placement is not a rigid motion (rotation off by " + std::to_string(error) +
+                           ", at most 1e-6)");
+}
+
+void write_matrix(detail::Hdf5Output& file, const std::string& name, const Eigen::Isometry3d& motion) {
+    file.columns<double>(name, motion.matrix().transpose(), "mm");
+    file.attribute(name, "meaning", "homogeneous matrix, moving to fixed, LPS mm: y = A x");
+}
+
+void write_rounds(detail::Hdf5Output& file, const std::vector<Round>& rounds) {
+    const auto column = [&](const std::string& name, auto member, const std::string& units) {
+        using Value = std::decay_t<decltype(rounds[0].*member)>;
+        Eigen::Matrix<Value, Eigen::Dynamic, 1> values(static_cast<Eigen::Index>(rounds.size()));
+        std::transform(rounds.begin(), rounds.end(), values.begin(), [&](const Round& r) { return r.*member; });
+        file.vector<Value>("rounds/" + name, values, units);
+    };
+    column("range_mm", &Round::range_mm, "mm");
+    column("matched", &Round::matched, "1");
+    column("interface_nodes", &Round::interface_nodes, "1");
+    column("mean_residual_mm", &Round::mean_residual_mm, "mm");
+    column("largest_change_mm", &Round::largest_change_mm, "mm");
+    column("force_evaluations", &Round::force_evaluations, "1");
+    column("estimated_error_mm", &Round::estimated_error_mm, "mm");
+}
+
+void write_info(detail::Hdf5Output& file, const RecordInfo& info) {
+    std::vector<std::string> names, values;
+    for (const auto& [name, value] : info.provenance) {
+        names.push_back(name);
+        values.push_back(value);
+    }
+    file.texts("provenance/name", names);
+    file.texts("provenance/value", values);
+    file.texts("parameters_toml", {info.parameters_toml});
+}
+
+void write_result(detail::Hdf5Output& file, const UpdateResult& result) {
+    const Deformation& deformation = result.deformation;
+    file.columns<double>("displacement", deformation.displacement, "mm");
+    file.attribute("displacement", "frame", "moving image, LPS; elastic part, before the placement");
+    write_matrix(file, "placement", deformation.placement);
+    file.vector<double>("jacobian", jacobians(deformation), "1");
+    write_matrix(file, "alignment/matrix", result.alignment.placement);
+    file.scalar<double>("alignment/mean_distance_mm", result.alignment.mean_distance_mm, "mm");
+    write_rounds(file, result.rounds);
+    if (!result.rounds.empty())
+        file.scalar<double>("estimated_error_mm", result.rounds.back().estimated_error_mm, "mm");
+    file.texts("engine", {result.engine});
+    file.texts("doubts", result.doubts);
+}
+
+}  // namespace
+
+void write_record(const PreparedModel& prepared, const UpdateResult& result, const RecordInfo& info,
+                  const std::filesystem::path& path) {
+    const Deformation& deformation = result.deformation;
+    require_consistent(deformation);
+    if (deformation.mesh.tets != prepared.model.mesh.tets || deformation.mesh.nodes != prepared.model.mesh.nodes)
+        throw InvalidInput("the result's mesh is not the prepared model's; pass the model that was updated");
+    AtomicFile target(path);
+    detail::Hdf5Output file(target.path(), format, version);
+    detail::write_model(file, prepared.model);
+    detail::write_grid(file, "moving_grid", prepared.labels.geometry);
+    write_result(file, result);
+    detail::write_stages(file, "stages/prepare", prepared.times);
+    detail::write_stages(file, "stages/update", result.times);
+    write_info(file, info);
+    file.close();
+    target.commit();
+}
+
+Record read_record(const std::filesystem::path& path) {
+    const detail::Hdf5Input file(path, format, version);
+    Record record;
+    record.format_version = version;
+    tled::Model model = detail::read_model(file);
+    record.materials = std::move(model.materials);
+    record.element = model.element;
+    record.deformation.mesh = std::move(model.mesh);
+    record.deformation.displacement = file.columns<double>("displacement", 3);
+    Eigen::Matrix4d placement;
+    file.array<double>("placement", placement.data(), {4, 4});
+    record.deformation.placement.matrix() = placement.transpose();
+    require_consistent(record.deformation);
+    record.jacobian = file.vector<double>("jacobian", record.deformation.mesh.tet_count());
+    record.moving_grid = detail::read_grid(file, "moving_grid");
+    const std::vector<std::string> names = file.texts("provenance/name"), values = file.texts("provenance/value");
+    if (names.size() != values.size())
+        throw InvalidInput("'" + path.string() + "' holds " + std::to_string(names.size()) +
+                           " names of provenance for " + std::to_string(values.size()) + " values");
+    for (std::size_t row = 0; row < names.size(); ++row) record.provenance[names[row]] = values[row];
+    record.parameters_toml = file.text("parameters_toml");
+    return record;
+}
+
+}  // namespace tissuewarp::registration

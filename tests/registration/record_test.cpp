@@ -1,0 +1,309 @@
+/// Records and prepared models survive the disk bit by bit, and what is damaged or foreign is refused in words.
+#include "registration/record.hpp"
+#include "registration/prepared_io.hpp"
+#include "tests/registration/shapes.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <hdf5.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <limits>
+
+namespace tissuewarp::registration {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+/// A box of two labels, 6 × 4 × 4 cells of 5 mm, in an oblique label map.
+PreparedModel prepared_box() {
+    meshing::TetMesh mesh = test::box_at({-15, -10, -10}, {30, 20, 20}, {6, 4, 4}, 0.1);
+    for (int tet = 0; tet < mesh.tet_count(); ++tet) mesh.labels[tet] = mesh.nodes(0, mesh.tets(0, tet)) < -1 ? 1 : 7;
+    imaging::Volume labels(test::oblique_grid({0, 0, 0}, {31, 23, 21}, {1.5, 1.6, 1.7}), CV_32SC1);
+    test::for_each_voxel(labels, [&](const Eigen::Vector3d& index, std::int64_t offset) {
+        const Eigen::Vector3d p = labels.geometry.point(index);
+        const bool inside = (p.cwiseAbs().array() < Eigen::Array3d(15, 10, 10)).all();
+        labels.data<int>()[offset] = inside ? (p[0] < 0 ? 1 : 7) : 0;
+    });
+    PrepareOptions options;
+    options.materials[7] = tled::neo_hookean_iso(9.1, 0.31);
+    options.default_material = tled::neo_hookean_lnj(3.3, 0.49);
+    options.meshing.label_edge_length[7] = 3.25;
+    options.meshing.labels = {1, 7};
+    options.data_stiffness = 2.7;
+    options.tangential_ratio = 0.013;
+    return prepare(std::move(mesh), labels, options);
+}
+
+const PreparedModel& prepared() {
+    static const PreparedModel model = prepared_box();
+    return model;
+}
+
+UpdateResult some_result() {
+    UpdateResult result;
+    result.deformation = test::deformed_by(prepared().model.mesh, [](const Eigen::Vector3d& p) {
+        return Eigen::Vector3d(0.1 * p[0], 0.3 * std::sin(p[1] / 7), -0.05 * p[2] + 1e-300);
+    });
+    result.deformation.placement = test::motion(12.0, {1, 2, 3}, {4.0, -5.5, 1.0 / 3.0});
+    result.alignment = {result.deformation.placement, 0.731};
+    result.rounds = {{15.0, 120, 150, 1.25, 6.0, 900, 0.04}, {4.0, 140, 150, 0.5, 0.1, 400, 0.02}};
+    result.engine = "CPU, 2 threads";
+    result.times = {{"alignment", 1.5}, {"round 1", 0.25}};
+    result.doubts = {"only 80 % of the boundary was matched"};
+    return result;
+}
+
+RecordInfo some_info() {
+    return {{{"input/moving_labels", std::string(64, 'a')}, {"device", "llvmpipe µ"}},
+            "[meshing]\nedge_length = 5.0  # \"mm\"\n"};
+}
+
+class Records : public testing::Test {
+protected:
+    fs::path folder = fs::path(testing::TempDir()) /
+                      (std::string("records-") + testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::path path = folder / "record.h5";
+    void SetUp() override { fs::create_directories(folder); }
+    void TearDown() override { fs::remove_all(folder); }
+
+    void write() const { write_record(prepared(), some_result(), some_info(), path); }
+
+    /// Changes one value of a dataset behind the writer's back.
+    template <class T>
+    void poke(const char* dataset, std::size_t index, T value) const {
+        const hid_t type = std::is_same_v<T, double> ? H5T_NATIVE_DOUBLE : H5T_NATIVE_INT;
+        const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+        const hid_t data = H5Dopen2(file, dataset, H5P_DEFAULT);
+        const hid_t space = H5Dget_space(data);
+        std::vector<T> values(static_cast<std::size_t>(H5Sget_simple_extent_npoints(space)));
+        ASSERT_GE(H5Dread(data, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), 0);
+        values.at(index) = value;
+        ASSERT_GE(H5Dwrite(data, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), 0);
+        H5Sclose(space);
+        H5Dclose(data);
+        H5Fclose(file);
+    }
+
+    void remove_dataset(const char* name) const {
+        const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+        ASSERT_GE(H5Ldelete(file, name, H5P_DEFAULT), 0);
+        H5Fclose(file);
+    }
+};
+
+TEST_F(Records, ComeBackBitByBit) {
+    write();
+    const Record record = read_record(path);
+    const UpdateResult result = some_result();
+    EXPECT_EQ(record.format_version, 1);
+    EXPECT_EQ(record.deformation.mesh.nodes, prepared().model.mesh.nodes);
+    EXPECT_EQ(record.deformation.mesh.tets, prepared().model.mesh.tets);
+    EXPECT_EQ(record.deformation.mesh.labels, prepared().model.mesh.labels);
+    EXPECT_EQ(record.deformation.displacement, result.deformation.displacement);
+    EXPECT_EQ(record.deformation.placement.matrix(), result.deformation.placement.matrix());
+    EXPECT_EQ(record.element, prepared().model.element);
+    EXPECT_EQ(record.provenance, some_info().provenance);
+    EXPECT_EQ(record.parameters_toml, some_info().parameters_toml);
+    EXPECT_EQ(record.moving_grid.size, prepared().labels.geometry.size);
+    EXPECT_EQ(record.moving_grid.origin, prepared().labels.geometry.origin);
+    EXPECT_EQ(record.moving_grid.spacing, prepared().labels.geometry.spacing);
+    EXPECT_EQ(record.moving_grid.direction, prepared().labels.geometry.direction);
+    ASSERT_EQ(record.materials.size(), 2u);
+    const auto& soft = std::get<tled::NeoHookeanLnJ>(record.materials.at(1));
+    const auto& stiff = std::get<tled::NeoHookeanIso>(record.materials.at(7));
+    EXPECT_EQ(soft.lame_lambda, std::get<tled::NeoHookeanLnJ>(prepared().model.materials.at(1)).lame_lambda);
+    EXPECT_EQ(stiff.bulk_modulus, std::get<tled::NeoHookeanIso>(prepared().model.materials.at(7)).bulk_modulus);
+    EXPECT_EQ(stiff.shear_modulus, std::get<tled::NeoHookeanIso>(prepared().model.materials.at(7)).shear_modulus);
+}
+
+TEST_F(Records, HoldTheJacobianOfAnAffineMap) {
+    UpdateResult result = some_result();
+    result.deformation = test::deformed_by(prepared().model.mesh, [](const Eigen::Vector3d& p) {
+        return Eigen::Vector3d(0.1 * p[0] + 0.2 * p[1], -0.05 * p[1], 0.02 * p[2]);
+    });
+    write_record(prepared(), result, some_info(), path);
+    const Record record = read_record(path);
+    ASSERT_EQ(record.jacobian.size(), prepared().model.mesh.tet_count());
+    const double expected = 1.1 * 0.95 * 1.02;
+    EXPECT_LT((record.jacobian.array() - expected).abs().maxCoeff(), 1e-12);
+}
+
+TEST_F(Records, OfEmptyListsComeBack) {
+    UpdateResult result = some_result();
+    result.rounds.clear();
+    result.doubts.clear();
+    write_record(prepared(), result, {}, path);
+    EXPECT_TRUE(read_record(path).provenance.empty());
+}
+
+TEST_F(Records, LeaveNothingBesideThem) {
+    write();
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1);
+}
+
+TEST_F(Records, AreRefusedAtEveryTruncation) {
+    write();
+    const auto whole = fs::file_size(path);
+    for (const double part : {0.0, 0.01, 0.3, 0.7, 0.999}) {
+        write();
+        fs::resize_file(path, static_cast<std::uintmax_t>(part * static_cast<double>(whole)));
+        EXPECT_THROW(read_record(path), IoError) << part;
+    }
+}
+
+TEST_F(Records, WithAFlippedByteAreRefused) {
+    write();
+    // Somewhere in the compressed nodes: the checksum tells.
+    const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+    const hid_t data = H5Dopen2(file, "mesh/nodes", H5P_DEFAULT);
+    haddr_t address = 0;
+    hsize_t bytes = 0, offset[2];
+    unsigned filters = 0;
+    const hid_t space = H5Dget_space(data);
+    ASSERT_GE(H5Dget_chunk_info(data, space, 0, offset, &filters, &address, &bytes), 0);
+    H5Sclose(space);
+    H5Dclose(data);
+    H5Fclose(file);
+    std::fstream stream(path, std::ios::in | std::ios::out | std::ios::binary);
+    const auto place = static_cast<std::streamoff>(address + bytes / 2);
+    stream.seekg(place);
+    const int byte = stream.get();
+    stream.seekp(place);
+    stream.put(static_cast<char>(byte ^ 1));
+    stream.close();
+    EXPECT_THROW(read_record(path), IoError);
+}
+
+TEST_F(Records, OfForeignFormatsAreRefused) {
+    std::ofstream(path) << "not HDF5";
+    EXPECT_THROW(read_record(path), IoError);
+    EXPECT_THROW(read_record(folder / "missing.h5"), IoError);
+    EXPECT_THROW(read_record(folder), IoError);
+    H5Fclose(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT));
+    EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr("no file of tissuewarp")));
+    write_prepared(prepared(), path);
+    EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr("a tissuewarp prepared model")));
+}
+
+TEST_F(Records, OfAnotherVersionAreRefused) {
+    write();
+    const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    const hid_t attribute = H5Aopen(file, "format_version", H5P_DEFAULT);
+    const int version = 2;
+    ASSERT_GE(H5Awrite(attribute, H5T_NATIVE_INT, &version), 0);
+    H5Aclose(attribute);
+    H5Fclose(file);
+    EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr("format version 2")));
+}
+
+TEST_F(Records, WithNodeIndicesOutOfRangeAreRefused) {
+    for (const int index : {-1, prepared().model.mesh.node_count()}) {
+        write();
+        poke<int>("mesh/tetrahedra", 5, index);
+        EXPECT_THROW(read_record(path), InvalidInput) << index;
+    }
+}
+
+TEST_F(Records, WithValuesThatAreNotFiniteAreRefused) {
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    for (const char* name : {"mesh/nodes", "displacement", "placement", "jacobian", "materials/shear_modulus"}) {
+        write();
+        poke<double>(name, 1, nan);
+        EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr(name)));
+    }
+}
+
+TEST_F(Records, WithAPlacementThatIsNotRigidAreRefused) {
+    write();
+    poke<double>("placement", 0, 2.0);
+    EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr("rigid")));
+}
+
+TEST_F(Records, WithoutOneOfTheirPartsAreRefused) {
+    for (const char* name : {"mesh/labels", "displacement", "moving_grid/origin", "provenance/value", "element"}) {
+        write();
+        remove_dataset(name);
+        EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr(name)));
+    }
+}
+
+TEST_F(Records, OfPartsThatDisagreeInSizeAreRefused) {
+    write();
+    remove_dataset("displacement");
+    const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    const hsize_t shape[] = {4, 3};
+    const double zeros[12] = {};
+    const hid_t space = H5Screate_simple(2, shape, nullptr);
+    const hid_t data =
+        H5Dcreate2(file, "displacement", H5T_NATIVE_DOUBLE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    ASSERT_GE(H5Dwrite(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, zeros), 0);
+    H5Dclose(data);
+    H5Sclose(space);
+    H5Fclose(file);
+    EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr("4 nodes")));
+}
+
+TEST_F(Records, AreNotWrittenOfResultsThatAreNotFinite) {
+    UpdateResult result = some_result();
+    result.deformation.displacement(1, 3) = std::numeric_limits<double>::infinity();
+    EXPECT_THROW(write_record(prepared(), result, some_info(), path), InvalidInput);
+    EXPECT_FALSE(fs::exists(path));
+}
+
+TEST_F(Records, AreNotWrittenIntoMissingFolders) {
+    EXPECT_THROW(write_record(prepared(), some_result(), some_info(), folder / "none" / "r.h5"), IoError);
+}
+
+TEST_F(Records, AreReadByH5py) {
+    if (std::system("/usr/bin/python3 -c 'import h5py, numpy' 2>/dev/null") != 0) GTEST_SKIP() << "no h5py";
+    write();
+    const std::string script = std::string(TISSUEWARP_SOURCE_DIR) + "/tests/registration/check_record.py";
+    const UpdateResult result = some_result();
+    std::ofstream expected(folder / "expected.txt");
+    expected.precision(17);
+    expected << prepared().model.mesh.node_count() << ' ' << prepared().model.mesh.tet_count() << '\n'
+             << prepared().model.mesh.nodes.transpose() << '\n'
+             << result.deformation.displacement.transpose() << '\n'
+             << result.deformation.placement.matrix() << '\n';
+    expected.close();
+    EXPECT_EQ(
+        std::system(
+            ("/usr/bin/python3 " + script + " " + path.string() + " " + (folder / "expected.txt").string()).c_str()),
+        0);
+}
+
+TEST_F(Records, PreparedModelsComeBack) {
+    write_prepared(prepared(), path);
+    const PreparedModel back = read_prepared(path);
+    const PreparedModel& model = prepared();
+    EXPECT_EQ(back.model.mesh.nodes, model.model.mesh.nodes);
+    EXPECT_EQ(back.model.mesh.tets, model.model.mesh.tets);
+    EXPECT_EQ(back.model.mesh.labels, model.model.mesh.labels);
+    EXPECT_EQ(back.model.element, model.model.element);
+    EXPECT_EQ(back.labels.geometry.direction, model.labels.geometry.direction);
+    EXPECT_EQ(back.labels.geometry.origin, model.labels.geometry.origin);
+    EXPECT_EQ(cv::norm(back.labels.voxels, model.labels.voxels, cv::NORM_INF), 0.0);
+    EXPECT_EQ(back.options.data_stiffness, model.options.data_stiffness);
+    EXPECT_EQ(back.options.tangential_ratio, model.options.tangential_ratio);
+    EXPECT_EQ(back.options.meshing.label_edge_length, model.options.meshing.label_edge_length);
+    EXPECT_EQ(back.options.meshing.labels, model.options.meshing.labels);
+    EXPECT_EQ(tled::shear_modulus(back.options.default_material), tled::shear_modulus(model.options.default_material));
+    ASSERT_EQ(back.interfaces.nodes().size(), model.interfaces.nodes().size());
+    EXPECT_EQ(back.stiffness.factor_nonzeros(), model.stiffness.factor_nonzeros());
+    const Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Ones(3, model.model.mesh.node_count());
+    const Eigen::Matrix3Xd here = model.stiffness.solve(force), there = back.stiffness.solve(force);
+    EXPECT_LT((here - there).cwiseAbs().maxCoeff(), 1e-9 * here.cwiseAbs().maxCoeff());
+}
+
+TEST_F(Records, PreparedModelsWithAWrongGridAreRefused) {
+    write_prepared(prepared(), path);
+    poke<int>("moving_labels/grid/size", 0, 1000000);
+    EXPECT_THAT([&] { read_prepared(path); }, ThrowsMessage<InvalidInput>(HasSubstr("moving_labels/voxels")));
+}
+
+}  // namespace
+}  // namespace tissuewarp::registration
