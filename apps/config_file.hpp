@@ -1,0 +1,19 @@
+#pragma once
+/// Parameter files (TOML) turned into command-line arguments.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace tissuewarp::apps {
+
+/// What a verb's configuration may say: its long options without dashes; `switches` take no value.
+struct KnownOptions {
+    std::vector<std::string> names, switches;
+};
+
+/// The file's keys as arguments ("--edge-length", "4"). Throws IoError, and InvalidInput with file, line and the
+/// nearest right name for a key that is no option, a table, or a value of a kind that no option takes.
+std::vector<std::string> read_config(const std::filesystem::path& path, const KnownOptions& known);
+
+}  // namespace tissuewarp::apps

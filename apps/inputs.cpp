@@ -1,0 +1,165 @@
+#include "apps/inputs.hpp"
+
+#include "apps/point_files.hpp"
+#include "core/sha256.hpp"
+#include "imaging/filters.hpp"
+#include "imaging/labels.hpp"
+
+#include <fmt/format.h>
+#include <tbb/task_group.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+namespace tissuewarp::apps {
+namespace fs = std::filesystem;
+using imaging::Geometry;
+using imaging::Volume;
+
+namespace {
+
+void add_file(RegistrationInputs& inputs, const char* role, const fs::path& path) {
+    if (path.empty()) return;
+    std::error_code failure;
+    if (!fs::exists(path, failure)) throw IoError(fmt::format("--{} '{}': no such file", role, path.string()));
+    inputs.files.push_back({role, path, ""});
+}
+
+/// Geometry whose extent is no part of a body is in other units than millimetres.
+void require_millimetres(const Geometry& grid, const fs::path& path) {
+    double extent = 0;
+    for (int axis = 0; axis < 3; ++axis)
+        extent = std::max(extent, grid.spacing[axis] * grid.size[static_cast<std::size_t>(axis)]);
+    constexpr double least_mm = 10.0, most_mm = 3000.0;
+    if (extent >= least_mm && extent <= most_mm) return;
+    throw InvalidInput(
+        fmt::format("'{}' spans {:g} mm, outside {:g} to {:g} mm; its spacing is probably in other units: write it in "
+                    "millimetres",
+                    path.string(), extent, least_mm, most_mm));
+}
+
+void require_common_label(const Volume& moving, const Volume& fixed, const RegisterOptions& options) {
+    const std::vector<int> a = imaging::labels_in(moving), b = imaging::labels_in(fixed);
+    std::vector<int> common;
+    std::set_intersection(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(common));
+    if (!common.empty()) return;
+    throw InvalidInput(fmt::format(
+        "'{}' (labels {}) and '{}' (labels {}) share no label; give the same tissue the same number",
+        options.moving_labels.string(), fmt::join(a, ", "), options.fixed_labels.string(), fmt::join(b, ", ")));
+}
+
+/// Corners of the box around the labels, LPS mm.
+std::pair<Eigen::Vector3d, Eigen::Vector3d> label_box(const Volume& labels) {
+    Eigen::Vector3d lower = Eigen::Vector3d::Constant(INFINITY), upper = -lower;
+    for (const auto& [label, statistics] : imaging::label_statistics(labels))
+        for (int corner = 0; corner < 8; ++corner) {
+            Eigen::Vector3d index;
+            for (int axis = 0; axis < 3; ++axis) {
+                const auto a = static_cast<std::size_t>(axis);
+                index[axis] = (corner >> axis & 1) ? statistics.upper[a] - 0.5 : statistics.lower[a] - 0.5;
+            }
+            lower = lower.cwiseMin(labels.geometry.point(index));
+            upper = upper.cwiseMax(labels.geometry.point(index));
+        }
+    return {lower, upper};
+}
+
+/// Without alignment the organs must already lie within the search range of each other.
+void require_organs_meet(const RegistrationInputs& inputs) {
+    constexpr double search_mm = 15.0;  // UpdateOptions::first_range_mm
+    const auto [lower_a, upper_a] = label_box(inputs.moving_labels);
+    const auto [lower_b, upper_b] = label_box(inputs.fixed_labels);
+    const double gap = (lower_a - upper_b).cwiseMax(lower_b - upper_a).maxCoeff();
+    if (gap <= search_mm) return;
+    throw InvalidInput(fmt::format(
+        "the labelled organs lie {:.1f} mm apart, beyond the search of {:g} mm; drop --no-align", gap, search_mm));
+}
+
+void match_grid(Volume& labels, const Volume& image, const fs::path& image_path, const fs::path& labels_path,
+                bool resample) {
+    if (image.empty()) return;
+    if (!imaging::same_grid(image.geometry, labels.geometry)) {
+        if (!resample)
+            require_same_grid(image.geometry, labels.geometry, image_path.string(), labels_path.string(),
+                              "give labels drawn on that image, or add --resample-labels");
+        labels = imaging::resample(labels, image.geometry, imaging::Interpolation::Nearest);
+    }
+    labels.geometry = image.geometry;  // headers that differ in a late digit are one grid
+}
+
+}  // namespace
+
+void require_same_grid(const Geometry& image, const Geometry& labels, const std::string& image_name,
+                       const std::string& labels_name, const std::string& remedy) {
+    if (imaging::same_grid(image, labels)) return;
+    const auto text = [](const Geometry& g) { return fmt::format("{}x{}x{}", g.size[0], g.size[1], g.size[2]); };
+    const double distance = imaging::grid_distance(image, labels);
+    const std::string difference = std::isinf(distance)
+                                       ? fmt::format("{} and {} voxels", text(image), text(labels))
+                                       : fmt::format("corners up to {:.3g} voxels apart, 0.001 allowed", distance);
+    throw InvalidInput(
+        fmt::format("'{}' and '{}' are not on one grid ({}); {}", image_name, labels_name, difference, remedy));
+}
+
+std::optional<registration::Landmarks> read_landmark_files(const LandmarkFiles& files) {
+    if (!files.csv.empty()) return registration::read_landmarks(files.csv);
+    if (!files.moving.empty()) return registration::read_landmarks(files.moving, files.fixed);
+    return std::nullopt;
+}
+
+RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observer) {
+    RegistrationInputs inputs;
+    const std::vector<std::pair<const char*, const fs::path*>> roles{{"moving", &options.moving},
+                                                                     {"moving-labels", &options.moving_labels},
+                                                                     {"fixed", &options.fixed},
+                                                                     {"fixed-labels", &options.fixed_labels},
+                                                                     {"materials", &options.materials},
+                                                                     {"landmarks", &options.landmarks.csv},
+                                                                     {"landmarks-moving", &options.landmarks.moving},
+                                                                     {"landmarks-fixed", &options.landmarks.fixed},
+                                                                     {"points", &options.points},
+                                                                     {"surface", &options.surface}};
+    for (const auto& [role, path] : roles) add_file(inputs, role, *path);
+    if (!options.materials.empty()) inputs.materials = read_materials(options.materials);
+    inputs.landmarks = read_landmark_files(options.landmarks);
+    if (!options.points.empty()) inputs.points = read_points(options.points);
+    observer.checkpoint("reading", 0.1);
+
+    imaging::ReadResult moving, fixed;
+    tbb::task_group tasks;
+    tasks.run([&] { inputs.moving_labels = imaging::read_labels(options.moving_labels); });
+    tasks.run([&] { inputs.fixed_labels = imaging::read_labels(options.fixed_labels); });
+    if (!options.moving.empty()) tasks.run([&] { moving = imaging::read_volume_with_notes(options.moving); });
+    if (!options.fixed.empty()) tasks.run([&] { fixed = imaging::read_volume_with_notes(options.fixed); });
+    tasks.run([&] {
+        for (InputFile& file : inputs.files)
+            if (fs::is_regular_file(file.path)) file.sha256 = sha256_of_file(file.path);
+    });
+    tasks.wait();
+    for (const imaging::ReadResult* read : {&moving, &fixed})
+        inputs.notes.insert(inputs.notes.end(), read->notes.begin(), read->notes.end());
+    inputs.moving = moving.volume;
+    inputs.fixed = fixed.volume;
+    observer.checkpoint("reading", 1.0);
+    return inputs;
+}
+
+void validate(RegistrationInputs& inputs, const RegisterOptions& options) {
+    for (const auto& [image, path] : {std::pair{&inputs.moving, &options.moving}, {&inputs.fixed, &options.fixed}})
+        if (image->channels() > 1)
+            throw InvalidInput(
+                fmt::format("'{}' has {} components; give a grey image", path->string(), image->channels()));
+    match_grid(inputs.moving_labels, inputs.moving, options.moving, options.moving_labels, options.resample_labels);
+    match_grid(inputs.fixed_labels, inputs.fixed, options.fixed, options.fixed_labels, options.resample_labels);
+    require_millimetres(inputs.moving_labels.geometry, options.moving_labels);
+    require_millimetres(inputs.fixed_labels.geometry, options.fixed_labels);
+    imaging::require_labels(inputs.moving_labels, {}, options.moving_labels.string().c_str());
+    imaging::require_labels(inputs.fixed_labels, {}, options.fixed_labels.string().c_str());
+    require_common_label(inputs.moving_labels, inputs.fixed_labels, options);
+    if (!options.materials.empty())
+        require_materials(inputs.materials, imaging::labels_in(inputs.moving_labels), options.materials);
+    if (options.no_align) require_organs_meet(inputs);
+}
+
+}  // namespace tissuewarp::apps

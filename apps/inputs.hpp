@@ -1,0 +1,54 @@
+#pragma once
+/// Reading what a registration needs and refusing what cannot be registered, before any heavy work.
+
+#include "apps/material_file.hpp"
+#include "apps/options.hpp"
+#include "core/observer.hpp"
+#include "imaging/image_io.hpp"
+#include "registration/evaluation.hpp"
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace tissuewarp::apps {
+
+/// One file that was read.
+struct InputFile {
+    std::string role;  ///< "moving", "fixed-labels", ...: the option's name
+    std::filesystem::path path;
+    std::string sha256;  ///< empty for a folder
+};
+
+struct RegistrationInputs {
+    imaging::Volume moving, fixed;  ///< grey images; empty when not given
+    imaging::Volume moving_labels, fixed_labels;
+    std::optional<registration::Landmarks> landmarks;
+    std::optional<Eigen::Matrix3Xd> points;  ///< moving frame, LPS mm
+    std::map<int, TissueEntry> materials;    ///< empty without a table
+    std::vector<InputFile> files;
+    std::vector<std::string> notes;  ///< what the readers had to decide
+
+    [[nodiscard]] const imaging::Geometry& fixed_grid() const {
+        return fixed.empty() ? fixed_labels.geometry : fixed.geometry;
+    }
+    [[nodiscard]] const imaging::Geometry& moving_grid() const {
+        return moving.empty() ? moving_labels.geometry : moving.geometry;
+    }
+};
+
+/// Reads all files at once. Throws IoError or InvalidInput, each naming the file.
+RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observer);
+
+/// Throws InvalidInput where geometry, labels, units or materials cannot be registered; resamples labels when asked.
+void validate(RegistrationInputs& inputs, const RegisterOptions& options);
+
+/// Throws InvalidInput unless both lie on one grid; says how far apart they are, in voxels.
+void require_same_grid(const imaging::Geometry& image, const imaging::Geometry& labels, const std::string& image_name,
+                       const std::string& labels_name, const std::string& remedy);
+
+/// Reads the landmark files that were given.
+std::optional<registration::Landmarks> read_landmark_files(const LandmarkFiles& files);
+
+}  // namespace tissuewarp::apps

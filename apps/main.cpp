@@ -1,0 +1,65 @@
+// The program: picks the verb, turns exceptions into one line and an exit code.
+//   0 done, 1 unexpected, 2 wrong input or usage, 3 file, 4 numerics, 5 no GPU, 130 interrupted
+
+#include "apps/options.hpp"
+#include "apps/progress.hpp"
+#include "apps/verbs.hpp"
+#include "core/errors.hpp"
+
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <new>
+
+namespace {
+
+using namespace tissuewarp;
+
+struct RunVerb {
+    void operator()(const apps::RegisterOptions& options) const { apps::run_register(options); }
+    void operator()(const apps::MeshOptions& options) const { apps::run_mesh(options); }
+    void operator()(const apps::WarpOptions& options) const { apps::run_warp(options); }
+    void operator()(const apps::EvaluateOptions& options) const { apps::run_evaluate(options); }
+    void operator()(const apps::InfoOptions& options) const { apps::run_info(options); }
+};
+
+int report(const std::vector<std::string>& arguments, int code, std::string message) {
+    std::replace(message.begin(), message.end(), '\n', ' ');
+    const std::string verb = apps::verb_of(arguments);
+    spdlog::error("tissuewarp{}{}: {}", verb.empty() ? "" : " ", verb, message);
+    return code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    spdlog::set_default_logger(spdlog::stderr_logger_st("tissuewarp"));
+    spdlog::set_pattern("%v");
+    const std::vector<std::string> arguments(argv + 1, argv + argc);
+    try {
+        const apps::Command command = apps::parse_command_line(arguments);
+        apps::catch_interrupts();
+        std::visit(RunVerb{}, command);
+        if (std::fflush(stdout) != 0) throw IoError("cannot write to standard output");
+        return 0;
+    } catch (const apps::HelpRequest& help) {
+        std::fputs(help.text.c_str(), stdout);
+        return 0;
+    } catch (const InvalidInput& error) {
+        return report(arguments, 2, error.what());
+    } catch (const IoError& error) {
+        return report(arguments, 3, error.what());
+    } catch (const SolverFailure& error) {
+        return report(arguments, 4, error.what());
+    } catch (const GpuUnavailable& error) {
+        return report(arguments, 5, error.what());
+    } catch (const Cancelled&) {
+        return report(arguments, 130, "interrupted; nothing was written");
+    } catch (const std::bad_alloc&) {
+        return report(arguments, 1, "not enough memory; use a coarser --edge-length or smaller images");
+    } catch (const std::exception& error) {
+        return report(arguments, 1, std::string("unexpected: ") + error.what());
+    }
+}

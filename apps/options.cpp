@@ -1,0 +1,345 @@
+// The one translation unit that includes CLI11.
+
+#include "apps/options.hpp"
+
+#include "apps/config_file.hpp"
+#include "apps/versions.hpp"
+#include "core/errors.hpp"
+
+#include <CLI/CLI.hpp>
+
+#include <charconv>
+#include <deque>
+
+namespace tissuewarp::apps {
+
+namespace {
+
+using Kind = Parameter::Kind;
+
+/// Declares the options of one verb and remembers of which kind each is.
+class Verb {
+public:
+    Verb(CLI::App& parent, const char* name, const char* what) : app_(*parent.add_subcommand(name, what)) {
+        app_.set_help_flag("-h,--help", "Print this text and exit");
+    }
+    CLI::App& app() { return app_; }
+
+    CLI::Option* path(const std::string& names, std::filesystem::path& target, const char* what) {
+        return keep(Kind::Text, app_.add_option_function<std::string>(
+                                        names, [&target](const std::string& value) { target = value; }, what)
+                                    ->type_name("FILE")
+                                    ->take_last());
+    }
+    CLI::Option* text(const std::string& names, std::string& target, const char* what) {
+        return keep(Kind::Text, app_.add_option(names, target, what)->capture_default_str()->take_last());
+    }
+    /// A number within [least, most], of the unit that `unit` names.
+    template <class T>
+    CLI::Option* number(const std::string& names, T& target, const char* unit, T least, T most, const char* what) {
+        return keep(Kind::Number, app_.add_option(names, target, what)
+                                      ->type_name(unit)
+                                      ->check(CLI::Range(least, most).description(""))
+                                      ->capture_default_str()
+                                      ->take_last());
+    }
+    CLI::Option* flag(const std::string& names, bool& target, const char* what) {
+        return keep(Kind::Switch, app_.add_flag(names, target, what)->take_last());
+    }
+    CLI::Option* list(const std::string& names, std::vector<std::string>& target, const char* unit, const char* what) {
+        return keep(Kind::TextList, app_.add_option(names, target, what)->type_name(unit)->allow_extra_args(false));
+    }
+    void common(CommonOptions& target) {
+        number("--threads", target.threads, "COUNT", 0, 4096, "Cores to use; 0: all");
+        flag("--quiet", target.quiet, "Print errors only");
+    }
+    void landmarks(LandmarkFiles& target) {
+        CLI::Option* csv =
+            path("--landmarks", target.csv,
+                 "Corresponding points for scoring only: CSV pre_x,pre_y,pre_z,intra_x,intra_y,intra_z (mm, LPS)");
+        CLI::Option* moving =
+            path("--landmarks-moving", target.moving, "elastix point file of the moving image (mm, LPS)");
+        CLI::Option* fixed = path("--landmarks-fixed", target.fixed, "elastix point file of the fixed image (mm, LPS)");
+        moving->needs(fixed)->excludes(csv);
+        fixed->needs(moving)->excludes(csv);
+    }
+
+    [[nodiscard]] KnownOptions known() const {
+        KnownOptions result;
+        for (const auto& [option, kind] : options_) {
+            result.names.push_back(name_of(option));
+            if (kind == Kind::Switch) result.switches.push_back(name_of(option));
+        }
+        return result;
+    }
+    /// Present values, defaults included; options without a value are left out.
+    [[nodiscard]] std::vector<Parameter> parameters(const std::vector<std::string>& except) const {
+        std::vector<Parameter> result;
+        for (const auto& [option, kind] : options_) {
+            Parameter parameter{name_of(option), kind, {}};
+            if (std::find(except.begin(), except.end(), parameter.name) != except.end()) continue;
+            if (option->count() > 0)
+                parameter.values = option->results();
+            else if (kind == Kind::Switch)
+                parameter.values = {"false"};
+            else if (!option->get_default_str().empty() && kind != Kind::TextList)
+                parameter.values = {option->get_default_str()};
+            if (parameter.values.empty()) continue;
+            if (kind != Kind::TextList) parameter.values = {parameter.values.back()};
+            result.push_back(parameter);
+        }
+        return result;
+    }
+
+private:
+    CLI::Option* keep(Kind kind, CLI::Option* option) {
+        options_.emplace_back(option, kind);
+        return option;
+    }
+    static std::string name_of(const CLI::Option* option) { return option->get_lnames().front(); }
+
+    CLI::App& app_;
+    std::vector<std::pair<CLI::Option*, Kind>> options_;
+};
+
+std::string check_device(std::string& value) {
+    int index = 0;
+    const char* end = value.data() + value.size();
+    if (value == "auto" || value == "cpu" || value == "gpu") return {};
+    if (value.starts_with("gpu:") && std::from_chars(value.data() + 4, end, index).ptr == end && value.size() > 4)
+        return {};
+    return "'" + value + "' is no device; give auto, cpu, gpu or gpu:<index> (see 'tissuewarp info --devices')";
+}
+
+std::map<int, double> label_lengths(const std::vector<std::string>& entries) {
+    std::map<int, double> lengths;
+    for (const std::string& entry : entries) {
+        int label = 0;
+        double length = 0;
+        const char* end = entry.data() + entry.size();
+        const auto first = std::from_chars(entry.data(), end, label);
+        const bool equals = first.ptr != end && *first.ptr == '=';
+        const auto second = equals ? std::from_chars(first.ptr + 1, end, length) : first;
+        if (!equals || second.ptr != end || second.ec != std::errc() || label <= 0 || !(length > 0))
+            throw InvalidInput("--label-edge-length '" + entry +
+                               "' is not LABEL=MM with both above 0; write for instance 2=3.5");
+        lengths[label] = length;
+    }
+    return lengths;
+}
+
+/// All verbs with the structs that they fill.
+struct Parser {
+    CLI::App app{
+        "Registers images of soft tissue by simulating the tissue. Lengths in mm, stiffness in kPa, points in LPS.",
+        "tissuewarp"};
+    RegisterOptions registration;
+    MeshOptions mesh;
+    WarpOptions warp;
+    EvaluateOptions evaluate;
+    InfoOptions info;
+    std::filesystem::path config;
+    std::vector<std::string> register_lengths, mesh_lengths, info_files;
+    std::deque<Verb> verbs;
+
+    Parser() {
+        app.require_subcommand(1);
+        app.set_version_flag("--version", "tissuewarp " + program_version());
+        declare_register(verbs.emplace_back(app, "register", "Register a segmented volume to another"));
+        declare_mesh(verbs.emplace_back(app, "mesh", "Turn a label map into tetrahedra"));
+        declare_warp(verbs.emplace_back(app, "warp", "Carry an image, labels, points or a surface along"));
+        declare_evaluate(verbs.emplace_back(app, "evaluate", "Score label maps, landmarks and fields"));
+        declare_info(verbs.emplace_back(app, "info", "Print what a file holds, or the devices of this machine"));
+    }
+
+    void declare_register(Verb& verb) {
+        RegisterOptions& o = registration;
+        verb.app().footer(
+            "Example:\n  tissuewarp register --moving preop.nii.gz --moving-labels preop_labels.nii.gz \\\n"
+            "    --fixed intraop.nii.gz --fixed-labels intraop_labels.nii.gz --output out");
+        verb.path("--moving", o.moving, "Preoperative grey image; without it no warped image is written");
+        verb.path("--moving-labels", o.moving_labels, "Preoperative label map: what is meshed")->required();
+        verb.path("--fixed", o.fixed, "Intraoperative grey image: gives the output grid");
+        verb.path("--fixed-labels", o.fixed_labels, "Intraoperative label map: what is matched")->required();
+        verb.path("-o,--output", o.output, "Folder for the results")->required()->type_name("FOLDER");
+        verb.landmarks(o.landmarks);
+        verb.path("--points", o.points, "Moving points to carry along: CSV x,y,z (mm, LPS)");
+        verb.path("--surface", o.surface, "Moving surface to carry along: .ply, .stl, .obj, .vtk (mm, LPS)");
+        verb.number("--edge-length", o.edge_length, "MM", 0.1, 100.0, "Target edge of the tetrahedra (mm)");
+        verb.list("--label-edge-length", register_lengths, "LABEL=MM", "Target edge in one label (mm); repeatable");
+        verb.path("--materials", o.materials,
+                  "Material table (TOML): [label.1] youngs_modulus_kpa, poissons_ratio, law, name");
+        verb.number("--default-youngs-modulus", o.default_youngs_modulus, "KPA", 1e-3, 1e6,
+                    "Young's modulus without a table (kPa)");
+        verb.number("--default-poissons-ratio", o.default_poissons_ratio, "RATIO", 0.0, 0.4999,
+                    "Poisson's ratio without a table");
+        verb.text("--element", o.element,
+                  "auto, t4 or averaged-pressure; auto: the latter from a Poisson's ratio of 0.45")
+            ->check(CLI::IsMember({"auto", "t4", "averaged-pressure"}).description(""));
+        verb.number("--rounds", o.rounds, "COUNT", 1, 1000, "Rounds of matching and equilibrium");
+        verb.number("--tolerance", o.tolerance, "MM", 1e-6, 10.0, "Accepted error of each equilibrium (mm)");
+        verb.number("--data-stiffness", o.data_stiffness, "KPA/MM", 1e-6, 1e6,
+                    "Pull of the matched boundary per area (kPa/mm)");
+        verb.number("--fade", o.fade, "MM", 1.0, 1e4, "Distance from the organ where the field has become rigid (mm)");
+        verb.flag("--no-align", o.no_align, "Skip the rigid alignment: the images share one frame");
+        verb.flag("--resample-labels", o.resample_labels, "Accept labels on another grid than their image");
+        verb.text("--device", o.device.name, "auto, cpu, gpu or gpu:<index>")
+            ->check(CLI::Validator(check_device, "", "device"));
+        verb.common(o.common);
+        verb.path("--save-parameters", o.save_parameters, "Write the parameters in use to a TOML file");
+        verb.flag("--dry-run", o.dry_run, "Read and check the inputs, say what would be done, write nothing");
+        verb.app().add_option("--config", "Read parameters from a TOML file; the command line wins")->type_name("FILE");
+    }
+
+    void declare_mesh(Verb& verb) {
+        MeshOptions& o = mesh;
+        verb.path("labels", o.labels, "Label map")->required();
+        verb.path("-o,--output", o.output, "Mesh to write: .vtu (mm, LPS)")->required();
+        verb.number("--edge-length", o.edge_length, "MM", 0.1, 100.0, "Target edge of the tetrahedra (mm)");
+        verb.list("--label-edge-length", mesh_lengths, "LABEL=MM", "Target edge in one label (mm); repeatable");
+        verb.number("--facet-distance", o.facet_distance, "MM", 0.0, 100.0,
+                    "Largest distance of facets to the interface (mm); 0: 0.12 edges, at least a quarter voxel");
+        verb.number("--smoothing", o.smoothing, "VOXELS", 0.0, 10.0, "Gaussian that rounds the voxel steps (voxels)");
+        verb.app()
+            .add_option("--only", o.only, "Labels to mesh; default: all but 0")
+            ->type_name("LABEL")
+            ->delimiter(',');
+        verb.path("--json", o.json, "Also write the quality report as JSON");
+        verb.common(o.common);
+    }
+
+    void declare_warp(Verb& verb) {
+        WarpOptions& o = warp;
+        verb.path("input", o.input,
+                  "Image, label map, points (.csv) or surface (.ply, .stl, .obj, .vtk) of the moving frame")
+            ->required();
+        verb.path("-o,--output", o.output, "File to write")->required();
+        CLI::Option* record = verb.path("--record", o.record, "record.h5 of a registration");
+        CLI::Option* field =
+            verb.path("--displacement", o.displacement,
+                      "Displacement field (mm, LPS): fixed_to_moving for images and labels, moving_to_fixed "
+                      "for points and surfaces");
+        record->excludes(field);
+        verb.path("--reference", o.reference,
+                  "Image whose grid an image is warped onto, with --record; default: the input's");
+        verb.flag("--labels", o.labels, "The image is a label map: nearest neighbour");
+        verb.number("--outside", o.outside, "VALUE", -1e9, 1e9, "Value of voxels that come from outside the image");
+        verb.number("--fade", o.fade, "MM", 1.0, 1e4, "Distance from the organ where the field has become rigid (mm)");
+        verb.common(o.common);
+    }
+
+    void declare_evaluate(Verb& verb) {
+        EvaluateOptions& o = evaluate;
+        CLI::Option* labels = verb.path("--labels", o.labels, "Label map to score, for instance warped_labels.nii.gz");
+        CLI::Option* reference = verb.path("--reference-labels", o.reference_labels, "Label map that is the truth");
+        labels->needs(reference);
+        reference->needs(labels);
+        verb.landmarks(o.landmarks);
+        verb.path("--displacement", o.displacement, "Field moving_to_fixed (mm, LPS): maps the landmarks, gives det J");
+        verb.path("--mask", o.mask, "Only voxels other than 0 of this image count for det J");
+        verb.number("--moved", o.moved, "MM", 0.0, 1e3,
+                    "Landmarks that moved by more than this are also summed up apart (mm)");
+        verb.path("--json", o.json, "Also write the scores as JSON");
+        verb.common(o.common);
+    }
+
+    void declare_info(Verb& verb) {
+        InfoOptions& o = info;
+        verb.app()
+            .add_option("files", info_files,
+                        "Images, label maps, meshes (.vtu), surfaces or records (.h5); lengths in mm")
+            ->type_name("FILE");
+        verb.flag("--labels", o.labels, "Label statistics of an integer image (volumes in mm3)");
+        verb.flag("--devices", o.devices, "List the EGL devices that --device gpu:<index> counts");
+        verb.common(o.common);
+    }
+
+    Command result() {
+        const std::string verb = app.get_subcommands().front()->get_name();
+        if (verb == "register") {
+            registration.label_edge_length = label_lengths(register_lengths);
+            registration.parameters = verbs.front().parameters({"save-parameters", "dry-run"});
+            return registration;
+        }
+        if (verb == "mesh") {
+            mesh.label_edge_length = label_lengths(mesh_lengths);
+            return mesh;
+        }
+        if (verb == "warp") return warp;
+        if (verb == "evaluate") return evaluate;
+        info.files.assign(info_files.begin(), info_files.end());
+        return info;
+    }
+
+    /// Throws for a verb or a long option that does not exist, with the nearest that does: before CLI11 looks for what
+    /// is required, which a misspelt option would seem to lack.
+    void refuse_unknown(const std::vector<std::string>& arguments) {
+        if (arguments.empty() || arguments.front().starts_with("-")) return;
+        const auto verb =
+            std::find_if(verbs.begin(), verbs.end(), [&](Verb& v) { return v.app().get_name() == arguments.front(); });
+        if (verb == verbs.end())
+            refuse("there is no verb '" + arguments.front() + "'", arguments.front(), verb_names());
+        std::vector<std::string> names;
+        for (const CLI::Option* option : verb->app().get_options())
+            for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+        for (const std::string& argument : arguments) {
+            const std::string name = argument.substr(0, argument.find('='));
+            if (name.starts_with("--") && std::find(names.begin(), names.end(), name) == names.end())
+                refuse("there is no option '" + name + "'", name, names);
+        }
+    }
+
+    [[noreturn]] static void refuse(const std::string& message, const std::string& word,
+                                    const std::vector<std::string>& names) {
+        const std::string nearest = nearest_name(word, names);
+        throw InvalidInput(message + (nearest.empty() ? "; see --help" : "; did you mean '" + nearest + "'?"));
+    }
+
+    static std::vector<std::string> verb_names() { return {"register", "mesh", "warp", "evaluate", "info"}; }
+};
+
+/// Puts the file that --config names in front of the other arguments, so that those win.
+std::vector<std::string> with_config(const std::vector<std::string>& arguments, const KnownOptions& known) {
+    std::vector<std::string> expanded{arguments.front()}, rest;
+    for (std::size_t i = 1; i < arguments.size(); ++i) {
+        const bool separate = arguments[i] == "--config" && i + 1 < arguments.size();
+        if (!separate && !arguments[i].starts_with("--config=")) {
+            rest.push_back(arguments[i]);
+            continue;
+        }
+        const auto more = read_config(separate ? arguments[++i] : arguments[i].substr(9), known);
+        expanded.insert(expanded.end(), more.begin(), more.end());
+    }
+    expanded.insert(expanded.end(), rest.begin(), rest.end());
+    return expanded;
+}
+
+}  // namespace
+
+Command parse_command_line(std::vector<std::string> arguments) {
+    Parser parser;
+    if (!arguments.empty() && arguments.front() == "register")
+        arguments = with_config(arguments, parser.verbs.front().known());
+    parser.refuse_unknown(arguments);
+    std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them last first
+    try {
+        parser.app.parse(arguments);
+    } catch (const CLI::CallForHelp&) {
+        throw HelpRequest{parser.app.help()};
+    } catch (const CLI::CallForVersion&) {
+        throw HelpRequest{parser.app.version() + "\n"};
+    } catch (const CLI::ParseError& error) {
+        const bool no_verb = parser.app.get_subcommands().empty();
+        throw InvalidInput(no_verb ? "give a verb: register, mesh, warp, evaluate or info; see --help"
+                                   : std::string(error.what()) + "; see --help");
+    }
+    return parser.result();
+}
+
+std::string verb_of(const std::vector<std::string>& arguments) {
+    const auto verbs = Parser::verb_names();
+    const bool known = !arguments.empty() && std::find(verbs.begin(), verbs.end(), arguments.front()) != verbs.end();
+    return known ? arguments.front() : "";
+}
+
+}  // namespace tissuewarp::apps

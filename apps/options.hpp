@@ -1,0 +1,98 @@
+#pragma once
+/// What the command line of each verb says, as plain structs. The only place that knows the parser is options.cpp.
+
+#include "apps/parameters.hpp"
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace tissuewarp::apps {
+
+/// What every verb understands.
+struct CommonOptions {
+    int threads = 0;     ///< 0: all cores
+    bool quiet = false;  ///< errors only
+};
+
+/// Where the time steps run.
+struct DeviceChoice {
+    std::string name = "auto";  ///< "auto", "cpu", "gpu" or "gpu:<n>", n counting EGL devices
+};
+
+/// Known correspondences, for scoring only: one CSV, or a pair of elastix point files.
+struct LandmarkFiles {
+    std::filesystem::path csv, moving, fixed;
+    [[nodiscard]] bool given() const { return !csv.empty() || !moving.empty(); }
+};
+
+struct RegisterOptions {
+    CommonOptions common;
+    std::filesystem::path moving, moving_labels, fixed, fixed_labels, output;
+    LandmarkFiles landmarks;
+    std::filesystem::path points, surface;    ///< of the moving frame, carried along
+    double edge_length = 5.0;                 ///< mm
+    std::map<int, double> label_edge_length;  ///< mm
+    std::filesystem::path materials;
+    double default_youngs_modulus = 3.0;  ///< kPa
+    double default_poissons_ratio = 0.45;
+    std::string element = "auto";  ///< "auto", "t4" or "averaged-pressure"
+    int rounds = 8;
+    double tolerance = 0.05;      ///< mm
+    double data_stiffness = 3.0;  ///< kPa/mm
+    double fade = 60.0;           ///< mm
+    bool no_align = false;
+    bool resample_labels = false;
+    bool dry_run = false;
+    DeviceChoice device;
+    std::filesystem::path save_parameters;
+    std::vector<Parameter> parameters;  ///< all of the above as written to files
+};
+
+struct MeshOptions {
+    CommonOptions common;
+    std::filesystem::path labels, output, json;
+    double edge_length = 5.0;                 ///< mm
+    std::map<int, double> label_edge_length;  ///< mm
+    double facet_distance = 0.0;              ///< mm, 0: chosen from the edge length
+    double smoothing = 0.8;                   ///< voxels
+    std::vector<int> only;                    ///< labels to mesh; empty: all
+};
+
+struct WarpOptions {
+    CommonOptions common;
+    std::filesystem::path input, output, record, displacement, reference;
+    bool labels = false;   ///< nearest neighbour
+    double outside = 0.0;  ///< value of voxels whose tissue lay outside the moving image
+    double fade = 60.0;    ///< mm, with --record
+};
+
+struct EvaluateOptions {
+    CommonOptions common;
+    std::filesystem::path labels, reference_labels, displacement, mask, json;
+    LandmarkFiles landmarks;
+    double moved = 2.0;  ///< mm
+};
+
+struct InfoOptions {
+    CommonOptions common;
+    std::vector<std::filesystem::path> files;
+    bool labels = false, devices = false;
+};
+
+using Command = std::variant<RegisterOptions, MeshOptions, WarpOptions, EvaluateOptions, InfoOptions>;
+
+/// The text that --help or --version asked for; not an error.
+struct HelpRequest {
+    std::string text;
+};
+
+/// Parses the arguments after the program's name. Throws InvalidInput with one line, HelpRequest for --help.
+Command parse_command_line(std::vector<std::string> arguments);
+
+/// "register", "mesh", ... or nothing when the first argument names no verb: for the prefix of error messages.
+std::string verb_of(const std::vector<std::string>& arguments);
+
+}  // namespace tissuewarp::apps

@@ -1,0 +1,163 @@
+// tissuewarp register: read → prepare → update → fields → warp → score and write.
+
+#include "apps/output_folder.hpp"
+#include "apps/progress.hpp"
+#include "apps/register_outputs.hpp"
+#include "apps/report_json.hpp"
+#include "apps/threads.hpp"
+#include "apps/verbs.hpp"
+#include "apps/versions.hpp"
+#include "imaging/filters.hpp"
+#include "imaging/labels.hpp"
+#include "meshing/mesh_io.hpp"
+#include "registration/field.hpp"
+#include "registration/warp.hpp"
+
+#include <fmt/format.h>
+#include <tbb/task_group.h>
+
+#include <charconv>
+
+namespace tissuewarp::apps {
+
+namespace {
+
+using namespace registration;
+
+PrepareOptions prepare_options(const RegisterOptions& options, const std::map<int, TissueEntry>& tissues) {
+    PrepareOptions result;
+    result.meshing.edge_length = options.edge_length;
+    result.meshing.label_edge_length = options.label_edge_length;
+    for (const auto& [label, tissue] : tissues) result.materials[label] = material_of(tissue);
+    result.default_material = tled::neo_hookean_lnj(options.default_youngs_modulus, options.default_poissons_ratio);
+    if (options.element == "t4") result.element = tled::Element::T4;
+    if (options.element == "averaged-pressure") result.element = tled::Element::AveragedPressureT4;
+    result.data_stiffness = options.data_stiffness;
+    return result;
+}
+
+UpdateOptions update_options(const RegisterOptions& options) {
+    UpdateOptions result;
+    result.align = !options.no_align;
+    result.rematches = options.rounds;
+    result.equilibrium.tolerance_mm = options.tolerance;
+    const std::string& device = options.device.name;
+    if (device == "cpu") result.device = Device::Cpu;
+    if (device.starts_with("gpu")) result.device = Device::Gpu;
+    if (device.starts_with("gpu:")) std::from_chars(device.data() + 4, device.data() + device.size(), result.gpu_index);
+    return result;
+}
+
+void print_plan(const RegistrationInputs& inputs, const RegisterOptions& options) {
+    const auto grid = [](const imaging::Geometry& g) {
+        return fmt::format("{} x {} x {} voxels of {:g} x {:g} x {:g} mm", g.size[0], g.size[1], g.size[2],
+                           g.spacing[0], g.spacing[1], g.spacing[2]);
+    };
+    fmt::print("moving grid   {}\nfixed grid    {}\nlabels        {}\n", grid(inputs.moving_grid()),
+               grid(inputs.fixed_grid()), fmt::join(imaging::labels_in(inputs.moving_labels), ", "));
+    fmt::print("would mesh with edges of {:g} mm, {}, match in {} rounds on device '{}', and write to '{}':\n",
+               options.edge_length, options.no_align ? "not align" : "align rigidly", options.rounds,
+               options.device.name, options.output.string());
+    for (const std::string& name : output_names(options)) fmt::print("  {}\n", name);
+}
+
+void make_fields(RegistrationRun& run, Observer& observer) {
+    const FieldOptions options{run.options.fade};
+    const Deformation& deformation = run.result.deformation;
+    run.products.moving_to_fixed =
+        displacement_moving_to_fixed(deformation, run.inputs.moving_grid(), options, observer);
+    run.products.fixed_to_moving =
+        displacement_fixed_to_moving(deformation, run.inputs.fixed_grid(), options, observer);
+}
+
+void warp_everything(RegistrationRun& run) {
+    const RegistrationInputs& inputs = run.inputs;
+    Products& products = run.products;
+    if (!inputs.moving.empty()) products.warped = warp_image(inputs.moving, products.fixed_to_moving);
+    products.warped_labels = warp_labels(inputs.moving_labels, products.fixed_to_moving);
+    const bool surface = !run.options.surface.empty();
+    if (!inputs.landmarks && !inputs.points && !surface) return;
+    const PointTransform transform(run.result.deformation, {run.options.fade});
+    if (inputs.landmarks) products.landmarks = transform(inputs.landmarks->moving);
+    if (inputs.points) products.points = transform(*inputs.points);
+    if (surface) {
+        products.surface = meshing::read_surface(run.options.surface).mesh;
+        products.surface->nodes = transform(products.surface->nodes);
+    }
+}
+
+Scores score(const RegistrationRun& run) {
+    Scores scores;
+    const imaging::Volume &moving = run.inputs.moving_labels, &fixed = run.inputs.fixed_labels;
+    scores.moving_labels_by_header = imaging::resample(moving, fixed.geometry, imaging::Interpolation::Nearest);
+    scores.before = overlap(scores.moving_labels_by_header, fixed);
+    scores.after = overlap(run.products.warped_labels, fixed);
+    scores.mesh = mesh_jacobians(run.result.deformation);
+    const imaging::Volume organ = imaging::mask_of_all(moving);
+    scores.organ = field_jacobians(run.products.moving_to_fixed, &organ);
+    scores.grid = field_jacobians(run.products.moving_to_fixed);
+    if (run.inputs.landmarks) scores.target_error = target_error(*run.inputs.landmarks, run.products.landmarks);
+    return scores;
+}
+
+void append(std::vector<StageTime>& times, const std::vector<StageTime>& more) {
+    times.insert(times.end(), more.begin(), more.end());
+}
+
+}  // namespace
+
+void run_register(const RegisterOptions& options) {
+    const ThreadLimit threads(options.common.threads);
+    StageClock clock;
+    ProgressLine progress(options.common.quiet);
+    RegistrationRun run{options, utc_now(), {}, {}, {}, {}, {}, {}, {}};
+
+    if (options.dry_run) require_could_write(options.output);
+    std::unique_ptr<OutputFolder> output;
+    if (!options.dry_run) output = std::make_unique<OutputFolder>(options.output);
+
+    progress.begin("reading", 0.0, 0.05);
+    run.inputs = read_inputs(options, progress);
+    validate(run.inputs, options);
+    run.times.push_back(clock.lap("read"));
+    if (options.dry_run) {
+        progress.clear();
+        return print_plan(run.inputs, options);
+    }
+    if (!options.save_parameters.empty()) save_parameters(options.parameters, options.save_parameters);
+
+    progress.begin("preparing the model", 0.05, 0.35);
+    run.prepared = std::make_unique<PreparedModel>(
+        prepare(run.inputs.moving_labels, prepare_options(options, run.inputs.materials), progress));
+    append(run.times, run.prepared->times);
+
+    progress.begin("registering", 0.35, 0.70);
+    run.result = update(*run.prepared, run.inputs.fixed_labels, update_options(options), progress);
+    append(run.times, run.result.times);
+    clock.lap("");
+
+    progress.begin("displacement fields", 0.70, 0.85);
+    make_fields(run, progress);
+    run.times.push_back(clock.lap("fields"));
+    warp_everything(run);
+    run.times.push_back(clock.lap("warp"));
+
+    progress.begin("writing and scoring", 0.85, 0.97);
+    tbb::task_group writing;  // compression takes one core per file; the scores run beside it
+    start_writing(run, *output, writing);
+    run.scores = score(run);
+    run.times.push_back(clock.lap("score"));
+    writing.wait();
+    run.times.push_back(clock.lap("write"));
+
+    progress.begin("report", 0.97, 1.0);
+    run.notes = progress.notes();
+    const nlohmann::json report = report_json(run, clock.total());
+    write_reports(run, report, *output);
+    output->commit();
+    run.times.push_back(clock.lap("report"));
+    progress.clear();
+    if (!options.common.quiet) fmt::print("{}", summary_text(run, clock.total()));
+}
+
+}  // namespace tissuewarp::apps

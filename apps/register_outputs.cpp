@@ -1,0 +1,144 @@
+#include "apps/register_outputs.hpp"
+
+#include "apps/point_files.hpp"
+#include "apps/progress.hpp"
+#include "apps/text_file.hpp"
+#include "apps/versions.hpp"
+#include "meshing/mesh_io.hpp"
+#include "registration/record.hpp"
+#include "report/page.hpp"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+
+namespace tissuewarp::apps {
+
+namespace {
+
+using registration::Deformation;
+
+/// The smallest integer type that holds the labels, as other programs write them.
+imaging::Volume compact(const imaging::Volume& labels) {
+    double most = 0;
+    const auto* values = labels.data<std::int32_t>();
+    for (long long v = 0; v < labels.geometry.voxel_count(); ++v) most = std::max(most, double(values[v]));
+    if (most <= 255) return labels.as(CV_8U);
+    return most <= 32767 ? labels.as(CV_16S) : labels;
+}
+
+void write_mesh(const Deformation& deformation, const std::filesystem::path& path) {
+    const Eigen::VectorXd rest = meshing::tet_volumes(deformation.mesh);
+    const Eigen::VectorXd deformed = meshing::tet_volumes(deformation.deformed_mesh());
+    const meshing::MeshArray elastic{"displacement", deformation.displacement};
+    const meshing::MeshArray total{"total_displacement", deformation.deformed_nodes() - deformation.mesh.nodes};
+    const meshing::MeshArray jacobian{"J", deformed.cwiseQuotient(rest).transpose()};
+    meshing::write_vtu(deformation.mesh, path, {elastic, total}, {jacobian});
+}
+
+void write_landmarks(const RegistrationRun& run, const std::filesystem::path& path) {
+    const registration::Landmarks& landmarks = *run.inputs.landmarks;
+    std::vector<Column> columns;
+    append_points(columns, "pre_", landmarks.moving);
+    append_points(columns, "warped_", run.products.landmarks);
+    append_points(columns, "intra_", landmarks.fixed);
+    columns.push_back({"before_mm", (landmarks.moving - landmarks.fixed).colwise().norm()});
+    columns.push_back({"after_mm", (run.products.landmarks - landmarks.fixed).colwise().norm()});
+    write_columns(columns, path);
+}
+
+void write_points(const Eigen::Matrix3Xd& points, const std::filesystem::path& path) {
+    std::vector<Column> columns;
+    append_points(columns, "", points);
+    write_columns(columns, path);
+}
+
+registration::RecordInfo record_info(const RegistrationRun& run) {
+    registration::RecordInfo info;
+    info.parameters_toml = to_toml(run.options.parameters);
+    info.provenance = {{"started", run.started}, {"device", run.result.engine}};
+    for (const auto& [name, version] : versions()) info.provenance["version " + name] = version;
+    for (const InputFile& file : run.inputs.files) {
+        info.provenance["input " + file.role] = file.path.string();
+        if (!file.sha256.empty()) info.provenance["sha256 " + file.role] = file.sha256;
+    }
+    return info;
+}
+
+std::string surface_name(const RegisterOptions& options) {
+    return "warped_surface" + options.surface.extension().string();
+}
+
+std::string summary_row(const std::string& name, const registration::Summary& s) {
+    return fmt::format("  {:<22}{:>6}{:>8.2f}{:>8.2f}{:>8.2f}{:>8.2f}\n", name, s.count, s.mean, s.median,
+                       s.percentile_95, s.maximum);
+}
+
+}  // namespace
+
+std::vector<std::string> output_names(const RegisterOptions& options) {
+    std::vector<std::string> names;
+    if (!options.moving.empty()) names.push_back("warped.nii.gz");
+    for (const char* name : {"warped_labels.nii.gz", "displacement_moving_to_fixed.nii.gz",
+                             "displacement_fixed_to_moving.nii.gz", "mesh.vtu", "record.h5"})
+        names.emplace_back(name);
+    if (options.landmarks.given()) names.push_back("warped_landmarks.csv");
+    if (!options.points.empty()) names.push_back("warped_points.csv");
+    if (!options.surface.empty()) names.push_back(surface_name(options));
+    for (const char* name : {"report.json", "preview.png", "report.html"}) names.emplace_back(name);
+    return names;
+}
+
+void start_writing(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks) {
+    const auto start = [&](const std::string& name, auto write) {
+        tasks.run([path = output.path(name), write] {
+            if (interrupted()) throw Cancelled();
+            write(path);
+        });
+    };
+    const Products& products = run.products;
+    start("displacement_moving_to_fixed.nii.gz", [&](auto& path) { write_volume(products.moving_to_fixed, path); });
+    start("displacement_fixed_to_moving.nii.gz", [&](auto& path) { write_volume(products.fixed_to_moving, path); });
+    if (!products.warped.empty()) start("warped.nii.gz", [&](auto& path) { write_volume(products.warped, path); });
+    start("warped_labels.nii.gz", [&](auto& path) { write_volume(compact(products.warped_labels), path); });
+    start("mesh.vtu", [&](auto& path) { write_mesh(run.result.deformation, path); });
+    start("record.h5",
+          [&](auto& path) { registration::write_record(*run.prepared, run.result, record_info(run), path); });
+    if (run.inputs.landmarks) start("warped_landmarks.csv", [&](auto& path) { write_landmarks(run, path); });
+    if (run.inputs.points) start("warped_points.csv", [&](auto& path) { write_points(products.points, path); });
+    if (products.surface)
+        start(surface_name(run.options), [&](auto& path) { meshing::write_surface(*products.surface, path); });
+}
+
+void write_reports(const RegistrationRun& run, const nlohmann::json& report, const OutputFolder& output) {
+    const auto given = [](const imaging::Volume& volume) { return volume.empty() ? nullptr : &volume; };
+    const Products& products = run.products;
+    write_text(report.dump(2) + "\n", output.path("report.json"));
+    report::write_report(
+        {given(run.inputs.moving), given(run.inputs.fixed), given(products.warped), &run.inputs.moving_labels,
+         &run.inputs.fixed_labels, &products.warped_labels, &products.moving_to_fixed, report},
+        output.staging());
+}
+
+std::string summary_text(const RegistrationRun& run, double total_seconds) {
+    std::string text = "stage                  seconds\n";
+    for (const auto& [stage, seconds] : run.times) text += fmt::format("  {:<20}{:>8.2f}\n", stage, seconds);
+    text += fmt::format("  {:<20}{:>8.2f}\n", "total", total_seconds);
+    if (const auto& error = run.scores.target_error) {
+        text += "target error (mm)        count    mean  median    95th     max\n";
+        text += summary_row("before", error->before) + summary_row("after", error->after);
+        const std::string moved = fmt::format("moved > {:g} mm, ", error->moved_mm);
+        text += summary_row(moved + "before", error->moved_before) + summary_row(moved + "after", error->moved_after);
+    }
+    text += "Dice                      before   after\n";
+    for (const auto& [label, after] : run.scores.after)
+        text += fmt::format("  {:<22}{:>8.3f}{:>8.3f}\n", label == 0 ? "all labels" : fmt::format("label {}", label),
+                            run.scores.before.contains(label) ? run.scores.before.at(label).dice : 0.0, after.dice);
+    text +=
+        fmt::format("det J of the mesh: minimum {:.3f}, folded {}\n", run.scores.mesh.minimum, run.scores.mesh.folded);
+    for (const std::string& doubt : run.result.doubts) text += "doubt: " + doubt + "\n";
+    return text + "results in " + run.options.output.string() + "\n";
+}
+
+}  // namespace tissuewarp::apps

@@ -1,0 +1,28 @@
+#pragma once
+/// The files that a registration leaves behind.
+
+#include "apps/output_folder.hpp"
+#include "apps/register_run.hpp"
+
+#include <tbb/task_group.h>
+#include <nlohmann/json_fwd.hpp>
+
+#include <string>
+#include <vector>
+
+namespace tissuewarp::apps {
+
+/// Names of the files in the output folder.
+std::vector<std::string> output_names(const RegisterOptions& options);
+
+/// Starts one task per file for images, fields, mesh, points and record; `run` and `output` must outlive `tasks`.
+/// wait() on the tasks rethrows the first IoError, or Cancelled.
+void start_writing(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks);
+
+/// report.json, preview.png and report.html.
+void write_reports(const RegistrationRun& run, const nlohmann::json& report, const OutputFolder& output);
+
+/// What is printed at the end: stages, errors of landmarks, overlap, doubts.
+std::string summary_text(const RegistrationRun& run, double total_seconds);
+
+}  // namespace tissuewarp::apps

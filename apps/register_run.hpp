@@ -1,0 +1,58 @@
+#pragma once
+/// Everything that one registration read, computed and measured; what outputs and reports are made from.
+
+#include "apps/inputs.hpp"
+#include "meshing/quality.hpp"
+#include "registration/pipeline.hpp"
+
+#include <chrono>
+#include <memory>
+#include <optional>
+
+namespace tissuewarp::apps {
+
+/// Results on grids and at points.
+struct Products {
+    imaging::Volume moving_to_fixed, fixed_to_moving;  ///< displacement fields, mm, LPS
+    imaging::Volume warped, warped_labels;             ///< on the fixed grid; warped is empty without --moving
+    Eigen::Matrix3Xd landmarks, points;                ///< where moving landmarks and points went, mm, LPS
+    std::optional<meshing::SurfaceMesh> surface;
+};
+
+/// How good the result is.
+struct Scores {
+    std::map<int, registration::Overlap> before, after;  ///< per label; 0 is their union
+    imaging::Volume moving_labels_by_header;             ///< on the fixed grid, as the headers place them
+    registration::JacobianReport mesh, organ, grid;      ///< of the elements, of labelled voxels, of all voxels
+    std::optional<registration::TargetError> target_error;
+};
+
+struct RegistrationRun {
+    const RegisterOptions& options;
+    std::string started;  ///< UTC
+    RegistrationInputs inputs;
+    std::unique_ptr<registration::PreparedModel> prepared;
+    registration::UpdateResult result;
+    Products products;
+    Scores scores;
+    std::vector<registration::StageTime> times;
+    std::vector<std::string> notes;
+};
+
+/// Wall-clock seconds of stages, and of everything.
+class StageClock {
+public:
+    registration::StageTime lap(const std::string& stage) {
+        const auto now = Clock::now();
+        const double seconds = std::chrono::duration<double>(now - last_).count();
+        last_ = now;
+        return {stage, seconds};
+    }
+    [[nodiscard]] double total() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+
+private:
+    using Clock = std::chrono::steady_clock;
+    Clock::time_point start_ = Clock::now(), last_ = start_;
+};
+
+}  // namespace tissuewarp::apps

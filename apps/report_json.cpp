@@ -1,0 +1,222 @@
+#include "apps/report_json.hpp"
+
+#include "apps/register_outputs.hpp"
+#include "apps/versions.hpp"
+
+#include <cmath>
+
+namespace tissuewarp::apps {
+
+namespace {
+
+using nlohmann::json;
+
+json number(double value) {
+    return std::isfinite(value) ? json(value) : json(nullptr);
+}
+
+json vector(const Eigen::Vector3d& v) {
+    return {v.x(), v.y(), v.z()};
+}
+
+json geometry(const imaging::Geometry& grid) {
+    json direction = json::array();
+    for (int row = 0; row < 3; ++row) direction.push_back(vector(grid.direction.row(row).transpose()));
+    return {{"size", grid.size},
+            {"spacing_mm", vector(grid.spacing)},
+            {"origin_mm", vector(grid.origin)},
+            {"direction", direction}};
+}
+
+json inputs(const RegistrationRun& run) {
+    json list = json::array();
+    for (const InputFile& file : run.inputs.files)
+        list.push_back({{"role", file.role},
+                        {"path", file.path.string()},
+                        {"sha256", file.sha256.empty() ? json(nullptr) : json(file.sha256)}});
+    return list;
+}
+
+json parameters(const RegisterOptions& options) {
+    json object = json::object();
+    for (const Parameter& parameter : options.parameters) {
+        const std::string& last = parameter.values.back();
+        switch (parameter.kind) {
+            case Parameter::Kind::Number:
+                object[parameter.name] = std::stod(last);
+                break;
+            case Parameter::Kind::Switch:
+                object[parameter.name] = last == "true";
+                break;
+            case Parameter::Kind::Text:
+                object[parameter.name] = last;
+                break;
+            case Parameter::Kind::TextList:
+                object[parameter.name] = parameter.values;
+                break;
+        }
+    }
+    return object;
+}
+
+/// The moduli in use, those of labels that took the default included.
+json materials(const RegistrationRun& run) {
+    json object = json::object();
+    for (const auto& [label, material] : run.prepared->model.materials) {
+        const double mu = tled::shear_modulus(material), nu = tled::poisson_ratio(material);
+        const auto entry = run.inputs.materials.find(label);
+        object[std::to_string(label)] = {
+            {"name", entry == run.inputs.materials.end() ? "default" : entry->second.name},
+            {"law", std::holds_alternative<tled::NeoHookeanIso>(material) ? "neo-hookean-iso" : "neo-hookean-lnj"},
+            {"youngs_modulus_kpa", 2 * mu * (1 + nu)},
+            {"poissons_ratio", nu}};
+    }
+    return object;
+}
+
+json alignment(const RegistrationRun& run) {
+    const Eigen::Isometry3d& placement = run.result.alignment.placement;
+    json matrix = json::array();
+    for (int row = 0; row < 4; ++row) {
+        const Eigen::Vector4d r = placement.matrix().row(row).transpose();
+        matrix.push_back({r[0], r[1], r[2], r[3]});
+    }
+    const double angle = Eigen::AngleAxisd(placement.linear()).angle() * 180 / 3.14159265358979323846;
+    return {{"performed", !run.options.no_align},
+            {"moving_to_fixed", matrix},
+            {"rotation_deg", angle},
+            {"translation_mm", vector(placement.translation())},
+            {"mean_distance_mm", number(run.result.alignment.mean_distance_mm)}};
+}
+
+json rounds(const RegistrationRun& run) {
+    json list = json::array();
+    for (const registration::Round& round : run.result.rounds)
+        list.push_back({{"range_mm", number(round.range_mm)},
+                        {"matched", round.matched},
+                        {"interface_nodes", round.interface_nodes},
+                        {"mean_residual_mm", number(round.mean_residual_mm)},
+                        {"largest_change_mm", number(round.largest_change_mm)},
+                        {"force_evaluations", round.force_evaluations},
+                        {"estimated_error_mm", number(round.estimated_error_mm)}});
+    return list;
+}
+
+json timings(const RegistrationRun& run, double total_seconds) {
+    json list = json::array();
+    for (const auto& [stage, seconds] : run.times) list.push_back({{"stage", stage}, {"seconds", seconds}});
+    list.push_back({{"stage", "total"}, {"seconds", total_seconds}});
+    return list;
+}
+
+json notes(const RegistrationRun& run) {
+    std::vector<std::string> all = run.inputs.notes;
+    all.insert(all.end(), run.notes.begin(), run.notes.end());
+    return all;
+}
+
+json mesh(const RegistrationRun& run) {
+    json object = to_json(meshing::quality(run.result.deformation.mesh));
+    const bool t4 = run.prepared->model.element == tled::Element::T4;
+    object["element"] = t4 ? "t4" : "averaged-pressure";
+    return object;
+}
+
+}  // namespace
+
+json to_json(const registration::Summary& s) {
+    return {{"count", s.count},
+            {"mean", number(s.mean)},
+            {"median", number(s.median)},
+            {"percentile_95", number(s.percentile_95)},
+            {"maximum", number(s.maximum)}};
+}
+
+json to_json(const registration::TargetError& error) {
+    return {{"count", error.before.count},
+            {"unit", "mm"},
+            {"moved_mm", error.moved_mm},
+            {"before", {{"all", to_json(error.before)}, {"moved", to_json(error.moved_before)}}},
+            {"after", {{"all", to_json(error.after)}, {"moved", to_json(error.moved_after)}}}};
+}
+
+json to_json(const registration::JacobianReport& report) {
+    json places = json::array();
+    for (const Eigen::Vector3d& place : report.folded_places) places.push_back(vector(place));
+    return {{"minimum", number(report.minimum)},       {"percentile_1", number(report.percentile_1)},
+            {"median", number(report.median)},         {"percentile_99", number(report.percentile_99)},
+            {"maximum", number(report.maximum)},       {"folded", report.folded},
+            {"folded_mm3", number(report.folded_mm3)}, {"folded_places_mm", places}};
+}
+
+json to_json(const std::map<int, registration::Overlap>& overlaps) {
+    json object = json::object();
+    for (const auto& [label, overlap] : overlaps)
+        object[label == 0 ? "union" : std::to_string(label)] = {
+            {"dice", number(overlap.dice)},
+            {"hausdorff_95_mm", number(overlap.hausdorff_95_mm)},
+            {"mean_surface_distance_mm", number(overlap.mean_surface_distance_mm)}};
+    return object;
+}
+
+json to_json(const meshing::Distribution& d) {
+    return {{"minimum", number(d.minimum)}, {"percentile_1", number(d.percentile_1)},
+            {"median", number(d.median)},   {"percentile_99", number(d.percentile_99)},
+            {"maximum", number(d.maximum)}, {"mean", number(d.mean)}};
+}
+
+json to_json(const meshing::QualityReport& quality) {
+    json volumes = json::object();
+    for (const auto& [label, volume] : quality.label_volume_mm3) volumes[std::to_string(label)] = volume;
+    return {{"min_dihedral_deg", to_json(quality.min_dihedral_deg)},
+            {"max_dihedral_deg", to_json(quality.max_dihedral_deg)},
+            {"radius_edge", to_json(quality.radius_edge)},
+            {"volume_mm3", to_json(quality.volume_mm3)},
+            {"edge_mm", to_json(quality.edge_mm)},
+            {"label_volume_mm3", volumes},
+            {"step_limiting_tetrahedron", quality.step_limiting_tet},
+            {"step_limit_mm", number(quality.step_limit_mm)},
+            {"components", quality.components}};
+}
+
+json to_json(const meshing::Fidelity& fidelity) {
+    json ratios = json::object();
+    for (const auto& [label, ratio] : fidelity.volume_ratio) ratios[std::to_string(label)] = ratio;
+    return {{"volume_ratio", ratios},
+            {"mean_surface_distance_mm", number(fidelity.mean_surface_distance_mm)},
+            {"hausdorff_95_mm", number(fidelity.hausdorff_95_mm)},
+            {"hausdorff_mm", number(fidelity.hausdorff_mm)}};
+}
+
+json report_json(const RegistrationRun& run, double total_seconds) {
+    const Scores& scores = run.scores;
+    json report{
+        {"schema", "tissuewarp.report"},
+        {"schema_version", 1},
+        {"versions", versions()},
+        {"started", run.started},
+        {"inputs", inputs(run)},
+        {"grids", {{"moving", geometry(run.inputs.moving_grid())}, {"fixed", geometry(run.inputs.fixed_grid())}}},
+        {"parameters", parameters(run.options)},
+        {"materials", materials(run)},
+        {"device", run.result.engine},
+        {"mesh", mesh(run)},
+        {"alignment", alignment(run)},
+        {"rounds", rounds(run)},
+        {"overlap", {{"before", to_json(scores.before)}, {"after", to_json(scores.after)}}},
+        {"jacobian",
+         {{"mesh", to_json(scores.mesh)}, {"field_in_organ", to_json(scores.organ)}, {"field", to_json(scores.grid)}}},
+        {"doubts", run.result.doubts},
+        {"notes", notes(run)},
+        {"outputs", output_names(run.options)},
+        {"timings", timings(run, total_seconds)},
+        {"peak_memory_bytes", peak_memory_bytes()}};
+    report["mesh"]["nodes"] = run.result.deformation.mesh.node_count();
+    report["mesh"]["tetrahedra"] = run.result.deformation.mesh.tet_count();
+    report["estimated_error_mm"] =
+        run.result.rounds.empty() ? json(nullptr) : number(run.result.rounds.back().estimated_error_mm);
+    if (scores.target_error) report["landmarks"] = to_json(*scores.target_error);
+    return report;
+}
+
+}  // namespace tissuewarp::apps

@@ -1,0 +1,22 @@
+#pragma once
+/// report.json: everything about a run that a machine may want to read. The keys are listed in docs/manual/register.md.
+
+#include "apps/register_run.hpp"
+
+#include <nlohmann/json.hpp>
+
+namespace tissuewarp::apps {
+
+/// Lengths in mm, times in s, stiffness in kPa. NaN and infinity become null.
+nlohmann::json report_json(const RegistrationRun& run, double total_seconds);
+
+nlohmann::json to_json(const registration::Summary& summary);
+nlohmann::json to_json(const registration::TargetError& error);
+nlohmann::json to_json(const registration::JacobianReport& report);
+/// Keys "1", "2", ... and "union".
+nlohmann::json to_json(const std::map<int, registration::Overlap>& overlaps);
+nlohmann::json to_json(const meshing::Distribution& distribution);
+nlohmann::json to_json(const meshing::QualityReport& quality);
+nlohmann::json to_json(const meshing::Fidelity& fidelity);
+
+}  // namespace tissuewarp::apps

@@ -1,0 +1,14 @@
+#pragma once
+/// The verbs. Each throws the exceptions of core/errors.hpp.
+
+#include "apps/options.hpp"
+
+namespace tissuewarp::apps {
+
+void run_register(const RegisterOptions& options);
+void run_mesh(const MeshOptions& options);
+void run_warp(const WarpOptions& options);
+void run_evaluate(const EvaluateOptions& options);
+void run_info(const InfoOptions& options);
+
+}  // namespace tissuewarp::apps

@@ -1,0 +1,83 @@
+// tissuewarp warp: carries an image, a label map, points or a surface through a registration that was made before.
+
+#include "registration/warp.hpp"
+
+#include "apps/file_kind.hpp"
+#include "apps/point_files.hpp"
+#include "apps/progress.hpp"
+#include "apps/threads.hpp"
+#include "apps/verbs.hpp"
+#include "core/errors.hpp"
+#include "imaging/image_io.hpp"
+#include "meshing/mesh_io.hpp"
+#include "registration/field.hpp"
+#include "registration/record.hpp"
+
+namespace tissuewarp::apps {
+
+namespace {
+
+using imaging::Volume;
+
+Volume read_field(const std::filesystem::path& path) {
+    const Volume field = imaging::read_volume(path);
+    if (field.channels() != 3)
+        throw InvalidInput("'" + path.string() + "' has " + std::to_string(field.channels()) +
+                           " components; give a displacement field of three");
+    return field.as(CV_32F);
+}
+
+/// The pulling field: the one that was given, or the record's on the reference grid.
+Volume fixed_to_moving(const WarpOptions& options, const Volume& image, Observer& observer) {
+    if (!options.displacement.empty()) return read_field(options.displacement);
+    const registration::Record record = registration::read_record(options.record);
+    const imaging::Geometry grid =
+        options.reference.empty() ? image.geometry : imaging::read_volume(options.reference).geometry;
+    return registration::displacement_fixed_to_moving(record.deformation, grid, {options.fade}, observer);
+}
+
+void warp_volume(const WarpOptions& options, Observer& observer) {
+    const Volume image = options.labels ? imaging::read_labels(options.input) : imaging::read_volume(options.input);
+    const Volume field = fixed_to_moving(options, image, observer);
+    const Volume warped = options.labels ? registration::warp_labels(image, field)
+                                         : registration::warp_image(image, field, options.outside);
+    imaging::write_volume(warped, options.output);
+}
+
+Eigen::Matrix3Xd map_points(const WarpOptions& options, const Eigen::Matrix3Xd& points) {
+    if (!options.displacement.empty()) return displaced(points, read_field(options.displacement));
+    const registration::Record record = registration::read_record(options.record);
+    return registration::PointTransform(record.deformation, {options.fade})(points);
+}
+
+}  // namespace
+
+void run_warp(const WarpOptions& options) {
+    const ThreadLimit threads(options.common.threads);
+    ProgressLine progress(options.common.quiet);
+    if (options.record.empty() && options.displacement.empty())
+        throw InvalidInput("nothing to warp with; give --record record.h5 or --displacement FIELD");
+    const FileKind kind = file_kind(options.input);
+    if (file_kind(options.output) != kind)
+        throw InvalidInput("'" + options.input.string() + "' cannot become '" + options.output.string() +
+                           "'; give an output of the same kind (image, points or surface)");
+    progress.begin("warping", 0.0, 1.0);
+    if (kind == FileKind::Image) {
+        warp_volume(options, progress);
+    } else if (kind == FileKind::Points) {
+        std::vector<Column> columns;
+        append_points(columns, "", map_points(options, read_points(options.input)));
+        write_columns(columns, options.output);
+    } else if (kind == FileKind::Surface) {
+        meshing::SurfaceMesh surface = meshing::read_surface(options.input).mesh;
+        surface.nodes = map_points(options, surface.nodes);
+        meshing::write_surface(surface, options.output);
+    } else {
+        throw InvalidInput(
+            "'" + options.input.string() +
+            "' is of no kind that can be warped; give an image, points (.csv, .xyz) or a surface (.ply, .stl, "
+            ".obj, .vtk)");
+    }
+}
+
+}  // namespace tissuewarp::apps

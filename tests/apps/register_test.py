@@ -1,0 +1,149 @@
+"""One registration from end to end, its files read by other software."""
+
+import json
+import unittest
+
+import h5py
+import nibabel
+import numpy
+
+from phantom import CENTRE_LPS, FIXED_AFFINE, MOVING_AFFINE, SHIFT_LPS, SIZE, Phantom, run
+
+OUTPUTS = ["displacement_fixed_to_moving.nii.gz", "displacement_moving_to_fixed.nii.gz", "mesh.vtu", "preview.png",
+           "record.h5", "report.html", "report.json", "warped.nii.gz", "warped_labels.nii.gz", "warped_landmarks.csv",
+           "warped_points.csv"]
+
+
+def dice(a, b):
+    return 2 * numpy.count_nonzero(a & b) / (numpy.count_nonzero(a) + numpy.count_nonzero(b))
+
+
+def voxel_of(affine, lps):
+    return tuple(numpy.rint(numpy.linalg.solve(affine, [-lps[0], -lps[1], lps[2], 1])[:3]).astype(int))
+
+
+class Register(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.phantom = phantom = Phantom()
+        cls.addClassCleanup(phantom.temporary.cleanup)
+        landmarks, points = phantom.folder / "landmarks.csv", phantom.folder / "points.csv"
+        row = ",".join(map(str, [*CENTRE_LPS, *(CENTRE_LPS + SHIFT_LPS)]))
+        landmarks.write_text("pre_x,pre_y,pre_z,intra_x,intra_y,intra_z\n" + row + "\n")
+        points.write_text("x,y,z\n" + ",".join(map(str, CENTRE_LPS)) + "\n")
+        cls.result = phantom.register("--edge-length", 4, "--landmarks", landmarks, "--points", points)
+        if cls.result.returncode == 0:
+            cls.report = json.loads((phantom.output / "report.json").read_text())
+
+    def setUp(self):
+        self.assertEqual(self.result.returncode, 0, self.result.stderr)
+
+    def load(self, name):
+        return nibabel.load(str(self.phantom.output / name))
+
+    def test_outputs(self):
+        self.assertEqual(sorted(path.name for path in self.phantom.output.iterdir()), OUTPUTS)
+        self.assertEqual(sorted(self.report["outputs"]), OUTPUTS)
+
+    def test_quiet_in_a_pipe(self):
+        self.assertEqual(self.result.stderr, "")
+        self.assertIn("total", self.result.stdout)
+        self.assertIn("target error (mm)", self.result.stdout)
+        self.assertNotIn("\r", self.result.stdout)
+
+    def test_warped_labels_lie_on_the_fixed_grid_and_match(self):
+        image = self.load("warped_labels.nii.gz")
+        numpy.testing.assert_allclose(image.affine, FIXED_AFFINE, atol=1e-5)
+        warped = numpy.asarray(image.dataobj)
+        self.assertGreater(dice(warped > 0, self.phantom.fixed_labels_array > 0), 0.95)
+        for label in (1, 2):
+            measured = dice(warped == label, self.phantom.fixed_labels_array == label)
+            self.assertAlmostEqual(self.report["overlap"]["after"][str(label)]["dice"], measured, delta=1e-6)
+        union = dice(warped > 0, self.phantom.fixed_labels_array > 0)
+        self.assertAlmostEqual(self.report["overlap"]["after"]["union"]["dice"], union, delta=1e-6)
+        self.assertLess(self.report["overlap"]["before"]["union"]["dice"], union)
+
+    def test_warped_image_shows_the_fixed_organ(self):
+        warped = numpy.asarray(self.load("warped.nii.gz").dataobj)
+        self.assertEqual(warped.dtype, numpy.float32)
+        both = (self.phantom.fixed_labels_array > 0) & (warped > 55)
+        difference = numpy.abs(warped - self.phantom.fixed_array)[both]
+        self.assertLess(numpy.median(difference), 5.0)  # of a range of 80
+
+    def test_fields_point_the_right_way(self):
+        for name, affine, point, expected in (
+                ("displacement_moving_to_fixed.nii.gz", MOVING_AFFINE, CENTRE_LPS, SHIFT_LPS),
+                ("displacement_fixed_to_moving.nii.gz", FIXED_AFFINE, CENTRE_LPS + SHIFT_LPS, -SHIFT_LPS)):
+            image = self.load(name)
+            self.assertEqual(image.header["intent_code"], 1007)
+            self.assertEqual(image.shape, (SIZE, SIZE, SIZE, 1, 3))
+            numpy.testing.assert_allclose(image.affine, affine, atol=1e-5)
+            value = numpy.asarray(image.dataobj)[voxel_of(affine, point)][0]  # LPS mm
+            numpy.testing.assert_allclose(value, expected, atol=0.5)
+
+    def test_points_and_landmarks(self):
+        point = numpy.loadtxt(self.phantom.output / "warped_points.csv", delimiter=",", skiprows=1)
+        numpy.testing.assert_allclose(point, CENTRE_LPS + SHIFT_LPS, atol=0.5)
+        error = self.report["landmarks"]
+        self.assertEqual(error["count"], 1)
+        self.assertAlmostEqual(error["before"]["all"]["mean"], numpy.linalg.norm(SHIFT_LPS), delta=1e-6)
+        measured = numpy.linalg.norm(point - CENTRE_LPS - SHIFT_LPS)
+        self.assertAlmostEqual(error["after"]["all"]["maximum"], measured, delta=1e-5)
+        self.assertEqual(error["after"]["moved"]["count"], 1)
+        table = numpy.genfromtxt(self.phantom.output / "warped_landmarks.csv", delimiter=",", names=True)
+        self.assertAlmostEqual(float(table["after_mm"]), measured, delta=1e-5)
+
+    def test_report_holds_every_chapter(self):
+        for key in ("schema", "schema_version", "versions", "started", "inputs", "grids", "parameters", "materials",
+                    "device", "mesh", "alignment", "rounds", "overlap", "jacobian", "doubts", "notes", "outputs",
+                    "timings", "peak_memory_bytes", "estimated_error_mm", "landmarks"):
+            self.assertIn(key, self.report)
+        for chapter in ("mesh", "field_in_organ", "field"):
+            self.assertGreater(self.report["jacobian"][chapter]["minimum"], 0)
+            self.assertEqual(self.report["jacobian"][chapter]["folded"], 0)
+        for key in ("dice", "hausdorff_95_mm", "mean_surface_distance_mm"):
+            self.assertIn(key, self.report["overlap"]["after"]["union"])
+        stages = [entry["stage"] for entry in self.report["timings"]]
+        for stage in ("read", "meshing", "factor", "rigid alignment", "correspondence", "equilibrium", "fields", "warp",
+                      "score", "write", "total"):
+            self.assertIn(stage, stages)
+        self.assertGreater(self.report["peak_memory_bytes"], 10e6)
+
+    def test_provenance(self):
+        import hashlib
+        roles = {entry["role"]: entry for entry in self.report["inputs"]}
+        for role in ("moving", "moving-labels", "fixed", "fixed-labels", "landmarks", "points"):
+            with open(roles[role]["path"], "rb") as file:
+                self.assertEqual(roles[role]["sha256"], hashlib.sha256(file.read()).hexdigest())
+        with h5py.File(self.phantom.output / "record.h5") as record:
+            self.assertGreater(len(record.keys()), 0)
+
+    def test_mesh_carries_displacement_and_jacobian(self):
+        text = (self.phantom.output / "mesh.vtu").read_bytes()[:4000].decode("latin-1")
+        for name in ("displacement", "total_displacement", "J", "label"):
+            self.assertIn(f'Name="{name}"', text)
+
+    def test_warp_with_the_record_repeats_the_result(self):
+        again = self.phantom.folder / "again.nii.gz"
+        result = run("warp", self.phantom.moving_labels, "-o", again, "--record", self.phantom.output / "record.h5",
+                     "--reference", self.phantom.fixed, "--labels")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        first, second = (numpy.asarray(nibabel.load(str(path)).dataobj)
+                         for path in (self.phantom.output / "warped_labels.nii.gz", again))
+        self.assertEqual(numpy.count_nonzero(first != second), 0)
+
+    def test_evaluate_repeats_the_scores(self):
+        scores = self.phantom.folder / "scores.json"
+        result = run("evaluate", "--labels", self.phantom.output / "warped_labels.nii.gz", "--reference-labels",
+                     self.phantom.fixed_labels, "--json", scores)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(json.loads(scores.read_text())["overlap"], self.report["overlap"]["after"])
+
+    def test_info_reads_the_record(self):
+        result = run("info", self.phantom.output / "record.h5")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("record of a registration", result.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()
