@@ -88,12 +88,16 @@ Eigen::Matrix3Xd boundary_points(const Volume& mask, int most) {
     return points;
 }
 
-/// Rigid motion from six numbers, all in mm: translation, and rotation vector about `centre` times `radius`.
+constexpr unsigned parameters = 7;
+
+/// Similarity from seven numbers, all in mm: translation, rotation vector about `centre` times `radius`, and logarithm of
+/// the scale times `radius`. The scale takes up a change of size that would otherwise turn the organ; the answer is the
+/// rigid part alone.
 struct PoseSpace {
     Eigen::Vector3d centre;
     double radius = 1;
 
-    [[nodiscard]] Eigen::Isometry3d pose(const double* x) const {
+    [[nodiscard]] Eigen::Isometry3d rigid(const double* x) const {
         const Eigen::Vector3d rotation = Eigen::Vector3d(x[3], x[4], x[5]) / radius;
         const double angle = rotation.norm();
         Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
@@ -101,38 +105,41 @@ struct PoseSpace {
         result.translation() = centre + Eigen::Vector3d(x[0], x[1], x[2]) - result.linear() * centre;
         return result;
     }
+    [[nodiscard]] Eigen::Affine3d similarity(const double* x) const {
+        const Eigen::Affine3d grown = Eigen::Translation3d(centre) * Eigen::Scaling(std::exp(x[6] / radius)) *
+                                      Eigen::Translation3d(-centre);
+        return rigid(x) * grown;
+    }
 };
 
-class DistanceCost {
+/// Boundary points of one image and the distance maps of the other, per label.
+class BoundaryDistances {
 public:
-    DistanceCost(const Volume& moving, const Volume& fixed, int samples) {
-        const std::vector<int> labels = labels_to_align(moving, fixed);
-        const Volume coarse_fixed = coarsened(fixed);
+    BoundaryDistances(const Volume& points_from, const Volume& maps_from, const std::vector<int>& labels, int samples) {
+        const Volume coarse = coarsened(maps_from);
         for (const int label : labels) {
-            const Volume fixed_mask = mask(coarse_fixed, label);
-            if (cv::countNonZero(fixed_mask.voxels.reshape(1, 1)) == 0) continue;
-            maps_.push_back(imaging::signed_distance(fixed_mask));
-            points_.push_back(boundary_points(mask(moving, label), samples / static_cast<int>(labels.size())));
+            const Volume inside = mask(coarse, label);
+            if (cv::countNonZero(inside.voxels.reshape(1, 1)) == 0) continue;
+            maps_.push_back(imaging::signed_distance(inside));
+            points_.push_back(boundary_points(mask(points_from, label), samples / static_cast<int>(labels.size())));
         }
         for (const Volume& map : maps_) samplers_.emplace_back(map);
     }
 
-    /// Mean of min(|distance|, trim) over every `stride`-th point.
-    [[nodiscard]] double operator()(const Eigen::Isometry3d& pose, double trim, int stride) const {
+    /// Mean of min(|distance|, trim) over every `stride`-th point after a map of space.
+    [[nodiscard]] double mean(const Eigen::Affine3d& map, double trim, int stride) const {
         double sum = 0;
         long count = 0;
         for (std::size_t label = 0; label < points_.size(); ++label)
             for (Eigen::Index i = 0; i < points_[label].cols(); i += stride, ++count) {
-                const Eigen::Vector3d point = pose * points_[label].col(i);
+                const Eigen::Vector3d point = map * points_[label].col(i);
                 sum += std::min(trim, std::abs(double(samplers_[label].value(point))) + outside(label, point));
             }
         return sum / double(std::max(1l, count));
     }
 
-    [[nodiscard]] Eigen::Vector3d centroid_of_points() const { return points_.front().rowwise().mean(); }
-    [[nodiscard]] double radius() const {
-        return std::sqrt((points_.front().colwise() - centroid_of_points()).colwise().squaredNorm().mean());
-    }
+    /// Of the union of all labels.
+    [[nodiscard]] const Eigen::Matrix3Xd& points() const { return points_.front(); }
 
 private:
     std::vector<Volume> maps_;
@@ -145,16 +152,29 @@ private:
         const Eigen::Vector3d index = grid.index(point);
         double squared = 0;
         for (int axis = 0; axis < 3; ++axis) {
-            const double over =
-                std::max({0.0, -index[axis], index[axis] - (grid.size[static_cast<std::size_t>(axis)] - 1)});
+            const double over = std::max({0.0, -index[axis],
+                                          index[axis] - (grid.size[static_cast<std::size_t>(axis)] - 1)});
             squared += std::pow(over * grid.spacing[axis], 2);
         }
         return std::sqrt(squared);
     }
 };
 
+/// Symmetric: moving boundaries to fixed ones and, by the inverse map, fixed boundaries to moving ones, so that a smaller
+/// organ does not hide inside a larger one.
+struct DistanceCost {
+    BoundaryDistances forward, backward;
+
+    DistanceCost(const Volume& moving, const Volume& fixed, const std::vector<int>& labels, int samples)
+        : forward(moving, fixed, labels, samples), backward(fixed, moving, labels, samples) {}
+
+    [[nodiscard]] double operator()(const Eigen::Affine3d& map, double trim, int stride) const {
+        return 0.5 * (forward.mean(map, trim, stride) + backward.mean(map.inverse(), trim, stride));
+    }
+};
+
 struct Pose {
-    std::array<double, 6> x{};
+    std::array<double, parameters> x{};
     double cost = 0;
 };
 
@@ -165,11 +185,11 @@ Pose minimise(const DistanceCost& cost, const PoseSpace& space, Pose start, doub
         double trim;
         int stride;
     } problem{cost, space, trim, stride};
-    nlopt::opt optimiser(nlopt::LN_BOBYQA, 6);
+    nlopt::opt optimiser(nlopt::LN_BOBYQA, parameters);
     optimiser.set_min_objective(
         [](unsigned, const double* x, double*, void* data) {
             const auto& p = *static_cast<const Problem*>(data);
-            return p.cost(p.space.pose(x), p.trim, p.stride);
+            return p.cost(p.space.similarity(x), p.trim, p.stride);
         },
         &problem);
     optimiser.set_initial_step(std::max(0.5, trim / 4));
@@ -182,7 +202,7 @@ Pose minimise(const DistanceCost& cost, const PoseSpace& space, Pose start, doub
         // The best point so far is in x: as good as this cost can be resolved.
     }
     std::copy(x.begin(), x.end(), start.x.begin());
-    start.cost = cost(space.pose(start.x.data()), trim, stride);
+    start.cost = cost(space.similarity(start.x.data()), trim, stride);
     return start;
 }
 
@@ -204,24 +224,24 @@ std::vector<Pose> starting_poses(const PoseSpace& space, const Eigen::Vector3d& 
 Alignment align_labels(const Volume& moving_labels, const Volume& fixed_labels, const AlignmentOptions& options,
                        Observer& observer) {
     const Volume moving = as_int(moving_labels), fixed = as_int(fixed_labels);
-    const DistanceCost cost(moving, fixed, options.samples);
-    const PoseSpace space{cost.centroid_of_points(), cost.radius()};
-    const Volume fixed_mask = imaging::mask_of_all(fixed);
-    const Eigen::Vector3d fixed_centroid = boundary_points(fixed_mask, options.samples).rowwise().mean();
+    const DistanceCost cost(moving, fixed, labels_to_align(moving, fixed), options.samples / 2);
+    const Eigen::Vector3d centre = cost.forward.points().rowwise().mean();
+    const PoseSpace space{centre, std::sqrt((cost.forward.points().colwise() - centre).colwise().squaredNorm().mean())};
+    const Eigen::Vector3d fixed_centroid = cost.backward.points().rowwise().mean();
 
     std::vector<Pose> poses = starting_poses(space, fixed_centroid, options.start_angle_deg * EIGEN_PI / 180);
-    constexpr int coarse_stride = 8;
+    constexpr int coarse_stride = 4;
     tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t i) {
-        poses[i] = minimise(cost, space, poses[i], 10 * options.trim_mm, coarse_stride, 150);
+        poses[i] = minimise(cost, space, poses[i], 10 * options.trim_mm, coarse_stride, 200);
     });
     observer.checkpoint("rigid alignment", 0.6);
     std::stable_sort(poses.begin(), poses.end(), [](const Pose& a, const Pose& b) { return a.cost < b.cost; });
     poses.resize(2);
     tbb::parallel_for(std::size_t{0}, poses.size(),
-                      [&](std::size_t i) { poses[i] = minimise(cost, space, poses[i], options.trim_mm, 1, 400); });
+                      [&](std::size_t i) { poses[i] = minimise(cost, space, poses[i], options.trim_mm, 1, 600); });
     observer.checkpoint("rigid alignment", 1.0);
     const Pose& best = poses[1].cost < poses[0].cost ? poses[1] : poses[0];
-    return {space.pose(best.x.data()), best.cost};
+    return {space.rigid(best.x.data()), best.cost};
 }
 
 }  // namespace tissuewarp::registration

@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 namespace tissuewarp::registration {
 
@@ -38,18 +39,23 @@ std::unique_ptr<tled::Engine> make_engine(const PreparedModel& prepared, const U
 
 /// Search range of a round: geometric from the first to the last.
 double range_of(const UpdateOptions& options, int round) {
-    if (options.rematches < 2) return options.first_range_mm;
+    if (options.rematches < 2) return options.last_range_mm;
     const double t = std::min(1.0, double(round) / (options.rematches - 1));
     return options.first_range_mm * std::pow(options.last_range_mm / options.first_range_mm, t);
 }
 
-/// Matches every interface node of the deformed mesh to the fixed boundary along its normal. `scale_mm` is that of the
-/// Geman–McClure weight (σ²/(σ² + d²))², which lowers what the model did not follow; infinite in the first round.
-/// `most_mm` bounds the distance that a round asks for, so that elements are not turned over.
+/// What a round looks for, and how far it may pull.
+struct Search {
+    double range_mm = 0;
+    double max_angle_deg = 0;
+    double scale_mm = 0;      ///< of the Geman–McClure weight (σ²/(σ² + d²))², which lowers what the model did not follow
+    double most_step_mm = 0;  ///< bound on the distance asked for, so that elements are not turned over
+};
+
+/// Matches every interface node of the deformed mesh to the fixed boundary along its normal.
 std::vector<Match> match_interfaces(const PreparedModel& prepared, const LabelBoundaryField& fixed,
                                     const Eigen::Isometry3d& placement, const Eigen::Matrix3Xd& displacement,
-                                    const Eigen::Matrix3Xd& normals, double range_mm, double max_angle_deg,
-                                    double scale_mm, double most_mm) {
+                                    const Eigen::Matrix3Xd& normals, const Search& search) {
     const auto& nodes = prepared.interfaces.nodes();
     std::vector<Match> matches(nodes.size());
     tbb::parallel_for(std::size_t{0}, nodes.size(), [&](std::size_t i) {
@@ -58,13 +64,14 @@ std::vector<Match> match_interfaces(const PreparedModel& prepared, const LabelBo
         const Eigen::Vector3d normal = placement.linear() * normals.col(static_cast<Eigen::Index>(i));
         const Eigen::Vector3d point =
             placement * Eigen::Vector3d(prepared.model.mesh.nodes.col(node.node) + displacement.col(node.node));
-        const double distance = fixed.crossing(point, normal, node.inner, node.outer, range_mm, max_angle_deg);
-        if (std::isnan(distance)) return;
+        const double crossing =
+            fixed.crossing(point, normal, node.inner, node.outer, search.range_mm, search.max_angle_deg);
+        if (std::isnan(crossing)) return;
+        const double distance = crossing - node.offset, squared = search.scale_mm * search.scale_mm;
         matches[i].found = true;
-        matches[i].distance_mm = std::clamp(distance - node.offset, -most_mm, most_mm);
-        const double squared = scale_mm * scale_mm;
-        matches[i].weight =
-            std::isinf(scale_mm) ? 1.0 : std::pow(squared / (squared + std::pow(matches[i].distance_mm, 2)), 2);
+        matches[i].held_back = std::abs(distance) > search.most_step_mm;
+        matches[i].distance_mm = std::clamp(distance, -search.most_step_mm, search.most_step_mm);
+        matches[i].weight = std::pow(squared / (squared + distance * distance), 2);
     });
     return matches;
 }
@@ -84,7 +91,18 @@ void require_common_labels(const PreparedModel& prepared, const imaging::Volume&
     throw InvalidInput("the fixed label map holds none of the labels of the model; check the label tables");
 }
 
-std::vector<std::string> doubts(const PreparedModel& prepared, const UpdateResult& result) {
+double labelled_volume(const imaging::Volume& labels) {
+    return cv::countNonZero(imaging::mask_of_all(labels).voxels.reshape(1, 1)) * labels.geometry.voxel_volume();
+}
+
+std::string to_text(double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.2f", value);
+    return text;
+}
+
+std::vector<std::string> doubts(const PreparedModel& prepared, const imaging::Volume& fixed_labels,
+                                const UpdateResult& result) {
     std::vector<std::string> reasons;
     const Round& last = result.rounds.back();
     const double spacing = prepared.labels.geometry.spacing.maxCoeff();
@@ -92,13 +110,112 @@ std::vector<std::string> doubts(const PreparedModel& prepared, const UpdateResul
         reasons.push_back("only " + std::to_string(last.matched) + " of " + std::to_string(last.interface_nodes) +
                           " boundary nodes found their boundary in the fixed labels");
     if (last.mean_residual_mm > spacing)
-        reasons.push_back("the surfaces still differ by " + std::to_string(last.mean_residual_mm) +
+        reasons.push_back("the surfaces still differ by " + to_text(last.mean_residual_mm) +
                           " mm on average, more than a voxel");
+    if (last.held_back > last.matched / 50)
+        reasons.push_back(std::to_string(last.held_back) + " of " + std::to_string(last.matched) +
+                          " boundary nodes are still far from where they belong; allow more rounds");
     if (result.min_jacobian < 0.1)
-        reasons.push_back("tissue is compressed to " + std::to_string(result.min_jacobian) +
-                          " of its volume in one element");
+        reasons.push_back("tissue is compressed to " + to_text(result.min_jacobian) + " of its volume in one element");
+    const double growth = labelled_volume(fixed_labels) / labelled_volume(prepared.labels);
+    double poisson = 0;
+    for (const auto& [label, material] : prepared.model.materials)
+        poisson = std::max(poisson, tled::poisson_ratio(material));
+    if (std::abs(growth - 1) > 0.1 && poisson > 0.4)
+        reasons.push_back("the labelled volume changed by the factor " + to_text(growth) +
+                          ", which tissue of Poisson's ratio " + to_text(poisson) +
+                          " resists; for lungs and other tissue that changes volume take 0.3 or less");
     return reasons;
 }
+
+/// The rounds of matching and equilibrium.
+class Rematching {
+public:
+    Rematching(const PreparedModel& prepared, const LabelBoundaryField& fixed, const UpdateOptions& options,
+               UpdateResult& result, Observer& observer)
+        : prepared_(prepared), fixed_(fixed), options_(options), result_(result), observer_(observer),
+          engine_(make_engine(prepared, options)), step_mm_(options.most_step_mm),
+          displacement_(Eigen::Matrix3Xd::Zero(3, prepared.rest.node_count)) {
+        result_.engine = engine_->description();
+    }
+
+    /// Leaves the elastic displacement in the moving frame, 3 × N mm.
+    Eigen::Matrix3Xd run() {
+        int round = 0;
+        for (int done = 0; done < 2 * options_.rematches && round < options_.rematches; ++done) {
+            const Round record = attempt(round);
+            result_.rounds.push_back(record);
+            observer_.checkpoint("registration", double(round + 1) / options_.rematches);
+            if (50 * record.held_back > record.matched) continue;  // more than 2 %: the same range once more
+            const bool settled = record.largest_change_mm < options_.settled_mm;
+            round = settled && round < options_.rematches - 2 ? options_.rematches - 1 : round + 1;
+        }
+        result_.times.push_back({"correspondence", matching_seconds_});
+        result_.times.push_back({"equilibrium", solving_seconds_});
+        return displacement_;
+    }
+
+private:
+    const PreparedModel& prepared_;
+    const LabelBoundaryField& fixed_;
+    const UpdateOptions& options_;
+    UpdateResult& result_;
+    Observer& observer_;
+    std::unique_ptr<tled::Engine> engine_;
+    double step_mm_;
+    Eigen::Matrix3Xd displacement_;
+    double matching_seconds_ = 0, solving_seconds_ = 0;
+
+    /// One round; where the equilibrium fails, again with half the step bound.
+    Round attempt(int round) {
+        constexpr int most_halvings = 4;
+        for (int halving = 0;; ++halving) {
+            try {
+                return match_and_solve(round);
+            } catch (const SolverFailure& failure) {
+                if (halving == most_halvings) throw;
+                step_mm_ /= 2;
+                observer_.note("a round is repeated with steps of at most " + to_text(step_mm_) + " mm: " +
+                               failure.what());
+            }
+        }
+    }
+
+    Round match_and_solve(int round) {
+        detail::Stopwatch stopwatch;
+        Round record;
+        record.range_mm = range_of(options_, round);
+        const auto& interfaces = prepared_.interfaces;
+        const Eigen::Matrix3Xd normals = interfaces.normals(prepared_.model.mesh.nodes + displacement_);
+        const double scale = round == 0 ? 1e6 : std::max(options_.residual_scale_mm, record.range_mm / 3);
+        const std::vector<Match> matches =
+            match_interfaces(prepared_, fixed_, result_.alignment.placement, displacement_, normals,
+                             {record.range_mm, options_.max_angle_deg, scale, step_mm_});
+        const auto conditions = tled::nodal_conditions(
+            detail::matched_springs(interfaces, matches, normals, displacement_, prepared_.options),
+            prepared_.rest.node_count);
+        record.interface_nodes = static_cast<int>(matches.size());
+        for (const Match& match : matches) {
+            record.matched += match.found;
+            record.held_back += match.held_back;
+        }
+        if (record.matched == 0)
+            throw InvalidInput("no boundary of the model was found in the fixed labels within " +
+                               to_text(record.range_mm) + " mm; check that the images show the same organ");
+        record.mean_residual_mm = mean_residual(matches);
+        matching_seconds_ += stopwatch.lap("").seconds;
+
+        const tled::EquilibriumResult solved = tled::equilibrium(*engine_, prepared_.stiffness, conditions,
+                                                                 options_.equilibrium, &displacement_, observer_);
+        record.largest_change_mm = std::sqrt((solved.displacement - displacement_).colwise().squaredNorm().maxCoeff());
+        record.force_evaluations = solved.force_evaluations;
+        record.estimated_error_mm = solved.estimated_error_mm;
+        displacement_ = solved.displacement;
+        result_.min_jacobian = solved.min_jacobian;
+        solving_seconds_ += stopwatch.lap("").seconds;
+        return record;
+    }
+};
 
 }  // namespace
 
@@ -108,52 +225,16 @@ UpdateResult update(const PreparedModel& prepared, const imaging::Volume& fixed_
     detail::Stopwatch stopwatch;
     UpdateResult result;
     if (options.align) result.alignment = align_labels(prepared.labels, fixed_labels, options.alignment, observer);
-    const Eigen::Isometry3d& placement = result.alignment.placement;
     result.times.push_back(stopwatch.lap("rigid alignment"));
 
     std::vector<int> labels;
     for (const auto& [label, material] : prepared.model.materials) labels.push_back(label);
     const LabelBoundaryField fixed(fixed_labels, labels);
-    const std::unique_ptr<tled::Engine> engine = make_engine(prepared, options);
-    result.engine = engine->description();
     result.times.push_back(stopwatch.lap("boundary maps"));
 
-    double matching_seconds = 0, solving_seconds = 0;
-    const auto& interfaces = prepared.interfaces;
-    Eigen::Matrix3Xd u = Eigen::Matrix3Xd::Zero(3, prepared.rest.node_count);
-    for (int round = 0; round < options.rematches; ++round) {
-        Round record;
-        record.range_mm = range_of(options, round);
-        const Eigen::Matrix3Xd normals = interfaces.normals(prepared.model.mesh.nodes + u);
-        const double scale = round == 0 ? INFINITY : std::max(options.residual_scale_mm, record.range_mm / 3);
-        const std::vector<Match> matches =
-            match_interfaces(prepared, fixed, placement, u, normals, record.range_mm, options.max_angle_deg, scale, options.most_step_mm);
-        const auto conditions = tled::nodal_conditions(
-            detail::matched_springs(interfaces, matches, normals, u, prepared.options), prepared.rest.node_count);
-        record.interface_nodes = static_cast<int>(matches.size());
-        record.matched =
-            static_cast<int>(std::count_if(matches.begin(), matches.end(), [](auto& m) { return m.found; }));
-        if (record.matched == 0)
-            throw InvalidInput("no boundary of the model was found in the fixed labels within " +
-                               std::to_string(record.range_mm) + " mm; check that the images show the same organ");
-        record.mean_residual_mm = mean_residual(matches);
-        matching_seconds += stopwatch.lap("").seconds;
-
-        const tled::EquilibriumResult solved =
-            tled::equilibrium(*engine, prepared.stiffness, conditions, options.equilibrium, &u, observer);
-        record.largest_change_mm = std::sqrt((solved.displacement - u).colwise().squaredNorm().maxCoeff());
-        record.force_evaluations = solved.force_evaluations;
-        record.estimated_error_mm = solved.estimated_error_mm;
-        u = solved.displacement;
-        result.min_jacobian = solved.min_jacobian;
-        result.rounds.push_back(record);
-        solving_seconds += stopwatch.lap("").seconds;
-        observer.checkpoint("registration", double(round + 1) / options.rematches);
-    }
-    result.times.push_back({"correspondence", matching_seconds});
-    result.times.push_back({"equilibrium", solving_seconds});
-    result.deformation = {prepared.model.mesh, u, placement};
-    result.doubts = doubts(prepared, result);
+    const Eigen::Matrix3Xd displacement = Rematching(prepared, fixed, options, result, observer).run();
+    result.deformation = {prepared.model.mesh, displacement, result.alignment.placement};
+    result.doubts = doubts(prepared, fixed_labels, result);
     return result;
 }
 

@@ -23,8 +23,11 @@ struct StageTime {
     double seconds = 0;
 };
 
+/// Edge length (mm) that cuts an organ of the map's volume into about 50 000 tetrahedra: a cube root of the volume over 18.
+double suggested_edge_length(const imaging::Volume& labels);
+
 struct PrepareOptions {
-    meshing::MeshingOptions meshing;
+    meshing::MeshingOptions meshing{.edge_length = 0};  ///< edge length 0: suggested_edge_length
     tled::MaterialTable materials;                ///< labels without an entry take `default_material`
     tled::Material default_material = tled::neo_hookean_lnj(3.0, 0.45);
     std::optional<tled::Element> element;         ///< default: tled::suggested_element
@@ -56,7 +59,9 @@ enum class Device { Auto, Cpu, Gpu };
 struct UpdateOptions {
     AlignmentOptions alignment;
     bool align = true;                            ///< false: the images are in one frame already
-    int rematches = 8;                            ///< rounds of correspondence and equilibrium
+    int rematches = 8;                            ///< rounds of correspondence and equilibrium; up to twice as many when the
+                                                  ///< step bound holds the surface back
+    double settled_mm = 0.15;                     ///< a round that moves no node further is followed by the last one
     double most_step_mm = 6.0;                    ///< most that one round asks a surface node to move
     double first_range_mm = 15.0;                 ///< correspondence search range of the first round
     double last_range_mm = 4.0;                   ///< and of the last, geometric in between
@@ -71,6 +76,7 @@ struct UpdateOptions {
 struct Round {
     double range_mm = 0;
     int matched = 0, interface_nodes = 0;
+    int held_back = 0;                            ///< matches further away than the round's step bound
     double mean_residual_mm = 0;                  ///< along the normal, after equilibrium, weighted
     double largest_change_mm = 0;                 ///< of a node since the round before
     int force_evaluations = 0;

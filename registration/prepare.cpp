@@ -32,7 +32,15 @@ void measure_offsets(Interfaces& interfaces, const meshing::TetMesh& mesh, const
 
 }  // namespace
 
-PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions& options, Observer& observer) {
+double suggested_edge_length(const imaging::Volume& labels) {
+    const double volume = cv::countNonZero(imaging::mask_of_all(labels).voxels.reshape(1, 1)) *
+                          labels.geometry.voxel_volume();
+    return std::cbrt(volume) / 18;
+}
+
+PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions& given, Observer& observer) {
+    PrepareOptions options = given;
+    if (options.meshing.edge_length == 0) options.meshing.edge_length = suggested_edge_length(moving_labels);
     detail::Stopwatch stopwatch;
     meshing::TetMesh mesh = meshing::mesh_labels(moving_labels, options.meshing, observer);
     const StageTime meshing_time = stopwatch.lap("meshing");

@@ -34,7 +34,7 @@ void require_valid(const Model& model) {
 
 Element suggested_element(const MaterialTable& materials) {
     for (const auto& [label, material] : materials)
-        if (poisson_ratio(material) >= 0.45 - 1e-9) return Element::AveragedPressureT4;
+        if (poisson_ratio(material) > 0.46) return Element::AveragedPressureT4;
     return Element::T4;
 }
 

@@ -21,7 +21,8 @@ struct Model {
 /// Throws InvalidInput when a label has no material, a modulus is not positive, or the mesh is invalid.
 void require_valid(const Model& model);
 
-/// AveragedPressureT4 when any material has ν ≥ 0.45, T4 otherwise: below, T4 does not lock noticeably and costs less.
+/// AveragedPressureT4 when any material has ν > 0.46, T4 otherwise: below, T4 hardly locks, and its factor is three times
+/// smaller (docs/decisions/rest_stiffness.md).
 Element suggested_element(const MaterialTable& materials);
 
 }  // namespace tissuewarp::tled
