@@ -3,8 +3,10 @@
 //     equilibrium_bench [tolerance_mm ...]
 
 #include "meshing/primitives.hpp"
+#include "shaders/device.hpp"
 #include "tled/equilibrium.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -32,6 +34,26 @@ tled::Conditions retraction(const meshing::TetMesh& mesh) {
     return conditions;
 }
 
+bool has_gpu() {
+    const auto devices = shaders::list_devices();
+    return std::any_of(devices.begin(), devices.end(), [](const auto& device) { return device.hardware; });
+}
+
+void relax(tled::Engine& engine, const tled::RestStiffness& stiffness, const tled::NodalConditions& conditions,
+           const Eigen::Matrix3Xd& exact, const std::vector<double>& tolerances) {
+    std::printf("  %s\n", engine.description().c_str());
+    for (const double tolerance : tolerances) {
+        const double start = now();
+        const auto found = tled::equilibrium(engine, stiffness, conditions, {.tolerance_mm = tolerance});
+        const double seconds = now() - start;
+        const double error = std::sqrt((found.displacement - exact).colwise().squaredNorm().maxCoeff());
+        std::printf("    tolerance %-5g %5d force evaluations, %2d lifted residuals, %6.2f s; true error %.4f mm, "
+                    "estimated %.4f mm (effectivity %.2f), min J %.2f\n",
+                    tolerance, found.force_evaluations, found.lifted_residuals, seconds, error,
+                    found.estimated_error_mm, found.estimated_error_mm / error, found.min_jacobian);
+    }
+}
+
 void solve_cube(int cells, double poisson, const std::vector<double>& tolerances) {
     tled::Model model;
     model.mesh = meshing::box_mesh({100, 100, 100}, {cells, cells, cells}, 0.2, 1);
@@ -50,18 +72,8 @@ void solve_cube(int cells, double poisson, const std::vector<double>& tolerances
     const auto exact_engine = tled::make_cpu_engine(rest, tled::Scalar::Float64);
     const auto exact =
         tled::equilibrium(*exact_engine, stiffness, conditions, {.tolerance_mm = 1e-5, .max_steps = 40000});
-    const auto engine = tled::make_cpu_engine(rest, tled::Scalar::Float32);
-    for (const double tolerance : tolerances) {
-        start = now();
-        const auto found = tled::equilibrium(*engine, stiffness, conditions, {.tolerance_mm = tolerance});
-        const double seconds = now() - start;
-        const double error =
-            std::sqrt((found.displacement - exact.displacement).colwise().squaredNorm().maxCoeff());
-        std::printf("  tolerance %-6g: %5d force evaluations, %2d lifted residuals, %.2f s; true error %.4f mm, "
-                    "estimated %.4f mm (effectivity %.2f), min J %.2f\n",
-                    tolerance, found.force_evaluations, found.lifted_residuals, seconds, error,
-                    found.estimated_error_mm, found.estimated_error_mm / error, found.min_jacobian);
-    }
+    relax(*tled::make_cpu_engine(rest, tled::Scalar::Float32), stiffness, conditions, exact.displacement, tolerances);
+    if (has_gpu()) relax(*tled::make_gpu_engine(rest), stiffness, conditions, exact.displacement, tolerances);
 }
 
 }  // namespace
