@@ -65,9 +65,9 @@ void solve_cube(int cells, double poisson, const std::vector<double>& tolerances
     const tled::RestStiffness stiffness(rest, conditions);
     const double factor_seconds = now() - start;
     start = now();
-    stiffness.lowest_eigenvalue();
-    std::printf("cube n=%d nu=%g: %d T4, factor %.2f s, lowest eigenvalue %.2f s\n", cells, poisson,
-                rest.element_count(), factor_seconds, now() - start);
+    const double lowest = stiffness.lowest_eigenvalue();
+    std::printf("cube n=%d nu=%g: %d T4, factor %.2f s, lowest eigenvalue %.2g in %.2f s\n", cells, poisson,
+                rest.element_count(), factor_seconds, lowest, now() - start);
 
     const auto exact_engine = tled::make_cpu_engine(rest, tled::Scalar::Float64);
     const auto exact =
