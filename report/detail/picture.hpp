@@ -1,0 +1,20 @@
+#pragma once
+/// preview.png: three planes through the place that moved most, before and after.
+
+#include "report/detail/display.hpp"
+
+namespace tissuewarp::report::detail {
+
+struct Preview {
+    cv::Mat picture;             ///< 8-bit BGR
+    std::optional<Focus> focus;  ///< where tissue moved most, when there is a field
+};
+
+/// Rows: axial, coronal, sagittal. Columns, as far as the data is there: before, after, the two differences, and the
+/// displacement over the moving image.
+Preview draw_preview(const ReportInput& input);
+
+/// Moving to fixed, from the report's "alignment" entry; the identity without one.
+Eigen::Isometry3d alignment_of(const nlohmann::json& report);
+
+}  // namespace tissuewarp::report::detail
