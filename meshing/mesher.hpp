@@ -11,16 +11,16 @@
 namespace tissuewarp::meshing {
 
 struct MeshingOptions {
-    double edge_length = 5.0;                 ///< mm, target edge in the interior and on surfaces
-    std::map<int, double> label_edge_length;  ///< mm, per label, overriding edge_length
-    double facet_distance = 0.0;              ///< mm, facet to interface; 0: 0.12 edge lengths, at least 0.25 voxel
-    double facet_angle = 25.0;                ///< degrees, lower bound on triangle angles, at most 30
-    double radius_edge_ratio = 2.0;           ///< upper bound on circumradius over shortest edge
+    double edge_length = 5.0;                   ///< mm, target edge in the interior and on surfaces
+    std::map<int, double> label_edge_length{};  ///< mm, per label, overriding edge_length
+    double facet_distance = 0.0;                ///< mm, facet to interface; 0: 0.12 edge lengths, at least 0.25 voxel
+    double facet_angle = 25.0;                  ///< degrees, lower bound on triangle angles, at most 30
+    double radius_edge_ratio = 2.0;             ///< upper bound on circumradius over shortest edge
     double smoothing = 0.8;  ///< voxels, Gaussian that turns voxel steps into smooth interfaces; 0 keeps the steps
     double min_dihedral_deg = 12.0;  ///< sliver bound that perturbation and exudation work towards
     double perturb_seconds = 60.0;   ///< safety limit; reaching it ties the mesh to the machine; 0 skips
     double exude_seconds = 60.0;     ///< safety limit, likewise; 0 skips
-    std::vector<int> labels;         ///< labels to mesh; empty: all but 0
+    std::vector<int> labels{};       ///< labels to mesh; empty: all but 0
 };
 
 /// Meshes the labels of an int32 label volume. Smooth conforming interfaces: each label's indicator is smoothed and a
