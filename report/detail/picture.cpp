@@ -22,7 +22,7 @@ using imaging::Volume;
 const cv::Scalar background(26, 23, 21), ink(235, 235, 235), faint(165, 165, 165);
 const cv::Scalar moving_colour(60, 60, 255), fixed_colour(90, 210, 70);
 
-constexpr int cell = 360, gap = 10, left_margin = 16, top_margin = 84, bottom_margin = 96, bar_margin = 78;
+constexpr int cell = 360, gap = 10, left_margin = 16, top_margin = 84, bottom_margin = 104, bar_margin = 84;
 constexpr double margin_mm = 12.0;
 constexpr double difference_range = 0.5;  // of the grey window
 
@@ -101,17 +101,17 @@ cv::Mat displacement(const Scene& scene, int row) {
 }
 
 void letters(cv::Mat& panel, const Plane& plane) {
-    text(panel, plane.left, {6, panel.rows / 2}, 0.55, ink);
-    text(panel, plane.right, {panel.cols - 6, panel.rows / 2}, 0.55, ink, Anchor::Right);
-    text(panel, plane.top, {panel.cols / 2, 13}, 0.55, ink, Anchor::Centre);
-    text(panel, plane.bottom, {panel.cols / 2, panel.rows - 13}, 0.55, ink, Anchor::Centre);
+    text(panel, plane.left, {6, panel.rows / 2}, 0.6, ink);
+    text(panel, plane.right, {panel.cols - 6, panel.rows / 2}, 0.6, ink, Anchor::Right);
+    text(panel, plane.top, {panel.cols / 2, 13}, 0.6, ink, Anchor::Centre);
+    text(panel, plane.bottom, {panel.cols / 2, panel.rows - 13}, 0.6, ink, Anchor::Centre);
 }
 
 void place_name(cv::Mat& panel, const Plane& plane) {
     char line[32];
     std::snprintf(line, sizeof line, "%c = %.1f mm", plane.axis, plane.position);
-    text(panel, plane.name, {6, 13}, 0.45, ink);
-    text(panel, line, {6, 31}, 0.42, ink);
+    text(panel, plane.name, {6, 14}, 0.52, ink);
+    text(panel, line, {6, 35}, 0.52, ink);
 }
 
 /// A line of a round length, about a quarter of the panel.
@@ -120,13 +120,13 @@ void scale_bar(cv::Mat& panel, double mm_per_pixel) {
     const int pixels = static_cast<int>(std::lround(length / mm_per_pixel)), y = panel.rows - 8;
     cv::line(panel, {panel.cols - 10 - pixels, y}, {panel.cols - 10, y}, cv::Scalar(12, 12, 12), 5);
     cv::line(panel, {panel.cols - 10 - pixels, y}, {panel.cols - 10, y}, ink, 2);
-    text(panel, tick_text(length) + " mm", {panel.cols - 10 - pixels / 2, y - 13}, 0.4, ink, Anchor::Centre);
+    text(panel, tick_text(length) + " mm", {panel.cols - 10 - pixels / 2, y - 15}, 0.52, ink, Anchor::Centre);
 }
 
 std::vector<Column> columns_of(const Scene& scene) {
     const ReportInput& in = scene.input;
     std::vector<Column> columns;
-    columns.push_back({"Before", "as the image headers place them",
+    columns.push_back({"Before", "as the image headers say",
                        [&scene, &in](int row) { return overlay(scene, row, *in.moving_labels); }});
     if (in.warped_labels != nullptr)
         columns.push_back({"After", "preoperative labels warped",
@@ -138,10 +138,10 @@ std::vector<Column> columns_of(const Scene& scene) {
         columns.push_back({"Difference after", "intraoperative - warped",
                            [&scene, &in](int row) { return difference(scene, row, *in.warped); }});
     if (scene.magnitude)
-        columns.push_back({"Displacement",
-                           in.report.contains("alignment") ? "beyond the rigid alignment, on the preoperative image"
-                                                           : "on the preoperative image",
-                           [&scene](int row) { return displacement(scene, row); }, true});
+        columns.push_back(
+            {"Displacement",
+             in.report.contains("alignment") ? "mm, beyond the rigid alignment" : "mm, rigid motion included",
+             [&scene](int row) { return displacement(scene, row); }, true});
     return columns;
 }
 
@@ -153,9 +153,9 @@ void vertical_bar(cv::Mat& page, const cv::Rect& place, double limit) {
     for (const double tick : round_ticks(limit, 5)) {
         const int y = place.y + static_cast<int>(std::lround((1 - tick / limit) * (place.height - 1)));
         cv::line(page, {place.x + place.width, y}, {place.x + place.width + 4, y}, faint);
-        text(page, tick_text(tick), {place.x + place.width + 8, y}, 0.42, ink);
+        text(page, tick_text(tick), {place.x + place.width + 8, y}, 0.55, ink);
     }
-    text(page, "mm", {place.x + place.width / 2, place.y - 14}, 0.45, ink, Anchor::Centre);
+    text(page, "mm", {place.x + place.width / 2, place.y - 14}, 0.55, ink, Anchor::Centre);
 }
 
 void difference_bar(cv::Mat& page, const cv::Rect& place) {
@@ -164,32 +164,32 @@ void difference_bar(cv::Mat& page, const cv::Rect& place) {
     signed_to_colour(ramp).copyTo(page(place));
     cv::rectangle(page, place, faint, 1);
     const int y = place.y + place.height + 14;
-    text(page, "-50 %", {place.x, y}, 0.42, ink, Anchor::Centre);
-    text(page, "0", {place.x + place.width / 2, y}, 0.42, ink, Anchor::Centre);
-    text(page, "+50 %", {place.x + place.width, y}, 0.42, ink, Anchor::Centre);
+    text(page, "-50 %", {place.x, y}, 0.55, ink, Anchor::Centre);
+    text(page, "0", {place.x + place.width / 2, y}, 0.55, ink, Anchor::Centre);
+    text(page, "+50 %", {place.x + place.width, y}, 0.55, ink, Anchor::Centre);
 }
 
 void legend(cv::Mat& page, const std::vector<Column>& columns, const Scene& scene) {
     const int y = page.rows - bottom_margin + 22;
     const auto sample = [&](int row, const cv::Scalar& colour, int thickness, const std::string& words) {
         cv::line(page, {left_margin, y + row}, {left_margin + 30, y + row}, colour, thickness, cv::LINE_AA);
-        text(page, words, {left_margin + 40, y + row}, 0.45, ink);
+        text(page, words, {left_margin + 40, y + row}, 0.55, ink);
     };
     sample(0, fixed_colour, 2, "intraoperative (fixed) labels");
-    sample(24, moving_colour, 1, "preoperative (moving) labels: before, as they lie; after, warped");
+    sample(26, moving_colour, 1, "preoperative (moving) labels, as they lie and warped");
     text(page,
-         "Radiological convention: the patient's right (R) is on the left. A front, P back, S head, I feet. LPS mm.",
-         {left_margin, y + 52}, 0.42, faint);
+         "Radiological convention: the patient's right (R) is on the left. A front, P back, S head, I feet; LPS mm.",
+         {left_margin, y + 58}, 0.5, faint);
     for (std::size_t k = 0; k < columns.size(); ++k) {
         const int x = left_margin + static_cast<int>(k) * (cell + gap);
         if (columns[k].title.starts_with("Difference")) {
             difference_bar(page, {x + 60, y - 6, cell - 120, 12});
-            text(page, "of the grey window of each image", {x + cell / 2, y + 44}, 0.42, faint, Anchor::Centre);
+            text(page, "of the grey window of each image", {x + cell / 2, y + 44}, 0.5, faint, Anchor::Centre);
         }
         if (columns[k].of_moving_frame) {
             char line[96];
             std::snprintf(line, sizeof line, "largest in the organ: %.1f mm, at the cross", scene.focus->displacement);
-            text(page, line, {x + cell / 2, y}, 0.45, ink, Anchor::Centre);
+            text(page, line, {x + cell / 2, y}, 0.55, ink, Anchor::Centre);
         }
     }
 }
@@ -276,8 +276,8 @@ Preview draw_preview(const ReportInput& input) {
     for (int k = 0; k < count; ++k) {
         const Column& column = columns[static_cast<std::size_t>(k)];
         const int x = left_margin + k * (cell + gap);
-        text(page, column.title, {x + cell / 2, 34}, 0.7, ink, Anchor::Centre);
-        text(page, column.subtitle, {x + cell / 2, 62}, 0.42, faint, Anchor::Centre);
+        text(page, column.title, {x + cell / 2, 34}, 0.85, ink, Anchor::Centre);
+        text(page, column.subtitle, {x + cell / 2, 62}, 0.55, faint, Anchor::Centre);
         for (int row = 0; row < 3; ++row) {
             cv::Mat panel = column.draw(row);
             const auto index = static_cast<std::size_t>(row);

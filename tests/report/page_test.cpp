@@ -224,8 +224,43 @@ TEST_F(Pages, HaveFiveColumnsInTheirPicture) {
     const cv::Mat fewer = detail::draw_preview(input).picture;
     EXPECT_EQ(whole.type(), CV_8UC3);
     EXPECT_GT(whole.cols, fewer.cols + 700);
-    // Nothing moved: both differences are white at the middle of their panels, and a panel has outlines in green.
-    EXPECT_GE(whole.cols, 5 * 360);
+}
+
+/// The axial panels are the first row; pixels from their middle, which is that of the ball.
+struct AxialPanels {
+    cv::Mat picture;
+    [[nodiscard]] cv::Vec3b at(int column, int right, int down) const {
+        constexpr int first = 16, step = 370, half = 180, top = 84;  // the layout of picture.cpp
+        return picture.at<cv::Vec3b>(top + half + down, first + column * step + half + right);
+    }
+};
+
+TEST_F(Pages, ShowTheFrontOnTopAndTheRightOnTheLeft) {
+    const AxialPanels panels{detail::draw_preview(example.input()).picture};
+    // The ball is brighter in front; outlines run along the rim and down the middle.
+    EXPECT_GT(panels.at(0, 40, -70)[1], panels.at(0, 40, 70)[1] + 20);
+    // What moved lies on the patient's right, in front of nothing: viridis is brighter there.
+    EXPECT_GT(panels.at(4, -80, 30)[1], panels.at(4, 80, 30)[1] + 30);
+}
+
+TEST_F(Pages, ShowInRedWhatIsBrighterDuringTheOperation) {
+    const AxialPanels same{detail::draw_preview(example.input()).picture};
+    for (int channel = 0; channel < 3; ++channel) EXPECT_NEAR(same.at(2, 40, 20)[channel], 247, 3);
+    // A part in the back, whose values stay below those of the front: the grey window does not change.
+    const auto changed = [&](float by) {
+        return filled<float>(example.grid, CV_32FC1, [by](const Vector3d& p) {
+            const float value = static_cast<float>(p.norm() < 40 ? 200 - p[1] : 0);
+            return (p - Vector3d(12, 20, 14)).norm() < 14 ? value + by : value;
+        });
+    };
+    const Volume brighter = changed(40), darker = changed(-40);
+    ReportInput input = example.input();
+    input.fixed = &brighter;
+    const cv::Vec3b red = AxialPanels{detail::draw_preview(input).picture}.at(2, 38, 62);
+    EXPECT_GT(red[2], red[0] + 20);
+    input.fixed = &darker;
+    const cv::Vec3b blue = AxialPanels{detail::draw_preview(input).picture}.at(2, 38, 62);
+    EXPECT_GT(blue[0], blue[2] + 20);
 }
 
 TEST_F(Pages, AreDrawnByABrowser) {
