@@ -3,8 +3,9 @@
 #include "apps/parameters.hpp"
 #include "apps/toml_file.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <sstream>
 
 namespace tissuewarp::apps {
 
@@ -16,15 +17,9 @@ bool contains(const std::vector<std::string>& names, std::string_view name) {
 
 std::string value_text(const toml::node& node, const std::string& place) {
     if (const auto* text = node.as_string()) return text->get();
-    std::ostringstream stream;
-    stream.precision(17);
-    if (const auto* number = node.as_integer())
-        stream << number->get();
-    else if (const auto* real = node.as_floating_point())
-        stream << real->get();
-    else
-        throw InvalidInput(place + ": the value must be a number, a text, true, false or a list of texts");
-    return stream.str();
+    if (const auto* number = node.as_integer()) return std::to_string(number->get());
+    if (const auto* real = node.as_floating_point()) return fmt::format("{}", real->get());  // shortest that reads back
+    throw InvalidInput(place + ": the value must be a number, a text, true, false or a list of texts");
 }
 
 void append_switch(const std::string& name, const toml::node& node, const std::string& place,

@@ -3,6 +3,7 @@
 #include "registration/evaluation.hpp"
 
 #include "apps/inputs.hpp"
+#include "apps/output_folder.hpp"
 #include "apps/point_files.hpp"
 #include "apps/progress.hpp"
 #include "apps/report_json.hpp"
@@ -39,7 +40,7 @@ void evaluate_landmarks(const EvaluateOptions& options, const imaging::Volume& f
     const Landmarks landmarks = *read_landmark_files(options.landmarks);
     const Eigen::Matrix3Xd mapped = field.empty() ? landmarks.moving : displaced(landmarks.moving, field);
     const TargetError error = target_error(landmarks, mapped, options.moved);
-    report["landmarks"] = to_json(error);
+    report["target_registration_error"] = to_json(error);
     text +=
         fmt::format("{:<24}{:>6}{:>8}{:>8}{:>8}{:>8}\n", "target error (mm)", "count", "mean", "median", "95th", "max");
     const auto row = [&](const std::string& name, const Summary& s) {
@@ -78,6 +79,7 @@ void run_evaluate(const EvaluateOptions& options) {
             "nothing to evaluate; give --labels with --reference-labels, --landmarks, or --displacement");
     json report{{"schema", "tissuewarp.evaluation"}, {"schema_version", 1}};
     std::string text;
+    if (!options.json.empty()) require_could_write_file(options.json);
     progress.begin("evaluating", 0.0, 1.0);
     if (!options.labels.empty()) evaluate_labels(options, report, text);
     imaging::Volume field;

@@ -1,5 +1,6 @@
 // tissuewarp mesh: label map → tetrahedra, with the quality and the fidelity of what was made.
 
+#include "apps/output_folder.hpp"
 #include "apps/progress.hpp"
 #include "apps/report_json.hpp"
 #include "apps/text_file.hpp"
@@ -44,6 +45,8 @@ void run_mesh(const MeshOptions& options) {
     ProgressLine progress(options.common.quiet);
     if (options.output.extension() != ".vtu")
         throw InvalidInput("'" + options.output.string() + "' is not a .vtu file; give a name that ends in .vtu");
+    require_could_write_file(options.output);
+    if (!options.json.empty()) require_could_write_file(options.json);
     progress.begin("reading", 0.0, 0.05);
     const imaging::Volume labels = imaging::read_labels(options.labels);
     imaging::require_labels(labels, options.only, options.labels.string().c_str());

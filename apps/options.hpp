@@ -33,7 +33,7 @@ struct RegisterOptions {
     std::filesystem::path moving, moving_labels, fixed, fixed_labels, output;
     LandmarkFiles landmarks;
     std::filesystem::path points, surface;    ///< of the moving frame, carried along
-    double edge_length = 5.0;                 ///< mm
+    double edge_length = 0.0;                 ///< mm; 0: from the volume of the organ
     std::map<int, double> label_edge_length;  ///< mm
     std::filesystem::path materials;
     double default_youngs_modulus = 3.0;  ///< kPa

@@ -56,6 +56,13 @@ OutputFolder::~OutputFolder() {
     if (!committed_) remove_created(created_);
 }
 
+std::string OutputFolder::in_words(std::string message) const {
+    const std::string hidden = staging_.string();
+    for (auto at = message.find(hidden); at != std::string::npos; at = message.find(hidden, at))
+        message.replace(at, hidden.size(), folder_.string());
+    return message;
+}
+
 void OutputFolder::commit() {
     for (const fs::directory_entry& entry : fs::directory_iterator(staging_)) {
         std::error_code failure;
@@ -74,6 +81,14 @@ void require_could_write(const fs::path& folder) {
         throw IoError("cannot write into '" + folder.string() + "': '" + at.string() + "' is not a folder");
     if (::access(at.c_str(), W_OK | X_OK) != 0)
         throw IoError("cannot write into '" + folder.string() + "': " + std::strerror(errno));
+}
+
+void require_could_write_file(const fs::path& file) {
+    const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+    std::error_code ignored;
+    if (!fs::is_directory(folder, ignored))
+        throw IoError("cannot write '" + file.string() + "': there is no folder '" + folder.string() + "'");
+    require_could_write(folder);
 }
 
 }  // namespace tissuewarp::apps

@@ -22,6 +22,9 @@ public:
     [[nodiscard]] const std::filesystem::path& staging() const { return staging_; }
     [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
 
+    /// A message that names the folder the user asked for in place of the hidden one.
+    [[nodiscard]] std::string in_words(std::string message) const;
+
     /// Moves every file to its place, over files of the same name. Throws IoError.
     void commit();
 
@@ -33,5 +36,8 @@ private:
 
 /// Throws IoError unless files could be written to `folder`, which need not exist; creates nothing.
 void require_could_write(const std::filesystem::path& folder);
+
+/// The same for a single file, whose folder must exist.
+void require_could_write_file(const std::filesystem::path& file);
 
 }  // namespace tissuewarp::apps

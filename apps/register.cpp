@@ -4,6 +4,7 @@
 #include "apps/progress.hpp"
 #include "apps/register_outputs.hpp"
 #include "apps/report_json.hpp"
+#include "apps/silenced_stderr.hpp"
 #include "apps/threads.hpp"
 #include "apps/verbs.hpp"
 #include "apps/versions.hpp"
@@ -55,9 +56,10 @@ void print_plan(const RegistrationInputs& inputs, const RegisterOptions& options
     };
     fmt::print("moving grid   {}\nfixed grid    {}\nlabels        {}\n", grid(inputs.moving_grid()),
                grid(inputs.fixed_grid()), fmt::join(imaging::labels_in(inputs.moving_labels), ", "));
-    fmt::print("would mesh with edges of {:g} mm, {}, match in {} rounds on device '{}', and write to '{}':\n",
-               options.edge_length, options.no_align ? "not align" : "align rigidly", options.rounds,
-               options.device.name, options.output.string());
+    const double edge = options.edge_length > 0 ? options.edge_length : suggested_edge_length(inputs.moving_labels);
+    fmt::print("would mesh with edges of {:.3g} mm, {}, match in {} rounds on device '{}', and write to '{}':\n", edge,
+               options.no_align ? "not align" : "align rigidly", options.rounds, options.device.name,
+               options.output.string());
     for (const std::string& name : output_names(options)) fmt::print("  {}\n", name);
 }
 
@@ -113,6 +115,7 @@ void run_register(const RegisterOptions& options) {
     RegistrationRun run{options, utc_now(), {}, {}, {}, {}, {}, {}, {}};
 
     if (options.dry_run) require_could_write(options.output);
+    if (!options.save_parameters.empty()) require_could_write_file(options.save_parameters);
     std::unique_ptr<OutputFolder> output;
     if (!options.dry_run) output = std::make_unique<OutputFolder>(options.output);
 
@@ -124,7 +127,6 @@ void run_register(const RegisterOptions& options) {
         progress.clear();
         return print_plan(run.inputs, options);
     }
-    if (!options.save_parameters.empty()) save_parameters(options.parameters, options.save_parameters);
 
     progress.begin("preparing the model", 0.05, 0.35);
     run.prepared = std::make_unique<PreparedModel>(
@@ -143,11 +145,13 @@ void run_register(const RegisterOptions& options) {
     run.times.push_back(clock.lap("warp"));
 
     progress.begin("writing and scoring", 0.85, 0.97);
+    auto silenced = std::make_unique<SilencedStandardError>();
     tbb::task_group writing;  // compression takes one core per file; the scores run beside it
     start_writing(run, *output, writing);
     run.scores = score(run);
     run.times.push_back(clock.lap("score"));
     writing.wait();
+    silenced.reset();
     run.times.push_back(clock.lap("write"));
 
     progress.begin("report", 0.97, 1.0);
@@ -155,6 +159,7 @@ void run_register(const RegisterOptions& options) {
     const nlohmann::json report = report_json(run, clock.total());
     write_reports(run, report, *output);
     output->commit();
+    if (!options.save_parameters.empty()) save_parameters(options.parameters, options.save_parameters);
     run.times.push_back(clock.lap("report"));
     progress.clear();
     if (!options.common.quiet) fmt::print("{}", summary_text(run, clock.total()));

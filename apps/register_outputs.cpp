@@ -92,9 +92,13 @@ std::vector<std::string> output_names(const RegisterOptions& options) {
 
 void start_writing(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks) {
     const auto start = [&](const std::string& name, auto write) {
-        tasks.run([path = output.path(name), write] {
+        tasks.run([&output, path = output.path(name), write] {
             if (interrupted()) throw Cancelled();
-            write(path);
+            try {
+                write(path);
+            } catch (const IoError& error) {
+                throw IoError(output.in_words(error.what()));
+            }
         });
     };
     const Products& products = run.products;

@@ -23,18 +23,25 @@ json geometry(const imaging::Geometry& grid) {
     json direction = json::array();
     for (int row = 0; row < 3; ++row) direction.push_back(vector(grid.direction.row(row).transpose()));
     return {{"size", grid.size},
-            {"spacing_mm", vector(grid.spacing)},
-            {"origin_mm", vector(grid.origin)},
+            {"spacing", vector(grid.spacing)},
+            {"origin", vector(grid.origin)},
             {"direction", direction}};
 }
 
-json inputs(const RegistrationRun& run) {
-    json list = json::array();
-    for (const InputFile& file : run.inputs.files)
-        list.push_back({{"role", file.role},
-                        {"path", file.path.string()},
-                        {"sha256", file.sha256.empty() ? json(nullptr) : json(file.sha256)}});
-    return list;
+json inputs(const RegistrationInputs& inputs) {
+    const std::map<std::string, const imaging::Volume*> volumes{{"moving", &inputs.moving},
+                                                                {"moving-labels", &inputs.moving_labels},
+                                                                {"fixed", &inputs.fixed},
+                                                                {"fixed-labels", &inputs.fixed_labels}};
+    json object = json::object();
+    for (const InputFile& file : inputs.files) {
+        json& entry = object[file.role];
+        entry["path"] = file.path.string();
+        entry["sha256"] = file.sha256.empty() ? json(nullptr) : json(file.sha256);
+        const auto volume = volumes.find(file.role);
+        if (volume != volumes.end()) entry["geometry"] = geometry(volume->second->geometry);
+    }
+    return object;
 }
 
 json parameters(const RegisterOptions& options) {
@@ -83,7 +90,7 @@ json alignment(const RegistrationRun& run) {
     }
     const double angle = Eigen::AngleAxisd(placement.linear()).angle() * 180 / 3.14159265358979323846;
     return {{"performed", !run.options.no_align},
-            {"moving_to_fixed", matrix},
+            {"matrix", matrix},
             {"rotation_deg", angle},
             {"translation_mm", vector(placement.translation())},
             {"mean_distance_mm", number(run.result.alignment.mean_distance_mm)}};
@@ -95,6 +102,7 @@ json rounds(const RegistrationRun& run) {
         list.push_back({{"range_mm", number(round.range_mm)},
                         {"matched", round.matched},
                         {"interface_nodes", round.interface_nodes},
+                        {"held_back", round.held_back},
                         {"mean_residual_mm", number(round.mean_residual_mm)},
                         {"largest_change_mm", number(round.largest_change_mm)},
                         {"force_evaluations", round.force_evaluations},
@@ -102,10 +110,9 @@ json rounds(const RegistrationRun& run) {
     return list;
 }
 
-json timings(const RegistrationRun& run, double total_seconds) {
+json stages(const RegistrationRun& run) {
     json list = json::array();
     for (const auto& [stage, seconds] : run.times) list.push_back({{"stage", stage}, {"seconds", seconds}});
-    list.push_back({{"stage", "total"}, {"seconds", total_seconds}});
     return list;
 }
 
@@ -119,6 +126,9 @@ json mesh(const RegistrationRun& run) {
     json object = to_json(meshing::quality(run.result.deformation.mesh));
     const bool t4 = run.prepared->model.element == tled::Element::T4;
     object["element"] = t4 ? "t4" : "averaged-pressure";
+    object["nodes"] = run.result.deformation.mesh.node_count();
+    object["tetrahedra"] = run.result.deformation.mesh.tet_count();
+    object["edge_length_mm"] = run.prepared->options.meshing.edge_length;
     return object;
 }
 
@@ -133,11 +143,11 @@ json to_json(const registration::Summary& s) {
 }
 
 json to_json(const registration::TargetError& error) {
-    return {{"count", error.before.count},
-            {"unit", "mm"},
-            {"moved_mm", error.moved_mm},
-            {"before", {{"all", to_json(error.before)}, {"moved", to_json(error.moved_before)}}},
-            {"after", {{"all", to_json(error.after)}, {"moved", to_json(error.moved_after)}}}};
+    return {{"all", {{"before", to_json(error.before)}, {"after", to_json(error.after)}}},
+            {"moved",
+             {{"threshold_mm", error.moved_mm},
+              {"before", to_json(error.moved_before)},
+              {"after", to_json(error.moved_after)}}}};
 }
 
 json to_json(const registration::JacobianReport& report) {
@@ -152,7 +162,7 @@ json to_json(const registration::JacobianReport& report) {
 json to_json(const std::map<int, registration::Overlap>& overlaps) {
     json object = json::object();
     for (const auto& [label, overlap] : overlaps)
-        object[label == 0 ? "union" : std::to_string(label)] = {
+        object[label == 0 ? "all" : std::to_string(label)] = {
             {"dice", number(overlap.dice)},
             {"hausdorff_95_mm", number(overlap.hausdorff_95_mm)},
             {"mean_surface_distance_mm", number(overlap.mean_surface_distance_mm)}};
@@ -193,10 +203,11 @@ json report_json(const RegistrationRun& run, double total_seconds) {
     json report{
         {"schema", "tissuewarp.report"},
         {"schema_version", 1},
+        {"program", "tissuewarp"},
+        {"version", program_version()},
         {"versions", versions()},
         {"started", run.started},
-        {"inputs", inputs(run)},
-        {"grids", {{"moving", geometry(run.inputs.moving_grid())}, {"fixed", geometry(run.inputs.fixed_grid())}}},
+        {"inputs", inputs(run.inputs)},
         {"parameters", parameters(run.options)},
         {"materials", materials(run)},
         {"device", run.result.engine},
@@ -209,13 +220,12 @@ json report_json(const RegistrationRun& run, double total_seconds) {
         {"doubts", run.result.doubts},
         {"notes", notes(run)},
         {"outputs", output_names(run.options)},
-        {"timings", timings(run, total_seconds)},
-        {"peak_memory_bytes", peak_memory_bytes()}};
-    report["mesh"]["nodes"] = run.result.deformation.mesh.node_count();
-    report["mesh"]["tetrahedra"] = run.result.deformation.mesh.tet_count();
+        {"stages", stages(run)},
+        {"total_seconds", total_seconds},
+        {"peak_memory_mb", static_cast<double>(peak_memory_bytes()) / 1e6}};
     report["estimated_error_mm"] =
         run.result.rounds.empty() ? json(nullptr) : number(run.result.rounds.back().estimated_error_mm);
-    if (scores.target_error) report["landmarks"] = to_json(*scores.target_error);
+    if (scores.target_error) report["target_registration_error"] = to_json(*scores.target_error);
     return report;
 }
 

@@ -13,7 +13,7 @@ nlohmann::json report_json(const RegistrationRun& run, double total_seconds);
 nlohmann::json to_json(const registration::Summary& summary);
 nlohmann::json to_json(const registration::TargetError& error);
 nlohmann::json to_json(const registration::JacobianReport& report);
-/// Keys "1", "2", ... and "union".
+/// Keys "1", "2", ... and "all" for the union of the labels.
 nlohmann::json to_json(const std::map<int, registration::Overlap>& overlaps);
 nlohmann::json to_json(const meshing::Distribution& distribution);
 nlohmann::json to_json(const meshing::QualityReport& quality);

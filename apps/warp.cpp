@@ -3,8 +3,10 @@
 #include "registration/warp.hpp"
 
 #include "apps/file_kind.hpp"
+#include "apps/output_folder.hpp"
 #include "apps/point_files.hpp"
 #include "apps/progress.hpp"
+#include "apps/silenced_stderr.hpp"
 #include "apps/threads.hpp"
 #include "apps/verbs.hpp"
 #include "core/errors.hpp"
@@ -41,6 +43,7 @@ void warp_volume(const WarpOptions& options, Observer& observer) {
     const Volume field = fixed_to_moving(options, image, observer);
     const Volume warped = options.labels ? registration::warp_labels(image, field)
                                          : registration::warp_image(image, field, options.outside);
+    const SilencedStandardError silenced;
     imaging::write_volume(warped, options.output);
 }
 
@@ -61,6 +64,7 @@ void run_warp(const WarpOptions& options) {
     if (file_kind(options.output) != kind)
         throw InvalidInput("'" + options.input.string() + "' cannot become '" + options.output.string() +
                            "'; give an output of the same kind (image, points or surface)");
+    require_could_write_file(options.output);
     progress.begin("warping", 0.0, 1.0);
     if (kind == FileKind::Image) {
         warp_volume(options, progress);

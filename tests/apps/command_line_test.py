@@ -97,6 +97,14 @@ class SmallVerbs(PhantomTest):
     def test_mesh_refuses_a_name_that_is_no_vtu(self):
         self.assert_refused(run("mesh", self.phantom.moving_labels, "-o", self.phantom.folder / "a.vtk"), 2, ".vtu")
 
+    def test_single_files_need_a_folder(self):
+        nowhere = self.phantom.folder / "nowhere"
+        for arguments in (("mesh", self.phantom.moving_labels, "-o", nowhere / "a.vtu"),
+                          ("warp", self.phantom.moving, "-o", nowhere / "a.nii.gz", "--record", "record.h5"),
+                          ("evaluate", "--labels", self.phantom.moving_labels, "--reference-labels",
+                           self.phantom.moving_labels, "--json", nowhere / "a.json")):
+            self.assert_refused(run(*arguments), 3, str(nowhere))
+
     def test_info_prints_geometry_and_labels(self):
         result = run("info", "--labels", self.phantom.moving_labels)
         self.assertEqual(result.returncode, 0, result.stderr)
@@ -142,10 +150,10 @@ class SmallVerbs(PhantomTest):
                      self.phantom.moving_labels, "--reference-labels", self.phantom.moving_labels)
         self.assertEqual(result.returncode, 0, result.stderr)
         values = json.loads(scores.read_text())
-        self.assertAlmostEqual(values["landmarks"]["after"]["all"]["maximum"], 1.0, delta=1e-5)
-        self.assertAlmostEqual(values["landmarks"]["after"]["all"]["mean"], 0.5, delta=1e-5)
+        self.assertAlmostEqual(values["target_registration_error"]["all"]["after"]["maximum"], 1.0, delta=1e-5)
+        self.assertAlmostEqual(values["target_registration_error"]["all"]["after"]["mean"], 0.5, delta=1e-5)
         self.assertAlmostEqual(values["jacobian"]["minimum"], 1.0, delta=1e-5)
-        self.assertEqual(values["overlap"]["union"]["dice"], 1.0)
+        self.assertEqual(values["overlap"]["all"]["dice"], 1.0)
 
     def test_warp_refuses_without_anything_to_warp_with(self):
         result = run("warp", self.phantom.moving, "-o", self.phantom.folder / "w.nii.gz")

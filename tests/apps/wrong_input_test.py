@@ -1,7 +1,6 @@
 """Wrong input ends in one line on standard error, the right exit code, and no output."""
 
 import os
-import pathlib
 import struct
 import subprocess
 import unittest
@@ -51,10 +50,11 @@ class WrongFiles(PhantomTest):
         path.write_bytes(data)
         self.assert_refused(self.phantom.register(fixed=None, fixed_labels=path), INPUT, "zero.nii", "spacing")
 
-    def test_spacing_in_metres(self):
-        affine = MOVING_AFFINE @ numpy.diag([1e-3, 1e-3, 1e-3, 1])
-        path = save(self.phantom.moving_labels_array, affine, self.phantom.folder / "metres.nii.gz")
-        self.assert_refused(self.phantom.register(moving=None, moving_labels=path), INPUT, "metres.nii.gz", "millimetres")
+    def test_spacing_in_centimetres(self):
+        affine = MOVING_AFFINE @ numpy.diag([0.1, 0.1, 0.1, 1])
+        path = save(self.phantom.moving_labels_array, affine, self.phantom.folder / "centimetres.nii.gz")
+        self.assert_refused(self.phantom.register(moving=None, moving_labels=path), INPUT, "centimetres.nii.gz",
+                            "spans 4.8 mm", "millimetres")
 
 
 class WrongLabels(PhantomTest):
@@ -193,7 +193,7 @@ class WrongOutput(PhantomTest):
     def test_full_disk(self):
         folder = self.mount("size=256k")
         result = self.phantom.register("--edge-length", 8, "--rounds", 1, output=folder / "deep" / "out")
-        self.assert_refused(result, IO)
+        self.assert_refused(result, IO, str(folder / "deep" / "out"))
         self.assertEqual(os.listdir(folder), [])
 
 
