@@ -18,7 +18,7 @@ struct ReportInput {
     const imaging::Volume* fixed_labels = nullptr;   ///< needed
     const imaging::Volume* warped_labels = nullptr;
     const imaging::Volume* moving_to_fixed = nullptr;  ///< displacement field of three channels, LPS mm, moving grid
-    nlohmann::json report;                             ///< report.json, docs/report.md; missing keys leave sections out
+    nlohmann::json report;  ///< report.json, docs/manual/register.md; missing keys leave sections out
 };
 
 /// Writes preview.png and report.html into an existing folder, each to a temporary name that is renamed.

@@ -75,6 +75,12 @@ cv::Mat slice(const imaging::Volume& volume, const Plane& plane, imaging::Interp
         .clone();
 }
 
+cv::Mat label_slice(const imaging::Volume& labels, const Plane& plane) {
+    cv::Mat integers;
+    slice(labels, plane, imaging::Interpolation::Nearest).convertTo(integers, CV_32S);
+    return integers;
+}
+
 Window window_of(const imaging::Volume& image, const Box& box) {
     const imaging::Volume real = image.as(CV_32F);
     std::vector<float> values;

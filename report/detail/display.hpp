@@ -38,6 +38,9 @@ std::array<Plane, 3> planes_through(const Eigen::Vector3d& point, const Box& box
 /// Values on a plane: rows × columns, of the volume's type; zero outside.
 cv::Mat slice(const imaging::Volume& volume, const Plane& plane, imaging::Interpolation interpolation);
 
+/// Labels on a plane, int32, nearest neighbour.
+cv::Mat label_slice(const imaging::Volume& labels, const Plane& plane);
+
 /// Grey values between these are shown from black to white.
 struct Window {
     double lower = 0, upper = 1;

@@ -22,7 +22,7 @@ using imaging::Volume;
 const cv::Scalar background(26, 23, 21), ink(235, 235, 235), faint(165, 165, 165);
 const cv::Scalar moving_colour(60, 60, 255), fixed_colour(90, 210, 70);
 
-constexpr int cell = 360, gap = 10, left_margin = 16, top_margin = 84, bottom_margin = 104, bar_margin = 84;
+constexpr int cell = 360, gap = 10, left_margin = 16, top_margin = 84, bottom_margin = 112, bar_margin = 84;
 constexpr double margin_mm = 12.0;
 constexpr double difference_range = 0.5;  // of the grey window
 
@@ -54,15 +54,14 @@ double corner_sigma(const Volume& labels, const Scene& scene) {
 
 void outline(cv::Mat& picture, const Volume& labels, const Plane& plane, const Scene& scene, const cv::Scalar& colour,
              int thickness) {
-    outlines(picture, slice(labels.as(CV_32S), plane, Interpolation::Nearest), colour, thickness,
-             corner_sigma(labels, scene));
+    outlines(picture, label_slice(labels, plane), colour, thickness, corner_sigma(labels, scene));
 }
 
 /// The image's plane, or the labels as flat grey where there is no image.
 cv::Mat base(const Volume* image, const Window& window, const Volume& labels, const Plane& plane) {
     if (image != nullptr) return grey_to_colour(grey_slice(*image, window, plane));
     cv::Mat grey;
-    cv::Mat(slice(labels.as(CV_32S), plane, Interpolation::Nearest) != 0).convertTo(grey, CV_32F, 0.45 / 255);
+    cv::Mat(label_slice(labels, plane) != 0).convertTo(grey, CV_32F, 0.45 / 255);
     return grey_to_colour(grey);
 }
 
@@ -92,7 +91,7 @@ cv::Mat displacement(const Scene& scene, int row) {
     values = cv::max(cv::min(values, 1.0), 0.0);
     cv::Mat mixed;
     cv::addWeighted(magnitude_to_colour(values), 0.75, picture, 0.25, 0, mixed);
-    mixed.copyTo(picture, slice(labels.as(CV_32S), plane, Interpolation::Nearest) != 0);
+    mixed.copyTo(picture, label_slice(labels, plane) != 0);
     outline(picture, labels, plane, scene, moving_colour, 1);
     const Vector3d pixel = plane.grid.index(scene.focus->moving);
     cv::drawMarker(picture, {static_cast<int>(std::lround(pixel[0])), static_cast<int>(std::lround(pixel[1]))},
@@ -177,9 +176,9 @@ void legend(cv::Mat& page, const std::vector<Column>& columns, const Scene& scen
     };
     sample(0, fixed_colour, 2, "intraoperative (fixed) labels");
     sample(26, moving_colour, 1, "preoperative (moving) labels, as they lie and warped");
-    text(page,
-         "Radiological convention: the patient's right (R) is on the left. A front, P back, S head, I feet; LPS mm.",
-         {left_margin, y + 58}, 0.5, faint);
+    text(page, "Radiological: the patient's right (R) is on the left. A front, P back,", {left_margin, y + 54}, 0.5,
+         faint);
+    text(page, "S head, I feet. Places in LPS mm.", {left_margin, y + 72}, 0.5, faint);
     for (std::size_t k = 0; k < columns.size(); ++k) {
         const int x = left_margin + static_cast<int>(k) * (cell + gap);
         if (columns[k].title.starts_with("Difference")) {
@@ -271,8 +270,9 @@ Preview draw_preview(const ReportInput& input) {
         height += scene.fixed_planes[row].grid.size[1] + gap;
     }
     const int count = static_cast<int>(columns.size());
+    constexpr int least_width = 660;  // of the legend
     const int width = left_margin + count * (cell + gap) + (scene.magnitude ? bar_margin : left_margin - gap);
-    cv::Mat page(height + bottom_margin, width, CV_8UC3, background);
+    cv::Mat page(height + bottom_margin, std::max(width, least_width), CV_8UC3, background);
     for (int k = 0; k < count; ++k) {
         const Column& column = columns[static_cast<std::size_t>(k)];
         const int x = left_margin + k * (cell + gap);
