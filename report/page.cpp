@@ -1,6 +1,5 @@
 #include "report/page.hpp"
 
-#include "report/detail/normalised.hpp"
 #include "report/detail/picture.hpp"
 #include "report/detail/slice_stack.hpp"
 #include "report/detail/template.hpp"
@@ -67,9 +66,7 @@ nlohmann::json page_values(const ReportInput& input, const detail::Preview& prev
 
 }  // namespace
 
-void write_report(const ReportInput& given, const std::filesystem::path& folder) {
-    ReportInput input = given;
-    input.report = detail::normalised(given.report);
+void write_report(const ReportInput& input, const std::filesystem::path& folder) {
     const detail::Preview preview = detail::draw_preview(input);
     std::vector<unsigned char> png;
     cv::imencode(".png", preview.picture, png, {cv::IMWRITE_PNG_COMPRESSION, 9});

@@ -73,12 +73,18 @@ cv::Mat overlay(const Scene& scene, int row, const Volume& labels) {
     return picture;
 }
 
-/// fixed − other, each windowed; as colours.
-cv::Mat difference(const Scene& scene, int row, const Volume& other) {
+/// fixed − other, each windowed; as colours, pale where neither has labels, because nothing is simulated there.
+cv::Mat difference(const Scene& scene, int row, const Volume& other, const Volume* other_labels) {
     const Plane& plane = scene.fixed_planes[static_cast<std::size_t>(row)];
     const cv::Mat values =
         grey_slice(*scene.input.fixed, scene.fixed_window, plane) - grey_slice(other, scene.moving_window, plane);
-    cv::Mat picture = signed_to_colour(values / difference_range);
+    const cv::Mat colours = signed_to_colour(values / difference_range);
+    constexpr double kept = 0.3;
+    const cv::Scalar white(247, 247, 247);
+    cv::Mat picture = colours * kept + cv::Mat(colours.size(), colours.type(), white) * (1 - kept);
+    cv::Mat mask = label_slice(*scene.input.fixed_labels, plane) != 0;
+    if (other_labels != nullptr) mask |= label_slice(*other_labels, plane) != 0;
+    colours.copyTo(picture, mask);
     outline(picture, *scene.input.fixed_labels, plane, scene, cv::Scalar(60, 120, 40), 1);
     return picture;
 }
@@ -132,10 +138,10 @@ std::vector<Column> columns_of(const Scene& scene) {
                            [&scene, &in](int row) { return overlay(scene, row, *in.warped_labels); }});
     if (in.fixed != nullptr && in.moving != nullptr)
         columns.push_back({"Difference before", "intraoperative - preoperative",
-                           [&scene, &in](int row) { return difference(scene, row, *in.moving); }});
+                           [&scene, &in](int row) { return difference(scene, row, *in.moving, in.moving_labels); }});
     if (in.fixed != nullptr && in.warped != nullptr)
         columns.push_back({"Difference after", "intraoperative - warped",
-                           [&scene, &in](int row) { return difference(scene, row, *in.warped); }});
+                           [&scene, &in](int row) { return difference(scene, row, *in.warped, in.warped_labels); }});
     if (scene.magnitude)
         columns.push_back(
             {"Displacement",
@@ -183,7 +189,7 @@ void legend(cv::Mat& page, const std::vector<Column>& columns, const Scene& scen
         const int x = left_margin + static_cast<int>(k) * (cell + gap);
         if (columns[k].title.starts_with("Difference")) {
             difference_bar(page, {x + 60, y - 6, cell - 120, 12});
-            text(page, "of the grey window of each image", {x + cell / 2, y + 44}, 0.5, faint, Anchor::Centre);
+            text(page, "of the grey window; pale outside labels", {x + cell / 2, y + 44}, 0.5, faint, Anchor::Centre);
         }
         if (columns[k].of_moving_frame) {
             char line[96];

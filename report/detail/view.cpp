@@ -100,6 +100,7 @@ json rounds_view(const json& rounds) {
         rows.push_back({{"index", std::to_string(rows.size() + 1)},
                         {"range", number(at(round, "range_mm"), 1)},
                         {"matched", number(at(round, "matched"), 0)},
+                        {"held_back", is_finite(at(round, "held_back")) ? number(at(round, "held_back"), 0) : "–"},
                         {"interface_nodes", number(at(round, "interface_nodes"), 0)},
                         {"residual", number(at(round, "mean_residual_mm"), 2)},
                         {"change", number(at(round, "largest_change_mm"), 2)},
@@ -116,9 +117,7 @@ json overlap_row(const std::string& label, const json& before, const json& after
             {"distance_before", number(at(before, "mean_surface_distance_mm"), 2)},
             {"distance_after", number(at(after, "mean_surface_distance_mm"), 2)},
             {"hausdorff_before", number(at(before, "hausdorff_95_mm"), 2)},
-            {"hausdorff_after", number(at(after, "hausdorff_95_mm"), 2)},
-            {"no_before", before.is_null()},
-            {"no_after", after.is_null()}};
+            {"hausdorff_after", number(at(after, "hausdorff_95_mm"), 2)}};
 }
 
 /// Labels in the order of their numbers, their union last.
@@ -181,28 +180,28 @@ json summary_view(const json& report) {
     json tiles;
     const json& error = at(report, "target_registration_error", "all");
     if (is_finite(at(error, "after", "mean")))
-        tiles["error"] = {{"before", number(at(error, "before", "mean"), 2)},
-                          {"after", number(at(error, "after", "mean"), 2)},
-                          {"maximum", number(at(error, "after", "maximum"), 2)},
-                          {"count", number(at(error, "after", "count"), 0)}};
+        tiles["landmarks"] = {{"before", number(at(error, "before", "mean"), 2)},
+                              {"after", number(at(error, "after", "mean"), 2)},
+                              {"maximum", number(at(error, "after", "maximum"), 2)},
+                              {"count", number(at(error, "after", "count"), 0)}};
     for (const char* key : {"all", "0"}) {
         const json& after = at(report, "overlap", "after", key);
         if (!is_finite(at(after, "dice"))) continue;
         const json& before = at(report, "overlap", "before", key);
-        tiles["dice"] = {{"before", number(at(before, "dice"), 3)},
-                         {"after", number(at(after, "dice"), 3)},
-                         {"distance_before", number(at(before, "mean_surface_distance_mm"), 2)},
-                         {"distance_after", number(at(after, "mean_surface_distance_mm"), 2)}};
+        tiles["organ"] = {{"before", number(at(before, "dice"), 3)},
+                          {"after", number(at(after, "dice"), 3)},
+                          {"distance_before", number(at(before, "mean_surface_distance_mm"), 2)},
+                          {"distance_after", number(at(after, "mean_surface_distance_mm"), 2)}};
     }
     const json& mesh = at(report, "jacobian", "mesh");
     if (is_finite(at(mesh, "minimum"))) {
         const json& folded = at(mesh, "folded");
-        tiles["jacobian"] = {{"minimum", number(at(mesh, "minimum"), 3)},
-                             {"folded", number(folded, 0)},
-                             {"folds", is_finite(folded) && folded.get<double>() > 0}};
+        tiles["volume"] = {{"minimum", number(at(mesh, "minimum"), 3)},
+                           {"folded", number(folded, 0)},
+                           {"folds", is_finite(folded) && folded.get<double>() > 0}};
     }
     if (is_finite(at(report, "estimated_error_mm")))
-        tiles["solver"] = {{"error", number(at(report, "estimated_error_mm"), 3)}};
+        tiles["equations"] = {{"error", number(at(report, "estimated_error_mm"), 3)}};
     return tiles;
 }
 
@@ -267,8 +266,8 @@ json view_of(const json& report) {
     if (is_finite(at(report, "peak_memory_mb"))) view["memory"] = number(at(report, "peak_memory_mb"), 0);
     view["started"] = text(at(report, "started"));
     if (is_finite(at(report, "mesh", "nodes")))
-        view["mesh"] = {{"nodes", number(at(report, "mesh", "nodes"), 0)},
-                        {"tetrahedra", number(at(report, "mesh", "tetrahedra"), 0)}};
+        view["mesh_size"] = {{"nodes", number(at(report, "mesh", "nodes"), 0)},
+                             {"tetrahedra", number(at(report, "mesh", "tetrahedra"), 0)}};
     put_table(view, "materials", materials_view(at(report, "materials")));
     if (at(report, "notes").is_array() && !at(report, "notes").empty())
         view["notable"] = {{"notes", at(report, "notes")}};

@@ -157,9 +157,12 @@ TEST_F(Pages, AreWellFormedCompleteAndNeedNoNetwork) {
     EXPECT_LT(fs::file_size(folder / "report.html"), 3u << 20);
     // What report.json says, as the page shows it.
     EXPECT_EQ(
-        python((folder / "report.html").string() +
-               " 4.41 1.06 0.962 0.993 0.624 0.031 'Neo &lt;Hooke&gt; &amp; co' 9f86d081884c7d659a2feaa0c55ad015 1830"
-               " 'only 78 % of the nodes were matched'"),
+        python(
+            (folder / "report.html").string() +
+            " 4.41 1.06 0.962 0.993 0.624 0.031 'Neo &lt;Hooke&gt; &amp; co' 9f86d081884c7d659a2feaa0c55ad015 '1830 MB'"
+            " '<td>tetrahedra of the organ</td><td>0.624</td>' '<td>voxels of the whole field</td><td>0.555</td>'"
+            " '2.41 →' '0.962 →' '1234 nodes' '48 × 40 × 30' 'a &lt;b&gt;.nii.gz' 'sform and qform disagree'"
+            " 'only 78 % of the nodes were matched'"),
         0);
 }
 
@@ -170,6 +173,12 @@ TEST_F(Pages, LeaveOutWhatIsMissing) {
         EXPECT_THAT(text, testing::Not(testing::HasSubstr(heading)));
     EXPECT_THAT(text, testing::HasSubstr("<h2>Which field for what"));
     EXPECT_EQ(python((folder / "report.html").string()), 0);
+}
+
+TEST_F(Pages, ShowNoTileForWhatOnlyATableHolds) {
+    write_report(example.input({{"jacobian", {{"field", {{"minimum", 0.7}, {"folded", 3}}}}}}), folder);
+    EXPECT_THAT(page(), testing::Not(testing::HasSubstr("Smallest local volume ratio")));
+    EXPECT_THAT(page(), testing::HasSubstr("<td>voxels of the whole field</td><td>0.700</td>"));
 }
 
 TEST_F(Pages, SurviveReportsOfOddTypes) {
