@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <csignal>
-#include <cstdio>
+#include <utility>
 
 namespace tissuewarp::apps {
 
@@ -24,6 +24,15 @@ std::string clock_text(double seconds) {
     return fmt::format("{}:{:02d}", whole / 60, whole % 60);
 }
 
+/// The part of a verb's stage that a library's stage takes. Equilibria run within rounds, which count for them.
+std::pair<double, double> share_of(std::string_view stage) {
+    if (stage == "rigid alignment") return {0.0, 0.15};
+    if (stage == "registration") return {0.15, 1.0};
+    if (stage == "equilibrium") return {0.0, 0.0};
+    if (stage == "factor of the rest stiffness") return {0.75, 1.0};
+    return {0.0, 1.0};
+}
+
 }  // namespace
 
 void catch_interrupts() {
@@ -38,10 +47,15 @@ bool interrupted() {
     return stop_requested;
 }
 
-ProgressLine::ProgressLine(bool quiet) : drawn_(!quiet && isatty(STDERR_FILENO) == 1) {}
+ProgressLine::ProgressLine(bool quiet) {
+    if (quiet || isatty(STDERR_FILENO) != 1) return;
+    const int own = dup(STDERR_FILENO);
+    if (own >= 0) terminal_ = fdopen(own, "w");
+}
 
 ProgressLine::~ProgressLine() {
     clear();
+    if (terminal_) std::fclose(terminal_);
 }
 
 void ProgressLine::begin(const std::string& stage, double from, double to) {
@@ -57,10 +71,11 @@ void ProgressLine::begin(const std::string& stage, double from, double to) {
     if (interrupted()) throw Cancelled();
 }
 
-void ProgressLine::progress(std::string_view, double fraction) {
+void ProgressLine::progress(std::string_view stage, double fraction) {
+    const auto [from, to] = share_of(stage);
     const std::lock_guard lock(mutex_);
-    // Stages nest (rounds hold equilibria), so the line only ever moves forward.
-    done_ = std::max(done_, from_ + (to_ - from_) * std::clamp(fraction, 0.0, 1.0));
+    const double part = from + (to - from) * std::clamp(fraction, 0.0, 1.0);
+    done_ = std::max(done_, from_ + (to_ - from_) * part);  // never backwards
     draw();
 }
 
@@ -71,20 +86,21 @@ void ProgressLine::note(std::string_view message) {
 
 void ProgressLine::draw() {
     const auto now = Clock::now();
-    if (!drawn_ || now - last_ < std::chrono::milliseconds(100)) return;
+    if (!terminal_ || now - last_ < std::chrono::milliseconds(100)) return;
     last_ = now;
     const double elapsed = std::chrono::duration<double>(now - start_).count();
     const std::string left =
         done_ > 0.02 ? "  about " + clock_text(elapsed * (1 - done_) / done_) + " left" : std::string();
-    fmt::print(stderr, "\r\x1b[K{:<24}{:>4.0f} %{}", stage_, 100 * done_, left);
-    std::fflush(stderr);
+    fmt::print(terminal_, "\r\x1b[K{:<24}{:>4.0f} %{}", stage_, 100 * done_, left);
+    std::fflush(terminal_);
     dirty_ = true;
 }
 
 void ProgressLine::clear() {
     const std::lock_guard lock(mutex_);
-    if (dirty_) fmt::print(stderr, "\r\x1b[K");
-    std::fflush(stderr);
+    if (!dirty_) return;
+    fmt::print(terminal_, "\r\x1b[K");
+    std::fflush(terminal_);
     dirty_ = false;
 }
 

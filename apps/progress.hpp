@@ -4,6 +4,7 @@
 #include "core/observer.hpp"
 
 #include <chrono>
+#include <cstdio>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -41,7 +42,7 @@ private:
     void draw();
 
     using Clock = std::chrono::steady_clock;
-    bool drawn_;  // whether anything is drawn at all
+    std::FILE* terminal_ = nullptr;  // standard error of its own, which SilencedStandardError leaves alone; or null
     bool dirty_ = false;
     std::mutex mutex_;
     std::string stage_;

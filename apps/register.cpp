@@ -63,13 +63,14 @@ void print_plan(const RegistrationInputs& inputs, const RegisterOptions& options
     for (const std::string& name : output_names(options)) fmt::print("  {}\n", name);
 }
 
-void make_fields(RegistrationRun& run, Observer& observer) {
+void make_fields(RegistrationRun& run, ProgressLine& progress) {
     const FieldOptions options{run.options.fade};
     const Deformation& deformation = run.result.deformation;
-    run.products.moving_to_fixed =
-        displacement_moving_to_fixed(deformation, run.inputs.moving_grid(), options, observer);
-    run.products.fixed_to_moving =
-        displacement_fixed_to_moving(deformation, run.inputs.fixed_grid(), options, observer);
+    Products& products = run.products;
+    progress.begin("field forward", 0.47, 0.52);
+    products.moving_to_fixed = displacement_moving_to_fixed(deformation, run.inputs.moving_grid(), options, progress);
+    progress.begin("field backward", 0.52, 0.57);
+    products.fixed_to_moving = displacement_fixed_to_moving(deformation, run.inputs.fixed_grid(), options, progress);
 }
 
 void warp_everything(RegistrationRun& run) {
@@ -119,7 +120,7 @@ void run_register(const RegisterOptions& options) {
     std::unique_ptr<OutputFolder> output;
     if (!options.dry_run) output = std::make_unique<OutputFolder>(options.output);
 
-    progress.begin("reading", 0.0, 0.05);
+    progress.begin("reading", 0.0, 0.02);
     run.inputs = read_inputs(options, progress);
     validate(run.inputs, options);
     run.times.push_back(clock.lap("read"));
@@ -128,33 +129,32 @@ void run_register(const RegisterOptions& options) {
         return print_plan(run.inputs, options);
     }
 
-    progress.begin("preparing the model", 0.05, 0.35);
+    progress.begin("preparing the model", 0.02, 0.20);
     run.prepared = std::make_unique<PreparedModel>(
         prepare(run.inputs.moving_labels, prepare_options(options, run.inputs.materials), progress));
     append(run.times, run.prepared->times);
 
-    progress.begin("registering", 0.35, 0.70);
+    progress.begin("registering", 0.20, 0.47);
     run.result = update(*run.prepared, run.inputs.fixed_labels, update_options(options), progress);
     append(run.times, run.result.times);
     clock.lap("");
 
-    progress.begin("displacement fields", 0.70, 0.85);
     make_fields(run, progress);
     run.times.push_back(clock.lap("fields"));
     warp_everything(run);
     run.times.push_back(clock.lap("warp"));
 
-    progress.begin("writing and scoring", 0.85, 0.97);
+    progress.begin("writing and scoring", 0.57, 0.88);
     auto silenced = std::make_unique<SilencedStandardError>();
     tbb::task_group writing;  // compression takes one core per file; the scores run beside it
-    start_writing(run, *output, writing);
+    start_writing(run, *output, writing, progress);
     run.scores = score(run);
     run.times.push_back(clock.lap("score"));
     writing.wait();
     silenced.reset();
     run.times.push_back(clock.lap("write"));
 
-    progress.begin("report", 0.97, 1.0);
+    progress.begin("report", 0.88, 1.0);
     run.notes = progress.notes();
     const nlohmann::json report = report_json(run, clock.total());
     write_reports(run, report, *output);

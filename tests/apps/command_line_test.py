@@ -1,10 +1,11 @@
 """Help, dry runs, parameter files, interrupts, and the small verbs."""
 
 import json
-import os
 import re
+import resource
 import signal
 import subprocess
+import time
 import unittest
 
 import nibabel
@@ -54,6 +55,27 @@ class CommandLine(PhantomTest):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("edges of 9 mm", result.stdout)
         self.assertIn("5 rounds", result.stdout)
+
+    def test_one_thread_gives_the_same_files_as_many(self):
+        outputs = {}
+        for threads in (1, 0):
+            output = self.phantom.folder / f"out{threads}"
+            result = self.phantom.register("--edge-length", 6, "--rounds", 3, "--threads", threads, output=output)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            outputs[threads] = [(output / name).read_bytes() for name in
+                                ("mesh.vtu", "warped.nii.gz", "warped_labels.nii.gz",
+                                 "displacement_fixed_to_moving.nii.gz", "displacement_moving_to_fixed.nii.gz")]
+        self.assertEqual(outputs[1], outputs[0])
+
+    def test_threads_limit_the_cores_in_use(self):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        start = time.monotonic()
+        result = self.phantom.register("--edge-length", 3, "--threads", 1)
+        elapsed = time.monotonic() - start
+        self.assertEqual(result.returncode, 0, result.stderr)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        used = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+        self.assertLess(used, 1.05 * elapsed + 0.1)
 
     def test_interrupt_leaves_nothing(self):
         process = subprocess.Popen(
