@@ -50,6 +50,7 @@ void write_rounds(detail::Hdf5Output& file, const std::vector<Round>& rounds) {
     column("range_mm", &Round::range_mm, "mm");
     column("matched", &Round::matched, "1");
     column("interface_nodes", &Round::interface_nodes, "1");
+    column("held_back", &Round::held_back, "1");
     column("mean_residual_mm", &Round::mean_residual_mm, "mm");
     column("largest_change_mm", &Round::largest_change_mm, "mm");
     column("force_evaluations", &Round::force_evaluations, "1");

@@ -29,6 +29,7 @@ assert np.allclose(record["jacobian"][:], jacobian, rtol=1e-9)
 assert [law.decode() for law in record["materials/law"][:]] == ["neo_hookean_lnj", "neo_hookean_iso"]
 assert list(record["materials/label"][:]) == [1, 7]
 assert list(record["rounds/range_mm"][:]) == [15.0, 4.0]
+assert list(record["rounds/held_back"][:]) == [11, 0]
 assert record["estimated_error_mm"][()] == 0.02
 assert record["engine"][0].decode() == "CPU, 2 threads"
 names = [name.decode() for name in record["provenance/name"][:]]

@@ -50,7 +50,7 @@ UpdateResult some_result() {
     });
     result.deformation.placement = test::motion(12.0, {1, 2, 3}, {4.0, -5.5, 1.0 / 3.0});
     result.alignment = {result.deformation.placement, 0.731};
-    result.rounds = {{15.0, 120, 150, 1.25, 6.0, 900, 0.04}, {4.0, 140, 150, 0.5, 0.1, 400, 0.02}};
+    result.rounds = {{15.0, 120, 150, 11, 1.25, 6.0, 900, 0.04}, {4.0, 140, 150, 0, 0.5, 0.1, 400, 0.02}};
     result.engine = "CPU, 2 threads";
     result.times = {{"alignment", 1.5}, {"round 1", 0.25}};
     result.doubts = {"only 80 % of the boundary was matched"};
