@@ -8,7 +8,6 @@
 #include "apps/progress.hpp"
 #include "apps/report_json.hpp"
 #include "apps/text_file.hpp"
-#include "apps/threads.hpp"
 #include "apps/verbs.hpp"
 #include "core/errors.hpp"
 
@@ -72,7 +71,6 @@ void evaluate_field(const EvaluateOptions& options, const imaging::Volume& field
 }  // namespace
 
 void run_evaluate(const EvaluateOptions& options) {
-    const ThreadLimit threads(options.common.threads);
     ProgressLine progress(options.common.quiet);
     if (options.labels.empty() && !options.landmarks.given() && options.displacement.empty())
         throw InvalidInput(

@@ -76,6 +76,24 @@ void require_organs_meet(const RegistrationInputs& inputs) {
         "the labelled organs lie {:.1f} mm apart, beyond the search of {:g} mm; drop --no-align", gap, search_mm));
 }
 
+/// Points outside of their image are mostly RAS taken for LPS, or of another image: some are worth a note, most an
+/// error.
+void check_inside(const Eigen::Matrix3Xd& points, const Geometry& grid, const std::string& what,
+                  std::vector<std::string>& notes) {
+    Eigen::Index outside = 0;
+    for (Eigen::Index p = 0; p < points.cols(); ++p) {
+        const Eigen::Vector3d index = grid.index(points.col(p));
+        bool inside = true;
+        for (int axis = 0; axis < 3; ++axis)
+            inside &= index[axis] >= -0.5 && index[axis] <= grid.size[static_cast<std::size_t>(axis)] - 0.5;
+        outside += !inside;
+    }
+    if (outside == 0) return;
+    const std::string text = fmt::format("{} of {} {} lie outside the image", outside, points.cols(), what);
+    if (2 * outside > points.cols()) throw InvalidInput(text + "; coordinates must be LPS mm: for RAS, negate x and y");
+    notes.push_back(text);
+}
+
 void match_grid(Volume& labels, const Volume& image, const fs::path& image_path, const fs::path& labels_path,
                 bool resample) {
     if (image.empty()) return;
@@ -160,6 +178,11 @@ void validate(RegistrationInputs& inputs, const RegisterOptions& options) {
     if (!options.materials.empty())
         require_materials(inputs.materials, imaging::labels_in(inputs.moving_labels), options.materials);
     if (options.no_align) require_organs_meet(inputs);
+    if (inputs.landmarks) {
+        check_inside(inputs.landmarks->moving, inputs.moving_grid(), "moving landmarks", inputs.notes);
+        check_inside(inputs.landmarks->fixed, inputs.fixed_grid(), "fixed landmarks", inputs.notes);
+    }
+    if (inputs.points) check_inside(*inputs.points, inputs.moving_grid(), "points", inputs.notes);
 }
 
 }  // namespace tissuewarp::apps

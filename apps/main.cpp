@@ -3,6 +3,7 @@
 
 #include "apps/options.hpp"
 #include "apps/progress.hpp"
+#include "apps/threads.hpp"
 #include "apps/verbs.hpp"
 #include "core/errors.hpp"
 
@@ -41,7 +42,8 @@ int main(int argc, char** argv) {
     try {
         const apps::Command command = apps::parse_command_line(arguments);
         apps::catch_interrupts();
-        std::visit(RunVerb{}, command);
+        const int threads = std::visit([](const auto& options) { return options.common.threads; }, command);
+        apps::with_threads(threads, [&] { std::visit(RunVerb{}, command); });
         if (std::fflush(stdout) != 0) throw IoError("cannot write to standard output");
         return 0;
     } catch (const apps::HelpRequest& help) {

@@ -4,7 +4,6 @@
 #include "apps/progress.hpp"
 #include "apps/report_json.hpp"
 #include "apps/text_file.hpp"
-#include "apps/threads.hpp"
 #include "apps/verbs.hpp"
 #include "core/atomic_file.hpp"
 #include "imaging/image_io.hpp"
@@ -41,7 +40,6 @@ void print_report(const meshing::TetMesh& mesh, const meshing::QualityReport& qu
 }  // namespace
 
 void run_mesh(const MeshOptions& options) {
-    const ThreadLimit threads(options.common.threads);
     ProgressLine progress(options.common.quiet);
     if (options.output.extension() != ".vtu")
         throw InvalidInput("'" + options.output.string() + "' is not a .vtu file; give a name that ends in .vtu");

@@ -5,7 +5,6 @@
 #include "apps/register_outputs.hpp"
 #include "apps/report_json.hpp"
 #include "apps/silenced_stderr.hpp"
-#include "apps/threads.hpp"
 #include "apps/verbs.hpp"
 #include "apps/versions.hpp"
 #include "imaging/filters.hpp"
@@ -110,7 +109,6 @@ void append(std::vector<StageTime>& times, const std::vector<StageTime>& more) {
 }  // namespace
 
 void run_register(const RegisterOptions& options) {
-    const ThreadLimit threads(options.common.threads);
     StageClock clock;
     ProgressLine progress(options.common.quiet);
     RegistrationRun run{options, utc_now(), {}, {}, {}, {}, {}, {}, {}};

@@ -1,20 +1,11 @@
 #pragma once
 /// How many cores a run may use.
 
-#include <memory>
+#include <functional>
 
 namespace tissuewarp::apps {
 
-/// Limits TBB, OpenCV and OpenBLAS for as long as it lives; 0 leaves their choice, all cores. Throws InvalidInput below
-/// 0.
-class ThreadLimit {
-public:
-    explicit ThreadLimit(int threads);
-    ~ThreadLimit();
-
-private:
-    struct Impl;
-    std::unique_ptr<Impl> impl_;
-};
+/// Calls `work` with TBB, OpenCV and OpenBLAS limited to `threads` cores; 0 leaves their choice, all cores.
+void with_threads(int threads, const std::function<void()>& work);
 
 }  // namespace tissuewarp::apps

@@ -7,7 +7,6 @@
 #include "apps/point_files.hpp"
 #include "apps/progress.hpp"
 #include "apps/silenced_stderr.hpp"
-#include "apps/threads.hpp"
 #include "apps/verbs.hpp"
 #include "core/errors.hpp"
 #include "imaging/image_io.hpp"
@@ -56,7 +55,6 @@ Eigen::Matrix3Xd map_points(const WarpOptions& options, const Eigen::Matrix3Xd& 
 }  // namespace
 
 void run_warp(const WarpOptions& options) {
-    const ThreadLimit threads(options.common.threads);
     ProgressLine progress(options.common.quiet);
     if (options.record.empty() && options.displacement.empty())
         throw InvalidInput("nothing to warp with; give --record record.h5 or --displacement FIELD");

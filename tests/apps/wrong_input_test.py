@@ -130,6 +130,12 @@ class WrongTables(PhantomTest):
         self.assert_refused(self.phantom.register("--landmarks", path), INPUT, "landmarks.csv", "2")
 
 
+    def test_landmarks_in_ras(self):
+        path = self.phantom.folder / "landmarks.csv"
+        path.write_text("pre_x,pre_y,pre_z,intra_x,intra_y,intra_z\n25,-10,14,24,-9,14\n24,-12,10,23,-11,10\n")
+        self.assert_refused(self.phantom.register("--landmarks", path), INPUT, "2 of 2 moving landmarks", "LPS")
+
+
 class WrongOptions(PhantomTest):
     def test_unknown_option(self):
         self.assert_refused(self.phantom.register("--edge-lenght", 5), INPUT, "--edge-lenght", "'--edge-length'")
