@@ -56,7 +56,7 @@ nlohmann::json page_values(const ReportInput& input, const detail::Preview& prev
         values["summary"]["displacement"] = {{"largest", millimetres},
                                              {"beyond_alignment", input.report.contains("alignment")}};
     }
-    constexpr int slices = 24;  // a page below 3 MB
+    constexpr int slices = 20;  // a page below 3 MB
     const nlohmann::json stack = detail::slice_stack(input, slices);
     if (!stack.empty())
         values["viewer"] = {

@@ -40,22 +40,16 @@ imaging::Geometry plane_grid(const Vector3d& point, const Box& box, const Vector
 std::optional<Box> label_box(const imaging::Volume& labels) {
     const imaging::Volume integers = labels.as(CV_32S);
     const int* values = integers.data<int>();
+    const Eigen::Matrix3d to_point = labels.geometry.index_to_point();
     Vector3d lower = Vector3d::Constant(std::numeric_limits<double>::infinity()), upper = -lower;
     for_each_voxel(labels.geometry, [&](const Vector3d& index, std::int64_t offset) {
         if (values[offset] == 0) return;
-        lower = lower.cwiseMin(index);
-        upper = upper.cwiseMax(index);
+        const Vector3d point = labels.geometry.origin + to_point * index;
+        lower = lower.cwiseMin(point);
+        upper = upper.cwiseMax(point);
     });
     if (!(lower[0] <= upper[0])) return std::nullopt;
-    Box box{labels.geometry.point(lower), labels.geometry.point(lower)};
-    for (int corner = 0; corner < 8; ++corner) {
-        Vector3d index;
-        for (int axis = 0; axis < 3; ++axis) index[axis] = (corner >> axis) & 1 ? upper[axis] : lower[axis];
-        const Vector3d point = labels.geometry.point(index);
-        box.lower = box.lower.cwiseMin(point);
-        box.upper = box.upper.cwiseMax(point);
-    }
-    return box;
+    return Box{lower, upper};
 }
 
 Box around(const Vector3d& centre, const Vector3d& extent) {

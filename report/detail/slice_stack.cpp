@@ -41,7 +41,7 @@ nlohmann::json slice_stack(const ReportInput& input, int count) {
             cv::Mat picture = grey_to_colour(grey_slice(image, window, plane));
             outlines(picture, outline, cv::Scalar(90, 210, 70), 1, sigma);
             std::vector<unsigned char> bytes;
-            cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, 80});
+            cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, 75});
             return base64(bytes);
         };
         char mm[32];

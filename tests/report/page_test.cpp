@@ -124,6 +124,16 @@ TEST(Planes, ShowObliqueVolumesWhereTheyLie) {
     }
 }
 
+TEST(Planes, CoverTheLabelsTightlyOnObliqueGrids) {
+    const Example example;
+    const auto box = detail::label_box(example.labels);
+    ASSERT_TRUE(box);
+    // A ball of 40 mm; voxels of up to 3.6 mm, whose centres are counted.
+    EXPECT_LT((box->upper - Vector3d::Constant(40)).cwiseAbs().maxCoeff(), 1.5);
+    EXPECT_LT((box->lower + Vector3d::Constant(40)).cwiseAbs().maxCoeff(), 1.5);
+    EXPECT_FALSE(detail::label_box(Volume(example.grid, CV_32SC1)));
+}
+
 TEST(Focus, IsWhereTissueMovedMostBeyondTheAlignment) {
     const Example example;
     // A rigid motion on top of the bump must not draw the focus away.
