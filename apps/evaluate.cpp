@@ -7,7 +7,6 @@
 #include "apps/point_files.hpp"
 #include "apps/progress.hpp"
 #include "apps/report_json.hpp"
-#include "apps/text_file.hpp"
 #include "apps/verbs.hpp"
 #include "core/errors.hpp"
 
@@ -39,7 +38,9 @@ void evaluate_landmarks(const EvaluateOptions& options, const imaging::Volume& f
     const Landmarks landmarks = *read_landmark_files(options.landmarks);
     const Eigen::Matrix3Xd mapped = field.empty() ? landmarks.moving : displaced(landmarks.moving, field);
     const TargetError error = target_error(landmarks, mapped, options.moved);
-    report["target_registration_error"] = to_json(error);
+    json& errors = report["target_registration_error"] = to_json(error);
+    if (field.empty())  // nothing was mapped
+        for (const char* which : {"all", "moved"}) errors[which].erase("after");
     text +=
         fmt::format("{:<24}{:>6}{:>8}{:>8}{:>8}{:>8}\n", "target error (mm)", "count", "mean", "median", "95th", "max");
     const auto row = [&](const std::string& name, const Summary& s) {
@@ -90,7 +91,7 @@ void run_evaluate(const EvaluateOptions& options) {
     }
     if (options.landmarks.given()) evaluate_landmarks(options, field, report, text);
     if (!field.empty()) evaluate_field(options, field, report, text);
-    if (!options.json.empty()) write_text(report.dump(2) + "\n", options.json);
+    if (!options.json.empty()) write_json(report, options.json);
     progress.clear();
     if (!options.common.quiet) fmt::print("{}", text);
 }

@@ -3,7 +3,6 @@
 #include "apps/output_folder.hpp"
 #include "apps/progress.hpp"
 #include "apps/report_json.hpp"
-#include "apps/text_file.hpp"
 #include "apps/verbs.hpp"
 #include "core/atomic_file.hpp"
 #include "imaging/image_io.hpp"
@@ -68,7 +67,7 @@ void run_mesh(const MeshOptions& options) {
                               {"nodes", mesh.node_count()},  {"tetrahedra", mesh.tet_count()},
                               {"quality", to_json(quality)}, {"fidelity", to_json(fidelity)},
                               {"notes", progress.notes()}};
-        write_text(report.dump(2) + "\n", options.json);
+        write_json(report, options.json);
     }
     file.commit();
     progress.clear();

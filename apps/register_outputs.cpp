@@ -1,7 +1,7 @@
 #include "apps/register_outputs.hpp"
 
 #include "apps/point_files.hpp"
-#include "apps/text_file.hpp"
+#include "apps/report_json.hpp"
 #include "apps/versions.hpp"
 #include "meshing/mesh_io.hpp"
 #include "registration/record.hpp"
@@ -122,7 +122,7 @@ void start_writing(const RegistrationRun& run, const OutputFolder& output, tbb::
 void write_reports(const RegistrationRun& run, const nlohmann::json& report, const OutputFolder& output) {
     const auto given = [](const imaging::Volume& volume) { return volume.empty() ? nullptr : &volume; };
     const Products& products = run.products;
-    write_text(report.dump(2) + "\n", output.path("report.json"));
+    write_json(report, output.path("report.json"));
     report::write_report(
         {given(run.inputs.moving), given(run.inputs.fixed), given(products.warped), &run.inputs.moving_labels,
          &run.inputs.fixed_labels, &products.warped_labels, &products.moving_to_fixed, report},

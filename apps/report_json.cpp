@@ -1,6 +1,7 @@
 #include "apps/report_json.hpp"
 
 #include "apps/register_outputs.hpp"
+#include "apps/text_file.hpp"
 #include "apps/versions.hpp"
 
 #include <cmath>
@@ -66,6 +67,11 @@ json parameters(const RegisterOptions& options) {
     return object;
 }
 
+/// What the conversion to Lamé's constants and back left behind the tenth digit goes.
+double rounded(double value) {
+    return std::round(value * 1e10) / 1e10;
+}
+
 /// The moduli in use, those of labels that took the default included.
 json materials(const RegistrationRun& run) {
     json object = json::object();
@@ -75,8 +81,8 @@ json materials(const RegistrationRun& run) {
         object[std::to_string(label)] = {
             {"name", entry == run.inputs.materials.end() ? "default" : entry->second.name},
             {"law", std::holds_alternative<tled::NeoHookeanIso>(material) ? "neo-hookean-iso" : "neo-hookean-lnj"},
-            {"youngs_modulus_kpa", 2 * mu * (1 + nu)},
-            {"poissons_ratio", nu}};
+            {"youngs_modulus_kpa", rounded(2 * mu * (1 + nu))},
+            {"poissons_ratio", rounded(nu)}};
     }
     return object;
 }
@@ -133,6 +139,10 @@ json mesh(const RegistrationRun& run) {
 }
 
 }  // namespace
+
+void write_json(const json& document, const std::filesystem::path& path) {
+    write_text(document.dump(2, ' ', false, json::error_handler_t::replace) + "\n", path);
+}
 
 json to_json(const registration::Summary& s) {
     return {{"count", s.count},

@@ -68,6 +68,14 @@ class CommandLine(PhantomTest):
                                  "displacement_fixed_to_moving.nii.gz", "displacement_moving_to_fixed.nii.gz")]
         self.assertEqual(outputs[1], outputs[0])
 
+    def test_file_names_need_not_be_utf8(self):
+        path = os.fsencode(self.phantom.folder) + b"/pr\xe9op.nii.gz"
+        os.rename(self.phantom.moving, path)
+        result = self.phantom.register("--edge-length", 8, "--rounds", 1, moving=os.fsdecode(path))
+        self.assertEqual(result.returncode, 0, result.stderr)
+        report = json.loads((self.phantom.output / "report.json").read_text())
+        self.assertTrue(report["inputs"]["moving"]["path"].endswith("op.nii.gz"))
+
     def test_interrupt_leaves_nothing(self):
         process = subprocess.Popen(
             [PROGRAM, "register", "--moving-labels", self.phantom.moving_labels, "--fixed-labels",
