@@ -59,7 +59,8 @@ class CommandLine(PhantomTest):
         outputs = {}
         for threads in (1, 0):
             output = self.phantom.folder / f"out{threads}"
-            result = self.phantom.register("--edge-length", 6, "--rounds", 3, "--device", "cpu", "--threads", threads, output=output)
+            result = self.phantom.register("--edge-length", 6, "--rounds", 3, "--device", "cpu", "--threads", threads,
+                                           output=output)
             self.assertEqual(result.returncode, 0, result.stderr)
             device = json.loads((output / "report.json").read_text())["device"]
             self.assertEqual(", 1 threads" in device, threads == 1 or os.cpu_count() == 1, device)
@@ -95,12 +96,15 @@ class CommandLine(PhantomTest):
         path = save(self.phantom.moving_labels_array, affine, self.phantom.folder / "shifted.nii.gz")
         result = self.phantom.register("--resample-labels", "--dry-run", moving_labels=path)
         self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("warped.nii.gz", result.stdout)
 
     def test_headers_that_differ_in_a_late_digit_are_one_grid(self):
         affine = MOVING_AFFINE.copy()
         affine[:3, 3] += 2e-6
         path = save(self.phantom.moving_labels_array, affine, self.phantom.folder / "late.nii.gz")
-        self.assertEqual(self.phantom.register("--dry-run", moving_labels=path).returncode, 0)
+        result = self.phantom.register("--dry-run", moving_labels=path)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("warped.nii.gz", result.stdout)
 
 
 class SmallVerbs(PhantomTest):
