@@ -95,8 +95,8 @@ class Register(unittest.TestCase):
 
     def test_report_holds_every_chapter(self):
         for key in ("schema", "schema_version", "program", "version", "versions", "started", "inputs", "parameters",
-                    "materials", "device", "mesh", "alignment", "rounds", "overlap", "jacobian", "doubts", "notes", "outputs",
-                    "stages", "total_seconds", "peak_memory_mb", "estimated_error_mm",
+                    "materials", "device", "mesh", "alignment", "rounds", "overlap", "jacobian", "doubts", "notes",
+                    "outputs", "stages", "total_seconds", "peak_memory_mb", "estimated_error_mm",
                     "target_registration_error"):
             self.assertIn(key, self.report)
         for chapter in ("mesh", "field_in_organ", "field"):
