@@ -29,11 +29,16 @@ bool has_gpu() {
                        [](const shaders::DeviceInfo& device) { return device.hardware && device.problem.empty(); });
 }
 
-std::unique_ptr<tled::Engine> make_engine(const PreparedModel& prepared, const UpdateOptions& options) {
+std::unique_ptr<tled::Engine> make_engine(const PreparedModel& prepared, const UpdateOptions& options,
+                                          Observer& observer) {
     if (options.device == Device::Gpu) return tled::make_gpu_engine(prepared.rest, options.gpu_index);
     const bool gpu = options.device == Device::Auto && prepared.rest.element_count() >= least_elements_for_gpu &&
                      has_gpu();
-    if (gpu) return tled::make_gpu_engine(prepared.rest, options.gpu_index);
+    if (gpu) try {
+            return tled::make_gpu_engine(prepared.rest, options.gpu_index);
+        } catch (const GpuUnavailable& reason) {
+            observer.note(std::string("the CPU takes over from the GPU: ") + reason.what());
+        }
     return tled::make_cpu_engine(prepared.rest, tled::Scalar::Float32);
 }
 
@@ -134,7 +139,7 @@ public:
     Rematching(const PreparedModel& prepared, const LabelBoundaryField& fixed, const UpdateOptions& options,
                UpdateResult& result, Observer& observer)
         : prepared_(prepared), fixed_(fixed), options_(options), result_(result), observer_(observer),
-          engine_(make_engine(prepared, options)), step_mm_(options.most_step_mm),
+          engine_(make_engine(prepared, options, observer)), step_mm_(options.most_step_mm),
           displacement_(Eigen::Matrix3Xd::Zero(3, prepared.rest.node_count)) {
         result_.engine = engine_->description();
     }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <utility>
+#include <vector>
 
 namespace tissuewarp::shaders {
 namespace {
@@ -29,14 +30,16 @@ StorageBuffer::StorageBuffer(const Device& device, std::size_t bytes, std::strin
     glCreateBuffers(1, &id_);
     // OpenGL knows no empty buffer, and clears words.
     const std::size_t allocated = std::max<std::size_t>((bytes + 3) / 4 * 4, 16);
-    glNamedBufferStorage(id_, static_cast<GLsizeiptr>(allocated), nullptr, GL_DYNAMIC_STORAGE_BIT);
+    // Zeros come from the host: NVIDIA's driver 580 loses an upload of more than 64 KiB that follows
+    // glClearNamedBufferData (docs/decisions/gpu_uploads.md).
+    const std::vector<std::byte> zeros(allocated);
+    glNamedBufferStorage(id_, static_cast<GLsizeiptr>(allocated), zeros.data(), GL_DYNAMIC_STORAGE_BIT);
     try {
         check_errors(mebibytes(bytes) + " for " + what_);
     } catch (...) {
         glDeleteBuffers(1, &id_);
         throw;
     }
-    clear();
 }
 
 StorageBuffer::~StorageBuffer() {
@@ -70,9 +73,7 @@ void StorageBuffer::read(std::size_t offset, std::span<std::byte> bytes) const {
 }
 
 void StorageBuffer::clear() {
-    transfer_barrier();
-    glClearNamedBufferData(id_, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
-    check_errors("clearing of " + what_);
+    write(0, std::vector<std::byte>(bytes_));
 }
 
 void StorageBuffer::copy_from(const StorageBuffer& source, std::size_t bytes) {

@@ -65,7 +65,8 @@ enum class Scalar { Float32, Float64 };
 std::unique_ptr<Engine> make_cpu_engine(const RestState& rest, Scalar scalar = Scalar::Float32);
 
 /// OpenGL 4.5 compute through EGL, float32. `device` counts EGL devices; −1 takes the first hardware device, or the
-/// software rasteriser when there is none. Throws GpuUnavailable.
+/// software rasteriser when there is none. Its forces on this mesh are compared with the scalar reference once. Throws
+/// GpuUnavailable, also when they differ.
 std::unique_ptr<Engine> make_gpu_engine(const RestState& rest, int device = -1);
 
 }  // namespace tissuewarp::tled

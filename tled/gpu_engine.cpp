@@ -6,6 +6,7 @@
 #include "shaders/catalogue.hpp"
 #include "tled/detail/gpu_force.hpp"
 #include "tled/engine.hpp"
+#include "tled/reference.hpp"
 
 #include <cmath>
 #include <limits>
@@ -315,10 +316,36 @@ private:
     bool previous_residual_known_ = false;
 };
 
+/// A smooth displacement with strains of some per cent, by node number: enough to make every element pull.
+Matrix3Xd test_displacement(const RestState& rest) {
+    const double edge = std::cbrt(6 * rest.volume.mean());
+    Matrix3Xd u(3, rest.node_count);
+    for (Eigen::Index a = 0; a < u.cols(); ++a)
+        u.col(a) << std::sin(0.37 * static_cast<double>(a)), std::cos(0.23 * static_cast<double>(a)),
+            std::sin(0.51 * static_cast<double>(a) + 1);
+    return 0.01 * edge * u;
+}
+
+/// Drivers have been seen to lose uploads without an error: one evaluation on the very mesh is compared with the scalar
+/// reference before anything relies on the device.
+void require_right_forces(Engine& engine, const RestState& rest) {
+    const Matrix3Xd still = Matrix3Xd::Zero(3, rest.node_count);
+    const Matrix3Xd u = test_displacement(rest);
+    const Matrix3Xd expected = internal_force(rest, u);
+    engine.set_state(u, still);
+    const double error = (engine.internal_force() - expected).norm() / expected.norm();
+    engine.set_state(still, still);
+    if (error < 1e-3) return;
+    throw GpuUnavailable(engine.description() + " computes forces that are off by " + std::to_string(100 * error) +
+                         " %: its driver cannot be trusted; take another device or the CPU engine");
+}
+
 }  // namespace
 
 std::unique_ptr<Engine> make_gpu_engine(const RestState& rest, int device) {
-    return std::make_unique<GpuEngine>(rest, device);
+    auto engine = std::make_unique<GpuEngine>(rest, device);
+    require_right_forces(*engine, rest);
+    return engine;
 }
 
 }  // namespace tissuewarp::tled
