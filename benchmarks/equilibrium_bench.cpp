@@ -1,5 +1,5 @@
-// Force evaluations and seconds to a given displacement error on the three cubes of a brain-retraction-like load: 100 mm
-// cube, bottom held within 25 mm of its centre, a cap of 35 mm radius on top pushed 12 mm down and 6 mm sideways.
+// Force evaluations and seconds to a given displacement error on the three cubes of a brain-retraction-like load: 100
+// mm cube, bottom held within 25 mm of its centre, a cap of 35 mm radius on top pushed 12 mm down and 6 mm sideways.
 //     equilibrium_bench [tolerance_mm ...]
 
 #include "meshing/primitives.hpp"
@@ -47,10 +47,11 @@ void relax(tled::Engine& engine, const tled::RestStiffness& stiffness, const tle
         const auto found = tled::equilibrium(engine, stiffness, conditions, {.tolerance_mm = tolerance});
         const double seconds = now() - start;
         const double error = std::sqrt((found.displacement - exact).colwise().squaredNorm().maxCoeff());
-        std::printf("    tolerance %-5g %5d force evaluations, %2d lifted residuals, %6.2f s; true error %.4f mm, "
-                    "estimated %.4f mm (effectivity %.2f), min J %.2f\n",
-                    tolerance, found.force_evaluations, found.lifted_residuals, seconds, error,
-                    found.estimated_error_mm, found.estimated_error_mm / error, found.min_jacobian);
+        std::printf(
+            "    tolerance %-5g %5d force evaluations, %2d lifted residuals, %6.2f s; true error %.4f mm, "
+            "estimated %.4f mm (effectivity %.2f), min J %.2f\n",
+            tolerance, found.force_evaluations, found.lifted_residuals, seconds, error, found.estimated_error_mm,
+            found.estimated_error_mm / error, found.min_jacobian);
     }
 }
 

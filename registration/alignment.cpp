@@ -90,9 +90,9 @@ Eigen::Matrix3Xd boundary_points(const Volume& mask, int most) {
 
 constexpr unsigned parameters = 7;
 
-/// Similarity from seven numbers, all in mm: translation, rotation vector about `centre` times `radius`, and logarithm of
-/// the scale times `radius`. The scale takes up a change of size that would otherwise turn the organ; the answer is the
-/// rigid part alone.
+/// Similarity from seven numbers, all in mm: translation, rotation vector about `centre` times `radius`, and logarithm
+/// of the scale times `radius`. The scale takes up a change of size that would otherwise turn the organ; the answer is
+/// the rigid part alone.
 struct PoseSpace {
     Eigen::Vector3d centre;
     double radius = 1;
@@ -106,8 +106,8 @@ struct PoseSpace {
         return result;
     }
     [[nodiscard]] Eigen::Affine3d similarity(const double* x) const {
-        const Eigen::Affine3d grown = Eigen::Translation3d(centre) * Eigen::Scaling(std::exp(x[6] / radius)) *
-                                      Eigen::Translation3d(-centre);
+        const Eigen::Affine3d grown =
+            Eigen::Translation3d(centre) * Eigen::Scaling(std::exp(x[6] / radius)) * Eigen::Translation3d(-centre);
         return rigid(x) * grown;
     }
 };
@@ -152,16 +152,16 @@ private:
         const Eigen::Vector3d index = grid.index(point);
         double squared = 0;
         for (int axis = 0; axis < 3; ++axis) {
-            const double over = std::max({0.0, -index[axis],
-                                          index[axis] - (grid.size[static_cast<std::size_t>(axis)] - 1)});
+            const double over =
+                std::max({0.0, -index[axis], index[axis] - (grid.size[static_cast<std::size_t>(axis)] - 1)});
             squared += std::pow(over * grid.spacing[axis], 2);
         }
         return std::sqrt(squared);
     }
 };
 
-/// Symmetric: moving boundaries to fixed ones and, by the inverse map, fixed boundaries to moving ones, so that a smaller
-/// organ does not hide inside a larger one.
+/// Symmetric: moving boundaries to fixed ones and, by the inverse map, fixed boundaries to moving ones, so that a
+/// smaller organ does not hide inside a larger one.
 struct DistanceCost {
     BoundaryDistances forward, backward;
 

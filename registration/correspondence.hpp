@@ -15,10 +15,10 @@ namespace tissuewarp::registration {
 /// A node of the mesh on the interface between two labels. A node where several interfaces meet occurs once for each.
 struct InterfaceNode {
     int node = -1;
-    int inner = 0, outer = 0;                            ///< labels; 0 is the outside
-    double area = 0;                                     ///< a third of the adjacent interface triangles, mm²
-    Eigen::Vector3d normal = Eigen::Vector3d::Zero();    ///< unit, rest configuration, from inner to outer
-    double offset = 0;                                   ///< mm along the normal from the node to the moving label boundary
+    int inner = 0, outer = 0;                          ///< labels; 0 is the outside
+    double area = 0;                                   ///< a third of the adjacent interface triangles, mm²
+    Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< unit, rest configuration, from inner to outer
+    double offset = 0;  ///< mm along the normal from the node to the moving label boundary
 };
 
 /// Interface triangles of a mesh gathered at nodes, and recomputed normals for a deformed state.

@@ -32,8 +32,8 @@ bool has_gpu() {
 std::unique_ptr<tled::Engine> make_engine(const PreparedModel& prepared, const UpdateOptions& options,
                                           Observer& observer) {
     if (options.device == Device::Gpu) return tled::make_gpu_engine(prepared.rest, options.gpu_index);
-    const bool gpu = options.device == Device::Auto && prepared.rest.element_count() >= least_elements_for_gpu &&
-                     has_gpu();
+    const bool gpu =
+        options.device == Device::Auto && prepared.rest.element_count() >= least_elements_for_gpu && has_gpu();
     if (gpu) try {
             return tled::make_gpu_engine(prepared.rest, options.gpu_index);
         } catch (const GpuUnavailable& reason) {
@@ -53,7 +53,7 @@ double range_of(const UpdateOptions& options, int round) {
 struct Search {
     double range_mm = 0;
     double max_angle_deg = 0;
-    double scale_mm = 0;      ///< of the Geman–McClure weight (σ²/(σ² + d²))², which lowers what the model did not follow
+    double scale_mm = 0;  ///< of the Geman–McClure weight (σ²/(σ² + d²))², which lowers what the model did not follow
     double most_step_mm = 0;  ///< bound on the distance asked for, so that elements are not turned over
 };
 
@@ -138,8 +138,13 @@ class Rematching {
 public:
     Rematching(const PreparedModel& prepared, const LabelBoundaryField& fixed, const UpdateOptions& options,
                UpdateResult& result, Observer& observer)
-        : prepared_(prepared), fixed_(fixed), options_(options), result_(result), observer_(observer),
-          engine_(make_engine(prepared, options, observer)), step_mm_(options.most_step_mm),
+        : prepared_(prepared),
+          fixed_(fixed),
+          options_(options),
+          result_(result),
+          observer_(observer),
+          engine_(make_engine(prepared, options, observer)),
+          step_mm_(options.most_step_mm),
           displacement_(Eigen::Matrix3Xd::Zero(3, prepared.rest.node_count)) {
         result_.engine = engine_->description();
     }
@@ -180,8 +185,8 @@ private:
             } catch (const SolverFailure& failure) {
                 if (halving == most_halvings) throw;
                 step_mm_ /= 2;
-                observer_.note("a round is repeated with steps of at most " + to_text(step_mm_) + " mm: " +
-                               failure.what());
+                observer_.note("a round is repeated with steps of at most " + to_text(step_mm_) +
+                               " mm: " + failure.what());
             }
         }
     }

@@ -23,26 +23,27 @@ struct StageTime {
     double seconds = 0;
 };
 
-/// Edge length (mm) that cuts an organ of the map's volume into about 50 000 tetrahedra: a cube root of the volume over 18.
+/// Edge length (mm) that cuts an organ of the map's volume into about 50 000 tetrahedra: a cube root of the volume
+/// over 18.
 double suggested_edge_length(const imaging::Volume& labels);
 
 struct PrepareOptions {
     meshing::MeshingOptions meshing{.edge_length = 0};  ///< edge length 0: suggested_edge_length
-    tled::MaterialTable materials;                ///< labels without an entry take `default_material`
+    tled::MaterialTable materials;                      ///< labels without an entry take `default_material`
     tled::Material default_material = tled::neo_hookean_lnj(3.0, 0.45);
-    std::optional<tled::Element> element;         ///< default: tled::suggested_element
-    double data_stiffness = 3.0;                  ///< kPa/mm along the normal per interface area, at full weight
-    double tangential_ratio = 0.02;               ///< stiffness along the surface over stiffness along the normal
+    std::optional<tled::Element> element;  ///< default: tled::suggested_element
+    double data_stiffness = 3.0;           ///< kPa/mm along the normal per interface area, at full weight
+    double tangential_ratio = 0.02;        ///< stiffness along the surface over stiffness along the normal
 };
 
 /// Everything that does not depend on intraoperative data.
 struct PreparedModel {
-    tled::Model model;                            ///< mesh in LPS mm of the preoperative image
-    imaging::Volume labels;                       ///< the preoperative label map it came from
+    tled::Model model;       ///< mesh in LPS mm of the preoperative image
+    imaging::Volume labels;  ///< the preoperative label map it came from
     PrepareOptions options;
     Interfaces interfaces;
     tled::RestState rest;
-    tled::RestStiffness stiffness;                ///< K₀ with all interface springs at full weight
+    tled::RestStiffness stiffness;  ///< K₀ with all interface springs at full weight
     std::vector<StageTime> times;
 };
 
@@ -58,43 +59,44 @@ enum class Device { Auto, Cpu, Gpu };
 
 struct UpdateOptions {
     AlignmentOptions alignment;
-    bool align = true;                            ///< false: the images are in one frame already
-    int rematches = 8;                            ///< rounds of correspondence and equilibrium; up to twice as many when the
-                                                  ///< step bound holds the surface back
-    double settled_mm = 0.15;                     ///< a round that moves no node further is followed by the last one
-    double most_step_mm = 6.0;                    ///< most that one round asks a surface node to move
-    double first_range_mm = 15.0;                 ///< correspondence search range of the first round
-    double last_range_mm = 4.0;                   ///< and of the last, geometric in between
-    double max_angle_deg = 50.0;                  ///< between mesh normal and image boundary normal
-    double residual_scale_mm = 1.0;               ///< Geman–McClure scale of the last round for what the model cannot follow
+    bool align = true;               ///< false: the images are in one frame already
+    int rematches = 8;               ///< rounds of correspondence and equilibrium; up to twice as many when the
+                                     ///< step bound holds the surface back
+    double settled_mm = 0.15;        ///< a round that moves no node further is followed by the last one
+    double most_step_mm = 6.0;       ///< most that one round asks a surface node to move
+    double first_range_mm = 15.0;    ///< correspondence search range of the first round
+    double last_range_mm = 4.0;      ///< and of the last, geometric in between
+    double max_angle_deg = 50.0;     ///< between mesh normal and image boundary normal
+    double residual_scale_mm = 1.0;  ///< Geman–McClure scale of the last round for what the model cannot follow
     tled::EquilibriumOptions equilibrium;
     Device device = Device::Auto;
-    int gpu_index = -1;                           ///< EGL device, −1: the first with hardware
+    int gpu_index = -1;  ///< EGL device, −1: the first with hardware
 };
 
 /// What a round of correspondence and equilibrium did.
 struct Round {
     double range_mm = 0;
     int matched = 0, interface_nodes = 0;
-    int held_back = 0;                            ///< matches further away than the round's step bound
-    double mean_residual_mm = 0;                  ///< along the normal, after equilibrium, weighted
-    double largest_change_mm = 0;                 ///< of a node since the round before
+    int held_back = 0;             ///< matches further away than the round's step bound
+    double mean_residual_mm = 0;   ///< along the normal, after equilibrium, weighted
+    double largest_change_mm = 0;  ///< of a node since the round before
     int force_evaluations = 0;
-    double estimated_error_mm = 0;                ///< lifted residual at acceptance
+    double estimated_error_mm = 0;  ///< lifted residual at acceptance
 };
 
 struct UpdateResult {
     Deformation deformation;
     Alignment alignment;
     std::vector<Round> rounds;
-    std::string engine;                           ///< description of the device that solved
+    std::string engine;  ///< description of the device that solved
     double min_jacobian = 1;
     std::vector<StageTime> times;
-    std::vector<std::string> doubts;              ///< reasons not to trust the result, empty when there are none
+    std::vector<std::string> doubts;  ///< reasons not to trust the result, empty when there are none
 };
 
-/// Registers the prepared model to a segmented intraoperative volume. Throws InvalidInput when the volumes share no label
-/// or do not meet, SolverFailure when no trustworthy equilibrium is found, GpuUnavailable when a GPU was demanded.
+/// Registers the prepared model to a segmented intraoperative volume. Throws InvalidInput when the volumes share no
+/// label or do not meet, SolverFailure when no trustworthy equilibrium is found, GpuUnavailable when a GPU was
+/// demanded.
 UpdateResult update(const PreparedModel& prepared, const imaging::Volume& fixed_labels,
                     const UpdateOptions& options = {}, Observer& observer = silent_observer());
 

@@ -33,8 +33,8 @@ void measure_offsets(Interfaces& interfaces, const meshing::TetMesh& mesh, const
 }  // namespace
 
 double suggested_edge_length(const imaging::Volume& labels) {
-    const double volume = cv::countNonZero(imaging::mask_of_all(labels).voxels.reshape(1, 1)) *
-                          labels.geometry.voxel_volume();
+    const double volume =
+        cv::countNonZero(imaging::mask_of_all(labels).voxels.reshape(1, 1)) * labels.geometry.voxel_volume();
     return std::cbrt(volume) / 18;
 }
 

@@ -72,8 +72,8 @@ NodalConditions nodal_conditions(const Conditions& conditions, int node_count) {
     nodal.external_force = Eigen::Matrix3Xd::Zero(3, node_count);
     if (conditions.external_force.size() == 0) return nodal;
     if (conditions.external_force.cols() != node_count || !conditions.external_force.allFinite())
-        throw InvalidInput("external forces need one finite vector (mN) for each of the " +
-                           std::to_string(node_count) + " nodes");
+        throw InvalidInput("external forces need one finite vector (mN) for each of the " + std::to_string(node_count) +
+                           " nodes");
     nodal.external_force = conditions.external_force;
     return nodal;
 }

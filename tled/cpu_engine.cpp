@@ -29,8 +29,8 @@ struct BatchBlock {
 /// Position of internal element e in the padded batches.
 struct BatchLayout {
     std::vector<BatchBlock> blocks;
-    std::vector<std::size_t> slot;         // element → batch·width + lane
-    std::vector<int> element;              // slot → element, −1 for padding
+    std::vector<std::size_t> slot;  // element → batch·width + lane
+    std::vector<int> element;       // slot → element, −1 for padding
 };
 
 BatchLayout batch_layout(const RestState& rest) {

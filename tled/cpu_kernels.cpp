@@ -5,9 +5,11 @@
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tled/cpu_kernels.cpp"
-#include <hwy/foreach_target.h>  // must come before highway.h
+// clang-format off: foreach_target.h must come before highway.h
+#include <hwy/foreach_target.h>
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
+// clang-format on
 
 #include "tled/detail/cpu_kernels.hpp"
 #include "tled/material.hpp"

@@ -21,17 +21,18 @@ struct StepCoefficients {
 
 /// Scalars of the present state, reduced where the engine runs. Sums are over free degrees of freedom.
 struct Observation {
-    double increment_max = 0;      ///< largest |u − u⁻| of a node, mm
-    double residual_max = 0;       ///< largest |residual| of a node, mN
-    double increment_mass = 0;     ///< Σ m (u − u⁻)²
-    double increment_stiffness = 0;///< Σ (u − u⁻)·(r⁻ − r): with increment_mass the Rayleigh quotient of the last step
-    double min_jacobian = 1;       ///< smallest det F of an element
-    int min_jacobian_tet = -1;     ///< its tetrahedron in the mesh
-    bool finite = true;            ///< false when any displacement is not finite
+    double increment_max = 0;   ///< largest |u − u⁻| of a node, mm
+    double residual_max = 0;    ///< largest |residual| of a node, mN
+    double increment_mass = 0;  ///< Σ m (u − u⁻)²
+    double increment_stiffness =
+        0;  ///< Σ (u − u⁻)·(r⁻ − r): with increment_mass the Rayleigh quotient of the last step
+    double min_jacobian = 1;    ///< smallest det F of an element
+    int min_jacobian_tet = -1;  ///< its tetrahedron in the mesh
+    bool finite = true;         ///< false when any displacement is not finite
 };
 
-/// State: displacement u and increment u − u⁻ (3 × N, mm), nodal diagonal mass (3 × N), conditions. Copies in and out are
-/// float64 whatever the engine computes in.
+/// State: displacement u and increment u − u⁻ (3 × N, mm), nodal diagonal mass (3 × N), conditions. Copies in and out
+/// are float64 whatever the engine computes in.
 class Engine {
 public:
     virtual ~Engine() = default;

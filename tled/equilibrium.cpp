@@ -23,7 +23,9 @@ StepCoefficients heavy_ball(const Spectrum& spectrum) {
     return {ratio * ratio, 4 / ((high + low) * (high + low))};
 }
 
-double largest_norm(const Eigen::Matrix3Xd& vectors) { return std::sqrt(vectors.colwise().squaredNorm().maxCoeff()); }
+double largest_norm(const Eigen::Matrix3Xd& vectors) {
+    return std::sqrt(vectors.colwise().squaredNorm().maxCoeff());
+}
 
 /// A fixed start vector with every frequency in it, so that repeated runs give the same bits.
 Eigen::Matrix3Xd fixed_vector(Eigen::Index count) {
@@ -36,8 +38,8 @@ Eigen::Matrix3Xd fixed_vector(Eigen::Index count) {
     return vector;
 }
 
-/// Largest eigenvalue of M⁻¹K at the engine's displacement, by power iteration through the real force kernel. Leaves the
-/// engine at that displacement with zero increment.
+/// Largest eigenvalue of M⁻¹K at the engine's displacement, by power iteration through the real force kernel. Leaves
+/// the engine at that displacement with zero increment.
 double highest_eigenvalue(Engine& engine, const Eigen::Matrix3Xd& mass, const Eigen::Matrix3Xd& u, int iterations) {
     const Eigen::Matrix3Xd rest = Eigen::Matrix3Xd::Zero(3, u.cols());
     engine.set_state(u, rest);
@@ -67,14 +69,33 @@ class Relaxation {
 public:
     Relaxation(Engine& engine, const RestStiffness& stiffness, const NodalConditions& conditions,
                const EquilibriumOptions& options, Observer& observer)
-        : engine_(engine), stiffness_(stiffness), conditions_(conditions), options_(options), observer_(observer),
-          mass_(stiffness.diagonal(conditions)), preset_(stiffness.lowest_eigenvalue()) {
+        : engine_(engine),
+          stiffness_(stiffness),
+          conditions_(conditions),
+          options_(options),
+          observer_(observer),
+          mass_(stiffness.diagonal(conditions)),
+          preset_(stiffness.lowest_eigenvalue()) {
         engine_.set_conditions(conditions);
         engine_.set_mass(mass_);
     }
 
+    /// From rest: starts at the linear-elastic solution.
+    EquilibriumResult run() {
+        const Eigen::Matrix3Xd linear = stiffness_.linear_solution(conditions_);
+        begin_from(Eigen::Matrix3Xd::Zero(3, linear.cols()), linear);
+        return relax();
+    }
+
+    /// From a displacement: starts at it plus the linear-elastic answer to its residual.
     EquilibriumResult run(const Eigen::Matrix3Xd& start) {
-        begin_from(start);
+        engine_.set_state(start, Eigen::Matrix3Xd::Zero(3, start.cols()));
+        begin_from(start, lifted());
+        return relax();
+    }
+
+private:
+    EquilibriumResult relax() {
         double error = lifted_residual();
         const double first_error = std::max(error, options_.tolerance_mm);
         int steps_before_lifting = 0;
@@ -110,28 +131,25 @@ public:
         return std::move(result_);
     }
 
-private:
     Engine& engine_;
     const RestStiffness& stiffness_;
     const NodalConditions& conditions_;
     const EquilibriumOptions& options_;
     Observer& observer_;
     Eigen::Matrix3Xd mass_;
-    double preset_;                  // lowest eigenvalue at rest
+    double preset_;  // lowest eigenvalue at rest
     Spectrum spectrum_;
-    Eigen::Matrix3Xd good_;          // last state that was trustworthy
+    Eigen::Matrix3Xd good_;  // last state that was trustworthy
     double good_residual_ = 0;
     int restarts_ = 0;
     EquilibriumResult result_;
 
-    /// Starts from `start` plus the linear-elastic answer to the residual there, or as much of that answer as leaves no
-    /// element inverted: loads applied at once would tear the nodes next to them.
-    void begin_from(const Eigen::Matrix3Xd& start) {
-        const Eigen::Matrix3Xd still = Eigen::Matrix3Xd::Zero(3, start.cols());
-        engine_.set_state(start, still);
-        const Eigen::Matrix3Xd correction = lifted();
+    /// Starts from `base` plus `correction`, or as much of it as leaves no element inverted: loads applied at once
+    /// would tear the nodes next to them.
+    void begin_from(const Eigen::Matrix3Xd& base, const Eigen::Matrix3Xd& correction) {
+        const Eigen::Matrix3Xd still = Eigen::Matrix3Xd::Zero(3, base.cols());
         for (double part = 1; part > 0.01; part *= 0.7) {
-            engine_.set_state(start + part * correction, still);
+            engine_.set_state(base + part * correction, still);
             const Observation seen = engine_.observe();
             result_.force_evaluations += 2;
             if (!seen.finite || seen.min_jacobian <= least_starting_jacobian) continue;
@@ -208,7 +226,7 @@ private:
 EquilibriumResult equilibrium(Engine& engine, const RestStiffness& stiffness, const NodalConditions& conditions,
                               const EquilibriumOptions& options, const Eigen::Matrix3Xd* start, Observer& observer) {
     Relaxation relaxation(engine, stiffness, conditions, options, observer);
-    return relaxation.run(start ? *start : stiffness.linear_solution(conditions));
+    return start ? relaxation.run(*start) : relaxation.run();
 }
 
 }  // namespace tissuewarp::tled

@@ -14,16 +14,17 @@ struct EquilibriumOptions {
 };
 
 struct EquilibriumResult {
-    Eigen::Matrix3Xd displacement;    ///< 3 × N, mm
-    double estimated_error_mm = 0;    ///< lifted residual at the end
+    Eigen::Matrix3Xd displacement;  ///< 3 × N, mm
+    double estimated_error_mm = 0;  ///< lifted residual at the end
     int force_evaluations = 0;
-    int lifted_residuals = 0;         ///< triangular solves spent on acceptance
+    int lifted_residuals = 0;  ///< triangular solves spent on acceptance
     double min_jacobian = 1;
 };
 
-/// Relaxes the engine to equilibrium under the conditions: mass = diag K₀, damping preset from the lowest mode of K₀ and
-/// adapted by the Rayleigh quotient of the motion (Joldes, Wittek, Miller 2011), linear-elastic start unless `start` is
-/// given (3 × N mm). Throws SolverFailure when the error bound is not reached or tissue inverts for good.
+/// Relaxes the engine to equilibrium under the conditions: mass = diag K₀, damping preset from the lowest mode of K₀
+/// and adapted by the Rayleigh quotient of the motion (Joldes, Wittek, Miller 2011). Starts from the linear-elastic
+/// solution, or from `start` (3 × N mm) plus the linear-elastic answer to its residual. Throws SolverFailure when the
+/// error bound is not reached or tissue inverts for good.
 EquilibriumResult equilibrium(Engine& engine, const RestStiffness& stiffness, const NodalConditions& conditions,
                               const EquilibriumOptions& options = {}, const Eigen::Matrix3Xd* start = nullptr,
                               Observer& observer = silent_observer());

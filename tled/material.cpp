@@ -17,7 +17,8 @@ Lame lame(double youngs_modulus_kpa, double poisson) {
     if (!(youngs_modulus_kpa > 0) || !std::isfinite(youngs_modulus_kpa))
         throw InvalidInput("Young's modulus is " + std::to_string(youngs_modulus_kpa) + " kPa; it must be positive");
     if (!(poisson > -1.0 && poisson < 0.5))
-        throw InvalidInput("Poisson's ratio is " + std::to_string(poisson) + "; it must lie between -1 and 0.5 (below)");
+        throw InvalidInput("Poisson's ratio is " + std::to_string(poisson) +
+                           "; it must lie between -1 and 0.5 (below)");
     return {youngs_modulus_kpa * poisson / ((1 + poisson) * (1 - 2 * poisson)),
             youngs_modulus_kpa / (2 * (1 + poisson))};
 }
@@ -49,7 +50,9 @@ double volumetric_modulus(const Material& material) {
     return std::get<NeoHookeanLnJ>(material).lame_lambda;
 }
 
-double p_wave_modulus(const Material& material) { return lame_lambda(material) + 2 * shear_modulus(material); }
+double p_wave_modulus(const Material& material) {
+    return lame_lambda(material) + 2 * shear_modulus(material);
+}
 
 double poisson_ratio(const Material& material) {
     const double lambda = lame_lambda(material);

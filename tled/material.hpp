@@ -1,6 +1,6 @@
 #pragma once
-/// Constitutive laws: one struct each, moduli in kPa. W is the strain energy per rest volume (kPa; 1 kPa mm³ = 1 mN mm),
-/// F the deformation gradient, C = FᵀF, J = det F.
+/// Constitutive laws: one struct each, moduli in kPa. W is the strain energy per rest volume (kPa; 1 kPa mm³ = 1 mN
+/// mm), F the deformation gradient, C = FᵀF, J = det F.
 ///
 /// Every law is split into a shear part Ψ(F) and a volumetric part M·U(J), because the averaged-pressure element
 /// evaluates the second at nodes.

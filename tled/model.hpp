@@ -13,16 +13,16 @@ enum class Element {
 
 struct Model {
     meshing::TetMesh mesh;
-    MaterialTable materials;           ///< one entry for every label of the mesh
+    MaterialTable materials;  ///< one entry for every label of the mesh
     Element element = Element::AveragedPressureT4;
-    double density = 1e-6;             ///< kg/mm³
+    double density = 1e-6;  ///< kg/mm³
 };
 
 /// Throws InvalidInput when a label has no material, a modulus is not positive, or the mesh is invalid.
 void require_valid(const Model& model);
 
-/// AveragedPressureT4 when any material has ν > 0.46, T4 otherwise: below, T4 hardly locks, and its factor is three times
-/// smaller (docs/decisions/rest_stiffness.md).
+/// AveragedPressureT4 when any material has ν > 0.46, T4 otherwise: below, T4 hardly locks, and its factor is three
+/// times smaller (docs/decisions/rest_stiffness.md).
 Element suggested_element(const MaterialTable& materials);
 
 }  // namespace tissuewarp::tled

@@ -26,7 +26,7 @@ Eigen::VectorXd jacobians(const RestState& rest, const Eigen::Matrix3Xd& displac
 struct NewtonOptions {
     double tolerance_mm = 1e-9;  ///< largest nodal correction at which the iteration ends
     int max_iterations = 60;
-    int load_steps = 1;          ///< imposed displacements, targets and forces applied in equal parts
+    int load_steps = 1;  ///< imposed displacements, targets and forces applied in equal parts
 };
 
 struct NewtonResult {

@@ -42,8 +42,7 @@ void precompute_elements(const Model& model, RestState& rest) {
         const Eigen::Vector4i nodes = model.mesh.tets.col(tet);
         rest.nodes.col(e) = nodes;
         Eigen::Matrix3d edges;  // columns X_k − X_0
-        for (int k = 0; k < 3; ++k)
-            edges.col(k) = model.mesh.nodes.col(nodes[k + 1]) - model.mesh.nodes.col(nodes[0]);
+        for (int k = 0; k < 3; ++k) edges.col(k) = model.mesh.nodes.col(nodes[k + 1]) - model.mesh.nodes.col(nodes[0]);
         // N_k(X) are barycentric coordinates: row k of edges⁻¹ is ∂N_{k+1}/∂X.
         const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> gradient = edges.inverse();
         rest.gradient.col(e) = Eigen::Map<const Eigen::Matrix<double, 9, 1>>(gradient.data());

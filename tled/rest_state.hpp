@@ -1,6 +1,6 @@
 #pragma once
-/// What total Lagrangian dynamics computes once, in the rest configuration (Miller et al. 2007, section 3): shape-function
-/// derivatives, volumes, lumped mass, and the lists by which nodes gather forces.
+/// What total Lagrangian dynamics computes once, in the rest configuration (Miller et al. 2007, section 3):
+/// shape-function derivatives, volumes, lumped mass, and the lists by which nodes gather forces.
 
 #include "tled/model.hpp"
 
@@ -34,16 +34,18 @@ struct PressureNodes {
 
 /// Per-element arrays are in the internal order: grouped by law, otherwise as in the mesh.
 struct RestState {
-    std::vector<int> tet;                               ///< M, internal position → tetrahedron of the mesh
+    std::vector<int> tet;  ///< M, internal position → tetrahedron of the mesh
     std::vector<LawBlock> blocks;
-    Eigen::Matrix4Xi nodes;                             ///< 4 × M
-    Eigen::Matrix<double, 9, Eigen::Dynamic> gradient;  ///< 9 × M: row 3k+j is ∂N_{k+1}/∂X_j, 1/mm; N_0 = −Σ of the others
-    Eigen::VectorXd volume;                             ///< M, mm³
-    Eigen::VectorXd shear_modulus;                      ///< M, μ in kPa
-    Eigen::VectorXd volumetric_modulus;                 ///< M, the part evaluated in the element, kPa: all of it for T4, none for averaged pressure
-    Eigen::VectorXd lumped_mass;                        ///< N, kg
-    Incidence incidence;                                ///< node → 4·element + corner
-    PressureNodes pressure;                             ///< empty for T4
+    Eigen::Matrix4Xi nodes;  ///< 4 × M
+    Eigen::Matrix<double, 9, Eigen::Dynamic>
+        gradient;                        ///< 9 × M: row 3k+j is ∂N_{k+1}/∂X_j, 1/mm; N_0 = −Σ of the others
+    Eigen::VectorXd volume;              ///< M, mm³
+    Eigen::VectorXd shear_modulus;       ///< M, μ in kPa
+    Eigen::VectorXd volumetric_modulus;  ///< M, the part evaluated in the element, kPa: all of it for T4, none for
+                                         ///< averaged pressure
+    Eigen::VectorXd lumped_mass;         ///< N, kg
+    Incidence incidence;                 ///< node → 4·element + corner
+    PressureNodes pressure;              ///< empty for T4
     int node_count = 0;
 
     [[nodiscard]] int element_count() const { return static_cast<int>(tet.size()); }

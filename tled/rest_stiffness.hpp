@@ -1,6 +1,6 @@
 #pragma once
-/// The stiffness at rest K₀, factorised before the operation (CHOLMOD): gives the linear-elastic start, the diagonal mass,
-/// the lowest frequency, and turns a residual into an error in millimetres.
+/// The stiffness at rest K₀, factorised before the operation (CHOLMOD): gives the linear-elastic start, the diagonal
+/// mass, the lowest frequency, and turns a residual into an error in millimetres.
 
 #include "tled/conditions.hpp"
 #include "tled/rest_state.hpp"
@@ -22,8 +22,8 @@ public:
     RestStiffness& operator=(RestStiffness&&) noexcept;
 
     /// x with K x = f on the free degrees of freedom, zero on the constrained ones (3 × N; f in mN, x in mm). When
-    /// `conditions` carry other springs than those factorised (same constraints), conjugate gradients with the factor as
-    /// preconditioner solve the present system to `relative_tolerance`.
+    /// `conditions` carry other springs than those factorised (same constraints), conjugate gradients with the factor
+    /// as preconditioner solve the present system to `relative_tolerance`.
     [[nodiscard]] Eigen::Matrix3Xd solve(const Eigen::Matrix3Xd& force) const;
     [[nodiscard]] Eigen::Matrix3Xd solve(const Eigen::Matrix3Xd& force, const NodalConditions& conditions,
                                          double relative_tolerance) const;

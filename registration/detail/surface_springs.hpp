@@ -16,7 +16,7 @@ tled::Conditions full_weight_springs(const Interfaces& interfaces, const Prepare
 /// Where one interface node is drawn to.
 struct Match {
     bool found = false;
-    bool held_back = false;   ///< the image's boundary lies further away than this round may pull
+    bool held_back = false;  ///< the image's boundary lies further away than this round may pull
     double distance_mm = 0;  ///< along the normal, from the node's material boundary to the image's boundary
     double weight = 0;       ///< in [0, 1]
 };

@@ -1,6 +1,6 @@
 /// Digests against the values of FIPS 180-4's examples.
-#include "core/errors.hpp"
 #include "core/sha256.hpp"
+#include "core/errors.hpp"
 
 #include <gtest/gtest.h>
 
@@ -27,11 +27,12 @@ TEST(Sha256, OfAbc) {
 }
 
 TEST(Sha256, OfAMillionLetters) {
-    EXPECT_EQ(digest_of(std::string(1000000, 'a')),
-              "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
+    EXPECT_EQ(digest_of(std::string(1000000, 'a')), "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
 }
 
-TEST(Sha256, OfAMissingFileThrows) { EXPECT_THROW(sha256_of_file("/nonexistent/file"), IoError); }
+TEST(Sha256, OfAMissingFileThrows) {
+    EXPECT_THROW(sha256_of_file("/nonexistent/file"), IoError);
+}
 
 }  // namespace
 }  // namespace tissuewarp

@@ -38,8 +38,7 @@ TEST(Alignment, HeadersInOtherAxesAreHonoured) {
     Eigen::Matrix3d turned;
     turned << 0, -1, 0, 0, 0, 1, 1, 0, 0;
     const auto expected = shapes::motion(10, {1, 0, 0}, {2, 2, -3});
-    const Alignment found =
-        align_labels(organ_labels({}), organ_labels({}, expected, 1.5, turned));
+    const Alignment found = align_labels(organ_labels({}), organ_labels({}, expected, 1.5, turned));
     EXPECT_LT(pose_error(found.placement, expected), 0.75);
 }
 

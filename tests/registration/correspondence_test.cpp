@@ -1,6 +1,8 @@
 /// Sub-voxel boundaries from voxel labels, and interface nodes with their normals.
 #include "registration/correspondence.hpp"
 
+#include "core/errors.hpp"
+
 #include "meshing/primitives.hpp"
 #include "tests/support/label_shapes.hpp"
 
@@ -19,9 +21,9 @@ TEST(LabelBoundaryField, CrossingOfABallIsSubVoxel) {
     const LabelBoundaryField field(shapes::organ_labels(ball_organ, Eigen::Isometry3d::Identity(), 1.0), {1, 2}, 1.0);
     for (int i = 0; i < 50; ++i) {
         const Vector3d n = Vector3d(std::sin(1.0 + i), std::cos(2.3 * i), std::sin(0.7 * i)).normalized();
-        EXPECT_NEAR(field.crossing(37 * n, n, 1, 0, 10, 45), 3.0, 0.35) << i;  // ahead
-        EXPECT_NEAR(field.crossing(44 * n, n, 1, 0, 10, 45), -4.0, 0.35) << i; // behind
-        EXPECT_NEAR(field.crossing(17 * n, n, 2, 1, 10, 45), -2.0, 0.35) << i; // inner interface
+        EXPECT_NEAR(field.crossing(37 * n, n, 1, 0, 10, 45), 3.0, 0.35) << i;   // ahead
+        EXPECT_NEAR(field.crossing(44 * n, n, 1, 0, 10, 45), -4.0, 0.35) << i;  // behind
+        EXPECT_NEAR(field.crossing(17 * n, n, 2, 1, 10, 45), -2.0, 0.35) << i;  // inner interface
     }
 }
 
@@ -32,8 +34,8 @@ TEST(LabelBoundaryField, NothingBeyondTheRange) {
 
 TEST(LabelBoundaryField, ASurfaceFacingAwayIsNotMatched) {
     const LabelBoundaryField field(shapes::organ_labels(ball_organ), {1, 2});
-    EXPECT_TRUE(std::isnan(field.crossing({39, 0, 0}, {-1, 0, 0}, 1, 0, 6, 45)));    // normal reversed
-    const Vector3d oblique = Vector3d(1, 2, 0).normalized();                        // 63° off
+    EXPECT_TRUE(std::isnan(field.crossing({39, 0, 0}, {-1, 0, 0}, 1, 0, 6, 45)));  // normal reversed
+    const Vector3d oblique = Vector3d(1, 2, 0).normalized();                       // 63° off
     EXPECT_TRUE(std::isnan(field.crossing(Vector3d(40, 0, 0) - oblique, oblique, 1, 0, 6, 45)));
 }
 

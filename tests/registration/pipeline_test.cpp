@@ -25,7 +25,9 @@ UpdateOptions on_cpu() {
     return options;
 }
 
-double largest(const Eigen::Matrix3Xd& x) { return std::sqrt(x.colwise().squaredNorm().maxCoeff()); }
+double largest(const Eigen::Matrix3Xd& x) {
+    return std::sqrt(x.colwise().squaredNorm().maxCoeff());
+}
 
 TEST(Pipeline, AnImageRegisteredToItselfDoesNotMove) {
     const auto labels = organ_labels({});
@@ -49,13 +51,15 @@ TEST(Pipeline, ARigidMotionIsFoundWithoutStrain) {
 TEST(Pipeline, AnOrganPressedFlatIsFollowed) {
     shapes::Organ pressed;
     pressed.semi_axes = {47.5, 36.5, 27.5};  // 8 % thinner, wider, of nearly the same volume
-    pressed.inclusion = shapes::Organ{}.inclusion.cwiseProduct(pressed.semi_axes).cwiseQuotient(shapes::Organ{}.semi_axes);
+    pressed.inclusion =
+        shapes::Organ{}.inclusion.cwiseProduct(pressed.semi_axes).cwiseQuotient(shapes::Organ{}.semi_axes);
     UpdateOptions options = on_cpu();
     options.align = false;
     const auto prepared = prepare(organ_labels({}), coarse());
     const auto result = update(prepared, organ_labels(pressed), options);
     const Eigen::Vector3d stretch = pressed.semi_axes.cwiseQuotient(shapes::Organ{}.semi_axes);
-    const Eigen::Matrix3Xd error = result.deformation.deformed_nodes() - stretch.asDiagonal() * prepared.model.mesh.nodes;
+    const Eigen::Matrix3Xd error =
+        result.deformation.deformed_nodes() - stretch.asDiagonal() * prepared.model.mesh.nodes;
     EXPECT_LT(error.colwise().norm().mean(), 0.8);
     EXPECT_LT(result.rounds.back().mean_residual_mm, 0.3);
     EXPECT_EQ(mesh_jacobians(result.deformation).folded, 0);

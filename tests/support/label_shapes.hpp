@@ -10,15 +10,16 @@
 namespace tissuewarp::shapes {
 
 struct Organ {
-    Eigen::Vector3d centre{0, 0, 0};           ///< LPS mm
-    Eigen::Vector3d semi_axes{45, 35, 30};     ///< mm
-    Eigen::Vector3d inclusion{12, 5, 4};       ///< centre of the ball, mm from the organ's centre
-    double inclusion_radius = 9;               ///< mm
+    Eigen::Vector3d centre{0, 0, 0};        ///< LPS mm
+    Eigen::Vector3d semi_axes{45, 35, 30};  ///< mm
+    Eigen::Vector3d inclusion{12, 5, 4};    ///< centre of the ball, mm from the organ's centre
+    double inclusion_radius = 9;            ///< mm
 };
 
 /// Labels 1 (organ) and 2 (ball) of the organ after a rigid motion, on a grid of `spacing` mm around the origin.
 inline imaging::Volume organ_labels(const Organ& organ, const Eigen::Isometry3d& motion = Eigen::Isometry3d::Identity(),
-                                    double spacing = 1.5, const Eigen::Matrix3d& direction = Eigen::Matrix3d::Identity()) {
+                                    double spacing = 1.5,
+                                    const Eigen::Matrix3d& direction = Eigen::Matrix3d::Identity()) {
     imaging::Geometry grid;
     const int count = static_cast<int>(130 / spacing);
     grid.size = {count, count, count};

@@ -1,10 +1,11 @@
 /// Dynamic relaxation on every engine against Newton's method, on the cube of Taylor, Cheng and Ourselin (2007).
-#include "meshing/primitives.hpp"
 #include "tled/equilibrium.hpp"
+#include "meshing/primitives.hpp"
 #include "tled/reference.hpp"
 
 #include <gmock/gmock.h>
 #include <tbb/global_control.h>
+#include <Eigen/Geometry>
 
 #include <cmath>
 
@@ -46,8 +47,8 @@ protected:
 
     /// Largest difference to Newton's solution over the largest displacement, 20 mm.
     double relative_error(Engine& engine, double tolerance_mm) {
-        const auto found = equilibrium(engine, stiffness, cube.conditions,
-                                       {.tolerance_mm = tolerance_mm, .max_steps = 60000});
+        const auto found =
+            equilibrium(engine, stiffness, cube.conditions, {.tolerance_mm = tolerance_mm, .max_steps = 60000});
         EXPECT_LE(found.estimated_error_mm, tolerance_mm);
         return largest_difference(found.displacement, newton) / 20;
     }
@@ -80,25 +81,37 @@ TEST_P(SeedCubes, EstimatedErrorIsTheTrueError) {
 }
 
 TEST(Equilibrium, SpringsPullHalfwayAgainstTissueOfTheirOwnStiffness) {
-    // A bar held at one end and pulled by springs of stiffness k at the other moves by t k / (k + K) in the linear limit.
+    // A bar held at one end and pulled by springs of stiffness k at the other moves by t k / (k + K) in the linear
+    // limit.
     Model model;
     model.mesh = meshing::box_mesh({40, 10, 10}, {8, 2, 2});
     model.materials[1] = neo_hookean_lnj(3.0, 0.0);
     model.element = Element::T4;
     const RestState rest = rest_state(model);
     const double bar = 3.0 * 100 / 40, target = 0.02;  // mN/mm, mm
-    const double end_area = 100;
     Conditions conditions;
     for (int node = 0; node < rest.node_count; ++node) {
         const Eigen::Vector3d X = model.mesh.nodes.col(node);
-        if (X.x() < 1e-9) conditions.prescribed.push_back({node, {true, false, false}, {0, 0, 0}});
-        if (X.norm() < 1e-9) conditions.prescribed.back().constrained = {true, true, true};
-        if (X.x() < 1e-9 && X.y() > 9 && X.z() < 1e-9) conditions.prescribed.back().constrained = {true, false, true};
-        if (X.x() < 40 - 1e-9) continue;
-        const auto on_edge = [](double x) { return x < 1e-9 || x > 10 - 1e-9; };
-        const double area = 25.0 * (on_edge(X.y()) ? 0.5 : 1) * (on_edge(X.z()) ? 0.5 : 1);
+        if (X.x() > 1e-9) continue;
+        PrescribedDisplacement held{node, {true, false, false}, {0, 0, 0}};
+        if (X.norm() < 1e-9) held.constrained = {true, true, true};
+        if (X.y() > 9 && X.z() < 1e-9) held.constrained = {true, false, true};
+        conditions.prescribed.push_back(held);
+    }
+    // A third of the triangles around a node: the share of a uniform traction that linear triangles give it.
+    Eigen::VectorXd area = Eigen::VectorXd::Zero(rest.node_count);
+    const auto boundary = meshing::boundary_surface(model.mesh);
+    for (const auto& triangle : boundary.surface.triangles.colwise()) {
+        const Eigen::Vector3d a = boundary.surface.nodes.col(triangle[0]), b = boundary.surface.nodes.col(triangle[1]),
+                              c = boundary.surface.nodes.col(triangle[2]);
+        if (std::min({a.x(), b.x(), c.x()}) < 40 - 1e-9) continue;
+        for (const int corner : triangle)
+            area[boundary.node_of[static_cast<std::size_t>(corner)]] += (b - a).cross(c - a).norm() / 6;
+    }
+    for (int node = 0; node < rest.node_count; ++node) {
+        if (area[node] == 0) continue;
         Eigen::Matrix3d k = Eigen::Matrix3d::Zero();
-        k(0, 0) = bar * area / end_area;
+        k(0, 0) = bar * area[node] / 100;
         conditions.springs.push_back({node, k, {target, 0, 0}});
     }
     const auto nodal = nodal_conditions(conditions, rest.node_count);

@@ -128,8 +128,8 @@ CholmodFactor::CholmodFactor(const Eigen::SparseMatrix<double>& lower, const std
     const Eigen::SparseMatrix<double> graph = node_graph(lower, compact, node_count);
     cholmod_sparse graph_view = view(graph);
     std::vector<int> node_order(node_count), order;
-    // Nested dissection factorises a box of 48 k tetrahedra 1.6 (T4) and 1.3 times (averaged pressure) as fast as minimum
-    // degree, but gains nothing on tiny graphs.
+    // Nested dissection factorises a box of 48 k tetrahedra 1.6 (T4) and 1.3 times (averaged pressure) as fast as
+    // minimum degree, but gains nothing on tiny graphs.
     if (node_count < 200) {
         cholmod_amd(&graph_view, nullptr, 0, node_order.data(), &common);
     } else {
