@@ -34,7 +34,7 @@ Volume as_int(const Volume& labels) {
 Volume coarsened(const Volume& labels) {
     Geometry grid = labels.geometry;
     for (int axis = 0; axis < 3; ++axis) {
-        const double factor = std::max(1.0, map_spacing / grid.spacing[axis]);
+        const double factor = std::max(1.0, std::floor(map_spacing / grid.spacing[axis]));  // whole: no aliasing
         grid.size[static_cast<std::size_t>(axis)] =
             static_cast<int>(std::ceil(grid.size[static_cast<std::size_t>(axis)] / factor));
         grid.spacing[axis] *= factor;
@@ -160,6 +160,10 @@ private:
     }
 };
 
+/// mm of cost per mm that the rotation carries the boundary: decides where the boundaries do not, as for a ball, and is
+/// far below the slope of a cost that does.
+constexpr double rotation_penalty = 5e-3;
+
 /// Symmetric: moving boundaries to fixed ones and, by the inverse map, fixed boundaries to moving ones, so that a
 /// smaller organ does not hide inside a larger one.
 struct DistanceCost {
@@ -178,6 +182,10 @@ struct Pose {
     double cost = 0;
 };
 
+double penalised(const DistanceCost& cost, const PoseSpace& space, const double* x, double trim, int stride) {
+    return cost(space.similarity(x), trim, stride) + rotation_penalty * std::hypot(x[3], x[4], x[5]);
+}
+
 Pose minimise(const DistanceCost& cost, const PoseSpace& space, Pose start, double trim, int stride, int evaluations) {
     struct Problem {
         const DistanceCost& cost;
@@ -189,7 +197,7 @@ Pose minimise(const DistanceCost& cost, const PoseSpace& space, Pose start, doub
     optimiser.set_min_objective(
         [](unsigned, const double* x, double*, void* data) {
             const auto& p = *static_cast<const Problem*>(data);
-            return p.cost(p.space.similarity(x), p.trim, p.stride);
+            return penalised(p.cost, p.space, x, p.trim, p.stride);
         },
         &problem);
     optimiser.set_initial_step(std::max(0.5, trim / 4));
@@ -202,7 +210,7 @@ Pose minimise(const DistanceCost& cost, const PoseSpace& space, Pose start, doub
         // The best point so far is in x: as good as this cost can be resolved.
     }
     std::copy(x.begin(), x.end(), start.x.begin());
-    start.cost = cost(space.similarity(start.x.data()), trim, stride);
+    start.cost = penalised(cost, space, start.x.data(), trim, stride);
     return start;
 }
 
@@ -241,7 +249,7 @@ Alignment align_labels(const Volume& moving_labels, const Volume& fixed_labels, 
                       [&](std::size_t i) { poses[i] = minimise(cost, space, poses[i], options.trim_mm, 1, 600); });
     observer.checkpoint("rigid alignment", 1.0);
     const Pose& best = poses[1].cost < poses[0].cost ? poses[1] : poses[0];
-    return {space.rigid(best.x.data()), best.cost};
+    return {space.rigid(best.x.data()), cost(space.similarity(best.x.data()), options.trim_mm, 1)};
 }
 
 }  // namespace tissuewarp::registration

@@ -22,7 +22,8 @@ struct Alignment {
 /// Minimises the symmetric mean truncated distance between moving and fixed boundaries (distance maps), of all labels
 /// together and of the four largest that both maps hold, by BOBYQA (Powell 2009) from several starts: as the headers
 /// say, centroids matched, and rotations about them. A change of size is fitted along with the pose and then left to
-/// the tissue: the placement is rigid. Throws InvalidInput when the maps share no label.
+/// the tissue: the placement is rigid, and turned no further than the boundaries demand. Throws InvalidInput when the
+/// maps share no label.
 Alignment align_labels(const imaging::Volume& moving_labels, const imaging::Volume& fixed_labels,
                        const AlignmentOptions& options = {}, Observer& observer = silent_observer());
 
