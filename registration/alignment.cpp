@@ -3,6 +3,8 @@
 #include "imaging/filters.hpp"
 #include "imaging/labels.hpp"
 #include "imaging/sampling.hpp"
+#include "registration/detail/point_tree.hpp"
+#include "registration/detail/pose_search.hpp"
 
 #include <tbb/parallel_for.h>
 #include <nlopt.hpp>
@@ -88,30 +90,6 @@ Eigen::Matrix3Xd boundary_points(const Volume& mask, int most) {
     return points;
 }
 
-constexpr unsigned parameters = 7;
-
-/// Similarity from seven numbers, all in mm: translation, rotation vector about `centre` times `radius`, and logarithm
-/// of the scale times `radius`. The scale takes up a change of size that would otherwise turn the organ; the answer is
-/// the rigid part alone.
-struct PoseSpace {
-    Eigen::Vector3d centre;
-    double radius = 1;
-
-    [[nodiscard]] Eigen::Isometry3d rigid(const double* x) const {
-        const Eigen::Vector3d rotation = Eigen::Vector3d(x[3], x[4], x[5]) / radius;
-        const double angle = rotation.norm();
-        Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
-        if (angle > 0) result.linear() = Eigen::AngleAxisd(angle, rotation / angle).toRotationMatrix();
-        result.translation() = centre + Eigen::Vector3d(x[0], x[1], x[2]) - result.linear() * centre;
-        return result;
-    }
-    [[nodiscard]] Eigen::Affine3d similarity(const double* x) const {
-        const Eigen::Affine3d grown =
-            Eigen::Translation3d(centre) * Eigen::Scaling(std::exp(x[6] / radius)) * Eigen::Translation3d(-centre);
-        return rigid(x) * grown;
-    }
-};
-
 /// Boundary points of one image and the distance maps of the other, per label.
 class BoundaryDistances {
 public:
@@ -160,10 +138,6 @@ private:
     }
 };
 
-/// mm of cost per mm that the rotation carries the boundary: decides where the boundaries do not, as for a ball, and is
-/// far below the slope of a cost that does.
-constexpr double rotation_penalty = 5e-3;
-
 /// Symmetric: moving boundaries to fixed ones and, by the inverse map, fixed boundaries to moving ones, so that a
 /// smaller organ does not hide inside a larger one.
 struct DistanceCost {
@@ -177,54 +151,18 @@ struct DistanceCost {
     }
 };
 
-struct Pose {
-    std::array<double, parameters> x{};
-    double cost = 0;
-};
-
-double penalised(const DistanceCost& cost, const PoseSpace& space, const double* x, double trim, int stride) {
-    return cost(space.similarity(x), trim, stride) + rotation_penalty * std::hypot(x[3], x[4], x[5]);
-}
-
-Pose minimise(const DistanceCost& cost, const PoseSpace& space, Pose start, double trim, int stride, int evaluations) {
-    struct Problem {
-        const DistanceCost& cost;
-        const PoseSpace& space;
-        double trim;
-        int stride;
-    } problem{cost, space, trim, stride};
-    nlopt::opt optimiser(nlopt::LN_BOBYQA, parameters);
-    optimiser.set_min_objective(
-        [](unsigned, const double* x, double*, void* data) {
-            const auto& p = *static_cast<const Problem*>(data);
-            return penalised(p.cost, p.space, x, p.trim, p.stride);
-        },
-        &problem);
-    optimiser.set_initial_step(std::max(0.5, trim / 4));
-    optimiser.set_xtol_abs(0.01);
-    optimiser.set_maxeval(evaluations);
-    std::vector<double> x(start.x.begin(), start.x.end());
-    try {
-        optimiser.optimize(x, start.cost);
-    } catch (const nlopt::roundoff_limited&) {
-        // The best point so far is in x: as good as this cost can be resolved.
+/// Nodes, edge midpoints and centroids of a surface: close enough to stand for it.
+std::vector<Eigen::Vector3d> dense_points(const meshing::SurfaceMesh& surface) {
+    std::vector<Eigen::Vector3d> points;
+    for (const auto& node : surface.nodes.colwise()) points.emplace_back(node);
+    for (const auto& triangle : surface.triangles.colwise()) {
+        const Eigen::Vector3d a = surface.nodes.col(triangle[0]), b = surface.nodes.col(triangle[1]),
+                              c = surface.nodes.col(triangle[2]);
+        for (const Eigen::Vector3d& point : {Eigen::Vector3d((a + b) / 2), Eigen::Vector3d((b + c) / 2),
+                                             Eigen::Vector3d((c + a) / 2), Eigen::Vector3d((a + b + c) / 3)})
+            points.push_back(point);
     }
-    std::copy(x.begin(), x.end(), start.x.begin());
-    start.cost = penalised(cost, space, start.x.data(), trim, stride);
-    return start;
-}
-
-std::vector<Pose> starting_poses(const PoseSpace& space, const Eigen::Vector3d& fixed_centroid, double angle) {
-    const Eigen::Vector3d shift = fixed_centroid - space.centre;
-    std::vector<Pose> starts(2);
-    std::copy(shift.begin(), shift.end(), starts[1].x.begin());
-    for (std::size_t axis = 3; axis < 6; ++axis)
-        for (const double sign : {-1.0, 1.0}) {
-            Pose turned = starts[1];
-            turned.x[axis] = sign * angle * space.radius;
-            starts.push_back(turned);
-        }
-    return starts;
+    return points;
 }
 
 }  // namespace
@@ -233,23 +171,28 @@ Alignment align_labels(const Volume& moving_labels, const Volume& fixed_labels, 
                        Observer& observer) {
     const Volume moving = as_int(moving_labels), fixed = as_int(fixed_labels);
     const DistanceCost cost(moving, fixed, labels_to_align(moving, fixed), options.samples / 2);
-    const Eigen::Vector3d centre = cost.forward.points().rowwise().mean();
-    const PoseSpace space{centre, std::sqrt((cost.forward.points().colwise() - centre).colwise().squaredNorm().mean())};
-    const Eigen::Vector3d fixed_centroid = cost.backward.points().rowwise().mean();
+    return detail::search_pose(cost, cost.forward.points(), cost.backward.points().rowwise().mean(),
+                               detail::PoseFreedom::Similarity, options, observer);
+}
 
-    std::vector<Pose> poses = starting_poses(space, fixed_centroid, options.start_angle_deg * EIGEN_PI / 180);
-    constexpr int coarse_stride = 4;
-    tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t i) {
-        poses[i] = minimise(cost, space, poses[i], 10 * options.trim_mm, coarse_stride, 200);
-    });
-    observer.checkpoint("rigid alignment", 0.6);
-    std::stable_sort(poses.begin(), poses.end(), [](const Pose& a, const Pose& b) { return a.cost < b.cost; });
-    poses.resize(2);
-    tbb::parallel_for(std::size_t{0}, poses.size(),
-                      [&](std::size_t i) { poses[i] = minimise(cost, space, poses[i], options.trim_mm, 1, 600); });
-    observer.checkpoint("rigid alignment", 1.0);
-    const Pose& best = poses[1].cost < poses[0].cost ? poses[1] : poses[0];
-    return {space.rigid(best.x.data()), cost(space.similarity(best.x.data()), options.trim_mm, 1)};
+Alignment align_surfaces(const meshing::SurfaceMesh& moving, const Eigen::Matrix3Xd& fixed,
+                         const AlignmentOptions& options, Observer& observer) {
+    if (moving.node_count() == 0 || fixed.cols() == 0)
+        throw InvalidInput("a surface to align has no points; give at least one on either side");
+    if (!moving.nodes.allFinite() || !fixed.allFinite())
+        throw InvalidInput("a surface to align has points that are not finite");
+    const detail::PointTree tree(dense_points(moving));
+    const Eigen::Index step = std::max<Eigen::Index>(1, fixed.cols() / options.samples);
+    const auto cost = [&](const Eigen::Affine3d& map, double trim, int stride) {
+        const Eigen::Affine3d back = map.inverse();
+        double sum = 0;
+        long count = 0;
+        for (Eigen::Index i = 0; i < fixed.cols(); i += step * stride, ++count)
+            sum += std::min(trim, tree.distance(back * Eigen::Vector3d(fixed.col(i))));
+        return sum / double(count);
+    };
+    return detail::search_pose(cost, moving.nodes, fixed.rowwise().mean(), detail::PoseFreedom::Rigid, options,
+                               observer);
 }
 
 }  // namespace tissuewarp::registration

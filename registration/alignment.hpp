@@ -3,6 +3,7 @@
 
 #include "core/observer.hpp"
 #include "imaging/volume.hpp"
+#include "meshing/tet_mesh.hpp"
 
 #include <Eigen/Geometry>
 
@@ -26,5 +27,11 @@ struct Alignment {
 /// maps share no label.
 Alignment align_labels(const imaging::Volume& moving_labels, const imaging::Volume& fixed_labels,
                        const AlignmentOptions& options = {}, Observer& observer = silent_observer());
+
+/// The same for a whole moving surface and points of a fixed one, which may be a part of it (3 × P, LPS mm): minimises
+/// the mean truncated distance from the fixed points to the moving surface. No change of size, since a part does not
+/// show it. Throws InvalidInput on empty or non-finite input.
+Alignment align_surfaces(const meshing::SurfaceMesh& moving, const Eigen::Matrix3Xd& fixed,
+                         const AlignmentOptions& options = {}, Observer& observer = silent_observer());
 
 }  // namespace tissuewarp::registration

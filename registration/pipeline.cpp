@@ -81,6 +81,19 @@ std::vector<Match> match_interfaces(const PreparedModel& prepared, const LabelBo
     return matches;
 }
 
+/// Drops the share of matches that the model follows least, where they are further off than `scale_mm` (Clatz 2005).
+void trim(std::vector<Match>& matches, double share, double scale_mm) {
+    std::vector<double> distances;
+    for (const Match& match : matches)
+        if (match.found) distances.push_back(std::abs(match.distance_mm));
+    if (distances.empty()) return;
+    const auto kept = static_cast<std::size_t>((1 - share) * double(distances.size() - 1));
+    std::nth_element(distances.begin(), distances.begin() + static_cast<std::ptrdiff_t>(kept), distances.end());
+    const double limit = std::max(distances[kept], scale_mm);
+    for (Match& match : matches)
+        if (std::abs(match.distance_mm) > limit) match.weight = 0;
+}
+
 double mean_residual(const std::vector<Match>& matches) {
     double sum = 0, weights = 0;
     for (const Match& match : matches) {
@@ -198,9 +211,10 @@ private:
         const auto& interfaces = prepared_.interfaces;
         const Eigen::Matrix3Xd normals = interfaces.normals(prepared_.model.mesh.nodes + displacement_);
         const double scale = round == 0 ? 1e6 : std::max(options_.residual_scale_mm, record.range_mm / 3);
-        const std::vector<Match> matches =
+        std::vector<Match> matches =
             match_interfaces(prepared_, fixed_, result_.alignment.placement, displacement_, normals,
                              {record.range_mm, options_.max_angle_deg, scale, step_mm_});
+        if (round > 0) trim(matches, options_.trimmed_share, options_.residual_scale_mm);
         const auto conditions = tled::nodal_conditions(
             detail::matched_springs(interfaces, matches, normals, displacement_, prepared_.options),
             prepared_.rest.node_count);

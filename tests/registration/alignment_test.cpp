@@ -72,5 +72,47 @@ TEST(Alignment, SameResultEveryTime) {
     EXPECT_EQ(align_labels(moving, fixed).placement.matrix(), align_labels(moving, fixed).placement.matrix());
 }
 
+/// Nodes and triangles of the organ's ellipsoid.
+meshing::SurfaceMesh ellipsoid() {
+    constexpr int rings = 24, sectors = 48;
+    meshing::SurfaceMesh surface;
+    surface.nodes.resize(3, (rings + 1) * sectors);
+    for (int r = 0; r <= rings; ++r)
+        for (int s = 0; s < sectors; ++s) {
+            const double theta = EIGEN_PI * (r + 0.5) / (rings + 1), phi = 2 * EIGEN_PI * s / sectors;
+            const Eigen::Vector3d n(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta));
+            surface.nodes.col(r * sectors + s) = n.cwiseProduct(shapes::Organ{}.semi_axes);
+        }
+    surface.triangles.resize(3, 2 * rings * sectors);
+    for (int r = 0; r < rings; ++r)
+        for (int s = 0; s < sectors; ++s) {
+            const int a = r * sectors + s, b = r * sectors + (s + 1) % sectors;
+            surface.triangles.col(2 * a) << a, a + sectors, b;
+            surface.triangles.col(2 * a + 1) << b, a + sectors, b + sectors;
+        }
+    return surface;
+}
+
+TEST(SurfaceAlignment, APartOfASurfaceIsEnough) {
+    const auto surface = ellipsoid();
+    const auto expected = shapes::motion(12, {1, 2, 0}, {6, -4, 3});
+    std::vector<int> seen;
+    for (int node = 0; node < surface.node_count(); ++node)
+        if (surface.nodes(1, node) < 10) seen.push_back(node);
+    ASSERT_LT(double(seen.size()), 0.75 * surface.node_count());
+    const Eigen::Matrix3Xd part = expected * surface.nodes(Eigen::all, seen).eval();
+    const Alignment found = align_surfaces(surface, part);
+    EXPECT_LT(pose_error(found.placement, expected), 1.5);
+    EXPECT_LT(found.mean_distance_mm, 0.8);  // points against a dense sample of the surface
+}
+
+TEST(SurfaceAlignment, EmptyAndNonFiniteInputIsRefused) {
+    const auto surface = ellipsoid();
+    EXPECT_THROW(align_surfaces(surface, Eigen::Matrix3Xd(3, 0)), InvalidInput);
+    Eigen::Matrix3Xd bad = surface.nodes;
+    bad(1, 5) = NAN;
+    EXPECT_THROW(align_surfaces(surface, bad), InvalidInput);
+}
+
 }  // namespace
 }  // namespace tissuewarp::registration
