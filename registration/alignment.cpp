@@ -151,16 +151,17 @@ struct DistanceCost {
     }
 };
 
-/// Nodes, edge midpoints and centroids of a surface: close enough to stand for it.
-std::vector<Eigen::Vector3d> dense_points(const meshing::SurfaceMesh& surface) {
+/// Points on the triangles of a surface, at most `spacing` mm apart: close enough to stand for it. A surface without
+/// triangles stands for itself.
+std::vector<Eigen::Vector3d> dense_points(const meshing::SurfaceMesh& surface, double spacing) {
     std::vector<Eigen::Vector3d> points;
     for (const auto& node : surface.nodes.colwise()) points.emplace_back(node);
     for (const auto& triangle : surface.triangles.colwise()) {
-        const Eigen::Vector3d a = surface.nodes.col(triangle[0]), b = surface.nodes.col(triangle[1]),
-                              c = surface.nodes.col(triangle[2]);
-        for (const Eigen::Vector3d& point : {Eigen::Vector3d((a + b) / 2), Eigen::Vector3d((b + c) / 2),
-                                             Eigen::Vector3d((c + a) / 2), Eigen::Vector3d((a + b + c) / 3)})
-            points.push_back(point);
+        const Eigen::Vector3d a = surface.nodes.col(triangle[0]), b = surface.nodes.col(triangle[1]) - a,
+                              c = surface.nodes.col(triangle[2]) - a;
+        const int parts = static_cast<int>(std::ceil(std::max({b.norm(), c.norm(), (b - c).norm()}) / spacing));
+        for (int i = 0; i <= parts; ++i)
+            for (int j = 0; i + j <= parts; ++j) points.push_back(a + b * i / parts + c * j / parts);
     }
     return points;
 }
@@ -181,7 +182,8 @@ Alignment align_surfaces(const meshing::SurfaceMesh& moving, const Eigen::Matrix
         throw InvalidInput("a surface to align has no points; give at least one on either side");
     if (!moving.nodes.allFinite() || !fixed.allFinite())
         throw InvalidInput("a surface to align has points that are not finite");
-    const detail::PointTree tree(dense_points(moving));
+    constexpr double spacing_mm = 1.5;
+    const detail::PointTree tree(dense_points(moving, spacing_mm));
     const Eigen::Index step = std::max<Eigen::Index>(1, fixed.cols() / options.samples);
     const auto cost = [&](const Eigen::Affine3d& map, double trim, int stride) {
         const Eigen::Affine3d back = map.inverse();
