@@ -93,6 +93,12 @@ std::vector<std::uint32_t> gather_list(const Incidence& incidence, const BatchLa
     return list;
 }
 
+void require_columns(Eigen::Index columns, std::size_t nodes, const char* what) {
+    if (static_cast<std::size_t>(columns) != nodes)
+        throw InvalidInput(std::string(what) + " has " + std::to_string(columns) + " columns; the model has " +
+                           std::to_string(nodes) + " nodes");
+}
+
 template <class T>
 class CpuEngine final : public Engine {
 public:
@@ -119,6 +125,7 @@ public:
     }
 
     void set_conditions(const NodalConditions& conditions) override {
+        require_columns(conditions.constrained.cols(), node_count_, "the set of conditions");
         spring_of_node_.assign(node_count_, -1);
         springs_.clear();
         for (std::size_t s = 0; s < conditions.spring_node.size(); ++s) {
@@ -142,6 +149,7 @@ public:
     }
 
     void set_mass(const Eigen::Matrix3Xd& mass) override {
+        require_columns(mass.cols(), node_count_, "the mass");
         for (std::size_t node = 0; node < node_count_; ++node)
             for (std::size_t c = 0; c < 3; ++c) {
                 const double m = mass(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(node));
@@ -153,6 +161,8 @@ public:
     }
 
     void set_state(const Eigen::Matrix3Xd& displacement, const Eigen::Matrix3Xd& increment) override {
+        require_columns(displacement.cols(), node_count_, "the displacement");
+        require_columns(increment.cols(), node_count_, "the increment");
         for (std::size_t node = 0; node < node_count_; ++node)
             for (std::size_t c = 0; c < 3; ++c) {
                 const std::size_t at = node * record + c;
@@ -206,9 +216,11 @@ public:
         const Eigen::Matrix3Xd step = increment();
 
         Observation seen;
-        seen.finite = now.allFinite() && displacement().allFinite();
-        seen.increment_max = std::sqrt(step.colwise().squaredNorm().maxCoeff());
-        seen.residual_max = std::sqrt(now.colwise().squaredNorm().maxCoeff());
+        constexpr double infinite = std::numeric_limits<double>::infinity();
+        const bool finite_motion = displacement().allFinite() && step.allFinite();
+        seen.finite = finite_motion && now.allFinite();
+        seen.increment_max = finite_motion ? std::sqrt(step.colwise().squaredNorm().maxCoeff()) : infinite;
+        seen.residual_max = seen.finite ? std::sqrt(now.colwise().squaredNorm().maxCoeff()) : infinite;
         for (Eigen::Index node = 0; node < step.cols(); ++node)
             for (Eigen::Index c = 0; c < 3; ++c) {
                 const double v = step(c, node);
@@ -359,7 +371,6 @@ private:
         seen.min_jacobian = std::numeric_limits<double>::infinity();
         for (std::size_t e = 0; e < layout_.slot.size(); ++e) {
             const double jacobian = 1 + double(change_[layout_.slot[e]]);
-            if (!std::isfinite(jacobian)) seen.finite = false;
             if (jacobian >= seen.min_jacobian) continue;
             seen.min_jacobian = jacobian;
             seen.min_jacobian_tet = tet_[e];

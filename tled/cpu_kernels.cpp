@@ -5,7 +5,8 @@
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tled/cpu_kernels.cpp"
-// clang-format off: foreach_target.h must come before highway.h
+// foreach_target.h must come before highway.h.
+// clang-format off
 #include <hwy/foreach_target.h>
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
@@ -73,9 +74,9 @@ void finish_strain(D d, Strain<D>& strain) {
     cofactor<D>(strain.H, strain.cof);  // cof H for now
     const auto trace = strain.H[0][0] + strain.H[1][1] + strain.H[2][2];
     const auto second = strain.cof[0][0] + strain.cof[1][1] + strain.cof[2][2];
-    const auto determinant = hn::MulAdd(
-        strain.H[0][0], strain.cof[0][0],
-        hn::MulAdd(strain.H[0][1], strain.cof[0][1], strain.H[0][2] * strain.cof[0][2]));
+    const auto determinant =
+        hn::MulAdd(strain.H[0][0], strain.cof[0][0],
+                   hn::MulAdd(strain.H[0][1], strain.cof[0][1], strain.H[0][2] * strain.cof[0][2]));
     strain.change = trace + second + determinant;
     const auto diagonal = hn::Set(d, 1) + trace;
     for (int i = 0; i < 3; ++i)
@@ -83,6 +84,13 @@ void finish_strain(D d, Strain<D>& strain) {
             strain.cof[i][j] = strain.cof[i][j] - strain.H[j][i];
             if (i == j) strain.cof[i][j] = strain.cof[i][j] + diagonal;
         }
+}
+
+/// J − 1 where J > 0, NaN elsewhere: the laws know no inverted state, and Highway's logarithm gives a finite number for
+/// one, which would pass as a force.
+template <class D>
+Vec<D> positive_jacobian(D d, Vec<D> change) {
+    return hn::IfThenElse(change > hn::Set(d, -1), change, hn::NaN(d));
 }
 
 // A law provides shear_stress: P_Ψ = scale · S with S returned in place, and pressure_factor: U'(J).
@@ -152,6 +160,7 @@ void element_forces_of(const ElementBatches<T>& elements, std::size_t begin, std
             Strain<D> strain;
             displacement_gradient(d, elements, batch, lane, u, strain.H);
             finish_strain(d, strain);
+            strain.change = positive_jacobian(d, strain.change);
             const std::size_t scalar = batch * batch_width + static_cast<std::size_t>(lane);
             const auto volume = hn::LoadU(d, &elements.volume[scalar]);
             Vec<D> P[3][3];
@@ -209,12 +218,14 @@ void nodal_pressures_of(const T* modulus, const T* change, T* pressure, std::siz
     const std::size_t lanes = hn::Lanes(d);
     std::size_t i = 0;
     for (; i + lanes <= count; i += lanes)
-        hn::StoreU(hn::LoadU(d, modulus + i) * Response<Law>::pressure_factor(d, hn::LoadU(d, change + i)), d,
-                   pressure + i);
+        hn::StoreU(hn::LoadU(d, modulus + i) *
+                       Response<Law>::pressure_factor(d, positive_jacobian(d, hn::LoadU(d, change + i))),
+                   d, pressure + i);
     const hn::CappedTag<T, 1> one;
     for (; i < count; ++i)
-        hn::StoreU(hn::LoadU(one, modulus + i) * Response<Law>::pressure_factor(one, hn::LoadU(one, change + i)), one,
-                   pressure + i);
+        hn::StoreU(hn::LoadU(one, modulus + i) *
+                       Response<Law>::pressure_factor(one, positive_jacobian(one, hn::LoadU(one, change + i))),
+                   one, pressure + i);
 }
 
 template <class T>
@@ -260,11 +271,12 @@ void volume_changes_f64(const ElementBatches<double>& elements, std::size_t begi
 void nodal_pressures_f32(std::size_t law, const float* modulus, const float* change, float* out, std::size_t count) {
     nodal_pressures_any(law, modulus, change, out, count);
 }
-void nodal_pressures_f64(std::size_t law, const double* modulus, const double* change, double* out,
-                         std::size_t count) {
+void nodal_pressures_f64(std::size_t law, const double* modulus, const double* change, double* out, std::size_t count) {
     nodal_pressures_any(law, modulus, change, out, count);
 }
-const char* target_name() { return hwy::TargetName(HWY_TARGET); }
+const char* target_name() {
+    return hwy::TargetName(HWY_TARGET);
+}
 
 }  // namespace HWY_NAMESPACE
 }  // namespace tissuewarp::tled::detail
@@ -311,7 +323,9 @@ void nodal_pressures(std::size_t law, const double* modulus, const double* chang
     HWY_DYNAMIC_DISPATCH(nodal_pressures_f64)(law, modulus, change, pressure, count);
 }
 
-const char* instruction_set() { return HWY_DYNAMIC_DISPATCH(target_name)(); }
+const char* instruction_set() {
+    return HWY_DYNAMIC_DISPATCH(target_name)();
+}
 
 }  // namespace tissuewarp::tled::detail
 #endif  // HWY_ONCE

@@ -1,7 +1,7 @@
-/// How the GPU engine behaves in use: conditions that change, trouble, several engines, threads.
+/// How engines behave in use: conditions that change, trouble, several engines, threads.
 #include "core/errors.hpp"
 #include "shaders/device.hpp"
-#include "tests/tled/gpu_engine_scene.hpp"
+#include "tests/tled/engine_scene.hpp"
 
 #include <gmock/gmock.h>
 
@@ -15,7 +15,7 @@ namespace {
 
 using namespace scene;
 
-class GpuEngine : public ::testing::Test {
+class EngineInUse : public ::testing::TestWithParam<Kind> {
 protected:
     Model model = cube(4, Element::AveragedPressureT4, Laws::Mixed);
     RestState rest = rest_state(model);
@@ -24,8 +24,11 @@ protected:
     NodalConditions free = nodal_conditions({}, rest.node_count);
 };
 
-TEST_F(GpuEngine, StaysAtRestWithoutLoads) {
-    const auto engine = make_gpu_engine(rest);
+INSTANTIATE_TEST_SUITE_P(All, EngineInUse, ::testing::Values(Kind::CpuFloat64, Kind::CpuFloat32, Kind::Gpu),
+                         [](const auto& each) { return name_of(each.param); });
+
+TEST_P(EngineInUse, StaysAtRestWithoutLoads) {
+    const auto engine = make_engine(GetParam(), rest);
     engine->run(10, stable_coefficients(model, rest));
     EXPECT_EQ(engine->displacement(), zero);
     const Observation seen = engine->observe();
@@ -34,8 +37,8 @@ TEST_F(GpuEngine, StaysAtRestWithoutLoads) {
     EXPECT_EQ(seen.residual_max, 0.0);
 }
 
-TEST_F(GpuEngine, ObservesTheIncrementThatWasSet) {
-    const auto engine = make_gpu_engine(rest);
+TEST_P(EngineInUse, ObservesTheIncrementThatWasSet) {
+    const auto engine = make_engine(GetParam(), rest);
     const Matrix3Xd u = wavy(X), v = wavy(X, 0.01);
     engine->set_conditions(free);
     engine->set_state(u, v);
@@ -46,8 +49,8 @@ TEST_F(GpuEngine, ObservesTheIncrementThatWasSet) {
     EXPECT_NEAR(seen.increment_max, std::sqrt(v.colwise().squaredNorm().maxCoeff()), 1e-6);
 }
 
-TEST_F(GpuEngine, ConditionsReplaceEarlierOnes) {
-    const auto engine = make_gpu_engine(rest);
+TEST_P(EngineInUse, ConditionsReplaceEarlierOnes) {
+    const auto engine = make_engine(GetParam(), rest);
     engine->set_conditions(nodal_conditions(mixed_conditions(model.mesh), rest.node_count));
     engine->run(5, stable_coefficients(model, rest));
     engine->set_conditions(free);
@@ -56,8 +59,8 @@ TEST_F(GpuEngine, ConditionsReplaceEarlierOnes) {
     EXPECT_LT(largest(engine->residual() - expected), 1e-5 * largest(expected));
 }
 
-TEST_F(GpuEngine, ImposedDisplacementsTakeEffectAtOnceAndStay) {
-    const auto engine = make_gpu_engine(rest);
+TEST_P(EngineInUse, ImposedDisplacementsTakeEffectAtOnceAndStay) {
+    const auto engine = make_engine(GetParam(), rest);
     engine->set_state(wavy(X), wavy(X, 0.1));
     Conditions conditions;
     conditions.prescribed.push_back({7, {true, false, true}, {0.25, 9, -0.5}});
@@ -74,8 +77,8 @@ TEST_F(GpuEngine, ImposedDisplacementsTakeEffectAtOnceAndStay) {
     EXPECT_NE(engine->displacement()(1, 7), u(1, 7));
 }
 
-TEST_F(GpuEngine, NoticesWhatIsNotFinite) {
-    const auto engine = make_gpu_engine(rest);
+TEST_P(EngineInUse, NoticesWhatIsNotFinite) {
+    const auto engine = make_engine(GetParam(), rest);
     for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
         Matrix3Xd u = zero;
         u(1, 40) = bad;
@@ -88,8 +91,8 @@ TEST_F(GpuEngine, NoticesWhatIsNotFinite) {
     EXPECT_TRUE(engine->observe().finite);
 }
 
-TEST_F(GpuEngine, NoticesAnInvertedElementAndThatItsForceIsNotFinite) {
-    const auto engine = make_gpu_engine(rest);
+TEST_P(EngineInUse, NoticesAnInvertedElementAndThatItsForceIsNotFinite) {
+    const auto engine = make_engine(GetParam(), rest);
     const int inside = 2 + 5 * (2 + 5 * 2);
     Matrix3Xd u = zero;
     u(0, inside) = 12.0;  // further than the neighbours of a node in cells of 7.5 mm
@@ -103,8 +106,8 @@ TEST_F(GpuEngine, NoticesAnInvertedElementAndThatItsForceIsNotFinite) {
     EXPECT_FALSE(seen.finite);
 }
 
-TEST_F(GpuEngine, DivergenceIsNoticed) {
-    const auto engine = make_gpu_engine(rest);
+TEST_P(EngineInUse, DivergenceIsNoticed) {
+    const auto engine = make_engine(GetParam(), rest);
     engine->set_state(wavy(X, 0.3), zero);
     StepCoefficients coefficients = stable_coefficients(model, rest);
     coefficients.gain *= 100;
@@ -112,10 +115,10 @@ TEST_F(GpuEngine, DivergenceIsNoticed) {
     EXPECT_FALSE(engine->observe().finite);
 }
 
-TEST_F(GpuEngine, SeveralLiveSideBySide) {
+TEST_P(EngineInUse, SeveralLiveSideBySide) {
     const RestState other_rest = rest_state(cube(3, Element::T4, Laws::LnJ));
-    const auto first = make_gpu_engine(rest);
-    const auto second = make_gpu_engine(other_rest);
+    const auto first = make_engine(GetParam(), rest);
+    const auto second = make_engine(GetParam(), other_rest);
     const StepCoefficients coefficients = stable_coefficients(model, rest);
     const Matrix3Xd start = wavy(X, 0.3);
     first->set_state(start, zero);
@@ -123,15 +126,15 @@ TEST_F(GpuEngine, SeveralLiveSideBySide) {
     first->run(5, coefficients);
     second->run(5, coefficients);
     first->run(5, coefficients);
-    const auto alone = make_gpu_engine(rest);
+    const auto alone = make_engine(GetParam(), rest);
     alone->set_state(start, zero);
     alone->run(10, coefficients);
     EXPECT_EQ(first->displacement(), alone->displacement());
     EXPECT_LT(largest(second->displacement() - Matrix3Xd::Constant(3, other_rest.node_count, 0.5)), 1e-6);
 }
 
-TEST_F(GpuEngine, MayBeUsedFromOneThreadAfterAnother) {
-    const auto engine = make_gpu_engine(rest);
+TEST_P(EngineInUse, MayBeUsedFromOneThreadAfterAnother) {
+    const auto engine = make_engine(GetParam(), rest);
     const StepCoefficients coefficients = stable_coefficients(model, rest);
     engine->set_state(wavy(X, 0.3), zero);
     engine->run(10, coefficients);
@@ -146,8 +149,8 @@ TEST_F(GpuEngine, MayBeUsedFromOneThreadAfterAnother) {
     EXPECT_EQ(engine->displacement(), expected);
 }
 
-TEST_F(GpuEngine, RefusesWrongShapesAndMasses) {
-    const auto engine = make_gpu_engine(rest);
+TEST_P(EngineInUse, RefusesWrongShapesAndMasses) {
+    const auto engine = make_engine(GetParam(), rest);
     const Matrix3Xd other = Matrix3Xd::Zero(3, rest.node_count + 1);
     EXPECT_THROW(engine->set_state(other, zero), InvalidInput);
     EXPECT_THROW(engine->set_state(zero, other), InvalidInput);
@@ -155,6 +158,11 @@ TEST_F(GpuEngine, RefusesWrongShapesAndMasses) {
     EXPECT_THROW(engine->set_mass(zero), InvalidInput);
     EXPECT_THROW(engine->set_conditions(nodal_conditions({}, rest.node_count + 1)), InvalidInput);
 }
+
+class GpuEngine : public ::testing::Test {
+protected:
+    RestState rest = rest_state(cube(4, Element::AveragedPressureT4, Laws::Mixed));
+};
 
 TEST_F(GpuEngine, SaysWhereItRuns) {
     const auto engine = make_gpu_engine(rest);

@@ -1,5 +1,5 @@
 #pragma once
-/// The scenes of the GPU engine's tests, and the step in plain float64.
+/// The scenes of the engines' tests, and the step in plain float64.
 
 #include "meshing/primitives.hpp"
 #include "tled/engine.hpp"
@@ -13,6 +13,18 @@ namespace tissuewarp::tled::scene {
 using Eigen::Matrix3d;
 using Eigen::Matrix3Xd;
 using Eigen::Vector3d;
+
+/// Every engine takes the same tests.
+enum class Kind { CpuFloat64, CpuFloat32, Gpu };
+
+inline std::unique_ptr<Engine> make_engine(Kind kind, const RestState& rest) {
+    if (kind == Kind::Gpu) return make_gpu_engine(rest);
+    return make_cpu_engine(rest, kind == Kind::CpuFloat64 ? Scalar::Float64 : Scalar::Float32);
+}
+
+inline const char* name_of(Kind kind) {
+    return kind == Kind::Gpu ? "Gpu" : kind == Kind::CpuFloat64 ? "CpuFloat64" : "CpuFloat32";
+}
 
 enum class Laws { Iso, LnJ, Mixed };
 

@@ -1,5 +1,5 @@
-/// The GPU engine against the float64 reference, on whatever device EGL offers.
-#include "tests/tled/gpu_engine_scene.hpp"
+/// Every engine against the float64 reference, the GPU engine on whatever device EGL offers.
+#include "tests/tled/engine_scene.hpp"
 
 #include <gmock/gmock.h>
 #include <Eigen/Geometry>
@@ -13,26 +13,31 @@ namespace {
 
 using namespace scene;
 
-class GpuEngines : public ::testing::TestWithParam<std::tuple<Element, Laws>> {
+class Engines : public ::testing::TestWithParam<std::tuple<Kind, Element, Laws>> {
 protected:
-    Model model = cube(5, std::get<0>(GetParam()), std::get<1>(GetParam()));
+    Kind kind = std::get<0>(GetParam());
+    Model model = cube(5, std::get<1>(GetParam()), std::get<2>(GetParam()));
     RestState rest = rest_state(model);
     const Matrix3Xd& X = model.mesh.nodes;
-    std::unique_ptr<Engine> engine = make_gpu_engine(rest);
+    std::unique_ptr<Engine> engine = make_engine(kind, rest);
     Matrix3Xd zero = Matrix3Xd::Zero(3, rest.node_count);
 };
 
-INSTANTIATE_TEST_SUITE_P(All, GpuEngines,
-                         ::testing::Combine(::testing::Values(Element::T4, Element::AveragedPressureT4),
+INSTANTIATE_TEST_SUITE_P(All, Engines,
+                         ::testing::Combine(::testing::Values(Kind::CpuFloat64, Kind::CpuFloat32, Kind::Gpu),
+                                            ::testing::Values(Element::T4, Element::AveragedPressureT4),
                                             ::testing::Values(Laws::Iso, Laws::LnJ, Laws::Mixed)),
                          [](const auto& each) {
                              const std::string element =
-                                 std::get<0>(each.param) == Element::T4 ? "T4" : "AveragedPressure";
-                             const Laws laws = std::get<1>(each.param);
-                             return element + (laws == Laws::Iso ? "Iso" : laws == Laws::LnJ ? "LnJ" : "Mixed");
+                                 std::get<1>(each.param) == Element::T4 ? "T4" : "AveragedPressure";
+                             const Laws laws = std::get<2>(each.param);
+                             return name_of(std::get<0>(each.param)) + element +
+                                    (laws == Laws::Iso   ? "Iso"
+                                     : laws == Laws::LnJ ? "LnJ"
+                                                         : "Mixed");
                          });
 
-TEST_P(GpuEngines, InternalForceIsTheReferences) {
+TEST_P(Engines, InternalForceIsTheReferences) {
     for (const double amplitude : {1.0, 0.01}) {
         const Matrix3Xd u = wavy(X, amplitude).cast<float>().cast<double>();
         const Matrix3Xd expected = internal_force(rest, u);
@@ -41,14 +46,14 @@ TEST_P(GpuEngines, InternalForceIsTheReferences) {
     }
 }
 
-TEST_P(GpuEngines, ARigidRotationCausesNoForce) {
+TEST_P(Engines, ARigidRotationCausesNoForce) {
     const Matrix3d R = Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
     engine->set_state((R - Matrix3d::Identity()) * X, zero);
     const double scale = largest(internal_force(rest, wavy(X)));
     EXPECT_LT(largest(engine->internal_force()), 1e-3 * scale);
 }
 
-TEST_P(GpuEngines, ResidualHasSpringsForcesAndConstraints) {
+TEST_P(Engines, ResidualHasSpringsForcesAndConstraints) {
     const NodalConditions conditions = nodal_conditions(mixed_conditions(model.mesh), rest.node_count);
     engine->set_state(wavy(X), zero);
     engine->set_conditions(conditions);
@@ -62,7 +67,7 @@ TEST_P(GpuEngines, ResidualHasSpringsForcesAndConstraints) {
     EXPECT_LT(largest(engine->internal_force() - internal_force(rest, u)), 1e-5 * largest(internal_force(rest, u)));
 }
 
-TEST_P(GpuEngines, TwoHundredStepsFollowThePlainLoop) {
+TEST_P(Engines, TwoHundredStepsFollowThePlainLoop) {
     const NodalConditions conditions = nodal_conditions(mixed_conditions(model.mesh), rest.node_count);
     const StepCoefficients coefficients = stable_coefficients(model, rest);
     engine->set_conditions(conditions);
@@ -74,7 +79,7 @@ TEST_P(GpuEngines, TwoHundredStepsFollowThePlainLoop) {
     EXPECT_LT(largest(engine->increment() - plain.v), 1e-4 * largest(plain.v));
 }
 
-TEST_P(GpuEngines, ObservesWhatTheHostComputes) {
+TEST_P(Engines, ObservesWhatTheHostComputes) {
     const NodalConditions conditions = nodal_conditions(mixed_conditions(model.mesh), rest.node_count);
     const StepCoefficients coefficients = stable_coefficients(model, rest);
     const Matrix3Xd mass = 2.0 * lumped(rest) + Matrix3Xd::Constant(3, rest.node_count, 1e-6);
@@ -101,7 +106,7 @@ TEST_P(GpuEngines, ObservesWhatTheHostComputes) {
     EXPECT_EQ(seen.min_jacobian_tet, static_cast<int>(tet));
 }
 
-TEST_P(GpuEngines, RepeatsBitByBit) {
+TEST_P(Engines, RepeatsBitByBit) {
     const NodalConditions conditions = nodal_conditions(mixed_conditions(model.mesh), rest.node_count);
     const StepCoefficients coefficients = stable_coefficients(model, rest);
     const auto run = [&](Engine& each) {
@@ -112,10 +117,10 @@ TEST_P(GpuEngines, RepeatsBitByBit) {
     };
     const auto first = run(*engine);
     EXPECT_EQ(run(*engine), first);
-    EXPECT_EQ(run(*make_gpu_engine(rest)), first);
+    EXPECT_EQ(run(*make_engine(kind, rest)), first);
 }
 
-TEST_P(GpuEngines, RunningInPortionsIsRunningAtOnce) {
+TEST_P(Engines, RunningInPortionsIsRunningAtOnce) {
     const StepCoefficients coefficients = stable_coefficients(model, rest);
     engine->set_state(wavy(X, 0.3), zero);
     engine->run(30, coefficients);
