@@ -1,0 +1,13 @@
+#pragma once
+/// Where the equilibrium is computed.
+
+#include "registration/pipeline.hpp"
+
+namespace tissuewarp::registration::detail {
+
+/// The engine that the options ask for. `Auto` takes a hardware GPU for models large enough to profit, and the CPU when
+/// there is none or when it cannot be trusted (noted). Throws GpuUnavailable when a GPU was demanded.
+std::unique_ptr<tled::Engine> make_engine(const PreparedModel& prepared, const UpdateOptions& options,
+                                          Observer& observer);
+
+}  // namespace tissuewarp::registration::detail

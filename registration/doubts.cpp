@@ -1,0 +1,52 @@
+#include "registration/detail/doubts.hpp"
+
+#include "imaging/labels.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+double labelled_volume(const imaging::Volume& labels) {
+    return cv::countNonZero(imaging::mask_of_all(labels).voxels.reshape(1, 1)) * labels.geometry.voxel_volume();
+}
+
+}  // namespace
+
+std::string to_text(double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.2f", value);
+    return text;
+}
+
+std::vector<std::string> doubts(const PreparedModel& prepared, const imaging::Volume& fixed_labels,
+                                const UpdateResult& result) {
+    std::vector<std::string> reasons;
+    const Round& last = result.rounds.back();
+    const double spacing = prepared.labels.geometry.spacing.maxCoeff();
+    if (2 * last.matched < last.interface_nodes)
+        reasons.push_back("only " + std::to_string(last.matched) + " of " + std::to_string(last.interface_nodes) +
+                          " boundary nodes found their boundary in the fixed labels");
+    if (last.mean_residual_mm > spacing)
+        reasons.push_back("the surfaces still differ by " + to_text(last.mean_residual_mm) +
+                          " mm on average, more than a voxel");
+    if (last.held_back > last.matched / 50)
+        reasons.push_back(std::to_string(last.held_back) + " of " + std::to_string(last.matched) +
+                          " boundary nodes are still far from where they belong; allow more rounds");
+    if (result.min_jacobian < 0.1)
+        reasons.push_back("tissue is compressed to " + to_text(result.min_jacobian) + " of its volume in one element");
+    const double growth = labelled_volume(fixed_labels) / labelled_volume(prepared.labels);
+    double poisson = 0;
+    for (const auto& [label, material] : prepared.model.materials)
+        poisson = std::max(poisson, tled::poisson_ratio(material));
+    if (std::abs(growth - 1) > 0.1 && poisson > 0.4)
+        reasons.push_back("the labelled volume changed by the factor " + to_text(growth) +
+                          ", which tissue of Poisson's ratio " + to_text(poisson) +
+                          " resists; for lungs and other tissue that changes volume take 0.3 or less");
+    return reasons;
+}
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,36 @@
+#include "registration/detail/engine_choice.hpp"
+
+#include "shaders/device.hpp"
+
+#include <algorithm>
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+/// Elements below which one step on the CPU costs less than the GPU's dispatches.
+constexpr int least_elements_for_gpu = 20000;
+
+bool has_gpu() {
+    const auto devices = shaders::list_devices();
+    return std::any_of(devices.begin(), devices.end(),
+                       [](const shaders::DeviceInfo& device) { return device.hardware && device.problem.empty(); });
+}
+
+}  // namespace
+
+std::unique_ptr<tled::Engine> make_engine(const PreparedModel& prepared, const UpdateOptions& options,
+                                          Observer& observer) {
+    if (options.device == Device::Gpu) return tled::make_gpu_engine(prepared.rest, options.gpu_index);
+    const bool gpu =
+        options.device == Device::Auto && prepared.rest.element_count() >= least_elements_for_gpu && has_gpu();
+    if (!gpu) return tled::make_cpu_engine(prepared.rest, tled::Scalar::Float32);
+    try {
+        return tled::make_gpu_engine(prepared.rest, options.gpu_index);
+    } catch (const GpuUnavailable& reason) {
+        observer.note(std::string("the CPU takes over from the GPU: ") + reason.what());
+        return tled::make_cpu_engine(prepared.rest, tled::Scalar::Float32);
+    }
+}
+
+}  // namespace tissuewarp::registration::detail
