@@ -68,7 +68,7 @@ struct UpdateOptions {
     double last_range_mm = 4.0;      ///< and of the last, geometric in between
     double max_angle_deg = 50.0;     ///< between mesh normal and image boundary normal
     double residual_scale_mm = 1.0;  ///< Geman–McClure scale of the last round for what the model cannot follow
-    double trimmed_share = 0.02;  ///< of the matches, dropped from the second round on: those the model follows least
+    double trimmed_share = 0.02;  ///< of the matches, dropped in the last round: those the model did not follow
     tled::EquilibriumOptions equilibrium;
     Device device = Device::Auto;
     int gpu_index = -1;  ///< EGL device, −1: the first with hardware

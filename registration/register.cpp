@@ -99,7 +99,7 @@ private:
         std::vector<Match> matches =
             detail::match_interfaces(prepared_, fixed_, result_.alignment.placement, displacement_, normals,
                                      {record.range_mm, options_.max_angle_deg, scale, step_mm_});
-        if (round > 0) detail::trim(matches, options_.trimmed_share, options_.residual_scale_mm);
+        if (round == options_.rematches - 1) detail::trim(matches, options_.trimmed_share, options_.residual_scale_mm);
         const auto conditions = tled::nodal_conditions(
             detail::matched_springs(interfaces, matches, normals, displacement_, prepared_.options),
             prepared_.rest.node_count);
