@@ -30,6 +30,8 @@ void print_report(const meshing::TetMesh& mesh, const meshing::QualityReport& qu
     print_row("radius over edge", quality.radius_edge);
     print_row("volume (mm3)", quality.volume_mm3);
     print_row("edge (mm)", quality.edge_mm);
+    fmt::print("explicit time steps are limited by tetrahedron {}: 1/sqrt(sum |grad N|^2) = {:.3f} mm\n",
+               quality.step_limiting_tet, quality.step_limit_mm);
     for (const auto& [label, volume] : quality.label_volume_mm3)
         fmt::print("label {}: {:.1f} mm3, {:.3f} of its voxels\n", label, volume, fidelity.volume_ratio.at(label));
     fmt::print("distance to the label boundary: mean {:.3f} mm, 95th percentile {:.3f} mm, largest {:.3f} mm\n",
