@@ -147,7 +147,7 @@ CholmodFactor::CholmodFactor(const Eigen::SparseMatrix<double>& lower, const std
     cholmod_sparse matrix = view(lower);
     impl_->L = cholmod_analyze_p(&matrix, order.data(), nullptr, 0, &common);
     impl_->require_success("analyse");
-    constexpr double small_flops = 5e9;  // a third of a second on one core
+    constexpr double small_flops = 1e11;  // some seconds on one core; on busy cores spinning costs twenty times that
     impl_->small = common.fl < small_flops;
 }
 
@@ -171,7 +171,7 @@ Eigen::VectorXd CholmodFactor::solve(const Eigen::VectorXd& b) const {
     right.x = const_cast<double*>(b.data());
     right.xtype = CHOLMOD_REAL;
     right.dtype = CHOLMOD_DOUBLE;
-    const SingleBlasThread single(impl_->small);
+    const SingleBlasThread single(true);  // a triangular solve is bound by memory
     cholmod_solve2(CHOLMOD_A, impl_->L, &right, nullptr, &impl_->x, nullptr, &impl_->y, &impl_->e, &impl_->common);
     impl_->require_success("solve with");
     return Eigen::Map<const Eigen::VectorXd>(static_cast<const double*>(impl_->x->x), b.size());
