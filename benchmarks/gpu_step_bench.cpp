@@ -71,13 +71,12 @@ Scene stretched_cube(int cells) {
     return scene;
 }
 
-/// The same rest state under the other law of the same moduli at rest.
+/// The same rest state, of one material, under another law of the same moduli at rest.
 void use_law(tled::RestState& rest, const tled::Material& material) {
-    for (tled::LawBlock& block : rest.blocks) block.law = material.index();
+    rest.materials = {material};
     const double modulus = tled::volumetric_modulus(material);
     if (rest.pressure.count() == 0) rest.volumetric_modulus.setConstant(modulus);
     rest.pressure.modulus.setConstant(modulus);
-    std::fill(rest.pressure.law.begin(), rest.pressure.law.end(), material.index());
 }
 
 /// 0.9 of the step that the element bound allows, ω² ≤ 4 (λ + 2μ)/ρ Σ |grad N|², damped by α with α Δt/2 = 0.01.

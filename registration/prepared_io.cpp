@@ -9,7 +9,7 @@ namespace tissuewarp::registration {
 namespace {
 
 constexpr const char* format = "tissuewarp prepared model";
-constexpr int version = 1;
+constexpr int version = 2;
 
 std::vector<hsize_t> voxel_shape(const imaging::Geometry& grid) {
     return {static_cast<hsize_t>(grid.size[2]), static_cast<hsize_t>(grid.size[1]), static_cast<hsize_t>(grid.size[0])};

@@ -11,7 +11,7 @@ namespace tissuewarp::registration {
 namespace {
 
 constexpr const char* format = "tissuewarp registration record";
-constexpr int version = 1;
+constexpr int version = 2;
 
 /// det F of every tetrahedron; the placement is rigid and has no part in it.
 Eigen::VectorXd jacobians(const Deformation& deformation) {

@@ -1,5 +1,6 @@
 #include "shaders/catalogue.hpp"
 
+#include <array>
 #include <utility>
 
 namespace tissuewarp::shaders {
@@ -16,8 +17,15 @@ std::string flag(bool on) {
     return std::string(1, on ? '1' : '0');
 }
 
-std::string chunk(Law law) {
-    return law == Law::NeoHookeanIso ? "law.neo_hookean_iso" : "law.neo_hookean_lnj";
+constexpr std::array<const char*, law_count> law_chunk{
+    "law.neo_hookean_iso", "law.neo_hookean_lnj", "law.neo_hookean_stable",     "law.polynomial",
+    "law.arruda_boyce",    "law.ogden",           "law.transversely_isotropic",
+};
+
+/// The law, after its volumetric function where that has a chunk of its own.
+void add_law(ProgramSource& source, Law law) {
+    if (law != Law::NeoHookeanLnJ && law != Law::ArrudaBoyce) source.chunks.emplace_back("volume.quadratic");
+    source.chunks.emplace_back(law_chunk.at(static_cast<std::size_t>(law)));
 }
 
 ProgramSource node_program(std::string kernel, const NodeEffects& effects) {
@@ -34,7 +42,8 @@ ProgramSource node_program(std::string kernel, const NodeEffects& effects) {
 }  // namespace
 
 ProgramSource element_force_program(Law law, PressureRule rule) {
-    ProgramSource source{"element_force", {"index", "bindings", "numbers", "element", chunk(law)}, {}, {}};
+    ProgramSource source{"element_force", {"index", "bindings", "numbers", "element", "material", "isochoric"}, {}, {}};
+    add_law(source, law);
     source.defines = {{"WORKGROUP_SIZE", workgroup_size}, {"USES_SHEAR", "1"}};
     if (rule == PressureRule::Element) {
         source.chunks.emplace_back("pressure.element");
@@ -50,10 +59,10 @@ ProgramSource element_volume_program() {
 }
 
 ProgramSource nodal_pressure_program(Law law) {
-    return {"nodal_pressure",
-            {"index", "bindings", "numbers", chunk(law)},
-            {{"WORKGROUP_SIZE", workgroup_size}, {"USES_SHEAR", "0"}},
-            {}};
+    ProgramSource source{"nodal_pressure", {"index", "bindings", "numbers"}, {}, {}};
+    source.defines = {{"WORKGROUP_SIZE", workgroup_size}, {"USES_SHEAR", "0"}};
+    add_law(source, law);
+    return source;
 }
 
 ProgramSource node_step_program(const NodeEffects& effects, StoreResidual store) {
@@ -93,7 +102,8 @@ ProgramSource observe_elements_program() {
 std::vector<ProgramSource> every_program() {
     std::vector<ProgramSource> all{element_volume_program(), impose_program(), previous_displacement_program(),
                                    observe_nodes_program(), observe_elements_program()};
-    for (const Law law : {Law::NeoHookeanIso, Law::NeoHookeanLnJ}) {
+    for (int index = 0; index < law_count; ++index) {
+        const auto law = static_cast<Law>(index);
         for (const PressureRule rule :
              {PressureRule::Element, PressureRule::Averaged, PressureRule::AveragedWithElementPart})
             all.push_back(element_force_program(law, rule));

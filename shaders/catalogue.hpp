@@ -9,7 +9,16 @@
 namespace tissuewarp::shaders {
 
 /// Chunks law.*.glsl.
-enum class Law { NeoHookeanIso, NeoHookeanLnJ };
+enum class Law {
+    NeoHookeanIso,
+    NeoHookeanLnJ,
+    NeoHookeanStable,
+    Polynomial,
+    ArrudaBoyce,
+    Ogden,
+    TransverselyIsotropic,
+};
+inline constexpr int law_count = 7;
 
 /// Where the volumetric stress is evaluated: chunks pressure.*.glsl.
 enum class PressureRule {

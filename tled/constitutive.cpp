@@ -5,9 +5,8 @@
 
 #include <cmath>
 #include <limits>
-#include <string>
 
-#include "core/errors.hpp"
+#include "tled/detail/laws.hpp"
 
 namespace tissuewarp::tled {
 
@@ -17,47 +16,20 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-double contract(const Matrix3d& A, const Matrix3d& B) {
-    return A.cwiseProduct(B).sum();
+bool admissible(const Material& material, double J) {
+    return J > 0.0 || admits_inversion(material);
 }
 
-// The isochoric law, Bonet & Wood, Nonlinear Continuum Mechanics for Finite Element Analysis (2008), section 6.5:
-// Ψ = μ/2 (J^(−2/3) tr C − 3), so P = μ J^(−2/3) (F − tr C/3 F⁻ᵀ), and with d(F⁻ᵀ) = −F⁻ᵀ dFᵀ F⁻ᵀ, dJ = J F⁻ᵀ:dF the
-// tangent below. U = (J − 1)²/2.
-double shear_energy_of(const NeoHookeanIso& law, const Matrix3d& F, double J) {
-    return 0.5 * law.shear_modulus * (std::pow(J, -2.0 / 3.0) * F.squaredNorm() - 3.0);
+/// A direction of unit length in F: component `index` of the column-major order.
+Matrix3d unit_direction(int index) {
+    Matrix3d unit = Matrix3d::Zero();
+    unit.data()[index] = 1.0;
+    return unit;
 }
 
-Matrix3d shear_stress_of(const NeoHookeanIso& law, const Matrix3d& F, double J) {
-    const double scale = law.shear_modulus * std::pow(J, -2.0 / 3.0);
-    return scale * (F - F.squaredNorm() / 3.0 * F.inverse().transpose());
-}
-
-void set_shear_tangent(const NeoHookeanIso& law, double J, Tangent& t) {
-    const double scale = law.shear_modulus * std::pow(J, -2.0 / 3.0), trace_C = t.F.squaredNorm();
-    t.a = scale;
-    t.b = -2.0 / 3.0 * scale;
-    t.c = 2.0 / 9.0 * trace_C * scale;
-    t.d = trace_C / 3.0 * scale;
-}
-
-VolumetricFunction volumetric_of(const NeoHookeanIso& /*law*/, double J) {
+template <class Law>
+VolumetricFunction volumetric_of(const Law& /*law*/, double J) {
     return {0.5 * (J - 1.0) * (J - 1.0), J - 1.0, 1.0};
-}
-
-// The compressible neo-Hookean law, Bonet & Wood, equation 6.27:
-// Ψ = μ/2 (tr C − 3) − μ ln J, so P = μ (F − F⁻ᵀ) and dP = μ (dF + F⁻ᵀ dFᵀ F⁻ᵀ). U = (ln J)²/2.
-double shear_energy_of(const NeoHookeanLnJ& law, const Matrix3d& F, double J) {
-    return law.shear_modulus * (0.5 * (F.squaredNorm() - 3.0) - std::log(J));
-}
-
-Matrix3d shear_stress_of(const NeoHookeanLnJ& law, const Matrix3d& F, double /*J*/) {
-    return law.shear_modulus * (F - F.inverse().transpose());
-}
-
-void set_shear_tangent(const NeoHookeanLnJ& law, double /*J*/, Tangent& t) {
-    t.a = law.shear_modulus;
-    t.d = law.shear_modulus;
 }
 
 VolumetricFunction volumetric_of(const NeoHookeanLnJ& /*law*/, double J) {
@@ -65,68 +37,51 @@ VolumetricFunction volumetric_of(const NeoHookeanLnJ& /*law*/, double J) {
     return {0.5 * log_J * log_J, log_J / J, (1.0 - log_J) / (J * J)};
 }
 
-}  // namespace
-
-Material material_of_law(std::size_t law, double shear_modulus, double volumetric_modulus) {
-    static_assert(std::variant_size_v<Material> == 2, "a new law needs its case here");
-    switch (law) {
-        case 0:
-            return NeoHookeanIso{shear_modulus, volumetric_modulus};
-        case 1:
-            return NeoHookeanLnJ{shear_modulus, volumetric_modulus};
-        default:
-            throw InvalidInput("constitutive law " + std::to_string(law) + " does not exist: use 0 or 1");
-    }
+VolumetricFunction volumetric_of(const ArrudaBoyce& /*law*/, double J) {
+    return {0.5 * (0.5 * (J * J - 1.0) - std::log(J)), 0.5 * (J - 1.0 / J), 0.5 * (1.0 + 1.0 / (J * J))};
 }
 
+}  // namespace
+
 double shear_energy(const Material& material, const Matrix3d& F) {
-    const double J = F.determinant();
-    if (!(J > 0.0)) return infinity;
-    return std::visit([&](const auto& law) { return shear_energy_of(law, F, J); }, material);
+    if (!admissible(material, F.determinant())) return infinity;
+    return std::visit([&](const auto& law) { return detail::shear_energy_of(law, F); }, material);
 }
 
 Matrix3d shear_stress(const Material& material, const Matrix3d& F) {
-    return std::visit([&](const auto& law) { return shear_stress_of(law, F, F.determinant()); }, material);
+    return std::visit([&](const auto& law) { return detail::shear_stress_of(law, F); }, material);
 }
 
 Tangent shear_tangent(const Material& material, const Matrix3d& F) {
-    Tangent tangent;
-    tangent.F = F;
-    tangent.G = F.inverse().transpose();
-    std::visit([&](const auto& law) { set_shear_tangent(law, F.determinant(), tangent); }, material);
+    Tangent tangent{.F = F};
+    std::visit(
+        [&](const auto& law) {
+            for (int k = 0; k < 9; ++k)
+                tangent.derivative.col(k) = detail::shear_derivative_of(law, F, unit_direction(k)).reshaped();
+        },
+        material);
     return tangent;
 }
 
 void add_volumetric_tangent(Tangent& tangent, double pressure, double stiffness) {
-    // d(p J G) = stiffness J² (G:dF) G + p J [(G:dF) G − G dFᵀ G].
-    const double J = tangent.F.determinant();
-    tangent.c += stiffness * J * J + pressure * J;
-    tangent.d -= pressure * J;
+    const Eigen::Matrix<double, 9, 1> cof = cofactor(tangent.F).reshaped();
+    tangent.derivative += stiffness * cof * cof.transpose();
+    for (int k = 0; k < 9; ++k)
+        tangent.derivative.col(k) += pressure * cofactor_derivative(tangent.F, unit_direction(k)).reshaped();
 }
 
 Matrix3d Tangent::apply(const Matrix3d& dF) const {
-    const double G_dF = contract(G, dF), F_dF = contract(F, dF);
-    return a * dF + b * (G_dF * F + F_dF * G) + c * G_dF * G + d * G * dF.transpose() * G;
-}
-
-Eigen::Matrix<double, 9, 9> Tangent::matrix() const {
-    Eigen::Matrix<double, 9, 9> result;
-    for (int column = 0; column < 9; ++column) {
-        Matrix3d unit = Matrix3d::Zero();
-        unit(column % 3, column / 3) = 1.0;
-        result.col(column) = apply(unit).reshaped();
-    }
-    return result;
+    return (derivative * dF.reshaped()).reshaped(3, 3);
 }
 
 VolumetricFunction volumetric_function(const Material& material, double J) {
-    if (!(J > 0.0)) return {infinity, 0.0, 0.0};
+    if (!admissible(material, J)) return {infinity, 0.0, 0.0};
     return std::visit([&](const auto& law) { return volumetric_of(law, J); }, material);
 }
 
 double strain_energy(const Material& material, const Matrix3d& F) {
     const double J = F.determinant();
-    if (!(J > 0.0)) return infinity;  // not 0 · ∞ where the modulus is zero
+    if (!admissible(material, J)) return infinity;  // not 0 · ∞ where the modulus is zero
     return shear_energy(material, F) + volumetric_modulus(material) * volumetric_function(material, J).energy;
 }
 

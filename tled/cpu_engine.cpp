@@ -3,12 +3,14 @@
 
 #include "core/errors.hpp"
 #include "tled/detail/cpu_kernels.hpp"
+#include "tled/detail/kernel_parameters.hpp"
 #include "tled/engine.hpp"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -22,7 +24,7 @@ using detail::Kinematics;
 using detail::record;
 
 struct BatchBlock {
-    std::size_t law;
+    int material;            // of RestState::materials
     std::size_t begin, end;  // batches
 };
 
@@ -36,14 +38,14 @@ struct BatchLayout {
 BatchLayout batch_layout(const RestState& rest) {
     BatchLayout layout;
     layout.slot.resize(static_cast<std::size_t>(rest.element_count()));
-    for (const LawBlock& block : rest.blocks) {
+    for (const MaterialBlock& block : rest.blocks) {
         const std::size_t begin = layout.element.size() / batch_width;
         for (int e = block.begin; e < block.end; ++e) {
             layout.slot[static_cast<std::size_t>(e)] = layout.element.size();
             layout.element.push_back(e);
         }
         while (layout.element.size() % batch_width != 0) layout.element.push_back(-1);
-        layout.blocks.push_back({block.law, begin, layout.element.size() / batch_width});
+        layout.blocks.push_back({block.material, begin, layout.element.size() / batch_width});
     }
     return layout;
 }
@@ -56,8 +58,8 @@ ElementBatches<T> element_batches(const RestState& rest, const BatchLayout& layo
     batches.node.resize(slots * 4);
     if (averaged) batches.pressure.resize(slots * 4);
     batches.gradient.resize(slots * 9);
+    if (rest.fibre.size() > 0) batches.fibre.resize(slots * 3);
     batches.volume.assign(slots, T(0));
-    batches.shear_modulus.assign(slots, T(0));
     batches.volumetric_modulus.assign(slots, T(0));
     int last = 0;
     for (std::size_t s = 0; s < slots; ++s) {
@@ -72,9 +74,10 @@ ElementBatches<T> element_batches(const RestState& rest, const BatchLayout& layo
         }
         for (std::size_t k = 0; k < 9; ++k)
             batches.gradient[(batch * 9 + k) * batch_width + lane] = T(rest.gradient(static_cast<int>(k), e));
+        for (std::size_t c = 0; rest.fibre.size() > 0 && c < 3; ++c)
+            batches.fibre[(batch * 3 + c) * batch_width + lane] = T(rest.fibre(static_cast<int>(c), e));
         if (padding) continue;
         batches.volume[s] = T(rest.volume[e]);
-        batches.shear_modulus[s] = T(rest.shear_modulus[e]);
         batches.volumetric_modulus[s] = T(rest.volumetric_modulus[e]);
     }
     return batches;
@@ -93,6 +96,18 @@ std::vector<std::uint32_t> gather_list(const Incidence& incidence, const BatchLa
     return list;
 }
 
+template <class T>
+std::vector<detail::KernelMaterial<T>> kernel_materials(const RestState& rest) {
+    std::vector<detail::KernelMaterial<T>> result;
+    for (const Material& material : rest.materials) {
+        detail::KernelMaterial<T> entry{material.index(), {}};
+        const detail::KernelParameters parameters = detail::kernel_parameters(material);
+        std::transform(parameters.begin(), parameters.end(), entry.parameter.begin(), [](double p) { return T(p); });
+        result.push_back(entry);
+    }
+    return result;
+}
+
 void require_columns(Eigen::Index columns, std::size_t nodes, const char* what) {
     if (static_cast<std::size_t>(columns) != nodes)
         throw InvalidInput(std::string(what) + " has " + std::to_string(columns) + " columns; the model has " +
@@ -105,6 +120,7 @@ public:
     explicit CpuEngine(const RestState& rest)
         : layout_(batch_layout(rest)),
           elements_(element_batches<T>(rest, layout_)),
+          materials_(kernel_materials<T>(rest)),
           kinematics_(rest.pressure.count() > 0 ? Kinematics::AveragedPressure : Kinematics::T4),
           node_count_(static_cast<std::size_t>(rest.node_count)),
           tet_(rest.tet),
@@ -242,6 +258,7 @@ public:
 private:
     BatchLayout layout_;
     ElementBatches<T> elements_;
+    std::vector<detail::KernelMaterial<T>> materials_;
     Kinematics kinematics_;
     std::size_t node_count_;
     std::vector<int> tet_;
@@ -254,7 +271,7 @@ private:
     std::vector<int> pressure_offset_;
     std::vector<std::uint32_t> pressure_entry_;
     std::vector<T> inverse_pressure_volume_, pressure_modulus_, nodal_change_, nodal_pressure_, change_;
-    std::vector<BatchBlock> pressure_runs_;  // runs of pressure nodes that share a law
+    std::vector<BatchBlock> pressure_runs_;  // runs of pressure nodes that share a material
 
     // records of four per node
     std::vector<T> displacement_, increment_, inverse_mass_, force_load_, free_, scratch_;
@@ -273,8 +290,8 @@ private:
         for (std::size_t a = 0; a < count; ++a) {
             inverse_pressure_volume_[a] = T(1 / pressure.volume[static_cast<Eigen::Index>(a)]);
             pressure_modulus_[a] = T(pressure.modulus[static_cast<Eigen::Index>(a)]);
-            if (pressure_runs_.empty() || pressure_runs_.back().law != pressure.law[a])
-                pressure_runs_.push_back({pressure.law[a], a, a});
+            if (pressure_runs_.empty() || pressure_runs_.back().material != pressure.material[a])
+                pressure_runs_.push_back({pressure.material[a], a, a});
             pressure_runs_.back().end = a + 1;
         }
     }
@@ -301,8 +318,8 @@ private:
         if (kinematics_ == Kinematics::AveragedPressure) average_pressure(u);
         for (const BatchBlock& block : layout_.blocks)
             for_batches(block.begin, block.end, [&](std::size_t begin, std::size_t end) {
-                detail::element_forces(block.law, kinematics_, elements_, begin, end, u, nodal_pressure_.data(),
-                                       corner_force_.data());
+                detail::element_forces(materials_[static_cast<std::size_t>(block.material)], kinematics_, elements_,
+                                       begin, end, u, nodal_pressure_.data(), corner_force_.data());
             });
     }
 
@@ -325,7 +342,8 @@ private:
             },
             tbb::static_partitioner());
         for (const BatchBlock& run : pressure_runs_)
-            detail::nodal_pressures(run.law, &pressure_modulus_[run.begin], &nodal_change_[run.begin],
+            detail::nodal_pressures(materials_[static_cast<std::size_t>(run.material)].law,
+                                    &pressure_modulus_[run.begin], &nodal_change_[run.begin],
                                     &nodal_pressure_[run.begin], run.end - run.begin);
     }
 

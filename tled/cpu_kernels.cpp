@@ -13,23 +13,12 @@
 // clang-format on
 
 #include "tled/detail/cpu_kernels.hpp"
-#include "tled/material.hpp"
+#include "tled/detail/cpu_laws-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace tissuewarp::tled::detail {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
-
-template <class D>
-using Vec = hn::Vec<D>;
-
-/// Kinematics of a batch of elements: H, cof F and J − 1.
-template <class D>
-struct Strain {
-    Vec<D> H[3][3];
-    Vec<D> cof[3][3];
-    Vec<D> change;  // J − 1
-};
 
 template <class D, class T>
 Vec<D> gather(D d, const T* base, const std::int32_t* index) {
@@ -86,115 +75,84 @@ void finish_strain(D d, Strain<D>& strain) {
         }
 }
 
-/// J − 1 where J > 0, NaN elsewhere: the laws know no inverted state, and Highway's logarithm gives a finite number for
+/// J − 1 where J > 0, NaN elsewhere for laws that know no inverted state: Highway's logarithm gives a finite number for
 /// one, which would pass as a force.
-template <class D>
-Vec<D> positive_jacobian(D d, Vec<D> change) {
-    return hn::IfThenElse(change > hn::Set(d, -1), change, hn::NaN(d));
+template <class Law, class D>
+Vec<D> admissible(D d, Vec<D> change) {
+    if constexpr (Response<Law>::admits_inversion)
+        return change;
+    else
+        return hn::IfThenElse(change > hn::Set(d, -1), change, hn::NaN(d));
 }
 
-// A law provides shear_stress: P_Ψ = scale · S with S returned in place, and pressure_factor: U'(J).
-// J F − cof F = J H + (J I − cof F) is formed without the cancelling unit parts: J I − cof F has the entries of
-// (J − 1) I − (cof F − I).
+template <class D, class T>
+Strain<D> strain_of(D d, const ElementBatches<T>& elements, std::size_t batch, int lane, const T* u) {
+    Strain<D> strain;
+    displacement_gradient(d, elements, batch, lane, u, strain.H);
+    finish_strain(d, strain);
+    return strain;
+}
 
-template <class Law>
-struct Response;
+/// V p, kPa mm³.
+template <class Law, Kinematics kinematics, class D, class T>
+Vec<D> scaled_pressure(D d, const ElementBatches<T>& elements, std::size_t batch, int lane, Vec<D> volume,
+                       Vec<D> change, const T* pressure) {
+    if constexpr (kinematics == Kinematics::AveragedPressure) {
+        const std::int32_t* node = &elements.pressure[batch * 4 * batch_width + static_cast<std::size_t>(lane)];
+        const auto sum = gather(d, pressure, node) + gather(d, pressure, node + batch_width) +
+                         gather(d, pressure, node + 2 * batch_width) + gather(d, pressure, node + 3 * batch_width);
+        return volume * (sum * hn::Set(d, T(0.25)));
+    } else {
+        const auto modulus =
+            hn::LoadU(d, &elements.volumetric_modulus[batch * batch_width + static_cast<std::size_t>(lane)]);
+        return volume * (modulus * Response<Law>::pressure_factor(d, change));
+    }
+}
 
-template <>
-struct Response<NeoHookeanLnJ> {
-    /// P = μ (F − F^−T) = μ/J (J F − cof F)
-    template <class D>
-    static void shear_stress(D d, const Strain<D>& strain, Vec<D> mu, Vec<D> (&P)[3][3]) {
-        const auto one = hn::Set(d, 1);
-        const auto J = one + strain.change;
-        const auto scale = mu / J;
-        for (int i = 0; i < 3; ++i)
-            for (int j = 0; j < 3; ++j) {
-                auto s = hn::MulSub(J, strain.H[i][j], strain.cof[i][j]);
-                if (i == j) s = hn::MulSub(J, strain.H[i][j], strain.cof[i][j] - one) + strain.change;
-                P[i][j] = scale * s;
-            }
+/// f_a = V P ∂N_a/∂X for the scaled stress V P; the first corner takes minus the sum of the others.
+template <class D, class T>
+void store_corner_forces(D d, const ElementBatches<T>& elements, std::size_t batch, int lane, const Vec<D> (&P)[3][3],
+                         T* force) {
+    const T* gradient = &elements.gradient[batch * 9 * batch_width + static_cast<std::size_t>(lane)];
+    T* out = force + (batch * 4 * batch_width + static_cast<std::size_t>(lane)) * record;
+    const auto zero = hn::Zero(d);
+    Vec<D> f0[3] = {zero, zero, zero};
+    for (int k = 0; k < 3; ++k) {
+        const auto b0 = hn::LoadU(d, gradient + 3 * k * batch_width);
+        const auto b1 = hn::LoadU(d, gradient + (3 * k + 1) * batch_width);
+        const auto b2 = hn::LoadU(d, gradient + (3 * k + 2) * batch_width);
+        Vec<D> f[3];
+        for (int i = 0; i < 3; ++i) {
+            f[i] = hn::MulAdd(P[i][0], b0, hn::MulAdd(P[i][1], b1, P[i][2] * b2));
+            f0[i] = f0[i] - f[i];
+        }
+        hn::StoreInterleaved4(f[0], f[1], f[2], zero, d, out + (k + 1) * batch_width * record);
     }
-    /// U' = ln J / J
-    template <class D>
-    static Vec<D> pressure_factor(D d, Vec<D> change) {
-        return hn::Log1p(d, change) / (hn::Set(d, 1) + change);
-    }
-};
-
-template <>
-struct Response<NeoHookeanIso> {
-    /// P = μ J^(−2/3) (F − tr C/3 F^−T) = μ J^(−5/3) (J F − cof F − (tr C/3 − 1) cof F)
-    template <class D>
-    static void shear_stress(D d, const Strain<D>& strain, Vec<D> mu, Vec<D> (&P)[3][3]) {
-        const auto one = hn::Set(d, 1);
-        const auto J = one + strain.change;
-        auto trace = strain.H[0][0] + strain.H[1][1] + strain.H[2][2];
-        auto excess = trace + trace;  // tr C − 3 = 2 tr H + H : H
-        for (int i = 0; i < 3; ++i)
-            for (int j = 0; j < 3; ++j) excess = hn::MulAdd(strain.H[i][j], strain.H[i][j], excess);
-        const auto third = excess * hn::Set(d, 1.0 / 3);
-        const auto scale = mu * hn::Exp(d, hn::Log1p(d, strain.change) * hn::Set(d, -5.0 / 3));
-        for (int i = 0; i < 3; ++i)
-            for (int j = 0; j < 3; ++j) {
-                auto s = hn::MulSub(J, strain.H[i][j], strain.cof[i][j]);
-                if (i == j) s = hn::MulSub(J, strain.H[i][j], strain.cof[i][j] - one) + strain.change;
-                P[i][j] = scale * hn::NegMulAdd(third, strain.cof[i][j], s);
-            }
-    }
-    /// U' = J − 1
-    template <class D>
-    static Vec<D> pressure_factor(D, Vec<D> change) {
-        return change;
-    }
-};
+    hn::StoreInterleaved4(f0[0], f0[1], f0[2], zero, d, out);
+}
 
 template <class Law, Kinematics kinematics, class T>
-void element_forces_of(const ElementBatches<T>& elements, std::size_t begin, std::size_t end, const T* u,
-                       const T* pressure, T* force) {
+void element_forces_of(const T* parameter, const ElementBatches<T>& elements, std::size_t begin, std::size_t end,
+                       const T* u, const T* pressure, T* force) {
     const hn::CappedTag<T, batch_width> d;
     using D = hn::CappedTag<T, batch_width>;
     const int lanes = static_cast<int>(hn::Lanes(d));
     for (std::size_t batch = begin; batch < end; ++batch)
         for (int lane = 0; lane < batch_width; lane += lanes) {
-            Strain<D> strain;
-            displacement_gradient(d, elements, batch, lane, u, strain.H);
-            finish_strain(d, strain);
-            strain.change = positive_jacobian(d, strain.change);
-            const std::size_t scalar = batch * batch_width + static_cast<std::size_t>(lane);
-            const auto volume = hn::LoadU(d, &elements.volume[scalar]);
+            Strain<D> strain = strain_of(d, elements, batch, lane, u);
+            strain.change = admissible<Law>(d, strain.change);
+            Tissue<D> tissue;
+            tissue.parameter = parameter;
+            if constexpr (Response<Law>::has_fibre)
+                for (int c = 0; c < 3; ++c)
+                    tissue.fibre[c] = hn::LoadU(d, &elements.fibre[(batch * 3 + c) * batch_width + lane]);
+            const auto volume = hn::LoadU(d, &elements.volume[batch * batch_width + static_cast<std::size_t>(lane)]);
             Vec<D> P[3][3];
-            Response<Law>::shear_stress(d, strain, volume * hn::LoadU(d, &elements.shear_modulus[scalar]), P);
-            Vec<D> p;
-            if constexpr (kinematics == Kinematics::AveragedPressure) {
-                const std::int32_t* node = &elements.pressure[batch * 4 * batch_width + static_cast<std::size_t>(lane)];
-                p = gather(d, pressure, node) + gather(d, pressure, node + batch_width) +
-                    gather(d, pressure, node + 2 * batch_width) + gather(d, pressure, node + 3 * batch_width);
-                p = p * hn::Set(d, 0.25);
-            } else {
-                p = hn::LoadU(d, &elements.volumetric_modulus[scalar]) *
-                    Response<Law>::pressure_factor(d, strain.change);
-            }
-            p = p * volume;
+            Response<Law>::shear_stress(d, strain, tissue, volume, P);
+            const auto p = scaled_pressure<Law, kinematics>(d, elements, batch, lane, volume, strain.change, pressure);
             for (int i = 0; i < 3; ++i)
                 for (int j = 0; j < 3; ++j) P[i][j] = hn::MulAdd(p, strain.cof[i][j], P[i][j]);
-
-            const T* gradient = &elements.gradient[batch * 9 * batch_width + static_cast<std::size_t>(lane)];
-            T* out = force + (batch * 4 * batch_width + static_cast<std::size_t>(lane)) * record;
-            const auto zero = hn::Zero(d);
-            Vec<D> f0[3] = {zero, zero, zero};
-            for (int k = 0; k < 3; ++k) {
-                const auto b0 = hn::LoadU(d, gradient + 3 * k * batch_width);
-                const auto b1 = hn::LoadU(d, gradient + (3 * k + 1) * batch_width);
-                const auto b2 = hn::LoadU(d, gradient + (3 * k + 2) * batch_width);
-                Vec<D> f[3];
-                for (int i = 0; i < 3; ++i) {
-                    f[i] = hn::MulAdd(P[i][0], b0, hn::MulAdd(P[i][1], b1, P[i][2] * b2));
-                    f0[i] = f0[i] - f[i];
-                }
-                hn::StoreInterleaved4(f[0], f[1], f[2], zero, d, out + (k + 1) * batch_width * record);
-            }
-            hn::StoreInterleaved4(f0[0], f0[1], f0[2], zero, d, out);
+            store_corner_forces(d, elements, batch, lane, P, force);
         }
 }
 
@@ -204,12 +162,9 @@ void volume_changes_of(const ElementBatches<T>& elements, std::size_t begin, std
     using D = hn::CappedTag<T, batch_width>;
     const int lanes = static_cast<int>(hn::Lanes(d));
     for (std::size_t batch = begin; batch < end; ++batch)
-        for (int lane = 0; lane < batch_width; lane += lanes) {
-            Strain<D> strain;
-            displacement_gradient(d, elements, batch, lane, u, strain.H);
-            finish_strain(d, strain);
-            hn::StoreU(strain.change, d, change + batch * batch_width + static_cast<std::size_t>(lane));
-        }
+        for (int lane = 0; lane < batch_width; lane += lanes)
+            hn::StoreU(strain_of<D>(d, elements, batch, lane, u).change, d,
+                       change + batch * batch_width + static_cast<std::size_t>(lane));
 }
 
 template <class Law, class T>
@@ -218,47 +173,54 @@ void nodal_pressures_of(const T* modulus, const T* change, T* pressure, std::siz
     const std::size_t lanes = hn::Lanes(d);
     std::size_t i = 0;
     for (; i + lanes <= count; i += lanes)
-        hn::StoreU(hn::LoadU(d, modulus + i) *
-                       Response<Law>::pressure_factor(d, positive_jacobian(d, hn::LoadU(d, change + i))),
-                   d, pressure + i);
+        hn::StoreU(
+            hn::LoadU(d, modulus + i) * Response<Law>::pressure_factor(d, admissible<Law>(d, hn::LoadU(d, change + i))),
+            d, pressure + i);
     const hn::CappedTag<T, 1> one;
     for (; i < count; ++i)
         hn::StoreU(hn::LoadU(one, modulus + i) *
-                       Response<Law>::pressure_factor(one, positive_jacobian(one, hn::LoadU(one, change + i))),
+                       Response<Law>::pressure_factor(one, admissible<Law>(one, hn::LoadU(one, change + i))),
                    one, pressure + i);
 }
 
-template <class T>
-void element_forces_any(std::size_t law, Kinematics kinematics, const ElementBatches<T>& elements, std::size_t begin,
-                        std::size_t end, const T* u, const T* pressure, T* force) {
-    const auto run = [&]<class Law>() {
-        if (kinematics == Kinematics::T4)
-            element_forces_of<Law, Kinematics::T4>(elements, begin, end, u, pressure, force);
+/// Calls `run` with the law of index `law` as template argument.
+template <std::size_t index = 0, class Run>
+void with_law(std::size_t law, const Run& run) {
+    if constexpr (index < std::variant_size_v<Material>) {
+        if (law == index)
+            run.template operator()<std::variant_alternative_t<index, Material>>();
         else
-            element_forces_of<Law, Kinematics::AveragedPressure>(elements, begin, end, u, pressure, force);
-    };
-    if (law == 0)
-        run.template operator()<std::variant_alternative_t<0, Material>>();
-    else
-        run.template operator()<std::variant_alternative_t<1, Material>>();
+            with_law<index + 1>(law, run);
+    }
+}
+
+template <class T>
+void element_forces_any(const KernelMaterial<T>& material, Kinematics kinematics, const ElementBatches<T>& elements,
+                        std::size_t begin, std::size_t end, const T* u, const T* pressure, T* force) {
+    with_law(material.law, [&]<class Law>() {
+        const T* parameter = material.parameter.data();
+        if (kinematics == Kinematics::T4)
+            element_forces_of<Law, Kinematics::T4>(parameter, elements, begin, end, u, pressure, force);
+        else
+            element_forces_of<Law, Kinematics::AveragedPressure>(parameter, elements, begin, end, u, pressure, force);
+    });
 }
 
 template <class T>
 void nodal_pressures_any(std::size_t law, const T* modulus, const T* change, T* pressure, std::size_t count) {
-    if (law == 0)
-        nodal_pressures_of<std::variant_alternative_t<0, Material>>(modulus, change, pressure, count);
-    else
-        nodal_pressures_of<std::variant_alternative_t<1, Material>>(modulus, change, pressure, count);
+    with_law(law, [&]<class Law>() { nodal_pressures_of<Law>(modulus, change, pressure, count); });
 }
 
 // Highway dispatches plain functions: one name for each scalar type.
-void element_forces_f32(std::size_t law, Kinematics kinematics, const ElementBatches<float>& elements,
-                        std::size_t begin, std::size_t end, const float* u, const float* pressure, float* force) {
-    element_forces_any(law, kinematics, elements, begin, end, u, pressure, force);
+void element_forces_f32(const KernelMaterial<float>& material, Kinematics kinematics,
+                        const ElementBatches<float>& elements, std::size_t begin, std::size_t end, const float* u,
+                        const float* pressure, float* force) {
+    element_forces_any(material, kinematics, elements, begin, end, u, pressure, force);
 }
-void element_forces_f64(std::size_t law, Kinematics kinematics, const ElementBatches<double>& elements,
-                        std::size_t begin, std::size_t end, const double* u, const double* pressure, double* force) {
-    element_forces_any(law, kinematics, elements, begin, end, u, pressure, force);
+void element_forces_f64(const KernelMaterial<double>& material, Kinematics kinematics,
+                        const ElementBatches<double>& elements, std::size_t begin, std::size_t end, const double* u,
+                        const double* pressure, double* force) {
+    element_forces_any(material, kinematics, elements, begin, end, u, pressure, force);
 }
 void volume_changes_f32(const ElementBatches<float>& elements, std::size_t begin, std::size_t end, const float* u,
                         float* change) {
@@ -294,14 +256,15 @@ HWY_EXPORT(nodal_pressures_f64);
 HWY_EXPORT(target_name);
 
 template <>
-void element_forces(std::size_t law, Kinematics kinematics, const ElementBatches<float>& elements, std::size_t begin,
-                    std::size_t end, const float* u, const float* pressure, float* force) {
-    HWY_DYNAMIC_DISPATCH(element_forces_f32)(law, kinematics, elements, begin, end, u, pressure, force);
+void element_forces(const KernelMaterial<float>& material, Kinematics kinematics, const ElementBatches<float>& elements,
+                    std::size_t begin, std::size_t end, const float* u, const float* pressure, float* force) {
+    HWY_DYNAMIC_DISPATCH(element_forces_f32)(material, kinematics, elements, begin, end, u, pressure, force);
 }
 template <>
-void element_forces(std::size_t law, Kinematics kinematics, const ElementBatches<double>& elements, std::size_t begin,
-                    std::size_t end, const double* u, const double* pressure, double* force) {
-    HWY_DYNAMIC_DISPATCH(element_forces_f64)(law, kinematics, elements, begin, end, u, pressure, force);
+void element_forces(const KernelMaterial<double>& material, Kinematics kinematics,
+                    const ElementBatches<double>& elements, std::size_t begin, std::size_t end, const double* u,
+                    const double* pressure, double* force) {
+    HWY_DYNAMIC_DISPATCH(element_forces_f64)(material, kinematics, elements, begin, end, u, pressure, force);
 }
 template <>
 void volume_changes(const ElementBatches<float>& elements, std::size_t begin, std::size_t end, const float* u,

@@ -46,11 +46,11 @@ void require_shape(const Matrix3Xd& matrix, int node_count, const char* what) {
 }
 
 void require_limits(const shaders::Device& device) {
-    // node_step with all effects declares nine blocks; chunks/bindings.glsl counts to 16.
-    if (device.limits().storage_blocks < 9 || device.limits().storage_bindings < 16)
+    // node_step with all effects declares nine blocks; chunks/bindings.glsl counts to 24.
+    if (device.limits().storage_blocks < 9 || device.limits().storage_bindings < 24)
         throw GpuUnavailable(device.renderer() + " offers " + std::to_string(device.limits().storage_blocks) +
                              " storage blocks per shader and " + std::to_string(device.limits().storage_bindings) +
-                             " bindings; the solver needs 9 and 16; take the CPU engine");
+                             " bindings; the solver needs 9 and 24; take the CPU engine");
 }
 
 /// Springs and external forces on the device, each only when the scene has it.

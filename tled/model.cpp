@@ -20,15 +20,19 @@ void require_positive(double value, const std::string& what, const std::string& 
 void require_valid(const Model& model) {
     meshing::require_valid(model.mesh, "the model's mesh");
     require_positive(model.density, "density", "kg/mm3");
+    if (model.fibre.size() > 0 && model.fibre.cols() != model.mesh.tet_count())
+        throw InvalidInput("the model has " + std::to_string(model.fibre.cols()) + " fibre directions for " +
+                           std::to_string(model.mesh.tet_count()) + " tetrahedra; give one for each or none");
+    for (Eigen::Index t = 0; t < model.fibre.cols(); ++t)
+        if (!(std::abs(model.fibre.col(t).norm() - 1) < 1e-6))
+            throw InvalidInput("the fibre direction of tetrahedron " + std::to_string(t) + " has length " +
+                               std::to_string(model.fibre.col(t).norm()) + "; it must be a unit vector");
     const std::set<int> labels(model.mesh.labels.begin(), model.mesh.labels.end());
     for (const int label : labels) {
         const auto material = model.materials.find(label);
         if (material == model.materials.end())
             throw InvalidInput("label " + std::to_string(label) + " of the mesh has no material; add it to the table");
-        const std::string of_label = " of label " + std::to_string(label);
-        require_positive(shear_modulus(material->second), "shear modulus" + of_label, "kPa");
-        const double bulk_modulus = p_wave_modulus(material->second) - 4 * shear_modulus(material->second) / 3;
-        require_positive(bulk_modulus, "bulk modulus at rest" + of_label, "kPa");
+        require_valid(material->second, "label " + std::to_string(label));
     }
 }
 

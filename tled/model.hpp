@@ -15,7 +15,8 @@ struct Model {
     meshing::TetMesh mesh;
     MaterialTable materials;  ///< one entry for every label of the mesh
     Element element = Element::AveragedPressureT4;
-    double density = 1e-6;  ///< kg/mm³
+    double density = 1e-6;   ///< kg/mm³
+    Eigen::Matrix3Xd fibre;  ///< 3 × tetrahedra, unit vectors that replace those of the materials; or empty
 };
 
 /// Throws InvalidInput when a label has no material, a modulus is not positive, or the mesh is invalid.

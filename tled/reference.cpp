@@ -33,11 +33,9 @@ Matrix3d deformation_gradient(const RestState& rest, const Matrix3Xd& displaceme
     return Matrix3d::Identity() + edges * rest.gradient.col(element).reshaped(3, 3).transpose();
 }
 
-std::vector<std::size_t> law_of_elements(const RestState& rest) {
-    std::vector<std::size_t> result(rest.tet.size());
-    for (const LawBlock& block : rest.blocks) {
-        std::fill(result.begin() + block.begin, result.begin() + block.end, block.law);
-    }
+Material element_material(const RestState& rest, int material, int element) {
+    Material result = rest.materials[static_cast<std::size_t>(material)];
+    if (auto* fibrous = std::get_if<TransverselyIsotropic>(&result)) fibrous->fibre = rest.fibre.col(element);
     return result;
 }
 
@@ -58,7 +56,7 @@ std::vector<VolumetricFunction> nodal_volumetric(const RestState& rest, const Ve
             volume += 0.25 * rest.volume[e] * jacobian[e];
         }
         const double modulus = rest.pressure.modulus[a];
-        const Material material = material_of_law(rest.pressure.law[a], 0.0, modulus);
+        const Material& material = rest.materials[static_cast<std::size_t>(rest.pressure.material[a])];
         const VolumetricFunction U = volumetric_function(material, volume / rest.pressure.volume[a]);
         result[a] = {modulus * U.energy, modulus * U.first, modulus * U.second};
     });
@@ -75,8 +73,9 @@ double element_pressure(const RestState& rest, int element, const Material& mate
 }
 
 void require_positive(const RestState& rest, const VectorXd& jacobian) {
+    const std::vector<int> material_of = material_of_elements(rest);
     for (int e = 0; e < jacobian.size(); ++e) {
-        if (jacobian[e] > 0.0) continue;
+        if (jacobian[e] > 0.0 || admits_inversion(rest.materials[material_of[e]])) continue;
         throw SolverFailure("tetrahedron " + std::to_string(rest.tet[e]) +
                             " has det F = " + std::to_string(jacobian[e]) +
                             ", which must be positive for a stress: apply the load in smaller steps");
@@ -86,13 +85,16 @@ void require_positive(const RestState& rest, const VectorXd& jacobian) {
 }  // namespace detail
 
 double elastic_energy(const RestState& rest, const Matrix3Xd& displacement) {
-    const std::vector<std::size_t> law = detail::law_of_elements(rest);
+    const std::vector<int> material_of = material_of_elements(rest);
     VectorXd energy(rest.element_count()), jacobian(rest.element_count());
     tbb::parallel_for(0, rest.element_count(), [&](int e) {
-        const Material material = material_of_law(law[e], rest.shear_modulus[e], rest.volumetric_modulus[e]);
+        const Material material = detail::element_material(rest, material_of[e], e);
         const Matrix3d F = detail::deformation_gradient(rest, displacement, e);
         jacobian[e] = F.determinant();
-        energy[e] = rest.volume[e] * strain_energy(material, F);
+        energy[e] = rest.volume[e] * shear_energy(material, F);
+        if (rest.volumetric_modulus[e] > 0.0)
+            energy[e] +=
+                rest.volume[e] * rest.volumetric_modulus[e] * volumetric_function(material, jacobian[e]).energy;
     });
     double sum = std::accumulate(energy.begin(), energy.end(), 0.0);
     const std::vector<VolumetricFunction> nodal = detail::nodal_volumetric(rest, jacobian);
@@ -104,11 +106,11 @@ Matrix3Xd internal_force(const RestState& rest, const Matrix3Xd& displacement) {
     const VectorXd jacobian = detail::element_jacobians(rest, displacement);
     detail::require_positive(rest, jacobian);
     const std::vector<VolumetricFunction> nodal = detail::nodal_volumetric(rest, jacobian);
-    const std::vector<std::size_t> law = detail::law_of_elements(rest);
+    const std::vector<int> material_of = material_of_elements(rest);
 
     Matrix3Xd corner_force(3, 4 * rest.element_count());
     tbb::parallel_for(0, rest.element_count(), [&](int e) {
-        const Material material = material_of_law(law[e], rest.shear_modulus[e], rest.volumetric_modulus[e]);
+        const Material material = detail::element_material(rest, material_of[e], e);
         const Matrix3d F = detail::deformation_gradient(rest, displacement, e);
         const double pressure = detail::element_pressure(rest, e, material, jacobian[e], nodal);
         const Matrix3d P = shear_stress(material, F) + pressure * cofactor(F);

@@ -7,24 +7,65 @@
 #include <algorithm>
 #include <map>
 #include <numeric>
+#include <set>
 
 namespace tissuewarp::tled {
 
 namespace {
 
-/// Groups tetrahedra by the alternative of their material, keeping the mesh's order within a group.
-void order_by_law(const Model& model, RestState& rest) {
-    const auto law_of = [&](int tet) { return model.materials.at(model.mesh.labels[tet]).index(); };
+/// Materials without repetition in the order of their laws, and the index of each label's.
+struct DistinctMaterials {
+    std::vector<Material> materials;
+    std::map<int, int> of_label;
+};
+
+DistinctMaterials distinct_materials(const Model& model) {
+    const std::set<int> labels(model.mesh.labels.begin(), model.mesh.labels.end());
+    std::vector<int> by_law(labels.begin(), labels.end());
+    std::stable_sort(by_law.begin(), by_law.end(),
+                     [&](int a, int b) { return model.materials.at(a).index() < model.materials.at(b).index(); });
+    DistinctMaterials result;
+    for (const int label : by_law) {
+        const Material& material = model.materials.at(label);
+        const auto place = std::find(result.materials.begin(), result.materials.end(), material);
+        result.of_label[label] = static_cast<int>(place - result.materials.begin());
+        if (place == result.materials.end()) result.materials.push_back(material);
+    }
+    return result;
+}
+
+/// Groups tetrahedra by material, keeping the mesh's order within a group.
+void order_by_material(const Model& model, RestState& rest) {
+    DistinctMaterials distinct = distinct_materials(model);
+    rest.materials = std::move(distinct.materials);
+    const auto material_of = [&](int tet) { return distinct.of_label.at(model.mesh.labels[tet]); };
     rest.tet.resize(static_cast<std::size_t>(model.mesh.tet_count()));
     std::iota(rest.tet.begin(), rest.tet.end(), 0);
-    std::stable_sort(rest.tet.begin(), rest.tet.end(), [&](int a, int b) { return law_of(a) < law_of(b); });
+    std::stable_sort(rest.tet.begin(), rest.tet.end(), [&](int a, int b) { return material_of(a) < material_of(b); });
     const int count = rest.element_count();
     for (int begin = 0; begin < count;) {
-        const std::size_t law = law_of(rest.tet[static_cast<std::size_t>(begin)]);
+        const int material = material_of(rest.tet[static_cast<std::size_t>(begin)]);
         int end = begin;
-        while (end < count && law_of(rest.tet[static_cast<std::size_t>(end)]) == law) ++end;
-        rest.blocks.push_back({law, begin, end});
+        while (end < count && material_of(rest.tet[static_cast<std::size_t>(end)]) == material) ++end;
+        rest.blocks.push_back({material, begin, end});
         begin = end;
+    }
+}
+
+/// Directions of the mesh where it has them, else of the material; zero in tissue without fibres.
+void set_fibres(const Model& model, RestState& rest) {
+    const auto has_fibres = [](const Material& material) {
+        return std::holds_alternative<TransverselyIsotropic>(material);
+    };
+    if (std::none_of(rest.materials.begin(), rest.materials.end(), has_fibres)) return;
+    rest.fibre = Eigen::Matrix3Xd::Zero(3, rest.element_count());
+    for (const MaterialBlock& block : rest.blocks) {
+        const auto* law = std::get_if<TransverselyIsotropic>(&rest.materials[static_cast<std::size_t>(block.material)]);
+        if (law == nullptr) continue;
+        for (int e = block.begin; e < block.end; ++e) {
+            const int tet = rest.tet[static_cast<std::size_t>(e)];
+            rest.fibre.col(e) = model.fibre.size() > 0 ? Eigen::Vector3d(model.fibre.col(tet)) : law->fibre;
+        }
     }
 }
 
@@ -33,7 +74,6 @@ void precompute_elements(const Model& model, RestState& rest) {
     rest.nodes.resize(4, count);
     rest.gradient.resize(9, count);
     rest.volume.resize(count);
-    rest.shear_modulus.resize(count);
     rest.volumetric_modulus.resize(count);
     rest.lumped_mass = Eigen::VectorXd::Zero(model.mesh.node_count());
     const bool averaged = model.element == Element::AveragedPressureT4;
@@ -48,7 +88,6 @@ void precompute_elements(const Model& model, RestState& rest) {
         rest.gradient.col(e) = Eigen::Map<const Eigen::Matrix<double, 9, 1>>(gradient.data());
         rest.volume[e] = edges.determinant() / 6;
         const Material& material = model.materials.at(model.mesh.labels[tet]);
-        rest.shear_modulus[e] = shear_modulus(material);
         rest.volumetric_modulus[e] = averaged ? 0.0 : volumetric_modulus(material);
         for (const int node : nodes) rest.lumped_mass[node] += model.density * rest.volume[e] / 4;
     }
@@ -68,25 +107,26 @@ Incidence incidence_of(const Eigen::Matrix4Xi& of_element, int count) {
     return lists;
 }
 
-PressureNodes pressure_nodes(const Model& model, const RestState& rest) {
+PressureNodes pressure_nodes(const RestState& rest) {
     PressureNodes pressure;
     pressure.of_element.resize(4, rest.element_count());
-    std::map<std::pair<int, int>, int> index;  // (node, label) → pressure node, numbered in node order
+    const std::vector<int> material = material_of_elements(rest);
+    std::map<std::pair<int, int>, int> index;  // (material, node) → pressure node
     const auto key = [&](int e, int corner) {
-        return std::pair{rest.nodes(corner, e), model.mesh.labels[rest.tet[static_cast<std::size_t>(e)]]};
+        return std::pair{material[static_cast<std::size_t>(e)], rest.nodes(corner, e)};
     };
     for (int e = 0; e < rest.element_count(); ++e)
         for (int corner = 0; corner < 4; ++corner) index.emplace(key(e, corner), 0);
     int count = 0;
-    for (auto& [node_label, number] : index) number = count++;
+    for (auto& [material_node, number] : index) {
+        number = count++;
+        pressure.material.push_back(material_node.first);
+    }
     pressure.volume = Eigen::VectorXd::Zero(count);
     pressure.modulus.resize(count);
-    pressure.law.resize(index.size());
-    for (const auto& [node_label, number] : index) {
-        const Material& material = model.materials.at(node_label.second);
-        pressure.modulus[number] = volumetric_modulus(material);
-        pressure.law[static_cast<std::size_t>(number)] = material.index();
-    }
+    for (int a = 0; a < count; ++a)
+        pressure.modulus[a] = volumetric_modulus(
+            rest.materials[static_cast<std::size_t>(pressure.material[static_cast<std::size_t>(a)])]);
     for (int e = 0; e < rest.element_count(); ++e)
         for (int corner = 0; corner < 4; ++corner) {
             const int number = index.at(key(e, corner));
@@ -103,13 +143,21 @@ RestState rest_state(const Model& model) {
     require_valid(model);
     RestState rest;
     rest.node_count = model.mesh.node_count();
-    order_by_law(model, rest);
+    order_by_material(model, rest);
     precompute_elements(model, rest);
     if ((rest.lumped_mass.array() <= 0).any())
         throw InvalidInput("the model's mesh has nodes that belong to no tetrahedron; remove them");
     rest.incidence = incidence_of(rest.nodes, rest.node_count);
-    if (model.element == Element::AveragedPressureT4) rest.pressure = pressure_nodes(model, rest);
+    if (model.element == Element::AveragedPressureT4) rest.pressure = pressure_nodes(rest);
+    set_fibres(model, rest);
     return rest;
+}
+
+std::vector<int> material_of_elements(const RestState& rest) {
+    std::vector<int> result(rest.tet.size());
+    for (const MaterialBlock& block : rest.blocks)
+        std::fill(result.begin() + block.begin, result.begin() + block.end, block.material);
+    return result;
 }
 
 }  // namespace tissuewarp::tled

@@ -10,9 +10,9 @@
 
 namespace tissuewarp::tled {
 
-/// Elements [begin, end) of the internal order share one constitutive law.
-struct LawBlock {
-    std::size_t law = 0;  ///< index into the alternatives of Material
+/// Elements [begin, end) of the internal order share one material.
+struct MaterialBlock {
+    int material = 0;  ///< index into RestState::materials
     int begin = 0, end = 0;
 };
 
@@ -22,27 +22,29 @@ struct Incidence {
     std::vector<int> offset, entry;
 };
 
-/// Nodes of the averaged pressure: one for each (node, label) pair, so that pressure may jump at an interface.
+/// Nodes of the averaged pressure: one for each (node, material) pair, so that pressure may jump at an interface. In
+/// the order of their materials, then of the nodes.
 struct PressureNodes {
-    Eigen::Matrix4Xi of_element;   ///< 4 × M, pressure node of each corner
-    Eigen::VectorXd volume;        ///< V_a = Σ ¼ V_e, mm³
-    Eigen::VectorXd modulus;       ///< M_a of the label's material, kPa
-    std::vector<std::size_t> law;  ///< index of the label's law into the alternatives of Material
-    Incidence incidence;           ///< pressure node → 4·element + corner
+    Eigen::Matrix4Xi of_element;  ///< 4 × M, pressure node of each corner
+    Eigen::VectorXd volume;       ///< V_a = Σ ¼ V_e, mm³
+    Eigen::VectorXd modulus;      ///< M_a of the material, kPa
+    std::vector<int> material;    ///< index into RestState::materials, ascending
+    Incidence incidence;          ///< pressure node → 4·element + corner
     [[nodiscard]] int count() const { return static_cast<int>(volume.size()); }
 };
 
-/// Per-element arrays are in the internal order: grouped by law, otherwise as in the mesh.
+/// Per-element arrays are in the internal order: grouped by material, otherwise as in the mesh.
 struct RestState {
-    std::vector<int> tet;  ///< M, internal position → tetrahedron of the mesh
-    std::vector<LawBlock> blocks;
-    Eigen::Matrix4Xi nodes;  ///< 4 × M
+    std::vector<Material> materials;    ///< without repetition, equal laws adjacent
+    std::vector<MaterialBlock> blocks;  ///< one for each material, in their order
+    std::vector<int> tet;               ///< M, internal position → tetrahedron of the mesh
+    Eigen::Matrix4Xi nodes;             ///< 4 × M
     Eigen::Matrix<double, 9, Eigen::Dynamic>
         gradient;                        ///< 9 × M: row 3k+j is ∂N_{k+1}/∂X_j, 1/mm; N_0 = −Σ of the others
     Eigen::VectorXd volume;              ///< M, mm³
-    Eigen::VectorXd shear_modulus;       ///< M, μ in kPa
     Eigen::VectorXd volumetric_modulus;  ///< M, the part evaluated in the element, kPa: all of it for T4, none for
                                          ///< averaged pressure
+    Eigen::Matrix3Xd fibre;              ///< 3 × M, unit vectors; empty where no material has fibres
     Eigen::VectorXd lumped_mass;         ///< N, kg
     Incidence incidence;                 ///< node → 4·element + corner
     PressureNodes pressure;              ///< empty for T4
@@ -50,6 +52,9 @@ struct RestState {
 
     [[nodiscard]] int element_count() const { return static_cast<int>(tet.size()); }
 };
+
+/// Index into RestState::materials of every element.
+std::vector<int> material_of_elements(const RestState& rest);
 
 /// Throws InvalidInput through require_valid(model).
 RestState rest_state(const Model& model);

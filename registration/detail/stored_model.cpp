@@ -6,8 +6,7 @@ namespace tissuewarp::registration::detail {
 
 namespace {
 
-constexpr const char* element_names[] = {"T4", "AveragedPressureT4"};        // order of tled::Element
-constexpr const char* law_names[] = {"neo_hookean_iso", "neo_hookean_lnj"};  // order of tled::Material
+constexpr const char* element_names[] = {"T4", "AveragedPressureT4"};  // order of tled::Element
 
 tled::Element element_named(const std::string& name) {
     for (int k = 0; k < 2; ++k)
@@ -15,46 +14,48 @@ tled::Element element_named(const std::string& name) {
     throw InvalidInput("unknown element '" + name + "'; known are T4 and AveragedPressureT4");
 }
 
-/// The laws keep exactly what they hold: μ and the modulus of the volumetric part.
-tled::Material material_of(const std::string& law, double shear, double volumetric) {
-    if (law == law_names[0]) return tled::NeoHookeanIso{shear, volumetric};
-    if (law == law_names[1]) return tled::NeoHookeanLnJ{shear, volumetric};
-    throw InvalidInput("unknown material law '" + law + "'; known are neo_hookean_iso and neo_hookean_lnj");
-}
+/// Rows of materials/parameters; what a law does not use is zero.
+constexpr int parameter_rows = 8;
 
 }  // namespace
 
 void write_materials(Hdf5Output& file, const std::string& group, const tled::MaterialTable& materials) {
     const auto count = static_cast<Eigen::Index>(materials.size());
     Eigen::VectorXi label(count);
-    Eigen::VectorXd shear(count), volumetric(count);
+    Eigen::MatrixXd parameters = Eigen::MatrixXd::Zero(parameter_rows, count);
     std::vector<std::string> law;
-    Eigen::Index row = 0;
+    Eigen::Index column = 0;
     for (const auto& [key, material] : materials) {
-        label[row] = key;
-        shear[row] = tled::shear_modulus(material);
-        volumetric[row++] = tled::volumetric_modulus(material);
-        law.emplace_back(law_names[material.index()]);
+        const std::vector<double> values = tled::law_parameters(material);
+        label[column] = key;
+        for (std::size_t k = 0; k < values.size(); ++k) parameters(static_cast<Eigen::Index>(k), column) = values[k];
+        law.push_back(tled::law_name(material));
+        ++column;
     }
     file.vector<int>(group + "/label", label, "1");
     file.texts(group + "/law", law);
-    file.vector<double>(group + "/shear_modulus", shear, "kPa");
-    file.vector<double>(group + "/volumetric_modulus", volumetric, "kPa");
+    file.columns<double>(group + "/parameters", parameters, "kPa");
 }
 
 tled::MaterialTable read_materials(const Hdf5Input& file, const std::string& group) {
     const Eigen::VectorXi label = file.vector<int>(group + "/label");
-    const Eigen::VectorXd shear = file.vector<double>(group + "/shear_modulus", label.size());
-    const Eigen::VectorXd volumetric = file.vector<double>(group + "/volumetric_modulus", label.size());
+    const Eigen::MatrixXd parameters = file.columns<double>(group + "/parameters", parameter_rows);
     const std::vector<std::string> law = file.texts(group + "/law");
-    if (law.size() != static_cast<std::size_t>(label.size()))
-        throw InvalidInput("'" + group + "' names " + std::to_string(law.size()) + " laws for " +
+    if (law.size() != static_cast<std::size_t>(label.size()) || parameters.cols() != label.size())
+        throw InvalidInput("'" + group + "' names " + std::to_string(law.size()) + " laws and " +
+                           std::to_string(parameters.cols()) + " sets of parameters for " +
                            std::to_string(label.size()) + " labels");
     tled::MaterialTable materials;
-    for (Eigen::Index row = 0; row < label.size(); ++row)
-        if (!materials.emplace(label[row], material_of(law[static_cast<std::size_t>(row)], shear[row], volumetric[row]))
-                 .second)
+    for (Eigen::Index row = 0; row < label.size(); ++row) {
+        const std::string& name = law[static_cast<std::size_t>(row)];
+        const std::size_t count = tled::law_parameters(tled::material_of_law(name)).size();
+        const Eigen::VectorXd column = parameters.col(row);
+        const tled::Material material =
+            tled::material_of_law(name, {column.begin(), column.begin() + static_cast<std::ptrdiff_t>(count)});
+        tled::require_valid(material, "label " + std::to_string(label[row]) + " of '" + group + "'");
+        if (!materials.emplace(label[row], material).second)
             throw InvalidInput("'" + group + "' holds label " + std::to_string(label[row]) + " twice");
+    }
     return materials;
 }
 

@@ -16,7 +16,7 @@ tled::Model read_model(const Hdf5Input& file);
 void write_grid(Hdf5Output& file, const std::string& group, const imaging::Geometry& grid);
 imaging::Geometry read_grid(const Hdf5Input& file, const std::string& group);
 
-/// Groups with one row per material: label, law, shear_modulus, volumetric_modulus.
+/// Groups with one row per material: label, law, parameters.
 void write_materials(Hdf5Output& file, const std::string& group, const tled::MaterialTable& materials);
 tled::MaterialTable read_materials(const Hdf5Input& file, const std::string& group);
 

@@ -1,5 +1,5 @@
 // Gives: the binding of every storage block. The passes of a step use different numbers, so that one binding serves a
-// whole run; at most 16, which every driver of OpenGL 4.5 that is known to us offers. The host asks the linked program
+// whole run; at most 24, which every driver of OpenGL 4.5 that is known to us offers. The host asks the linked program
 // for its blocks and never repeats these numbers.
 
 #define BINDING_DISPLACEMENT 0         // mm, xyz of node
@@ -18,6 +18,8 @@
 #define BINDING_PRESSURE_CORNERS 13
 #define BINDING_PRESSURE_REST 14
 #define BINDING_PRESSURE_INCIDENCE 15
+#define BINDING_MATERIAL_PARAMETERS 16 // kPa and exponents
+#define BINDING_FIBRE 17               // unit vector of element
 
 // Outside of a step, these take the place of blocks that the kernel at hand does not use.
 #define BINDING_PARTIAL 6

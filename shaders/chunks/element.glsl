@@ -8,14 +8,14 @@ layout(location = 2) uniform uint element_count;
 
 layout(std430, binding = BINDING_DISPLACEMENT) readonly buffer Displacement { vec4 displacement[]; };
 layout(std430, binding = BINDING_ELEMENT_NODES) readonly buffer ElementNodes { uvec4 element_nodes[]; };
-/// Three planes of element_count entries: (gradient of N1, volume), (gradient of N2, mu), (gradient of N3, volumetric
-/// modulus); 1/mm, mm³, kPa.
+/// Three planes of element_count entries: (gradient of N1, volume), (gradient of N2, material), (gradient of N3,
+/// volumetric modulus); 1/mm, mm³, index of the scene's materials, kPa.
 layout(std430, binding = BINDING_ELEMENT_REST) readonly buffer ElementRest { vec4 element_rest[]; };
 
 struct RestElement {
     vec3 gradient_1, gradient_2, gradient_3;  // of the shape functions; the first node's is minus their sum
     float volume;
-    float shear_modulus;
+    float material;
     float volumetric_modulus;  // of the part that the element evaluates itself
 };
 

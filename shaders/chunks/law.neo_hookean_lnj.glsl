@@ -1,15 +1,14 @@
 // Law W = mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)².
-// Needs: numbers; element where shear_stress is used (define USES_SHEAR 1).
+// Needs: numbers; element, material and isochoric where shear_stress is used (define USES_SHEAR 1).
 // Gives: shear_stress, the first Piola-Kirchhoff stress of the part with mu (kPa), and volumetric_derivative, U'(J) of
 // U = (ln J)²/2. NaN where J <= 0: the energy is infinite there.
 //! define USES_SHEAR
 
 #if USES_SHEAR
-/// P = mu (F - F⁻ᵀ) = mu (H + (J I - cof F) / J).
-mat3 shear_stress(Deformation d, float shear_modulus) {
-    float J = 1.0 + d.volume_change;
-    if (!(J > 0.0)) return mat3(not_a_number());
-    return shear_modulus * (d.H + d.J_I_minus_cofactor_F * (1.0 / J));
+/// P = mu (F - F⁻ᵀ).
+mat3 shear_stress(uint e, Deformation d, Parameters p) {
+    if (!(d.volume_change > -1.0)) return mat3(not_a_number());
+    return p.a.x * stretch_difference(d);
 }
 #endif
 

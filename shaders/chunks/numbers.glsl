@@ -22,3 +22,15 @@ float log_one_plus(float x) {
     series = series * s2 + 1.0 / 3.0;
     return 2.0 * s + 2.0 * s * s2 * series;
 }
+
+/// exp(x) - 1 to a few units of the last place; the series' terms past x⁷ are below 1e-8 of the sum for |x| <= 1/4.
+float exp_minus_one(float x) {
+    if (abs(x) > 0.25) return exp(x) - 1.0;
+    float series = 1.0 / 5040.0;
+    series = series * x + 1.0 / 720.0;
+    series = series * x + 1.0 / 120.0;
+    series = series * x + 1.0 / 24.0;
+    series = series * x + 1.0 / 6.0;
+    series = series * x + 0.5;
+    return x + x * x * series;
+}

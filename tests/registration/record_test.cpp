@@ -210,7 +210,7 @@ TEST_F(Records, WithNodeIndicesOutOfRangeAreRefused) {
 
 TEST_F(Records, WithValuesThatAreNotFiniteAreRefused) {
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-    for (const char* name : {"mesh/nodes", "displacement", "placement", "jacobian", "materials/shear_modulus"}) {
+    for (const char* name : {"mesh/nodes", "displacement", "placement", "jacobian", "materials/parameters"}) {
         write();
         poke<double>(name, 1, nan);
         EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr(name)));

@@ -6,6 +6,7 @@
 #include "tled/reference.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace tissuewarp::tled::scene {
@@ -26,7 +27,38 @@ inline const char* name_of(Kind kind) {
     return kind == Kind::Gpu ? "Gpu" : kind == Kind::CpuFloat64 ? "CpuFloat64" : "CpuFloat32";
 }
 
-enum class Laws { Iso, LnJ, Mixed };
+enum class Laws { Iso, LnJ, Stable, Polynomial, ArrudaBoyce, Ogden, Fibres, Mixed };
+
+inline const char* name_of(Laws laws) {
+    constexpr const char* names[] = {"Iso", "LnJ", "Stable", "Polynomial", "ArrudaBoyce", "Ogden", "Fibres", "Mixed"};
+    return names[static_cast<int>(laws)];
+}
+
+/// Two materials of a law, shear moduli of 1 to 3 kPa.
+inline std::array<Material, 2> materials_of(Laws laws) {
+    const NeoHookeanLnJ soft_lnj{1.007, 49.329};
+    const Vector3d fibre = Vector3d(1, 2, -0.5).normalized();
+    switch (laws) {
+        case Laws::Iso:
+            return {NeoHookeanIso{1.007, 50.0}, NeoHookeanIso{2.5, 30.0}};
+        case Laws::LnJ:
+            return {soft_lnj, NeoHookeanLnJ{3.0, 20.0}};
+        case Laws::Stable:
+            return {NeoHookeanStable{1.007, 49.329}, NeoHookeanStable{3.0, 20.0}};
+        case Laws::Polynomial:
+            return {tled::Polynomial{0.3, 0.15, 0.08, 0.06, 0.04, 0.02, 50.0}, mooney_rivlin(0.8, 0.4, 30.0)};
+        case Laws::ArrudaBoyce:
+            return {tled::ArrudaBoyce{1.007, 1.1, 50.0}, tled::ArrudaBoyce{2.0, 1.5, 30.0}};
+        case Laws::Ogden:
+            return {tled::Ogden{{OgdenTerm{0.8, 2.5}, OgdenTerm{-0.3, -3.0}, OgdenTerm{0.05, 8.0}}, 50.0},
+                    tled::Ogden{{OgdenTerm{2.5, 2.0}}, 30.0}};
+        case Laws::Fibres:
+            return {TransverselyIsotropic{1.007, 50.0, 2.0, fibre}, NeoHookeanIso{2.5, 30.0}};
+        case Laws::Mixed:
+            return {soft_lnj, NeoHookeanIso{2.5, 30.0}};
+    }
+    return {};
+}
 
 /// A jittered cube of 30 mm, label 1 in front and 2 behind a diagonal plane, so that blocks and pressure nodes mix.
 inline Model cube(int cells, Element element, Laws laws) {
@@ -37,10 +69,8 @@ inline Model cube(int cells, Element element, Laws laws) {
         for (const int node : model.mesh.tets.col(t)) sum += model.mesh.nodes.col(node);
         model.mesh.labels[t] = sum.x() + sum.y() < 110 ? 1 : 2;
     }
-    const NeoHookeanIso soft_iso{1.007, 50.0};
-    const NeoHookeanLnJ soft_lnj{1.007, 49.329};
-    model.materials[1] = laws == Laws::Iso ? Material(soft_iso) : Material(soft_lnj);
-    model.materials[2] = laws == Laws::LnJ ? Material(NeoHookeanLnJ{3.0, 20.0}) : Material(NeoHookeanIso{2.5, 30.0});
+    const std::array<Material, 2> materials = materials_of(laws);
+    model.materials = {{1, materials[0]}, {2, materials[1]}};
     model.element = element;
     return model;
 }

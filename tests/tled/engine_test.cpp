@@ -26,15 +26,13 @@ protected:
 INSTANTIATE_TEST_SUITE_P(All, Engines,
                          ::testing::Combine(::testing::Values(Kind::CpuFloat64, Kind::CpuFloat32, Kind::Gpu),
                                             ::testing::Values(Element::T4, Element::AveragedPressureT4),
-                                            ::testing::Values(Laws::Iso, Laws::LnJ, Laws::Mixed)),
+                                            ::testing::Values(Laws::Iso, Laws::LnJ, Laws::Stable, Laws::Polynomial,
+                                                              Laws::ArrudaBoyce, Laws::Ogden, Laws::Fibres,
+                                                              Laws::Mixed)),
                          [](const auto& each) {
                              const std::string element =
                                  std::get<1>(each.param) == Element::T4 ? "T4" : "AveragedPressure";
-                             const Laws laws = std::get<2>(each.param);
-                             return name_of(std::get<0>(each.param)) + element +
-                                    (laws == Laws::Iso   ? "Iso"
-                                     : laws == Laws::LnJ ? "LnJ"
-                                                         : "Mixed");
+                             return name_of(std::get<0>(each.param)) + element + name_of(std::get<2>(each.param));
                          });
 
 TEST_P(Engines, InternalForceIsTheReferences) {

@@ -178,7 +178,8 @@ TEST_P(Reference, InvertedTetrahedronIsInfiniteInEnergyAndRefusedInForce) {
 // The averaged element's energy from its definition, with dense loops over nodes.
 TEST(AveragedPressure, EnergyIsThatOfNodalVolumes) {
     Model model = two_laws(Element::AveragedPressureT4);
-    model.materials[2] = model.materials[1] = NeoHookeanIso{1e-9, 20.0};  // next to no shear energy
+    model.materials[1] = NeoHookeanIso{1e-9, 20.0};  // next to no shear energy
+    model.materials[2] = NeoHookeanIso{2e-9, 20.0};  // another material, so that the pressure may jump
     const RestState rest = rest_state(model);
     const Matrix3Xd u = wavy(model.mesh.nodes);
     const Eigen::VectorXd J = jacobians(rest, u), V = meshing::tet_volumes(model.mesh);

@@ -2,13 +2,14 @@
 /// The inner loops of the CPU engine, compiled once per instruction set and chosen at run time (Highway). T is float or
 /// double.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
 namespace tissuewarp::tled::detail {
 
-/// Elements are stored in batches of `batch_width`, structure of arrays within a batch; a law block starts a new batch
+/// Elements are stored in batches of `batch_width`, structure of arrays within a batch; a material starts a new batch
 /// and is padded with copies of its last element that have zero volume.
 inline constexpr int batch_width = 16;
 
@@ -23,8 +24,8 @@ struct ElementBatches {
     std::vector<std::int32_t> pressure;  ///< batch × 4 corners × width: pressure node; empty for T4
     std::vector<T> gradient;             ///< batch × 9 × width, 1/mm
     std::vector<T> volume;               ///< batch × width, mm³
-    std::vector<T> shear_modulus;        ///< batch × width, kPa
     std::vector<T> volumetric_modulus;   ///< batch × width, kPa: what the element itself evaluates
+    std::vector<T> fibre;                ///< batch × 3 × width; empty where no material has fibres
     [[nodiscard]] std::size_t count() const { return volume.size() / batch_width; }
 };
 
@@ -33,11 +34,19 @@ template <class T>
 void volume_changes(const ElementBatches<T>& elements, std::size_t begin, std::size_t end, const T* u,
                     T* jacobian_minus_1);
 
-/// Nodal forces of each element's four corners, one record each at batch·4·width + corner·width + lane. `law` indexes
-/// the alternatives of Material. `pressure` holds M_a U'(J_a) per pressure node and is not read for T4.
+/// A material as the kernels take it: `law` indexes the alternatives of Material, the parameters are those of
+/// detail/kernel_parameters.hpp.
 template <class T>
-void element_forces(std::size_t law, Kinematics kinematics, const ElementBatches<T>& elements, std::size_t begin,
-                    std::size_t end, const T* u, const T* pressure, T* force);
+struct KernelMaterial {
+    std::size_t law = 0;
+    std::array<T, 8> parameter{};
+};
+
+/// Nodal forces of each element's four corners, one record each at batch·4·width + corner·width + lane. `pressure`
+/// holds M_a U'(J_a) per pressure node and is not read for T4.
+template <class T>
+void element_forces(const KernelMaterial<T>& material, Kinematics kinematics, const ElementBatches<T>& elements,
+                    std::size_t begin, std::size_t end, const T* u, const T* pressure, T* force);
 
 /// M U'(J) for J = 1 + `change`, per pressure node of one law.
 template <class T>

@@ -9,12 +9,28 @@ namespace {
 
 using shaders::Law;
 
-static_assert(std::is_same_v<std::variant_alternative_t<0, Material>, NeoHookeanIso>);
-static_assert(std::is_same_v<std::variant_alternative_t<1, Material>, NeoHookeanLnJ>);
-static_assert(std::variant_size_v<Material> == 2, "a new law needs its chunk in law_chunk()");
+template <Law law, class Struct>
+constexpr bool same_place = std::is_same_v<std::variant_alternative_t<static_cast<std::size_t>(law), Material>, Struct>;
+static_assert(std::variant_size_v<Material> == shaders::law_count, "a new law needs its chunk");
+static_assert(same_place<Law::NeoHookeanIso, NeoHookeanIso> && same_place<Law::NeoHookeanLnJ, NeoHookeanLnJ> &&
+              same_place<Law::NeoHookeanStable, NeoHookeanStable> && same_place<Law::Polynomial, Polynomial> &&
+              same_place<Law::ArrudaBoyce, ArrudaBoyce> && same_place<Law::Ogden, Ogden> &&
+              same_place<Law::TransverselyIsotropic, TransverselyIsotropic>);
 
-Law law_chunk(std::size_t law) {
-    return law == 0 ? Law::NeoHookeanIso : Law::NeoHookeanLnJ;
+/// Runs of blocks whose materials follow one law: one dispatch each.
+struct LawRun {
+    Law law;
+    int begin, end;
+};
+
+std::vector<LawRun> law_runs(const RestState& rest, const std::vector<MaterialBlock>& blocks) {
+    std::vector<LawRun> runs;
+    for (const MaterialBlock& block : blocks) {
+        const auto law = static_cast<Law>(rest.materials[static_cast<std::size_t>(block.material)].index());
+        if (runs.empty() || runs.back().law != law) runs.push_back({law, block.begin, block.begin});
+        runs.back().end = block.end;
+    }
+    return runs;
 }
 
 std::uint32_t unsigned_count(std::size_t count) {
@@ -22,11 +38,11 @@ std::uint32_t unsigned_count(std::size_t count) {
 }
 
 /// Range and total, uniforms 0 to 2 of the element and pressure kernels.
-Pass ranged(const shaders::Program& program, const LawBlock& block, std::size_t total) {
-    program.set(0, static_cast<std::uint32_t>(block.begin));
-    program.set(1, static_cast<std::uint32_t>(block.end));
+Pass ranged(const shaders::Program& program, int begin, int end, std::size_t total) {
+    program.set(0, static_cast<std::uint32_t>(begin));
+    program.set(1, static_cast<std::uint32_t>(end));
     program.set(2, unsigned_count(total));
-    return {&program, static_cast<std::size_t>(block.end - block.begin)};
+    return {&program, static_cast<std::size_t>(end - begin)};
 }
 
 }  // namespace
@@ -53,6 +69,8 @@ GpuForce::GpuForce(const shaders::Device& device, shaders::ProgramCache& program
     const shaders::CurrentContext current = device.make_current();
     {
         const GpuElements layout = gpu_elements(rest);
+        materials_.emplace(device, layout.materials, "material parameters");
+        if (!layout.fibre.empty()) fibre_.emplace(device, layout.fibre, "fibres");
         nodes_.emplace(device, layout.nodes, "nodes of elements");
         rest_.emplace(device, layout.rest, "rest data of elements");
         incidence_.emplace(device, layout.node_incidence, "corners of nodes");
@@ -61,7 +79,9 @@ GpuForce::GpuForce(const shaders::Device& device, shaders::ProgramCache& program
     blocks.set("ElementRest", *rest_);
     blocks.set("NodeIncidence", *incidence_);
     blocks.set("CornerForce", corner_force_);
-    std::vector<LawBlock> pressure_blocks;
+    blocks.set("MaterialParameters", *materials_);
+    if (fibre_) blocks.set("Fibre", *fibre_);
+    std::vector<MaterialBlock> pressure_blocks;
     if (rest.pressure.count() > 0) {
         const GpuPressure layout = gpu_pressure(rest);
         pressure_blocks = layout.blocks;
@@ -76,25 +96,25 @@ GpuForce::GpuForce(const shaders::Device& device, shaders::ProgramCache& program
 }
 
 void GpuForce::make_stages(shaders::ProgramCache& programs, const RestState& rest,
-                           const std::vector<LawBlock>& pressure) {
+                           const std::vector<MaterialBlock>& pressure) {
     using shaders::PressureRule;
     PressureRule rule = PressureRule::Element;
     if (!pressure.empty()) {
         rule = rest.volumetric_modulus.cwiseAbs().maxCoeff() > 0 ? PressureRule::AveragedWithElementPart
                                                                  : PressureRule::Averaged;
-        const LawBlock all{0, 0, rest.element_count()};
-        stages_.push_back({ranged(programs.get(shaders::element_volume_program()), all, element_count_)});
+        stages_.push_back(
+            {ranged(programs.get(shaders::element_volume_program()), 0, rest.element_count(), element_count_)});
         Stage nodal;
-        for (const LawBlock& block : pressure)
-            nodal.push_back(ranged(programs.get(shaders::nodal_pressure_program(law_chunk(block.law))), block,
+        for (const LawRun& run : law_runs(rest, pressure))
+            nodal.push_back(ranged(programs.get(shaders::nodal_pressure_program(run.law)), run.begin, run.end,
                                    static_cast<std::size_t>(rest.pressure.count())));
         stages_.push_back(nodal);
     }
-    // Laws are grouped, so each has one block and its program keeps one range.
+    // Equal laws are adjacent, so each has one run and its program keeps one range.
     Stage force;
-    for (const LawBlock& block : rest.blocks)
+    for (const LawRun& run : law_runs(rest, rest.blocks))
         force.push_back(
-            ranged(programs.get(shaders::element_force_program(law_chunk(block.law), rule)), block, element_count_));
+            ranged(programs.get(shaders::element_force_program(run.law, rule)), run.begin, run.end, element_count_));
     stages_.push_back(force);
 }
 
@@ -111,7 +131,7 @@ void GpuForce::dispatch() const {
 }
 
 void GpuForce::set_all_elements(const shaders::Program& program) const {
-    ranged(program, {0, 0, static_cast<int>(element_count_)}, element_count_);
+    ranged(program, 0, static_cast<int>(element_count_), element_count_);
 }
 
 }  // namespace tissuewarp::tled::detail

@@ -43,7 +43,8 @@ public:
     void set_all_elements(const shaders::Program& program) const;
 
 private:
-    void make_stages(shaders::ProgramCache& programs, const RestState& rest, const std::vector<LawBlock>& pressure);
+    void make_stages(shaders::ProgramCache& programs, const RestState& rest,
+                     const std::vector<MaterialBlock>& pressure);
 
     /// The buffers of the averaged pressure; absent for T4.
     struct Pressure {
@@ -56,7 +57,7 @@ private:
 
     std::size_t element_count_;
     std::optional<shaders::Buffer<Uint4>> nodes_;
-    std::optional<shaders::Buffer<Float4>> rest_;
+    std::optional<shaders::Buffer<Float4>> rest_, materials_, fibre_;
     std::optional<shaders::Buffer<std::uint32_t>> incidence_;
     shaders::Buffer<Float4> corner_force_;
     std::optional<Pressure> pressure_;

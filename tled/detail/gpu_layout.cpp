@@ -1,7 +1,6 @@
 #include "tled/detail/gpu_layout.hpp"
 
-#include <algorithm>
-#include <numeric>
+#include "tled/detail/kernel_parameters.hpp"
 
 namespace tissuewarp::tled::detail {
 namespace {
@@ -17,13 +16,14 @@ Uint4 column(const Eigen::Matrix4Xi& matrix, int index) {
     return result;
 }
 
-/// Pressure nodes in the order of their laws, otherwise as they were.
-std::vector<int> order_by_law(const PressureNodes& pressure) {
-    std::vector<int> order(static_cast<std::size_t>(pressure.count()));
-    std::iota(order.begin(), order.end(), 0);
-    const auto law = [&](int a) { return pressure.law[static_cast<std::size_t>(a)]; };
-    std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return law(a) < law(b); });
-    return order;
+std::vector<Float4> material_parameters(const RestState& rest) {
+    std::vector<Float4> result;
+    for (const Material& material : rest.materials) {
+        const KernelParameters p = kernel_parameters(material);
+        result.push_back({single(p[0]), single(p[1]), single(p[2]), single(p[3])});
+        result.push_back({single(p[4]), single(p[5]), single(p[6]), single(p[7])});
+    }
+    return result;
 }
 
 }  // namespace
@@ -34,10 +34,13 @@ GpuElements gpu_elements(const RestState& rest) {
     GpuElements elements;
     elements.nodes.resize(plane);
     elements.rest.resize(3 * plane);
+    elements.materials = material_parameters(rest);
+    if (rest.fibre.size() > 0) elements.fibre = packed(rest.fibre);
+    const std::vector<int> material = material_of_elements(rest);
     for (int e = 0; e < count; ++e) {
         const auto at = static_cast<std::size_t>(e);
         elements.nodes[at] = column(rest.nodes, e);
-        const std::array<double, 3> last{rest.volume[e], rest.shear_modulus[e], rest.volumetric_modulus[e]};
+        const std::array<double, 3> last{rest.volume[e], static_cast<double>(material[at]), rest.volumetric_modulus[e]};
         for (std::size_t k = 0; k < 3; ++k) {
             const auto row = static_cast<Eigen::Index>(3 * k);
             elements.rest[k * plane + at] = {single(rest.gradient(row, e)), single(rest.gradient(row + 1, e)),
@@ -56,32 +59,17 @@ GpuElements gpu_elements(const RestState& rest) {
 
 GpuPressure gpu_pressure(const RestState& rest) {
     const PressureNodes& nodes = rest.pressure;
-    const std::vector<int> order = order_by_law(nodes);
-    std::vector<std::uint32_t> position(order.size());
     GpuPressure pressure;
-    pressure.incidence.push_back(0);
-    for (int at = 0; at < nodes.count(); ++at) {
-        const int a = order[static_cast<std::size_t>(at)];
-        const auto index = static_cast<std::size_t>(a);
-        position[index] = static_cast<std::uint32_t>(at);
+    for (int a = 0; a < nodes.count(); ++a) {
         pressure.rest.push_back({single(1.0 / nodes.volume[a]), single(nodes.modulus[a])});
-        const int valence = nodes.incidence.offset[index + 1] - nodes.incidence.offset[index];
-        pressure.incidence.push_back(pressure.incidence.back() + static_cast<std::uint32_t>(valence));
-        if (pressure.blocks.empty() || pressure.blocks.back().law != nodes.law[index])
-            pressure.blocks.push_back({nodes.law[index], at, at});
-        pressure.blocks.back().end = at + 1;
+        const int material = nodes.material[static_cast<std::size_t>(a)];
+        if (pressure.blocks.empty() || pressure.blocks.back().material != material)
+            pressure.blocks.push_back({material, a, a});
+        pressure.blocks.back().end = a + 1;
     }
-    for (const int a : order) {
-        const auto index = static_cast<std::size_t>(a);
-        for (int i = nodes.incidence.offset[index]; i < nodes.incidence.offset[index + 1]; ++i)
-            pressure.incidence.push_back(
-                static_cast<std::uint32_t>(nodes.incidence.entry[static_cast<std::size_t>(i)] / 4));
-    }
-    for (int e = 0; e < rest.element_count(); ++e) {
-        Uint4 corners = column(nodes.of_element, e);
-        for (std::uint32_t& corner : corners) corner = position[corner];
-        pressure.corners.push_back(corners);
-    }
+    for (const int offset : nodes.incidence.offset) pressure.incidence.push_back(static_cast<std::uint32_t>(offset));
+    for (const int entry : nodes.incidence.entry) pressure.incidence.push_back(static_cast<std::uint32_t>(entry / 4));
+    for (int e = 0; e < rest.element_count(); ++e) pressure.corners.push_back(column(nodes.of_element, e));
     return pressure;
 }
 

@@ -18,16 +18,17 @@ using Uint4 = std::array<std::uint32_t, 4>;
 struct GpuElements {
     std::vector<Uint4> nodes;                   ///< M
     std::vector<Float4> rest;                   ///< 3 M
+    std::vector<Float4> materials;              ///< two for each material
+    std::vector<Float4> fibre;                  ///< M, or empty
     std::vector<std::uint32_t> node_incidence;  ///< N + 1 offsets, 4 M positions of corner forces
 };
 GpuElements gpu_elements(const RestState& rest);
 
-/// Pressure nodes, regrouped by law so that one dispatch serves each law.
 struct GpuPressure {
     std::vector<Uint4> corners;            ///< M
     std::vector<Float2> rest;              ///< 1/V_a, M_a
     std::vector<std::uint32_t> incidence;  ///< count + 1 offsets, 4 M elements
-    std::vector<LawBlock> blocks;          ///< ranges of pressure nodes
+    std::vector<MaterialBlock> blocks;     ///< ranges of pressure nodes
 };
 GpuPressure gpu_pressure(const RestState& rest);
 

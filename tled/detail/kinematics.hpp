@@ -16,8 +16,8 @@ Eigen::Matrix<double, 3, 4> shape_gradients(const RestState& rest, int element);
 /// F of one element of the internal order for displacements 3 × N.
 Eigen::Matrix3d deformation_gradient(const RestState& rest, const Eigen::Matrix3Xd& displacement, int element);
 
-/// Index into the alternatives of Material of every element.
-std::vector<std::size_t> law_of_elements(const RestState& rest);
+/// The material of an element, with its own fibre direction; `material` from material_of_elements().
+Material element_material(const RestState& rest, int material, int element);
 
 /// U and derivatives at every pressure node, times M_a (kPa); empty for T4. `jacobian` is det F of every element.
 std::vector<VolumetricFunction> nodal_volumetric(const RestState& rest, const Eigen::VectorXd& jacobian);
@@ -29,7 +29,7 @@ double element_pressure(const RestState& rest, int element, const Material& mate
 /// det F of every element in the internal order.
 Eigen::VectorXd element_jacobians(const RestState& rest, const Eigen::Matrix3Xd& displacement);
 
-/// Throws SolverFailure naming the first element with det F ≤ 0, where stresses have no meaning.
+/// Throws SolverFailure naming the first element with det F ≤ 0 whose law does not admit it.
 void require_positive(const RestState& rest, const Eigen::VectorXd& jacobian);
 
 }  // namespace tissuewarp::tled::detail

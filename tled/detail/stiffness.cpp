@@ -22,26 +22,16 @@ namespace {
 
 using Matrix34 = Eigen::Matrix<double, 3, 4>;
 
-// With g = G ∇N and f = F ∇N (3 × 4, a column per corner) the block of corners a, b of V ∂P/∂F contracted with ∇N is
-// V [a (∇N_a·∇N_b) 1 + b (f_a g_bᵀ + g_a f_bᵀ) + c g_a g_bᵀ + d g_b g_aᵀ], from the form of Tangent.
+// The block of corners a, b is V Σ_jl ∂P_ij/∂F_kl ∂N_a/∂X_j ∂N_b/∂X_l.
 struct ElementTerms {
-    Matrix34 gradient, f, g;
-    double a, b, c, d;  // times V_e
-
-    ElementTerms(const Tangent& tangent, const Matrix34& shape_gradient, double volume)
-        : gradient(shape_gradient),
-          f(tangent.F * shape_gradient),
-          g(tangent.G * shape_gradient),
-          a(volume * tangent.a),
-          b(volume * tangent.b),
-          c(volume * tangent.c),
-          d(volume * tangent.d) {}
+    Eigen::Matrix<double, 9, 9> tangent;   // times V_e
+    Matrix34 gradient, cofactor_gradient;  // ∇N and cof F ∇N, a column per corner
 
     [[nodiscard]] Matrix3d block(int row, int column) const {
-        const auto f_r = f.col(row), f_c = f.col(column), g_r = g.col(row), g_c = g.col(column);
-        Matrix3d result =
-            b * (f_r * g_c.transpose() + g_r * f_c.transpose()) + c * g_r * g_c.transpose() + d * g_c * g_r.transpose();
-        result.diagonal().array() += a * gradient.col(row).dot(gradient.col(column));
+        Eigen::Matrix<double, 9, 3> half = gradient(0, column) * tangent.leftCols<3>();
+        for (int l = 1; l < 3; ++l) half += gradient(l, column) * tangent.middleCols<3>(3 * l);
+        Matrix3d result = gradient(0, row) * half.topRows<3>();
+        for (int j = 1; j < 3; ++j) result += gradient(j, row) * half.middleRows<3>(3 * j);
         return result;
     }
 };
@@ -144,7 +134,7 @@ void transpose_rows(int node_count, PressureRows& rows) {
     for (std::size_t k = 0; k < rows.node.size(); ++k) rows.node_entry[next[rows.node[k]]++] = static_cast<int>(k);
 }
 
-PressureRows pressure_rows(const RestState& rest, const std::vector<ElementTerms>& terms, const VectorXd& jacobian,
+PressureRows pressure_rows(const RestState& rest, const std::vector<ElementTerms>& terms,
                            const std::vector<VolumetricFunction>& nodal) {
     PressureRows result;
     const PressureNodes& pressure = rest.pressure;
@@ -163,10 +153,10 @@ PressureRows pressure_rows(const RestState& rest, const std::vector<ElementTerms
         const auto begin = result.node.begin() + result.offset[a], end = result.node.begin() + result.offset[a + 1];
         for (int k = incidence.offset[a]; k < incidence.offset[a + 1]; ++k) {
             const int e = incidence.entry[k] / 4;
-            const double weight = 0.25 * rest.volume[e] * jacobian[e] / pressure.volume[a];  // cof F ∇N = J G ∇N
+            const double weight = 0.25 * rest.volume[e] / pressure.volume[a];
             for (int corner = 0; corner < 4; ++corner) {
                 const auto place = std::lower_bound(begin, end, rest.nodes(corner, e));
-                result.gradient[place - result.node.begin()] += weight * terms[e].g.col(corner);
+                result.gradient[place - result.node.begin()] += weight * terms[e].cofactor_gradient.col(corner);
             }
         }
     });
@@ -189,20 +179,21 @@ Stiffness stiffness(const RestState& rest, const Matrix3Xd& displacement) {
     const VectorXd jacobian = element_jacobians(rest, displacement);
     require_positive(rest, jacobian);
     const std::vector<VolumetricFunction> nodal = nodal_volumetric(rest, jacobian);
-    const std::vector<std::size_t> law = law_of_elements(rest);
+    const std::vector<int> material_of = material_of_elements(rest);
 
-    std::vector<ElementTerms> terms(rest.element_count(), ElementTerms(Tangent{}, Matrix34::Zero(), 0.0));
+    std::vector<ElementTerms> terms(rest.element_count());
     tbb::parallel_for(0, rest.element_count(), [&](int e) {
-        const Material material = material_of_law(law[e], rest.shear_modulus[e], rest.volumetric_modulus[e]);
+        const Material material = element_material(rest, material_of[e], e);
         Tangent tangent = shear_tangent(material, deformation_gradient(rest, displacement, e));
         add_volumetric_tangent(tangent, element_pressure(rest, e, material, jacobian[e], nodal),
                                rest.volumetric_modulus[e] * volumetric_function(material, jacobian[e]).second);
-        terms[e] = ElementTerms(tangent, shape_gradients(rest, e), rest.volume[e]);
+        const Matrix34 gradient = shape_gradients(rest, e);
+        terms[e] = {rest.volume[e] * tangent.derivative, gradient, cofactor(tangent.F) * gradient};
     });
 
     Stiffness result;
     result.elements = element_rows(rest, terms);
-    result.pressure = pressure_rows(rest, terms, jacobian, nodal);
+    result.pressure = pressure_rows(rest, terms, nodal);
     return result;
 }
 

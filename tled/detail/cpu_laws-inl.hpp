@@ -1,0 +1,321 @@
+// The shear stress of every law for a batch of elements, in terms of H = F − I, cof F and J − 1, so that float32 keeps
+// small strains. Included once for each instruction set (Highway's convention for -inl files).
+
+// clang-format off
+#if defined(TISSUEWARP_CPU_LAWS_INL) == defined(HWY_TARGET_TOGGLE)
+#ifdef TISSUEWARP_CPU_LAWS_INL
+#undef TISSUEWARP_CPU_LAWS_INL
+#else
+#define TISSUEWARP_CPU_LAWS_INL
+#endif
+// clang-format on
+
+#include <hwy/contrib/math/math-inl.h>
+#include <hwy/highway.h>
+
+#include "tled/material.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace tissuewarp::tled::detail {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+template <class D>
+using Vec = hn::Vec<D>;
+template <class D>
+using Scalar = hn::TFromD<D>;
+
+/// Kinematics of a batch of elements: H, cof F and J − 1.
+template <class D>
+struct Strain {
+    Vec<D> H[3][3];
+    Vec<D> cof[3][3];
+    Vec<D> change;  // J − 1
+};
+
+/// What a law knows beside the strain: its parameters (detail/kernel_parameters.hpp), and the fibre where it has one.
+template <class D>
+struct Tissue {
+    const Scalar<D>* parameter;
+    Vec<D> fibre[3];
+};
+
+/// a·b of three components.
+template <class D>
+Vec<D> dot(const Vec<D> (&a)[3], const Vec<D> (&b)[3]) {
+    return hn::MulAdd(a[0], b[0], hn::MulAdd(a[1], b[1], a[2] * b[2]));
+}
+
+/// J F − cof F = J H + (J I − cof F), without the cancelling unit parts: J I − cof F = (J − 1) I − (cof F − I).
+template <class D>
+Vec<D> stretch_difference(D d, const Strain<D>& strain, Vec<D> J, int i, int j) {
+    if (i != j) return hn::MulSub(J, strain.H[i][j], strain.cof[i][j]);
+    return hn::MulSub(J, strain.H[i][j], strain.cof[i][j] - hn::Set(d, 1)) + strain.change;
+}
+
+/// tr C − 3 = 2 tr H + H : H.
+template <class D>
+Vec<D> trace_excess(const Strain<D>& strain) {
+    const auto trace = strain.H[0][0] + strain.H[1][1] + strain.H[2][2];
+    auto excess = trace + trace;
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) excess = hn::MulAdd(strain.H[i][j], strain.H[i][j], excess);
+    return excess;
+}
+
+/// C − I = H + Hᵀ + Hᵀ H.
+template <class D>
+void strain_excess(const Strain<D>& strain, Vec<D> (&E)[3][3]) {
+    for (int i = 0; i < 3; ++i)
+        for (int j = i; j < 3; ++j) {
+            auto sum = strain.H[i][j] + strain.H[j][i];
+            for (int k = 0; k < 3; ++k) sum = hn::MulAdd(strain.H[k][i], strain.H[k][j], sum);
+            E[i][j] = E[j][i] = sum;
+        }
+}
+
+/// P of the law's shear part times `volume`, and U'(J).
+template <class Law>
+struct Response;
+
+/// U = (J − 1)²/2.
+struct QuadraticVolume {
+    template <class D>
+    static Vec<D> pressure_factor(D, Vec<D> change) {
+        return change;
+    }
+};
+
+template <>
+struct Response<NeoHookeanLnJ> {
+    static constexpr bool admits_inversion = false, has_fibre = false;
+
+    /// P = μ (F − F^−T) = μ/J (J F − cof F)
+    template <class D>
+    static void shear_stress(D d, const Strain<D>& strain, const Tissue<D>& tissue, Vec<D> volume, Vec<D> (&P)[3][3]) {
+        const auto J = hn::Set(d, 1) + strain.change;
+        const auto scale = volume * hn::Set(d, tissue.parameter[0]) / J;
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j) P[i][j] = scale * stretch_difference(d, strain, J, i, j);
+    }
+    /// U' = ln J / J
+    template <class D>
+    static Vec<D> pressure_factor(D d, Vec<D> change) {
+        return hn::Log1p(d, change) / (hn::Set(d, 1) + change);
+    }
+};
+
+template <>
+struct Response<NeoHookeanStable> : QuadraticVolume {
+    static constexpr bool admits_inversion = true, has_fibre = false;
+
+    /// P = μ' (1 − 1/(tr C + 1)) F − ¾ μ' cof F; with tr C + 1 = 4 + x the bracket of F is ¾ + x/(4 (4 + x)), so
+    /// P = μ' [¾ (F − cof F) + x/(4 (4 + x)) F].
+    template <class D>
+    static void shear_stress(D d, const Strain<D>& strain, const Tissue<D>& tissue, Vec<D> volume, Vec<D> (&P)[3][3]) {
+        const auto one = hn::Set(d, 1), excess = trace_excess(strain);
+        const auto mu = volume * hn::Set(d, tissue.parameter[0]);
+        const auto three_quarters = mu * hn::Set(d, Scalar<D>(0.75));
+        const auto four = hn::Set(d, 4);
+        const auto growth = mu * excess / (four * (four + excess));
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j) {
+                const auto unit_free = i == j ? strain.cof[i][j] - one : strain.cof[i][j];
+                const auto F = i == j ? strain.H[i][j] + one : strain.H[i][j];
+                P[i][j] = hn::MulAdd(three_quarters, strain.H[i][j] - unit_free, growth * F);
+            }
+    }
+};
+
+/// ln J^(−1/3) and the powers that isochoric laws take of it.
+template <class D>
+Vec<D> isochoric_exponent(D d, const Strain<D>& strain) {
+    return hn::Log1p(d, strain.change) * hn::Set(d, Scalar<D>(-1.0 / 3));
+}
+
+/// Adds 2 ψ₁ J^(−2/3) (F − I₁/3 F^−T) = 2 ψ₁ J^(−5/3) (J F − cof F − (I₁/3 − 1) cof F).
+template <class D>
+void set_first_invariant_stress(D d, const Strain<D>& strain, Vec<D> excess, Vec<D> scale, Vec<D> (&P)[3][3]) {
+    const auto J = hn::Set(d, 1) + strain.change;
+    const auto third = excess * hn::Set(d, Scalar<D>(1.0 / 3));
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j)
+            P[i][j] = scale * hn::NegMulAdd(third, strain.cof[i][j], stretch_difference(d, strain, J, i, j));
+}
+
+template <>
+struct Response<NeoHookeanIso> : QuadraticVolume {
+    static constexpr bool admits_inversion = false, has_fibre = false;
+
+    /// ψ₁ = μ/2
+    template <class D>
+    static void shear_stress(D d, const Strain<D>& strain, const Tissue<D>& tissue, Vec<D> volume, Vec<D> (&P)[3][3]) {
+        const auto scale =
+            volume * hn::Set(d, tissue.parameter[0]) * hn::Exp(d, isochoric_exponent(d, strain) * hn::Set(d, 5));
+        set_first_invariant_stress(d, strain, trace_excess(strain), scale, P);
+    }
+};
+
+template <>
+struct Response<ArrudaBoyce> {
+    static constexpr bool admits_inversion = false, has_fibre = false;
+
+    /// ψ₁ = Σ k_i Ī₁^(i−1)
+    template <class D>
+    static void shear_stress(D d, const Strain<D>& strain, const Tissue<D>& tissue, Vec<D> volume, Vec<D> (&P)[3][3]) {
+        const auto excess = trace_excess(strain);
+        const auto exponent = isochoric_exponent(d, strain);
+        const auto j = hn::Exp(d, exponent + exponent);
+        const auto invariant = j * (excess + hn::Set(d, 3));
+        auto psi = hn::Set(d, tissue.parameter[4]);
+        for (int i = 3; i >= 0; --i) psi = hn::MulAdd(psi, invariant, hn::Set(d, tissue.parameter[i]));
+        const auto scale = volume * (psi + psi) * j / (hn::Set(d, 1) + strain.change);
+        set_first_invariant_stress(d, strain, excess, scale, P);
+    }
+    /// U' = (J − 1/J)/2 = x (2 + x)/(2 (1 + x)) with x = J − 1
+    template <class D>
+    static Vec<D> pressure_factor(D d, Vec<D> change) {
+        const auto one = hn::Set(d, 1), J = one + change;
+        return change * (one + J) / (J + J);
+    }
+};
+
+template <>
+struct Response<Polynomial> : QuadraticVolume {
+    static constexpr bool admits_inversion = false, has_fibre = false;
+
+    /// P = 2 ψ₁ J^(−2/3) (F − I₁/3 G) + 2 ψ₂ J^(−4/3) (I₁ F − F C − 2/3 I₂ G), G = F^−T. With C = I + E, t = tr E and
+    /// q = 4/3 t + (t² − E:E)/3 the second bracket is 2 (F − G) + F (t I − E) − q G.
+    template <class D>
+    static void shear_stress(D d, const Strain<D>& strain, const Tissue<D>& tissue, Vec<D> volume, Vec<D> (&P)[3][3]) {
+        const auto set = [&](double value) { return hn::Set(d, Scalar<D>(value)); };
+        Vec<D> E[3][3];
+        strain_excess(strain, E);
+        const auto t = E[0][0] + E[1][1] + E[2][2];
+        auto E_E = E[0][0] * E[0][0];
+        for (int k = 1; k < 9; ++k) E_E = hn::MulAdd(E[k / 3][k % 3], E[k / 3][k % 3], E_E);
+        const auto minors = t * t - E_E;
+        const auto exponent = isochoric_exponent(d, strain);
+        const auto j = hn::Exp(d, exponent + exponent), three = set(3);
+        const auto x = hn::MulSub(j, three + t, three);
+        const auto y = hn::MulSub(j * j, hn::MulAdd(set(0.5), minors, three + t + t), three);
+        const auto c = [&](int k) { return hn::Set(d, tissue.parameter[k]); };  // c10 c01 c20 c11 c02 c30
+        const auto psi_1 = c(0) + hn::MulAdd(c(3), y, x * hn::MulAdd(three * c(5), x, c(2) + c(2)));
+        const auto psi_2 = c(1) + hn::MulAdd(c(3), x, (c(4) + c(4)) * y);
+
+        const auto J = set(1) + strain.change, inverse_J = set(1) / J;
+        const auto two_volume = volume + volume;
+        set_first_invariant_stress(d, strain, t, two_volume * psi_1 * j * inverse_J, P);
+        const auto scale = two_volume * psi_2 * j * j;
+        const auto q = hn::MulAdd(set(4.0 / 3), t, set(1.0 / 3) * minors) * inverse_J;
+        const auto two_over_J = inverse_J + inverse_J;
+        for (int i = 0; i < 3; ++i)
+            for (int k = 0; k < 3; ++k) {
+                auto F_E = E[i][k];  // F E = E + H E
+                for (int m = 0; m < 3; ++m) F_E = hn::MulAdd(strain.H[i][m], E[m][k], F_E);
+                auto bracket = hn::MulSub(t, strain.H[i][k], F_E) + two_over_J * stretch_difference(d, strain, J, i, k);
+                if (i == k) bracket = bracket + t;
+                P[i][k] = hn::MulAdd(scale, hn::NegMulAdd(q, strain.cof[i][k], bracket), P[i][k]);
+            }
+    }
+};
+
+template <>
+struct Response<TransverselyIsotropic> : QuadraticVolume {
+    static constexpr bool admits_inversion = false, has_fibre = true;
+
+    /// P of the isochoric neo-Hookean law and 2 η (Ī₄ − 1) J^(−2/3) (f aᵀ − I₄/3 G) with f = F a.
+    template <class D>
+    static void shear_stress(D d, const Strain<D>& strain, const Tissue<D>& tissue, Vec<D> volume, Vec<D> (&P)[3][3]) {
+        Response<NeoHookeanIso>::shear_stress(d, strain, tissue, volume, P);
+        Vec<D> stretch[3], f[3];  // H a, F a
+        for (int i = 0; i < 3; ++i) {
+            stretch[i] = dot<D>(strain.H[i], tissue.fibre);
+            f[i] = tissue.fibre[i] + stretch[i];
+        }
+        const auto along = dot<D>(tissue.fibre, stretch);
+        const auto excess = along + along + dot<D>(stretch, stretch);  // I₄ − 1 for a unit vector
+        const auto exponent = isochoric_exponent(d, strain);
+        const auto j_excess = hn::Expm1(d, exponent + exponent);  // J^(−2/3) − 1
+        const auto I4 = hn::Set(d, 1) + excess;
+        const auto strength = hn::MulAdd(j_excess, I4, excess);  // Ī₄ − 1
+        const auto scale =
+            volume * hn::Set(d, tissue.parameter[1]) * (strength + strength) * (hn::Set(d, 1) + j_excess);
+        const auto third = I4 * hn::Set(d, Scalar<D>(1.0 / 3)) / (hn::Set(d, 1) + strain.change);
+        for (int i = 0; i < 3; ++i)
+            for (int k = 0; k < 3; ++k) {
+                const auto bracket = hn::NegMulAdd(third, strain.cof[i][k], f[i] * tissue.fibre[k]);
+                P[i][k] = hn::MulAdd(scale, bracket, P[i][k]);
+            }
+    }
+};
+
+/// Eigenvalues on the diagonal of A and eigenvectors in the columns of n, by cyclic Jacobi rotations (Golub and Van
+/// Loan, Matrix Computations, section 8.5): exact for repeated eigenvalues and relative to the smallest, where formulas
+/// with roots of the characteristic polynomial are not. Four sweeps take any matrix to rounding in float64.
+template <class D>
+void symmetric_eigenvectors(D d, Vec<D> (&A)[3][3], Vec<D> (&n)[3][3]) {
+    constexpr int sweeps = 4;
+    const auto zero = hn::Zero(d), one = hn::Set(d, 1);
+    const auto tiny = hn::Set(d, sizeof(Scalar<D>) == 4 ? Scalar<D>(1e-37) : Scalar<D>(1e-300));
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) n[i][j] = i == j ? one : zero;
+    for (int rotation = 0; rotation < 3 * sweeps; ++rotation) {
+        const int p = rotation % 3 == 2 ? 1 : 0, q = rotation % 3 == 0 ? 1 : 2, r = 3 - p - q;
+        const auto gap = A[q][q] - A[p][p], twice = A[p][q] + A[p][q];
+        const auto root = hn::Sqrt(hn::MulAdd(gap, gap, twice * twice));
+        const auto t = twice / (gap + hn::CopySign(root + tiny, gap));  // tan of the rotation that clears A_pq
+        const auto c = one / hn::Sqrt(hn::MulAdd(t, t, one)), s = t * c;
+        A[p][p] = hn::NegMulAdd(t, A[p][q], A[p][p]);
+        A[q][q] = hn::MulAdd(t, A[p][q], A[q][q]);
+        A[p][q] = A[q][p] = zero;
+        const auto rp = A[r][p], rq = A[r][q];
+        A[r][p] = A[p][r] = hn::MulSub(c, rp, s * rq);
+        A[r][q] = A[q][r] = hn::MulAdd(s, rp, c * rq);
+        for (int i = 0; i < 3; ++i) {
+            const auto np = n[i][p], nq = n[i][q];
+            n[i][p] = hn::MulSub(c, np, s * nq);
+            n[i][q] = hn::MulAdd(s, np, c * nq);
+        }
+    }
+}
+
+template <>
+struct Response<Ogden> : QuadraticVolume {
+    static constexpr bool admits_inversion = false, has_fibre = false;
+
+    /// S = Σ T_i/c_i n_i n_iᵀ with T_i = Σ_p μ_p (y_i − ȳ) and y_i = λ̄_i^α_p − 1; P = F S.
+    template <class D>
+    static void shear_stress(D d, const Strain<D>& strain, const Tissue<D>& tissue, Vec<D> volume, Vec<D> (&P)[3][3]) {
+        Vec<D> E[3][3], n[3][3];
+        strain_excess(strain, E);
+        symmetric_eigenvectors(d, E, n);
+        const auto exponent = isochoric_exponent(d, strain);
+        const auto half = hn::Set(d, Scalar<D>(0.5)), third = hn::Set(d, Scalar<D>(1.0 / 3)), one = hn::Set(d, 1);
+        Vec<D> log_stretch[3], T[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};  // ln λ̄_i
+        for (int i = 0; i < 3; ++i) log_stretch[i] = hn::MulAdd(half, hn::Log1p(d, E[i][i]), exponent);
+        for (int term = 0; term < 3; ++term) {
+            if (tissue.parameter[2 * term] == Scalar<D>(0)) continue;
+            const auto modulus = hn::Set(d, tissue.parameter[2 * term]);
+            const auto alpha = hn::Set(d, tissue.parameter[2 * term + 1]);
+            Vec<D> y[3];
+            for (int i = 0; i < 3; ++i) y[i] = hn::Expm1(d, alpha * log_stretch[i]);
+            const auto mean = third * (y[0] + y[1] + y[2]);
+            for (int i = 0; i < 3; ++i) T[i] = hn::MulAdd(modulus, y[i] - mean, T[i]);
+        }
+        Vec<D> S[3][3];
+        for (int i = 0; i < 3; ++i) T[i] = volume * T[i] / (one + E[i][i]);
+        for (int i = 0; i < 3; ++i)
+            for (int k = i; k < 3; ++k)
+                S[i][k] = S[k][i] =
+                    hn::MulAdd(T[0] * n[i][0], n[k][0], hn::MulAdd(T[1] * n[i][1], n[k][1], T[2] * n[i][2] * n[k][2]));
+        for (int i = 0; i < 3; ++i)
+            for (int k = 0; k < 3; ++k) P[i][k] = S[i][k] + dot<D>(strain.H[i], S[k]);
+    }
+};
+
+}  // namespace HWY_NAMESPACE
+}  // namespace tissuewarp::tled::detail
+HWY_AFTER_NAMESPACE();
+
+#endif  // TISSUEWARP_CPU_LAWS_INL
