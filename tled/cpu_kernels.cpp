@@ -1,187 +1,19 @@
-// The element pass of total Lagrangian dynamics (Miller et al. 2007, section 3): displacement gradient from precomputed
-// derivatives, first Piola–Kirchhoff stress, corner forces f_a = V P ∂N_a/∂X.
-//
-// Stresses are written in H = F − I and J − 1 = tr H + ½(tr²H − tr H²) + det H, so that float32 keeps small strains.
+// The kernels of detail/cpu_elements-inl.hpp for every instruction set, law and scalar, chosen at run time.
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tled/cpu_kernels.cpp"
 // foreach_target.h must come before highway.h.
 // clang-format off
 #include <hwy/foreach_target.h>
-#include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 // clang-format on
 
+#include "tled/detail/cpu_elements-inl.hpp"
 #include "tled/detail/cpu_kernels.hpp"
-#include "tled/detail/cpu_laws-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace tissuewarp::tled::detail {
 namespace HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
-
-template <class D, class T>
-Vec<D> gather(D d, const T* base, const std::int32_t* index) {
-    const hn::RebindToSigned<D> di;
-    if constexpr (sizeof(T) == 4)
-        return hn::GatherIndex(d, base, hn::LoadU(di, index));
-    else
-        return hn::GatherIndex(d, base, hn::PromoteTo(di, hn::LoadU(hn::Rebind<std::int32_t, D>(), index)));
-}
-
-template <class D, class T>
-void displacement_gradient(D d, const ElementBatches<T>& elements, std::size_t batch, int lane, const T* u,
-                           Vec<D> (&H)[3][3]) {
-    const std::int32_t* node = &elements.node[batch * 4 * batch_width + lane];
-    const T* gradient = &elements.gradient[batch * 9 * batch_width + lane];
-    Vec<D> difference[3][3];  // [component][k]: u_{k+1} − u_0
-    for (int c = 0; c < 3; ++c) {
-        const auto u0 = gather(d, u + c, node);
-        for (int k = 0; k < 3; ++k) difference[c][k] = gather(d, u + c, node + (k + 1) * batch_width) - u0;
-    }
-    for (int j = 0; j < 3; ++j) {
-        const auto b0 = hn::LoadU(d, gradient + j * batch_width);
-        const auto b1 = hn::LoadU(d, gradient + (3 + j) * batch_width);
-        const auto b2 = hn::LoadU(d, gradient + (6 + j) * batch_width);
-        for (int i = 0; i < 3; ++i)
-            H[i][j] = hn::MulAdd(difference[i][0], b0, hn::MulAdd(difference[i][1], b1, difference[i][2] * b2));
-    }
-}
-
-template <class D>
-void cofactor(const Vec<D> (&A)[3][3], Vec<D> (&cof)[3][3]) {
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            const int a = (i + 1) % 3, b = (i + 2) % 3, c = (j + 1) % 3, e = (j + 2) % 3;
-            cof[i][j] = hn::MulSub(A[a][c], A[b][e], A[a][e] * A[b][c]);
-        }
-}
-
-/// Fills `cof` with cof F = (1 + tr H) I − Hᵀ + cof H, and `change` with J − 1 = tr H + tr cof H + det H.
-template <class D>
-void finish_strain(D d, Strain<D>& strain) {
-    cofactor<D>(strain.H, strain.cof);  // cof H for now
-    const auto trace = strain.H[0][0] + strain.H[1][1] + strain.H[2][2];
-    const auto second = strain.cof[0][0] + strain.cof[1][1] + strain.cof[2][2];
-    const auto determinant =
-        hn::MulAdd(strain.H[0][0], strain.cof[0][0],
-                   hn::MulAdd(strain.H[0][1], strain.cof[0][1], strain.H[0][2] * strain.cof[0][2]));
-    strain.change = trace + second + determinant;
-    const auto diagonal = hn::Set(d, 1) + trace;
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            strain.cof[i][j] = strain.cof[i][j] - strain.H[j][i];
-            if (i == j) strain.cof[i][j] = strain.cof[i][j] + diagonal;
-        }
-}
-
-/// J − 1 where J > 0, NaN elsewhere for laws that know no inverted state: Highway's logarithm gives a finite number for
-/// one, which would pass as a force.
-template <class Law, class D>
-Vec<D> admissible(D d, Vec<D> change) {
-    if constexpr (Response<Law>::admits_inversion)
-        return change;
-    else
-        return hn::IfThenElse(change > hn::Set(d, -1), change, hn::NaN(d));
-}
-
-template <class D, class T>
-Strain<D> strain_of(D d, const ElementBatches<T>& elements, std::size_t batch, int lane, const T* u) {
-    Strain<D> strain;
-    displacement_gradient(d, elements, batch, lane, u, strain.H);
-    finish_strain(d, strain);
-    return strain;
-}
-
-/// V p, kPa mm³.
-template <class Law, Kinematics kinematics, class D, class T>
-Vec<D> scaled_pressure(D d, const ElementBatches<T>& elements, std::size_t batch, int lane, Vec<D> volume,
-                       Vec<D> change, const T* pressure) {
-    if constexpr (kinematics == Kinematics::AveragedPressure) {
-        const std::int32_t* node = &elements.pressure[batch * 4 * batch_width + static_cast<std::size_t>(lane)];
-        const auto sum = gather(d, pressure, node) + gather(d, pressure, node + batch_width) +
-                         gather(d, pressure, node + 2 * batch_width) + gather(d, pressure, node + 3 * batch_width);
-        return volume * (sum * hn::Set(d, T(0.25)));
-    } else {
-        const auto modulus =
-            hn::LoadU(d, &elements.volumetric_modulus[batch * batch_width + static_cast<std::size_t>(lane)]);
-        return volume * (modulus * Response<Law>::pressure_factor(d, change));
-    }
-}
-
-/// f_a = V P ∂N_a/∂X for the scaled stress V P; the first corner takes minus the sum of the others.
-template <class D, class T>
-void store_corner_forces(D d, const ElementBatches<T>& elements, std::size_t batch, int lane, const Vec<D> (&P)[3][3],
-                         T* force) {
-    const T* gradient = &elements.gradient[batch * 9 * batch_width + static_cast<std::size_t>(lane)];
-    T* out = force + (batch * 4 * batch_width + static_cast<std::size_t>(lane)) * record;
-    const auto zero = hn::Zero(d);
-    Vec<D> f0[3] = {zero, zero, zero};
-    for (int k = 0; k < 3; ++k) {
-        const auto b0 = hn::LoadU(d, gradient + 3 * k * batch_width);
-        const auto b1 = hn::LoadU(d, gradient + (3 * k + 1) * batch_width);
-        const auto b2 = hn::LoadU(d, gradient + (3 * k + 2) * batch_width);
-        Vec<D> f[3];
-        for (int i = 0; i < 3; ++i) {
-            f[i] = hn::MulAdd(P[i][0], b0, hn::MulAdd(P[i][1], b1, P[i][2] * b2));
-            f0[i] = f0[i] - f[i];
-        }
-        hn::StoreInterleaved4(f[0], f[1], f[2], zero, d, out + (k + 1) * batch_width * record);
-    }
-    hn::StoreInterleaved4(f0[0], f0[1], f0[2], zero, d, out);
-}
-
-template <class Law, Kinematics kinematics, class T>
-void element_forces_of(const T* parameter, const ElementBatches<T>& elements, std::size_t begin, std::size_t end,
-                       const T* u, const T* pressure, T* force) {
-    const hn::CappedTag<T, batch_width> d;
-    using D = hn::CappedTag<T, batch_width>;
-    const int lanes = static_cast<int>(hn::Lanes(d));
-    for (std::size_t batch = begin; batch < end; ++batch)
-        for (int lane = 0; lane < batch_width; lane += lanes) {
-            Strain<D> strain = strain_of(d, elements, batch, lane, u);
-            strain.change = admissible<Law>(d, strain.change);
-            Tissue<D> tissue;
-            tissue.parameter = parameter;
-            if constexpr (Response<Law>::has_fibre)
-                for (int c = 0; c < 3; ++c)
-                    tissue.fibre[c] = hn::LoadU(d, &elements.fibre[(batch * 3 + c) * batch_width + lane]);
-            const auto volume = hn::LoadU(d, &elements.volume[batch * batch_width + static_cast<std::size_t>(lane)]);
-            Vec<D> P[3][3];
-            Response<Law>::shear_stress(d, strain, tissue, volume, P);
-            const auto p = scaled_pressure<Law, kinematics>(d, elements, batch, lane, volume, strain.change, pressure);
-            for (int i = 0; i < 3; ++i)
-                for (int j = 0; j < 3; ++j) P[i][j] = hn::MulAdd(p, strain.cof[i][j], P[i][j]);
-            store_corner_forces(d, elements, batch, lane, P, force);
-        }
-}
-
-template <class T>
-void volume_changes_of(const ElementBatches<T>& elements, std::size_t begin, std::size_t end, const T* u, T* change) {
-    const hn::CappedTag<T, batch_width> d;
-    using D = hn::CappedTag<T, batch_width>;
-    const int lanes = static_cast<int>(hn::Lanes(d));
-    for (std::size_t batch = begin; batch < end; ++batch)
-        for (int lane = 0; lane < batch_width; lane += lanes)
-            hn::StoreU(strain_of<D>(d, elements, batch, lane, u).change, d,
-                       change + batch * batch_width + static_cast<std::size_t>(lane));
-}
-
-template <class Law, class T>
-void nodal_pressures_of(const T* modulus, const T* change, T* pressure, std::size_t count) {
-    const hn::CappedTag<T, batch_width> d;
-    const std::size_t lanes = hn::Lanes(d);
-    std::size_t i = 0;
-    for (; i + lanes <= count; i += lanes)
-        hn::StoreU(
-            hn::LoadU(d, modulus + i) * Response<Law>::pressure_factor(d, admissible<Law>(d, hn::LoadU(d, change + i))),
-            d, pressure + i);
-    const hn::CappedTag<T, 1> one;
-    for (; i < count; ++i)
-        hn::StoreU(hn::LoadU(one, modulus + i) *
-                       Response<Law>::pressure_factor(one, admissible<Law>(one, hn::LoadU(one, change + i))),
-                   one, pressure + i);
-}
 
 /// Calls `run` with the law of index `law` as template argument.
 template <std::size_t index = 0, class Run>
