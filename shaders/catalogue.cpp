@@ -41,15 +41,21 @@ ProgramSource node_program(std::string kernel, const NodeEffects& effects) {
 
 }  // namespace
 
-ProgramSource element_force_program(Law law, PressureRule rule) {
+ProgramSource element_force_program(const ElementForces& forces) {
     ProgramSource source{"element_force", {"index", "bindings", "numbers", "element", "material", "isochoric"}, {}, {}};
-    add_law(source, law);
-    source.defines = {{"WORKGROUP_SIZE", workgroup_size}, {"USES_SHEAR", "1"}};
-    if (rule == PressureRule::Element) {
+    add_law(source, forces.law);
+    const bool viscous = forces.viscosity != Viscosity::None;
+    source.defines = {{"WORKGROUP_SIZE", workgroup_size}, {"USES_SHEAR", "1"}, {"HAS_VISCOSITY", flag(viscous)}};
+    if (viscous) {
+        source.chunks.emplace_back("viscosity.prony");
+        source.defines["PRONY_TERMS"] = std::to_string(forces.prony_terms) + "u";
+        source.defines["ADVANCES_TIME"] = flag(forces.viscosity == Viscosity::Advance);
+    }
+    if (forces.pressure == PressureRule::Element) {
         source.chunks.emplace_back("pressure.element");
     } else {
         source.chunks.emplace_back("pressure.averaged");
-        source.defines["HAS_ELEMENT_PRESSURE"] = flag(rule == PressureRule::AveragedWithElementPart);
+        source.defines["HAS_ELEMENT_PRESSURE"] = flag(forces.pressure == PressureRule::AveragedWithElementPart);
     }
     return source;
 }
@@ -106,7 +112,8 @@ std::vector<ProgramSource> every_program() {
         const auto law = static_cast<Law>(index);
         for (const PressureRule rule :
              {PressureRule::Element, PressureRule::Averaged, PressureRule::AveragedWithElementPart})
-            all.push_back(element_force_program(law, rule));
+            for (const Viscosity viscosity : {Viscosity::None, Viscosity::Hold, Viscosity::Advance})
+                all.push_back(element_force_program({law, rule, viscosity, 3}));
         all.push_back(nodal_pressure_program(law));
     }
     for (const bool springs : {false, true})

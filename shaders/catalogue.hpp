@@ -27,6 +27,17 @@ enum class PressureRule {
     AveragedWithElementPart,  ///< at nodes, and a part in each element
 };
 
+/// Viscous stresses in the element pass: none, read as they are at the end of the step, or advanced with it.
+enum class Viscosity { None, Hold, Advance };
+
+/// What the element pass of a law computes.
+struct ElementForces {
+    Law law = Law::NeoHookeanIso;
+    PressureRule pressure = PressureRule::Element;
+    Viscosity viscosity = Viscosity::None;
+    int prony_terms = 0;  ///< of the scene's materials, the most; at least 1 with viscosity
+};
+
 /// Effects that act on nodes; what is absent costs no read and no instruction.
 struct NodeEffects {
     bool springs = false;
@@ -36,7 +47,7 @@ struct NodeEffects {
 enum class StoreResidual { No, Yes };
 enum class MaskConstrained { No, Yes };
 
-ProgramSource element_force_program(Law law, PressureRule rule);
+ProgramSource element_force_program(const ElementForces& forces);
 ProgramSource element_volume_program();
 ProgramSource nodal_pressure_program(Law law);
 ProgramSource node_step_program(const NodeEffects& effects, StoreResidual store);

@@ -4,6 +4,7 @@
 #include "core/errors.hpp"
 #include "tled/detail/cpu_kernels.hpp"
 #include "tled/detail/kernel_parameters.hpp"
+#include "tled/detail/prony_coefficients.hpp"
 #include "tled/engine.hpp"
 
 #include <tbb/blocked_range.h>
@@ -18,6 +19,7 @@ namespace tissuewarp::tled {
 
 namespace {
 
+using detail::Advance;
 using detail::batch_width;
 using detail::ElementBatches;
 using detail::Kinematics;
@@ -133,6 +135,7 @@ public:
         spring_of_node_.assign(node_count_, -1);
         corner_force_.assign(elements_.count() * 4 * batch_width * record, T(0));
         if (kinematics_ == Kinematics::AveragedPressure) prepare_pressure(rest.pressure);
+        prepare_viscosity(rest);
         free_.assign(vector_size, T(1));
         for (std::size_t node = 0; node < node_count_; ++node) free_[node * record + 3] = T(0);
         Eigen::Matrix3Xd mass(3, rest.node_count);
@@ -186,12 +189,15 @@ public:
                 displacement_[at] = T(displacement(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(node)));
                 increment_[at] = T(increment(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(node)));
             }
+        for (detail::ViscousBatches<T>& viscous : viscous_)
+            std::fill(viscous.stress.begin(), viscous.stress.end(), T(0));
     }
 
     void run(int steps, const StepCoefficients& coefficients) override {
         const T momentum = T(coefficients.momentum), gain = T(coefficients.gain);
+        set_time_step(coefficients.time_step);
         for (int step = 0; step < steps; ++step) {
-            corner_forces(displacement_.data());
+            corner_forces(displacement_.data(), Advance::Yes);
             for_nodes([&](std::size_t node) {
                 T residual[3];
                 node_residual(node, displacement_.data(), residual);
@@ -273,6 +279,10 @@ private:
     std::vector<T> inverse_pressure_volume_, pressure_modulus_, nodal_change_, nodal_pressure_, change_;
     std::vector<BatchBlock> pressure_runs_;  // runs of pressure nodes that share a material
 
+    // by material; empty where none is viscous
+    std::vector<PronySeries> viscosity_;
+    std::vector<detail::ViscousBatches<T>> viscous_;
+
     // records of four per node
     std::vector<T> displacement_, increment_, inverse_mass_, force_load_, free_, scratch_;
     std::vector<std::int32_t> spring_of_node_;
@@ -314,13 +324,39 @@ private:
     }
 
     /// Element pass: corner forces at displacement `u`, nodal pressures first where the element needs them.
-    void corner_forces(const T* u) {
+    void corner_forces(const T* u, Advance advance = Advance::No) {
         if (kinematics_ == Kinematics::AveragedPressure) average_pressure(u);
-        for (const BatchBlock& block : layout_.blocks)
+        for (const BatchBlock& block : layout_.blocks) {
+            const auto m = static_cast<std::size_t>(block.material);
             for_batches(block.begin, block.end, [&](std::size_t begin, std::size_t end) {
-                detail::element_forces(materials_[static_cast<std::size_t>(block.material)], kinematics_, elements_,
-                                       begin, end, u, nodal_pressure_.data(), corner_force_.data());
+                if (viscous_.empty() || viscous_[m].coefficient.empty())
+                    detail::element_forces(materials_[m], kinematics_, elements_, begin, end, u, nodal_pressure_.data(),
+                                           corner_force_.data());
+                else
+                    detail::viscous_element_forces(materials_[m], viscous_[m], advance, kinematics_, elements_, begin,
+                                                   end, u, nodal_pressure_.data(), corner_force_.data());
             });
+        }
+    }
+
+    void prepare_viscosity(const RestState& rest) {
+        viscosity_ = rest.viscosity;
+        viscous_.resize(viscosity_.size());
+        for (const BatchBlock& block : layout_.blocks) {
+            if (viscosity_.empty()) break;
+            const auto m = static_cast<std::size_t>(block.material);
+            viscous_[m].first_batch = block.begin;
+            viscous_[m].stress.assign((block.end - block.begin) * viscosity_[m].terms.size() * 6 * batch_width, T(0));
+        }
+        set_time_step(0);
+    }
+
+    void set_time_step(double time_step) {
+        for (std::size_t m = 0; m < viscous_.size(); ++m) {
+            viscous_[m].coefficient.clear();
+            for (const auto& [a, b] : detail::prony_coefficients(viscosity_[m], time_step))
+                viscous_[m].coefficient.push_back({T(a), T(b)});
+        }
     }
 
     /// q_a = M_a U'(J_a) with J_a − 1 = Σ ¼ V_e (J_e − 1) / V_a.

@@ -8,23 +8,12 @@
 #include <hwy/highway.h>
 // clang-format on
 
-#include "tled/detail/cpu_elements-inl.hpp"
 #include "tled/detail/cpu_kernels.hpp"
+#include "tled/detail/cpu_elements-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace tissuewarp::tled::detail {
 namespace HWY_NAMESPACE {
-
-/// Calls `run` with the law of index `law` as template argument.
-template <std::size_t index = 0, class Run>
-void with_law(std::size_t law, const Run& run) {
-    if constexpr (index < std::variant_size_v<Material>) {
-        if (law == index)
-            run.template operator()<std::variant_alternative_t<index, Material>>();
-        else
-            with_law<index + 1>(law, run);
-    }
-}
 
 template <class T>
 void element_forces_any(const KernelMaterial<T>& material, Kinematics kinematics, const ElementBatches<T>& elements,

@@ -17,6 +17,9 @@ namespace tissuewarp::tled {
 struct StepCoefficients {
     double momentum = 0.0;  ///< ρ
     double gain = 0.0;      ///< c, s² for a mass in kg; dimensionless for a mass in mN/mm
+    /// Δt, s, by which viscous stresses advance in each step; without it (0) they rest as they are. Not read where no
+    /// material is viscous.
+    double time_step = 0.0;
 };
 
 /// Scalars of the present state, reduced where the engine runs. Sums are over free degrees of freedom.
@@ -31,8 +34,9 @@ struct Observation {
     bool finite = true;         ///< false when any displacement is not finite
 };
 
-/// State: displacement u and increment u − u⁻ (3 × N, mm), nodal diagonal mass (3 × N), conditions. Copies in and out
-/// are float64 whatever the engine computes in.
+/// State: displacement u and increment u − u⁻ (3 × N, mm), viscous stresses, nodal diagonal mass (3 × N), conditions.
+/// Copies in and out are float64 whatever the engine computes in. Forces that are read take the viscous stresses at the
+/// end of the time step that starts at the present displacement, as the next step will.
 class Engine {
 public:
     virtual ~Engine() = default;
@@ -41,6 +45,7 @@ public:
     virtual void set_conditions(const NodalConditions& conditions) = 0;
     /// Diagonal mass of every degree of freedom, positive: kg for dynamics, mN/mm for dynamic relaxation.
     virtual void set_mass(const Eigen::Matrix3Xd& mass) = 0;
+    /// Forgets viscous stresses: the material answers as if it had been at rest until now.
     virtual void set_state(const Eigen::Matrix3Xd& displacement, const Eigen::Matrix3Xd& increment) = 0;
 
     /// Advances by `steps` without any transfer between host and device.

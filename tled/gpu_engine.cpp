@@ -120,6 +120,7 @@ public:
         const CurrentContext current = device_.make_current();
         displacement_.upload(detail::packed(displacement));
         increment_.upload(detail::packed(increment));
+        force_.forget_viscous_stresses();
         impose();
         previous_residual_known_ = false;
     }
@@ -133,12 +134,13 @@ public:
             program->set(1, static_cast<float>(coefficients.momentum));
             program->set(2, static_cast<float>(coefficients.gain));
         }
+        force_.set_time_step(coefficients.time_step);
         blocks_.set("Displacement", displacement_);
         blocks_.set("Residual", previous_residual_);
         force_.bind(blocks_);
         blocks_.bind(last);
         for (int i = 1; i <= steps; ++i) {
-            force_.dispatch();
+            force_.dispatch(detail::Advance::Yes);
             (i < steps ? step : last).dispatch(nodes());
             shaders::storage_barrier();
             if (i % steps_per_flush == 0) shaders::flush();

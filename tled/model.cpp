@@ -34,6 +34,20 @@ void require_valid(const Model& model) {
             throw InvalidInput("label " + std::to_string(label) + " of the mesh has no material; add it to the table");
         require_valid(material->second, "label " + std::to_string(label));
     }
+    for (const auto& [label, series] : model.viscosity) {
+        require_valid(series, "label " + std::to_string(label));
+        if (!model.materials.contains(label))
+            throw InvalidInput("label " + std::to_string(label) + " has viscosity but no material");
+    }
+}
+
+Model relaxed(Model model) {
+    for (const auto& [label, series] : model.viscosity) {
+        Material& material = model.materials.at(label);
+        material = with_shear_scaled(material, relaxed_fraction(series));
+    }
+    model.viscosity.clear();
+    return model;
 }
 
 Element suggested_element(const MaterialTable& materials) {

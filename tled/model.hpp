@@ -3,6 +3,7 @@
 
 #include "meshing/tet_mesh.hpp"
 #include "tled/material.hpp"
+#include "tled/viscosity.hpp"
 
 namespace tissuewarp::tled {
 
@@ -15,12 +16,17 @@ struct Model {
     meshing::TetMesh mesh;
     MaterialTable materials;  ///< one entry for every label of the mesh
     Element element = Element::AveragedPressureT4;
-    double density = 1e-6;   ///< kg/mm³
-    Eigen::Matrix3Xd fibre;  ///< 3 × tetrahedra, unit vectors that replace those of the materials; or empty
+    double density = 1e-6;     ///< kg/mm³
+    ViscosityTable viscosity;  ///< of labels that are not elastic; for dynamics
+    Eigen::Matrix3Xd fibre;    ///< 3 × tetrahedra, unit vectors that replace those of the materials; or empty
 };
 
 /// Throws InvalidInput when a label has no material, a modulus is not positive, or the mesh is invalid.
 void require_valid(const Model& model);
+
+/// The model after all viscous stress has relaxed: elastic, with 1 − Σ g of the shear stress. What a static equilibrium
+/// of tissue that has had time is computed with.
+Model relaxed(Model model);
 
 /// AveragedPressureT4 when any material has ν > 0.46, T4 otherwise: below, T4 hardly locks, and its factor is three
 /// times smaller (docs/decisions/rest_stiffness.md).

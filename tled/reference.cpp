@@ -102,7 +102,37 @@ double elastic_energy(const RestState& rest, const Matrix3Xd& displacement) {
     return sum;
 }
 
+ViscousStresses unstressed(const RestState& rest) {
+    ViscousStresses stresses(rest.tet.size());
+    if (rest.viscosity.empty()) return stresses;
+    for (const MaterialBlock& block : rest.blocks)
+        for (int e = block.begin; e < block.end; ++e)
+            stresses[e].assign(rest.viscosity[block.material].terms.size(), Matrix3d::Zero());
+    return stresses;
+}
+
+ViscousStresses advanced(const RestState& rest, ViscousStresses stresses, const Matrix3Xd& displacement,
+                         double time_step) {
+    if (rest.viscosity.empty()) return stresses;
+    const std::vector<int> material_of = material_of_elements(rest);
+    tbb::parallel_for(0, rest.element_count(), [&](int e) {
+        const std::vector<PronyTerm>& terms = rest.viscosity[material_of[e]].terms;
+        if (terms.empty()) return;
+        const Matrix3d F = detail::deformation_gradient(rest, displacement, e);
+        const Matrix3d S = F.inverse() * shear_stress(detail::element_material(rest, material_of[e], e), F);
+        for (std::size_t k = 0; k < terms.size(); ++k) {
+            const auto [g, tau] = terms[k];
+            stresses[e][k] = (time_step * g * S + tau * stresses[e][k]) / (time_step + tau);
+        }
+    });
+    return stresses;
+}
+
 Matrix3Xd internal_force(const RestState& rest, const Matrix3Xd& displacement) {
+    return internal_force(rest, displacement, ViscousStresses(rest.tet.size()));
+}
+
+Matrix3Xd internal_force(const RestState& rest, const Matrix3Xd& displacement, const ViscousStresses& stresses) {
     const VectorXd jacobian = detail::element_jacobians(rest, displacement);
     detail::require_positive(rest, jacobian);
     const std::vector<VolumetricFunction> nodal = detail::nodal_volumetric(rest, jacobian);
@@ -113,7 +143,8 @@ Matrix3Xd internal_force(const RestState& rest, const Matrix3Xd& displacement) {
         const Material material = detail::element_material(rest, material_of[e], e);
         const Matrix3d F = detail::deformation_gradient(rest, displacement, e);
         const double pressure = detail::element_pressure(rest, e, material, jacobian[e], nodal);
-        const Matrix3d P = shear_stress(material, F) + pressure * cofactor(F);
+        Matrix3d P = shear_stress(material, F) + pressure * cofactor(F);
+        for (const Matrix3d& q : stresses[e]) P -= F * q;
         corner_force.middleCols<4>(4 * e) = rest.volume[e] * P * detail::shape_gradients(rest, e);
     });
 

@@ -9,6 +9,8 @@
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
 
+#include <vector>
+
 namespace tissuewarp::tled {
 
 /// Elastic energy of a displacement (3 × N mm), mN·mm.
@@ -16,6 +18,21 @@ double elastic_energy(const RestState& rest, const Eigen::Matrix3Xd& displacemen
 
 /// f_int = ∂E/∂u, mN, 3 × N.
 Eigen::Matrix3Xd internal_force(const RestState& rest, const Eigen::Matrix3Xd& displacement);
+
+/// Viscous stresses q_i (second Piola–Kirchhoff, kPa) of every element, in the internal order; elements of elastic
+/// materials have none.
+using ViscousStresses = std::vector<std::vector<Eigen::Matrix3d>>;
+
+/// No stress in any term.
+ViscousStresses unstressed(const RestState& rest);
+
+/// The viscous stresses after a time step (s) that ends at a displacement: q⁺ = (Δt g S_shear + τ q)/(Δt + τ).
+ViscousStresses advanced(const RestState& rest, ViscousStresses stresses, const Eigen::Matrix3Xd& displacement,
+                         double time_step);
+
+/// f_int with the viscous stresses taken off: P = ∂W/∂F − F Σ q_i, mN, 3 × N.
+Eigen::Matrix3Xd internal_force(const RestState& rest, const Eigen::Matrix3Xd& displacement,
+                                const ViscousStresses& stresses);
 
 /// ∂²E/∂u² (3N × 3N, mN/mm, symmetric, both triangles stored), degree of freedom 3·node + component.
 Eigen::SparseMatrix<double> tangent_stiffness(const RestState& rest, const Eigen::Matrix3Xd& displacement);

@@ -15,9 +15,14 @@ namespace {
 
 /// Materials without repetition in the order of their laws, and the index of each label's.
 struct DistinctMaterials {
-    std::vector<Material> materials;
+    std::vector<std::pair<Material, PronySeries>> materials;
     std::map<int, int> of_label;
 };
+
+PronySeries viscosity_of(const Model& model, int label) {
+    const auto found = model.viscosity.find(label);
+    return found == model.viscosity.end() ? PronySeries{} : found->second;
+}
 
 DistinctMaterials distinct_materials(const Model& model) {
     const std::set<int> labels(model.mesh.labels.begin(), model.mesh.labels.end());
@@ -26,7 +31,7 @@ DistinctMaterials distinct_materials(const Model& model) {
                      [&](int a, int b) { return model.materials.at(a).index() < model.materials.at(b).index(); });
     DistinctMaterials result;
     for (const int label : by_law) {
-        const Material& material = model.materials.at(label);
+        const std::pair material{model.materials.at(label), viscosity_of(model, label)};
         const auto place = std::find(result.materials.begin(), result.materials.end(), material);
         result.of_label[label] = static_cast<int>(place - result.materials.begin());
         if (place == result.materials.end()) result.materials.push_back(material);
@@ -36,8 +41,14 @@ DistinctMaterials distinct_materials(const Model& model) {
 
 /// Groups tetrahedra by material, keeping the mesh's order within a group.
 void order_by_material(const Model& model, RestState& rest) {
-    DistinctMaterials distinct = distinct_materials(model);
-    rest.materials = std::move(distinct.materials);
+    const DistinctMaterials distinct = distinct_materials(model);
+    bool viscous = false;
+    for (const auto& [material, series] : distinct.materials) {
+        rest.materials.push_back(material);
+        rest.viscosity.push_back(series);
+        viscous = viscous || !series.terms.empty();
+    }
+    if (!viscous) rest.viscosity.clear();
     const auto material_of = [&](int tet) { return distinct.of_label.at(model.mesh.labels[tet]); };
     rest.tet.resize(static_cast<std::size_t>(model.mesh.tet_count()));
     std::iota(rest.tet.begin(), rest.tet.end(), 0);

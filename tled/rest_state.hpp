@@ -35,10 +35,11 @@ struct PressureNodes {
 
 /// Per-element arrays are in the internal order: grouped by material, otherwise as in the mesh.
 struct RestState {
-    std::vector<Material> materials;    ///< without repetition, equal laws adjacent
-    std::vector<MaterialBlock> blocks;  ///< one for each material, in their order
-    std::vector<int> tet;               ///< M, internal position → tetrahedron of the mesh
-    Eigen::Matrix4Xi nodes;             ///< 4 × M
+    std::vector<Material> materials;     ///< without repetition (viscosity included), equal laws adjacent
+    std::vector<PronySeries> viscosity;  ///< of each material; empty where none is viscous
+    std::vector<MaterialBlock> blocks;   ///< one for each material, in their order
+    std::vector<int> tet;                ///< M, internal position → tetrahedron of the mesh
+    Eigen::Matrix4Xi nodes;              ///< 4 × M
     Eigen::Matrix<double, 9, Eigen::Dynamic>
         gradient;                        ///< 9 × M: row 3k+j is ∂N_{k+1}/∂X_j, 1/mm; N_0 = −Σ of the others
     Eigen::VectorXd volume;              ///< M, mm³

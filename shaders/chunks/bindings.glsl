@@ -20,6 +20,8 @@
 #define BINDING_PRESSURE_INCIDENCE 15
 #define BINDING_MATERIAL_PARAMETERS 16 // kPa and exponents
 #define BINDING_FIBRE 17               // unit vector of element
+#define BINDING_PRONY 18
+#define BINDING_VISCOUS_STRESS 19      // kPa
 
 // Outside of a step, these take the place of blocks that the kernel at hand does not use.
 #define BINDING_PARTIAL 6

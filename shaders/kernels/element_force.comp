@@ -1,5 +1,7 @@
 // One invocation per element: writes the four corner forces f_k = V (P_mu + p cof F) grad N_k (mN) of the displacement.
-// Needs: index, bindings, numbers, element, material, isochoric, a law with USES_SHEAR 1, a pressure chunk.
+// Needs: index, bindings, numbers, element, material, isochoric, a law with USES_SHEAR 1, a pressure chunk; the viscosity
+// chunk where HAS_VISCOSITY is 1.
+//! define HAS_VISCOSITY
 
 layout(std430, binding = BINDING_CORNER_FORCE) writeonly buffer CornerForce { vec4 corner_force[]; };
 
@@ -9,7 +11,12 @@ void main() {
     RestElement rest = rest_element(e);
     Deformation d = deformation(displacement_gradient(e, rest));
     float p = pressure_of_element(e, d.volume_change, rest.volumetric_modulus);
-    mat3 scaled_stress = rest.volume * (shear_stress(e, d, parameters_of(uint(rest.material))) + p * d.cofactor_F);
+    uint material = uint(rest.material);
+    mat3 stress = shear_stress(e, d, parameters_of(material));
+#if HAS_VISCOSITY
+    stress -= viscous_stress_of(e, material, d, stress);
+#endif
+    mat3 scaled_stress = rest.volume * (stress + p * d.cofactor_F);
     vec3 f1 = scaled_stress * rest.gradient_1;
     vec3 f2 = scaled_stress * rest.gradient_2;
     vec3 f3 = scaled_stress * rest.gradient_3;

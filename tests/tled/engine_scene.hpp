@@ -117,8 +117,10 @@ inline StepCoefficients stable_coefficients(const Model& model, const RestState&
 }
 
 /// The residual of the interface's comment in plain float64.
-inline Matrix3Xd plain_residual(const RestState& rest, const NodalConditions& conditions, const Matrix3Xd& u) {
-    Matrix3Xd residual = conditions.external_force - internal_force(rest, u);
+inline Matrix3Xd plain_residual(const RestState& rest, const NodalConditions& conditions, const Matrix3Xd& u,
+                                const ViscousStresses* viscous = nullptr) {
+    Matrix3Xd residual =
+        conditions.external_force - (viscous ? internal_force(rest, u, *viscous) : internal_force(rest, u));
     for (std::size_t s = 0; s < conditions.spring_node.size(); ++s) {
         const auto column = static_cast<Eigen::Index>(s);
         const auto k = conditions.spring_stiffness.col(column);
@@ -136,13 +138,15 @@ struct PlainState {
 
 /// The update of the interface's comment in plain float64.
 inline PlainState plain_steps(const RestState& rest, const NodalConditions& conditions, const Matrix3Xd& mass,
-                              Matrix3Xd u, Matrix3Xd v, int steps, const StepCoefficients& coefficients) {
+                              Matrix3Xd u, Matrix3Xd v, int steps, const StepCoefficients& coefficients,
+                              ViscousStresses* viscous = nullptr) {
     const Matrix3Xd zero = Matrix3Xd::Zero(3, rest.node_count);
     u = conditions.constrained.select(conditions.imposed, u).eval();
     v = conditions.constrained.select(zero, v).eval();
     PlainState state{u, v, zero};
     for (int step = 0; step < steps; ++step) {
-        state.previous_residual = plain_residual(rest, conditions, state.u);
+        if (viscous) *viscous = advanced(rest, std::move(*viscous), state.u, coefficients.time_step);
+        state.previous_residual = plain_residual(rest, conditions, state.u, viscous);
         state.v =
             coefficients.momentum * state.v + coefficients.gain * state.previous_residual.cwiseQuotient(mass).eval();
         state.u += state.v;

@@ -118,6 +118,34 @@ TEST_P(Engines, RepeatsBitByBit) {
     EXPECT_EQ(run(*make_engine(kind, rest)), first);
 }
 
+// Two materials with one and three terms, so that terms cannot be mixed up.
+TEST_P(Engines, ViscousStepsFollowThePlainLoop) {
+    model.viscosity[1] = {{{0.3, 0.01}}};
+    model.viscosity[2] = {{{0.2, 0.002}, {0.1, 0.02}, {0.3, 0.2}}};
+    rest = rest_state(model);
+    engine = make_engine(kind, rest);
+    const NodalConditions conditions = nodal_conditions(mixed_conditions(model.mesh), rest.node_count);
+    StepCoefficients coefficients = stable_coefficients(model, rest);
+    coefficients.time_step = 0.0005;
+    engine->set_conditions(conditions);
+    engine->set_state(wavy(X, 0.3), zero);
+    engine->run(60, coefficients);
+    engine->residual();  // looking does not move time
+    engine->run(40, coefficients);
+    ViscousStresses stresses = unstressed(rest);
+    const PlainState plain =
+        plain_steps(rest, conditions, lumped(rest), wavy(X, 0.3), zero, 100, coefficients, &stresses);
+    EXPECT_LT(largest(engine->displacement() - plain.u), 5e-6 * largest(plain.u));
+    const PlainState elastic = plain_steps(rest, conditions, lumped(rest), wavy(X, 0.3), zero, 100, coefficients);
+    EXPECT_GT(largest(elastic.u - plain.u), 1e-3) << "viscosity does not matter here";
+    const Matrix3Xd expected = internal_force(rest, plain.u, advanced(rest, stresses, plain.u, coefficients.time_step));
+    EXPECT_LT(largest(engine->internal_force() - expected), 2e-5 * largest(expected));
+    engine->set_conditions(nodal_conditions({}, rest.node_count));
+    engine->set_state(wavy(X), zero);  // forgets
+    const Matrix3Xd fresh = internal_force(rest, wavy(X), advanced(rest, unstressed(rest), wavy(X), 0.0005));
+    EXPECT_LT(largest(engine->internal_force() - fresh), 1e-5 * largest(fresh));
+}
+
 TEST_P(Engines, RunningInPortionsIsRunningAtOnce) {
     const StepCoefficients coefficients = stable_coefficients(model, rest);
     engine->set_state(wavy(X, 0.3), zero);

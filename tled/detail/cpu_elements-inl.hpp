@@ -134,9 +134,17 @@ void store_corner_forces(D d, const ElementBatches<T>& elements, std::size_t bat
     hn::StoreInterleaved4(f0[0], f0[1], f0[2], zero, d, out);
 }
 
-template <class Law, Kinematics kinematics, class T>
+/// Elastic tissue: nothing happens to the stress of a batch.
+struct Elastic {
+    template <class D>
+    void operator()(D /*d*/, std::size_t /*batch*/, int /*lane*/, const Strain<D>& /*strain*/,
+                    Vec<D> (&/*P*/)[3][3]) const {}
+};
+
+/// `after_shear(d, batch, lane, strain, P)` may change the shear stress P (times volume) of each batch.
+template <class Law, Kinematics kinematics, class T, class AfterShear = Elastic>
 void element_forces_of(const T* parameter, const ElementBatches<T>& elements, std::size_t begin, std::size_t end,
-                       const T* u, const T* pressure, T* force) {
+                       const T* u, const T* pressure, T* force, const AfterShear& after_shear = {}) {
     const hn::CappedTag<T, batch_width> d;
     using D = hn::CappedTag<T, batch_width>;
     const int lanes = static_cast<int>(hn::Lanes(d));
@@ -152,6 +160,7 @@ void element_forces_of(const T* parameter, const ElementBatches<T>& elements, st
             const auto volume = hn::LoadU(d, &elements.volume[batch * batch_width + static_cast<std::size_t>(lane)]);
             Vec<D> P[3][3];
             Response<Law>::shear_stress(d, strain, tissue, volume, P);
+            after_shear(d, batch, lane, strain, P);
             const auto p = scaled_pressure<Law, kinematics>(d, elements, batch, lane, volume, strain.change, pressure);
             for (int i = 0; i < 3; ++i)
                 for (int j = 0; j < 3; ++j) P[i][j] = hn::MulAdd(p, strain.cof[i][j], P[i][j]);
@@ -184,6 +193,17 @@ void nodal_pressures_of(const T* modulus, const T* change, T* pressure, std::siz
         hn::StoreU(hn::LoadU(one, modulus + i) *
                        Response<Law>::pressure_factor(one, admissible<Law>(one, hn::LoadU(one, change + i))),
                    one, pressure + i);
+}
+
+/// Calls `run` with the law of index `law` as template argument.
+template <std::size_t index = 0, class Run>
+void with_law(std::size_t law, const Run& run) {
+    if constexpr (index < std::variant_size_v<Material>) {
+        if (law == index)
+            run.template operator()<std::variant_alternative_t<index, Material>>();
+        else
+            with_law<index + 1>(law, run);
+    }
 }
 
 }  // namespace HWY_NAMESPACE

@@ -48,6 +48,22 @@ template <class T>
 void element_forces(const KernelMaterial<T>& material, Kinematics kinematics, const ElementBatches<T>& elements,
                     std::size_t begin, std::size_t end, const T* u, const T* pressure, T* force);
 
+enum class Advance { No, Yes };
+
+/// The viscous stresses of a material's batches and their backward-Euler step q⁺ = a S_shear + b q.
+template <class T>
+struct ViscousBatches {
+    std::vector<std::array<T, 2>> coefficient;  ///< (a, b) of each term
+    std::vector<T> stress;                      ///< batch × terms × 6 × width; V q, kPa mm³, 11 22 33 12 23 13
+    std::size_t first_batch = 0;                ///< the batch that `stress` begins with
+};
+
+/// As element_forces, with the viscous stresses at the end of the step taken off; they are kept where time advances.
+template <class T>
+void viscous_element_forces(const KernelMaterial<T>& material, ViscousBatches<T>& viscous, Advance advance,
+                            Kinematics kinematics, const ElementBatches<T>& elements, std::size_t begin,
+                            std::size_t end, const T* u, const T* pressure, T* force);
+
 /// M U'(J) for J = 1 + `change`, per pressure node of one law.
 template <class T>
 void nodal_pressures(std::size_t law, const T* modulus, const T* change, T* pressure, std::size_t count);

@@ -1,7 +1,8 @@
 #include "tled/detail/gpu_force.hpp"
 
-#include "shaders/catalogue.hpp"
+#include "tled/detail/prony_coefficients.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 
 namespace tissuewarp::tled::detail {
@@ -33,6 +34,12 @@ std::vector<LawRun> law_runs(const RestState& rest, const std::vector<MaterialBl
     return runs;
 }
 
+std::size_t most_terms(const std::vector<PronySeries>& series) {
+    std::size_t most = 0;
+    for (const PronySeries& each : series) most = std::max(most, each.terms.size());
+    return most;
+}
+
 std::uint32_t unsigned_count(std::size_t count) {
     return static_cast<std::uint32_t>(count);
 }
@@ -61,6 +68,12 @@ GpuForce::Pressure::Pressure(const shaders::Device& device, const GpuPressure& l
       corners(device, layout.corners, "pressure nodes of elements"),
       rest(device, layout.rest, "rest data of pressure nodes"),
       incidence(device, layout.incidence, "elements of pressure nodes") {}
+
+GpuForce::Viscous::Viscous(const shaders::Device& device, const RestState& rest)
+    : series(rest.viscosity),
+      terms(most_terms(series)),
+      coefficients(device, series.size() * terms, "Prony coefficients"),
+      stress(device, 2 * terms * static_cast<std::size_t>(rest.element_count()), "viscous stresses") {}
 
 GpuForce::GpuForce(const shaders::Device& device, shaders::ProgramCache& programs, const RestState& rest,
                    BlockBuffers& blocks)
@@ -92,6 +105,12 @@ GpuForce::GpuForce(const shaders::Device& device, shaders::ProgramCache& program
         blocks.set("PressureRest", pressure_->rest);
         blocks.set("PressureIncidence", pressure_->incidence);
     }
+    if (!rest.viscosity.empty()) {
+        viscous_.emplace(device, rest);
+        set_time_step(0);
+        blocks.set("Prony", viscous_->coefficients);
+        blocks.set("ViscousStress", viscous_->stress);
+    }
     make_stages(programs, rest, pressure_blocks);
 }
 
@@ -102,32 +121,66 @@ void GpuForce::make_stages(shaders::ProgramCache& programs, const RestState& res
     if (!pressure.empty()) {
         rule = rest.volumetric_modulus.cwiseAbs().maxCoeff() > 0 ? PressureRule::AveragedWithElementPart
                                                                  : PressureRule::Averaged;
-        stages_.push_back(
+        pressure_stages_.push_back(
             {ranged(programs.get(shaders::element_volume_program()), 0, rest.element_count(), element_count_)});
         Stage nodal;
         for (const LawRun& run : law_runs(rest, pressure))
             nodal.push_back(ranged(programs.get(shaders::nodal_pressure_program(run.law)), run.begin, run.end,
                                    static_cast<std::size_t>(rest.pressure.count())));
-        stages_.push_back(nodal);
+        pressure_stages_.push_back(nodal);
+    }
+    force_stage_ = force_stage(programs, rest, rule, Advance::No);
+    advancing_force_stage_ = force_stage(programs, rest, rule, Advance::Yes);
+}
+
+Stage GpuForce::force_stage(shaders::ProgramCache& programs, const RestState& rest, shaders::PressureRule rule,
+                            Advance advance) const {
+    shaders::ElementForces forces{.pressure = rule};
+    if (viscous_) {
+        forces.viscosity = advance == Advance::Yes ? shaders::Viscosity::Advance : shaders::Viscosity::Hold;
+        forces.prony_terms = static_cast<int>(viscous_->terms);
     }
     // Equal laws are adjacent, so each has one run and its program keeps one range.
-    Stage force;
-    for (const LawRun& run : law_runs(rest, rest.blocks))
-        force.push_back(
-            ranged(programs.get(shaders::element_force_program(run.law, rule)), run.begin, run.end, element_count_));
-    stages_.push_back(force);
+    Stage stage;
+    for (const LawRun& run : law_runs(rest, rest.blocks)) {
+        forces.law = run.law;
+        stage.push_back(
+            ranged(programs.get(shaders::element_force_program(forces)), run.begin, run.end, element_count_));
+    }
+    return stage;
+}
+
+void GpuForce::set_time_step(double time_step) {
+    if (!viscous_) return;
+    std::vector<Float2> table(viscous_->series.size() * viscous_->terms, Float2{0.0F, 0.0F});
+    for (std::size_t m = 0; m < viscous_->series.size(); ++m) {
+        auto entry = table.begin() + static_cast<std::ptrdiff_t>(m * viscous_->terms);
+        for (const auto& [a, b] : prony_coefficients(viscous_->series[m], time_step))
+            *entry++ = {static_cast<float>(a), static_cast<float>(b)};
+    }
+    viscous_->coefficients.upload(table);
+}
+
+void GpuForce::forget_viscous_stresses() {
+    if (viscous_) viscous_->stress.clear();
 }
 
 void GpuForce::bind(const BlockBuffers& blocks) const {
-    for (const Stage& stage : stages_)
+    const auto bind_stage = [&](const Stage& stage) {
         for (const Pass& pass : stage) blocks.bind(*pass.program);
+    };
+    for (const Stage& stage : pressure_stages_) bind_stage(stage);
+    bind_stage(force_stage_);
+    bind_stage(advancing_force_stage_);
 }
 
-void GpuForce::dispatch() const {
-    for (const Stage& stage : stages_) {
+void GpuForce::dispatch(Advance advance) const {
+    const auto run = [](const Stage& stage) {
         for (const Pass& pass : stage) pass.program->dispatch(pass.invocations);
         shaders::storage_barrier();
-    }
+    };
+    for (const Stage& stage : pressure_stages_) run(stage);
+    run(advance == Advance::Yes ? advancing_force_stage_ : force_stage_);
 }
 
 void GpuForce::set_all_elements(const shaders::Program& program) const {

@@ -3,6 +3,7 @@
 /// device's context current, except construction.
 
 #include "shaders/buffer.hpp"
+#include "shaders/catalogue.hpp"
 #include "shaders/program.hpp"
 #include "tled/detail/gpu_layout.hpp"
 
@@ -24,6 +25,9 @@ private:
     std::map<std::string, const shaders::StorageBuffer*> buffers_;
 };
 
+/// Whether viscous stresses move on with a pass of the elements.
+enum class Advance { No, Yes };
+
 /// Dispatches that may run at the same time.
 struct Pass {
     const shaders::Program* program;
@@ -37,14 +41,20 @@ public:
              BlockBuffers& blocks);
 
     void bind(const BlockBuffers& blocks) const;
-    /// Corner forces of whatever is bound as Displacement, each stage followed by a barrier.
-    void dispatch() const;
+    /// Corner forces of whatever is bound as Displacement, each stage followed by a barrier. Where time advances the
+    /// viscous stresses at the end of the step are kept.
+    void dispatch(Advance advance = Advance::No) const;
+    /// Time step (s) of the viscous stresses; 0 leaves them as they are.
+    void set_time_step(double time_step);
+    void forget_viscous_stresses();
     /// Sets the range of a program over all elements, as chunks/element.glsl has it.
     void set_all_elements(const shaders::Program& program) const;
 
 private:
     void make_stages(shaders::ProgramCache& programs, const RestState& rest,
                      const std::vector<MaterialBlock>& pressure);
+    [[nodiscard]] Stage force_stage(shaders::ProgramCache& programs, const RestState& rest, shaders::PressureRule rule,
+                                    Advance advance) const;
 
     /// The buffers of the averaged pressure; absent for T4.
     struct Pressure {
@@ -61,7 +71,17 @@ private:
     std::optional<shaders::Buffer<std::uint32_t>> incidence_;
     shaders::Buffer<Float4> corner_force_;
     std::optional<Pressure> pressure_;
-    std::vector<Stage> stages_;
+    /// The buffers of viscous tissue; absent in elastic scenes.
+    struct Viscous {
+        Viscous(const shaders::Device& device, const RestState& rest);
+        std::vector<PronySeries> series;  ///< of each material
+        std::size_t terms;                ///< the most of a material
+        shaders::Buffer<Float2> coefficients;
+        shaders::Buffer<Float4> stress;
+    };
+    std::optional<Viscous> viscous_;
+    std::vector<Stage> pressure_stages_;
+    Stage force_stage_, advancing_force_stage_;
 };
 
 }  // namespace tissuewarp::tled::detail

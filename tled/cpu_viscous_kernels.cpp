@@ -1,0 +1,104 @@
+// Viscous stresses in the element pass, for every instruction set, law and scalar, chosen at run time.
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "tled/cpu_viscous_kernels.cpp"
+// foreach_target.h must come before highway.h.
+// clang-format off
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+// clang-format on
+
+#include "tled/detail/cpu_elements-inl.hpp"
+#include "tled/detail/cpu_kernels.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace tissuewarp::tled::detail {
+namespace HWY_NAMESPACE {
+
+/// Takes F Σ q⁺ off P, q⁺ = a S + b q with S = F⁻¹ P = (cof F)ᵀ P / J.
+template <class T>
+struct PronyRelaxation {
+    ViscousBatches<T>* viscous;
+    Advance advance;
+
+    template <class D>
+    void operator()(D d, std::size_t batch, int lane, const Strain<D>& strain, Vec<D> (&P)[3][3]) const {
+        constexpr int row[6] = {0, 1, 2, 0, 1, 0}, column[6] = {0, 1, 2, 1, 2, 2};
+        const auto inverse_J = hn::Set(d, 1) / (hn::Set(d, 1) + strain.change);
+        Vec<D> S[6], sum[6];
+        for (int k = 0; k < 6; ++k) {
+            auto product = strain.cof[0][row[k]] * P[0][column[k]];
+            for (int m = 1; m < 3; ++m) product = hn::MulAdd(strain.cof[m][row[k]], P[m][column[k]], product);
+            S[k] = product * inverse_J;
+            sum[k] = hn::Zero(d);
+        }
+        T* stress = viscous->stress.data() +
+                    (batch - viscous->first_batch) * viscous->coefficient.size() * 6 * batch_width + lane;
+        for (const auto& [a, b] : viscous->coefficient)
+            for (int k = 0; k < 6; ++k, stress += batch_width) {
+                const auto q = hn::MulAdd(hn::Set(d, a), S[k], hn::Set(d, b) * hn::LoadU(d, stress));
+                if (advance == Advance::Yes) hn::StoreU(q, d, stress);
+                sum[k] = sum[k] + q;
+            }
+        Vec<D> full[3][3];
+        for (int k = 0; k < 6; ++k) full[row[k]][column[k]] = full[column[k]][row[k]] = sum[k];
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j) P[i][j] = P[i][j] - (full[i][j] + dot<D>(strain.H[i], full[j]));
+    }
+};
+
+template <class T>
+void viscous_element_forces_any(const KernelMaterial<T>& material, ViscousBatches<T>& viscous, Advance advance,
+                                Kinematics kinematics, const ElementBatches<T>& elements, std::size_t begin,
+                                std::size_t end, const T* u, const T* pressure, T* force) {
+    with_law(material.law, [&]<class Law>() {
+        const T* parameter = material.parameter.data();
+        const PronyRelaxation<T> relaxation{&viscous, advance};
+        if (kinematics == Kinematics::T4)
+            element_forces_of<Law, Kinematics::T4>(parameter, elements, begin, end, u, pressure, force, relaxation);
+        else
+            element_forces_of<Law, Kinematics::AveragedPressure>(parameter, elements, begin, end, u, pressure, force,
+                                                                 relaxation);
+    });
+}
+
+// Highway dispatches plain functions: one name for each scalar type.
+void viscous_element_forces_f32(const KernelMaterial<float>& material, ViscousBatches<float>& viscous, Advance advance,
+                                Kinematics kinematics, const ElementBatches<float>& elements, std::size_t begin,
+                                std::size_t end, const float* u, const float* pressure, float* force) {
+    viscous_element_forces_any(material, viscous, advance, kinematics, elements, begin, end, u, pressure, force);
+}
+void viscous_element_forces_f64(const KernelMaterial<double>& material, ViscousBatches<double>& viscous,
+                                Advance advance, Kinematics kinematics, const ElementBatches<double>& elements,
+                                std::size_t begin, std::size_t end, const double* u, const double* pressure,
+                                double* force) {
+    viscous_element_forces_any(material, viscous, advance, kinematics, elements, begin, end, u, pressure, force);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace tissuewarp::tled::detail
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace tissuewarp::tled::detail {
+
+HWY_EXPORT(viscous_element_forces_f32);
+HWY_EXPORT(viscous_element_forces_f64);
+
+template <>
+void viscous_element_forces(const KernelMaterial<float>& material, ViscousBatches<float>& viscous, Advance advance,
+                            Kinematics kinematics, const ElementBatches<float>& elements, std::size_t begin,
+                            std::size_t end, const float* u, const float* pressure, float* force) {
+    HWY_DYNAMIC_DISPATCH(viscous_element_forces_f32)
+    (material, viscous, advance, kinematics, elements, begin, end, u, pressure, force);
+}
+template <>
+void viscous_element_forces(const KernelMaterial<double>& material, ViscousBatches<double>& viscous, Advance advance,
+                            Kinematics kinematics, const ElementBatches<double>& elements, std::size_t begin,
+                            std::size_t end, const double* u, const double* pressure, double* force) {
+    HWY_DYNAMIC_DISPATCH(viscous_element_forces_f64)
+    (material, viscous, advance, kinematics, elements, begin, end, u, pressure, force);
+}
+
+}  // namespace tissuewarp::tled::detail
+#endif
