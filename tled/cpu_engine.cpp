@@ -141,6 +141,7 @@ public:
         Eigen::Matrix3Xd mass(3, rest.node_count);
         for (int c = 0; c < 3; ++c) mass.row(c) = rest.lumped_mass.transpose();
         set_mass(mass);
+        keep_state();
     }
 
     void set_conditions(const NodalConditions& conditions) override {
@@ -191,6 +192,24 @@ public:
             }
         for (detail::ViscousBatches<T>& viscous : viscous_)
             std::fill(viscous.stress.begin(), viscous.stress.end(), T(0));
+    }
+
+    void set_increment(const Eigen::Matrix3Xd& increment) override {
+        require_columns(increment.cols(), node_count_, "the increment");
+        for (std::size_t node = 0; node < node_count_; ++node)
+            for (std::size_t c = 0; c < 3; ++c) {
+                const std::size_t at = node * record + c;
+                increment_[at] =
+                    free_[at] * T(increment(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(node)));
+            }
+    }
+
+    void keep_state() override { kept_ = {displacement_, increment_, viscous_}; }
+
+    void return_to_kept_state() override {
+        displacement_ = kept_.displacement;
+        increment_ = kept_.increment;
+        viscous_ = kept_.viscous;
     }
 
     void run(int steps, const StepCoefficients& coefficients) override {
@@ -282,6 +301,12 @@ private:
     // by material; empty where none is viscous
     std::vector<PronySeries> viscosity_;
     std::vector<detail::ViscousBatches<T>> viscous_;
+
+    struct KeptState {
+        std::vector<T> displacement, increment;
+        std::vector<detail::ViscousBatches<T>> viscous;
+    };
+    KeptState kept_;
 
     // records of four per node
     std::vector<T> displacement_, increment_, inverse_mass_, force_load_, free_, scratch_;

@@ -48,6 +48,13 @@ public:
     /// Forgets viscous stresses: the material answers as if it had been at rest until now.
     virtual void set_state(const Eigen::Matrix3Xd& displacement, const Eigen::Matrix3Xd& increment) = 0;
 
+    /// Replaces the increment u − u⁻ (3 × N, mm) alone.
+    virtual void set_increment(const Eigen::Matrix3Xd& increment) = 0;
+    /// Keeps displacement, increment and viscous stresses where they are computed, replacing what was kept before; and
+    /// goes back to them. The first state kept is the one at construction.
+    virtual void keep_state() = 0;
+    virtual void return_to_kept_state() = 0;
+
     /// Advances by `steps` without any transfer between host and device.
     virtual void run(int steps, const StepCoefficients& coefficients) = 0;
 

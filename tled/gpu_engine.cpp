@@ -76,6 +76,8 @@ public:
           previous_residual_(node_vectors("previous residuals")),
           previous_displacement_(node_vectors("previous displacements")),
           imposed_(node_vectors("imposed displacements")),
+          kept_displacement_(node_vectors("kept displacements")),
+          kept_increment_(node_vectors("kept increments")),
           node_partials_(device_, shaders::observe_partials, "partial results of nodes"),
           element_partials_(device_, shaders::observe_partials, "partial results of elements"),
           mass_(rest.lumped_mass.transpose().replicate(3, 1)),
@@ -122,6 +124,29 @@ public:
         increment_.upload(detail::packed(increment));
         force_.forget_viscous_stresses();
         impose();
+        previous_residual_known_ = false;
+    }
+
+    void set_increment(const Matrix3Xd& increment) override {
+        require_shape(increment, node_count_, "the increment");
+        const CurrentContext current = device_.make_current();
+        increment_.upload(detail::packed(increment));
+        impose();
+        previous_residual_known_ = false;
+    }
+
+    void keep_state() override {
+        const CurrentContext current = device_.make_current();
+        kept_displacement_.copy_from(displacement_, displacement_.bytes());
+        kept_increment_.copy_from(increment_, increment_.bytes());
+        force_.keep_viscous_stresses();
+    }
+
+    void return_to_kept_state() override {
+        const CurrentContext current = device_.make_current();
+        displacement_.copy_from(kept_displacement_, displacement_.bytes());
+        increment_.copy_from(kept_increment_, increment_.bytes());
+        force_.return_to_kept_viscous_stresses();
         previous_residual_known_ = false;
     }
 
@@ -309,7 +334,7 @@ private:
     BlockBuffers blocks_;
     detail::GpuForce force_;
     Buffer<Float4> displacement_, increment_, inverse_mass_, residual_, previous_residual_, previous_displacement_,
-        imposed_;
+        imposed_, kept_displacement_, kept_increment_;
     Buffer<NodePartial> node_partials_;
     Buffer<ElementPartial> element_partials_;
     Effects effects_;

@@ -37,6 +37,35 @@ TEST_P(EngineInUse, StaysAtRestWithoutLoads) {
     EXPECT_EQ(seen.residual_max, 0.0);
 }
 
+TEST_P(EngineInUse, ReturnsToTheKeptStateBitByBit) {
+    model.viscosity[1] = {{{0.3, 0.01}, {0.2, 0.002}}};
+    const RestState viscous = rest_state(model);
+    const auto engine = make_engine(GetParam(), viscous);
+    StepCoefficients coefficients = stable_coefficients(model, viscous);
+    coefficients.time_step = 0.0005;
+    engine->set_state(wavy(X, 0.3), zero);
+    engine->run(20, coefficients);
+    engine->keep_state();
+    engine->run(30, coefficients);
+    const Matrix3Xd u = engine->displacement(), v = engine->increment();
+    engine->set_state(wavy(X), wavy(X, 0.01));
+    engine->return_to_kept_state();
+    engine->run(30, coefficients);
+    EXPECT_EQ(engine->displacement(), u);
+    EXPECT_EQ(engine->increment(), v);
+}
+
+TEST_P(EngineInUse, TheIncrementMayBeReplacedAlone) {
+    const auto engine = make_engine(GetParam(), rest);
+    engine->set_conditions(nodal_conditions(mixed_conditions(model.mesh), rest.node_count));
+    engine->set_state(wavy(X, 0.3), zero);
+    const Matrix3Xd u = engine->displacement();
+    engine->set_increment(wavy(X, 0.01));
+    EXPECT_EQ(engine->displacement(), u);
+    const auto held = nodal_conditions(mixed_conditions(model.mesh), rest.node_count).constrained;
+    EXPECT_LT(largest(engine->increment() - held.select(zero, wavy(X, 0.01))), 1e-8);
+}
+
 TEST_P(EngineInUse, ObservesTheIncrementThatWasSet) {
     const auto engine = make_engine(GetParam(), rest);
     const Matrix3Xd u = wavy(X), v = wavy(X, 0.01);

@@ -73,7 +73,8 @@ GpuForce::Viscous::Viscous(const shaders::Device& device, const RestState& rest)
     : series(rest.viscosity),
       terms(most_terms(series)),
       coefficients(device, series.size() * terms, "Prony coefficients"),
-      stress(device, 2 * terms * static_cast<std::size_t>(rest.element_count()), "viscous stresses") {}
+      stress(device, 2 * terms * static_cast<std::size_t>(rest.element_count()), "viscous stresses"),
+      kept(device, stress.size(), "kept viscous stresses") {}
 
 GpuForce::GpuForce(const shaders::Device& device, shaders::ProgramCache& programs, const RestState& rest,
                    BlockBuffers& blocks)
@@ -181,6 +182,14 @@ void GpuForce::dispatch(Advance advance) const {
     };
     for (const Stage& stage : pressure_stages_) run(stage);
     run(advance == Advance::Yes ? advancing_force_stage_ : force_stage_);
+}
+
+void GpuForce::keep_viscous_stresses() {
+    if (viscous_) viscous_->kept.copy_from(viscous_->stress, viscous_->stress.bytes());
+}
+
+void GpuForce::return_to_kept_viscous_stresses() {
+    if (viscous_) viscous_->stress.copy_from(viscous_->kept, viscous_->stress.bytes());
 }
 
 void GpuForce::set_all_elements(const shaders::Program& program) const {

@@ -47,6 +47,8 @@ public:
     /// Time step (s) of the viscous stresses; 0 leaves them as they are.
     void set_time_step(double time_step);
     void forget_viscous_stresses();
+    void keep_viscous_stresses();
+    void return_to_kept_viscous_stresses();
     /// Sets the range of a program over all elements, as chunks/element.glsl has it.
     void set_all_elements(const shaders::Program& program) const;
 
@@ -77,7 +79,7 @@ private:
         std::vector<PronySeries> series;  ///< of each material
         std::size_t terms;                ///< the most of a material
         shaders::Buffer<Float2> coefficients;
-        shaders::Buffer<Float4> stress;
+        shaders::Buffer<Float4> stress, kept;
     };
     std::optional<Viscous> viscous_;
     std::vector<Stage> pressure_stages_;

@@ -1,0 +1,211 @@
+// The central-difference step in increment form, v = u − u⁻ of the engine: v⁺ = ρ v + c M⁻¹ r with
+// c = Δt²/(1 + αΔt/2), ρ = (1 − αΔt/2)/(1 + αΔt/2) (Miller et al. 2007, eq. 17).
+
+#include "tled/dynamics.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "core/errors.hpp"
+#include "tled/critical_step.hpp"
+#include "tled/detail/springs.hpp"
+#include "tled/reference.hpp"
+
+namespace tissuewarp::tled {
+
+using Eigen::Matrix3Xd;
+
+namespace {
+
+constexpr int first_iterations = 40, later_iterations = 5, most_cuts = 6;
+constexpr double cutting_margin = 0.97;  // of the critical step: above, the step is cut
+constexpr double viscous_tolerance = 1.0;
+
+class Run {
+public:
+    Run(Engine& engine, const RestState& rest, const Matrix3Xd& mass, const NodalConditions& conditions,
+        const DynamicsState& start, double duration, const DynamicsOptions& options, Observer& observer)
+        : engine_(engine),
+          rest_(rest),
+          mass_(mass),
+          conditions_(conditions),
+          options_(options),
+          observer_(observer),
+          applied_(detail::applied_force(conditions)),
+          tolerance_(rest.viscosity.empty() ? options.energy_tolerance : viscous_tolerance),
+          start_time_(start.time),
+          end_time_(start.time + duration) {
+        engine_.set_mass(mass);
+        engine_.set_conditions(conditions);
+        choose_step(start.displacement);
+        begin(start);
+    }
+
+    DynamicsResult run() {
+        while (end_time_ - result_.state.time > 1e-9 * result_.step) {
+            const double left = end_time_ - result_.state.time;
+            const int steps =
+                static_cast<int>(std::min<double>(options_.steps_per_check, std::ceil(left / result_.step - 1e-9)));
+            if (steps * result_.step > left) change_step(left / steps);
+            engine_.run(steps, coefficients());
+            result_.steps += steps;
+            accept_or_cut(steps);
+        }
+        return std::move(result_);
+    }
+
+private:
+    [[nodiscard]] StepCoefficients coefficients() const {
+        const double half = 0.5 * options_.damping * result_.step;
+        return {(1 - half) / (1 + half), result_.step * result_.step / (1 + half), result_.step};
+    }
+
+    void choose_step(const Matrix3Xd& displacement) {
+        HighestMode mode = highest_mode(engine_, mass_, displacement, first_iterations);
+        mode_ = std::move(mode.shape);
+        result_.critical_step = mode.eigenvalue > 0 ? 2 / std::sqrt(mode.eigenvalue) : end_time_ - start_time_;
+        if (!std::isfinite(result_.critical_step))
+            throw SolverFailure("the start of the dynamics has forces that are not finite: no step is stable there");
+        if (options_.step > result_.critical_step)
+            throw InvalidInput("the time step of " + std::to_string(1e6 * options_.step) +
+                               " us is above the critical one, " + std::to_string(1e6 * result_.critical_step) +
+                               " us: take a smaller step, a coarser mesh or mass scaling");
+        result_.step = options_.step > 0 ? options_.step : options_.safety * result_.critical_step;
+    }
+
+    /// u − u⁻ = Δt v − Δt²/2 a, so that the first step has second order.
+    void begin(const DynamicsState& start) {
+        engine_.set_state(start.displacement, Matrix3Xd::Zero(3, rest_.node_count));
+        const Matrix3Xd acceleration = engine_.residual().cwiseQuotient(mass_) - options_.damping * start.velocity;
+        engine_.set_increment(result_.step * start.velocity - 0.5 * result_.step * result_.step * acceleration);
+        result_.state = {engine_.displacement(), start.velocity, start.time};
+        first_total_ = total_energy(engine_.observe()).total;
+        engine_.keep_state();
+    }
+
+    /// The same motion in steps of another length: v(t − Δt'/2) = v(t) − Δt'/2 a.
+    void change_step(double step) {
+        const Matrix3Xd half_velocity = engine_.increment() / result_.step;
+        const Matrix3Xd acceleration = engine_.residual().cwiseQuotient(mass_) - options_.damping * half_velocity;
+        engine_.set_increment(step * (half_velocity + 0.5 * (result_.step - step) * acceleration));
+        result_.step = step;
+        engine_.keep_state();
+    }
+
+    [[nodiscard]] double potential(const Matrix3Xd& u) const {
+        Matrix3Xd resistance = Matrix3Xd::Zero(3, u.cols());
+        detail::add_spring_resistance(conditions_, u, resistance);
+        return elastic_energy(rest_, u) + u.cwiseProduct(0.5 * resistance - applied_).sum();
+    }
+
+    [[nodiscard]] EnergyBalance total_energy(const Observation& seen) {
+        EnergyBalance balance;
+        const Matrix3Xd u = engine_.displacement();
+        balance.kinetic = 0.5 * seen.increment_mass / (result_.step * result_.step);
+        balance.potential = potential(u);
+        balance.total = balance.kinetic + 0.5 * (balance.potential + potential(u - engine_.increment())) -
+                        0.25 * seen.increment_stiffness;
+        exchanged_ = std::max({exchanged_, balance.kinetic, std::abs(balance.potential)});
+        if (exchanged_ > 0) balance.largest_growth = (balance.total - first_total_) / exchanged_;
+        return balance;
+    }
+
+    void accept_or_cut(int steps) {
+        const Observation seen = engine_.observe();
+        const std::string trouble = trouble_of(seen);
+        if (!trouble.empty()) return cut(trouble, steps);
+        const EnergyBalance balance = total_energy(seen);
+        if (!(balance.largest_growth <= tolerance_))
+            return cut("energy grew by " + std::to_string(100 * balance.largest_growth) + " %", steps);
+        const double growth = std::max(result_.energy.largest_growth, balance.largest_growth);
+        result_.energy = balance;
+        result_.energy.largest_growth = growth;
+        result_.min_jacobian = std::min(result_.min_jacobian, seen.min_jacobian);
+        result_.state.time += steps * result_.step;
+        result_.state.displacement = engine_.displacement();
+        const Matrix3Xd half_velocity = engine_.increment() / result_.step;
+        result_.state.velocity =
+            half_velocity +
+            0.5 * result_.step * (engine_.residual().cwiseQuotient(mass_) - options_.damping * half_velocity);
+        engine_.keep_state();
+        if (options_.watch) options_.watch(result_.state, result_.energy);
+        observer_.checkpoint("dynamics", (result_.state.time - start_time_) / (end_time_ - start_time_));
+        if (end_time_ - result_.state.time > 1e-9 * result_.step) follow_critical_step();
+    }
+
+    [[nodiscard]] std::string trouble_of(const Observation& seen) const {
+        if (!seen.finite) return "a displacement or force is not finite";
+        if (seen.min_jacobian > 0) return {};
+        const bool admitted = std::any_of(rest_.materials.begin(), rest_.materials.end(), admits_inversion);
+        if (admitted) return {};
+        return "tetrahedron " + std::to_string(seen.min_jacobian_tet) +
+               " has det F = " + std::to_string(seen.min_jacobian);
+    }
+
+    /// Goes back to the last good state with half the step.
+    void cut(const std::string& trouble, int steps) {
+        engine_.return_to_kept_state();
+        result_.steps -= steps;
+        if (++result_.cuts > most_cuts)
+            throw SolverFailure("dynamics stopped after t = " + std::to_string(result_.state.time) + " s: " + trouble +
+                                " within " + std::to_string(steps) + " steps of " + std::to_string(1e6 * result_.step) +
+                                " us, and smaller steps did not help; apply the load more slowly or refine the mesh");
+        observer_.note(trouble + ": going back to t = " + std::to_string(result_.state.time) +
+                       " s with half the time step");
+        change_step(0.5 * result_.step);
+    }
+
+    /// Stiffness grows under load: a few iterations from the last highest mode, mixed with every other frequency.
+    void follow_critical_step() {
+        Matrix3Xd start = mode_;
+        for (Eigen::Index i = 0; i < start.size(); ++i)
+            start.reshaped()[i] += 0.02 * std::sin(1.7 * static_cast<double>(i) + 0.3);
+        HighestMode mode = highest_mode(engine_, mass_, result_.state.displacement, later_iterations, &start);
+        engine_.return_to_kept_state();
+        mode_ = std::move(mode.shape);
+        if (!(mode.eigenvalue > 0)) return;
+        const double critical = 2 / std::sqrt(mode.eigenvalue);
+        result_.critical_step = std::min(result_.critical_step, critical);
+        if (result_.step <= cutting_margin * critical) return;
+        observer_.note("tissue stiffened: the time step is cut to " + std::to_string(1e6 * options_.safety * critical) +
+                       " us");
+        ++result_.cuts;
+        change_step(options_.safety * critical);
+    }
+
+    Engine& engine_;
+    const RestState& rest_;
+    const Matrix3Xd& mass_;
+    const NodalConditions& conditions_;
+    const DynamicsOptions& options_;
+    Observer& observer_;
+    Matrix3Xd applied_;
+    Matrix3Xd mode_;
+    double tolerance_;
+    double start_time_, end_time_;
+    double first_total_ = 0, exchanged_ = 0;
+    DynamicsResult result_;
+};
+
+void require_options(const DynamicsOptions& options, double duration) {
+    if (!(duration > 0) || !std::isfinite(duration))
+        throw InvalidInput("the duration of the dynamics is " + std::to_string(duration) + " s; it must be positive");
+    if (!(options.damping >= 0) || !(options.step >= 0) || !(options.safety > 0 && options.safety < 1) ||
+        options.steps_per_check < 1 || !(options.energy_tolerance > 0))
+        throw InvalidInput(
+            "dynamics needs damping and step of at least 0, a safety between 0 and 1, a check at least every step and "
+            "a "
+            "positive energy tolerance");
+}
+
+}  // namespace
+
+DynamicsResult dynamics(Engine& engine, const RestState& rest, const Matrix3Xd& mass, const NodalConditions& conditions,
+                        const DynamicsState& start, double duration, const DynamicsOptions& options,
+                        Observer& observer) {
+    require_options(options, duration);
+    return Run(engine, rest, mass, conditions, start, duration, options, observer).run();
+}
+
+}  // namespace tissuewarp::tled
