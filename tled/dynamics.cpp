@@ -84,12 +84,15 @@ private:
         engine_.keep_state();
     }
 
-    /// The same motion in steps of another length: v(t − Δt'/2) = v(t) − Δt'/2 a.
+    /// The same motion in steps of another length: v(t − Δt'/2) = v(t) − Δt'/2 a. The energy of the discrete model
+    /// depends on the step, that of fast modes strongly; its growth is counted from the new value.
     void change_step(double step) {
+        const double before = total_energy(engine_.observe()).total;
         const Matrix3Xd half_velocity = engine_.increment() / result_.step;
         const Matrix3Xd acceleration = engine_.residual().cwiseQuotient(mass_) - options_.damping * half_velocity;
         engine_.set_increment(step * (half_velocity + 0.5 * (result_.step - step) * acceleration));
         result_.step = step;
+        first_total_ += total_energy(engine_.observe()).total - before;
         engine_.keep_state();
     }
 
