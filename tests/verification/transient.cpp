@@ -131,7 +131,7 @@ double bar_period(double poisson, BarEnd end, tled::Element element, int cells, 
     shape = lowest_mode(rest, conditions, mass, shape);
     tled::DynamicsState state{0.01 * shape, Matrix3Xd::Zero(3, rest.node_count), 0};  // mm: strains of 1e-4
     std::vector<std::array<double, 2>> samples;
-    tled::DynamicsOptions options{.steps_per_check = 5 * cells};
+    tled::DynamicsOptions options{.steps_per_check = cells < 8 ? 10 : 20};  // some sixty looks a period
     options.watch = [&](const tled::DynamicsState& now, const tled::EnergyBalance&) {
         samples.push_back({now.time, mass.cwiseProduct(shape).cwiseProduct(now.displacement).sum()});
     };
