@@ -5,24 +5,25 @@
 //! define USES_SHEAR
 
 #if USES_SHEAR
-/// Rotation that clears A[p][q], applied to A and to the columns of n; r is the third index.
-void jacobi_rotation(inout mat3 A, inout mat3 n, int p, int q, int r) {
-    float gap = A[q][q] - A[p][p];
-    float twice = 2.0 * A[p][q];
-    float root = sqrt(gap * gap + twice * twice) + 1e-37;
+/// Rotation that clears the entry pq of a symmetric matrix with the diagonal entries pp and qq; rp and rq are its entries
+/// in the third row, np and nq the columns of the eigenvectors.
+void jacobi_rotation(inout float pp, inout float qq, inout float pq, inout float rp, inout float rq, inout vec3 np,
+                     inout vec3 nq) {
+    float gap = qq - pp;
+    float twice = 2.0 * pq;
+    float root = sqrt(gap * gap + twice * twice) + 1e-30;
     float t = twice / (gap + (gap < 0.0 ? -root : root));
     float c = inversesqrt(t * t + 1.0);
     float s = t * c;
-    A[p][p] -= t * A[p][q];
-    A[q][q] += t * A[p][q];
-    A[p][q] = A[q][p] = 0.0;
-    float rp = A[r][p];
-    float rq = A[r][q];
-    A[r][p] = A[p][r] = c * rp - s * rq;
-    A[r][q] = A[q][r] = s * rp + c * rq;
-    vec3 np = n[p];
-    n[p] = c * np - s * n[q];
-    n[q] = s * np + c * n[q];
+    pp = pp - t * pq;
+    qq = qq + t * pq;
+    pq = 0.0;
+    float old_rp = rp;
+    rp = c * old_rp - s * rq;
+    rq = s * old_rp + c * rq;
+    vec3 old_np = np;
+    np = c * old_np - s * nq;
+    nq = s * old_np + c * nq;
 }
 
 /// Adds mu (y - mean y), y = l^alpha - 1, to the principal Kirchhoff stresses.
@@ -36,13 +37,14 @@ vec3 ogden_term(float modulus, float exponent, vec3 log_stretch) {
 mat3 shear_stress(uint e, Deformation d, Parameters p) {
     if (!(d.volume_change > -1.0)) return mat3(not_a_number());
     mat3 E = strain_excess(d);
-    mat3 n = mat3(1.0);
+    float xx = E[0][0], yy = E[1][1], zz = E[2][2], xy = E[0][1], yz = E[1][2], zx = E[2][0];
+    vec3 n0 = vec3(1.0, 0.0, 0.0), n1 = vec3(0.0, 1.0, 0.0), n2 = vec3(0.0, 0.0, 1.0);
     for (int sweep = 0; sweep < 4; ++sweep) {
-        jacobi_rotation(E, n, 0, 1, 2);
-        jacobi_rotation(E, n, 0, 2, 1);
-        jacobi_rotation(E, n, 1, 2, 0);
+        jacobi_rotation(xx, yy, xy, zx, yz, n0, n1);
+        jacobi_rotation(xx, zz, zx, xy, yz, n0, n2);
+        jacobi_rotation(yy, zz, yz, xy, zx, n1, n2);
     }
-    vec3 value = vec3(E[0][0], E[1][1], E[2][2]);
+    vec3 value = vec3(xx, yy, zz);
     vec3 log_stretch = 0.5 * vec3(log_one_plus(value.x), log_one_plus(value.y), log_one_plus(value.z)) -
                        vec3(log_one_plus(d.volume_change) * (1.0 / 3.0));
     vec3 T = ogden_term(p.a.x, p.a.y, log_stretch);
@@ -50,6 +52,6 @@ mat3 shear_stress(uint e, Deformation d, Parameters p) {
     if (p.b.x != 0.0) T += ogden_term(p.b.x, p.b.y, log_stretch);
     vec3 S = T / (1.0 + value);
     return (mat3(1.0) + d.H) *
-           (S.x * outerProduct(n[0], n[0]) + S.y * outerProduct(n[1], n[1]) + S.z * outerProduct(n[2], n[2]));
+           (S.x * outerProduct(n0, n0) + S.y * outerProduct(n1, n1) + S.z * outerProduct(n2, n2));
 }
 #endif

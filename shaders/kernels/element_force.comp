@@ -14,7 +14,8 @@ void main() {
     uint material = uint(rest.material);
     mat3 stress = shear_stress(e, d, parameters_of(material));
 #if HAS_VISCOSITY
-    stress -= viscous_stress_of(e, material, d, stress);
+    mat3 viscous_stress = viscous_stress_of(e, material, d, stress);  // not in `stress -= …`: README, traps
+    stress = stress - viscous_stress;
 #endif
     mat3 scaled_stress = rest.volume * (stress + p * d.cofactor_F);
     vec3 f1 = scaled_stress * rest.gradient_1;

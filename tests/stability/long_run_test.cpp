@@ -1,0 +1,117 @@
+// A million steps, numbers too small for float32, and steps that are too long.
+
+#include "core/errors.hpp"
+#include "tests/stability/hard_cases.hpp"
+#include "tled/critical_step.hpp"
+#include "tled/dynamics.hpp"
+
+#include <chrono>
+
+namespace tissuewarp::stability {
+namespace {
+
+using LongRun = OnEveryEngine;
+INSTANTIATE_TEST_SUITE_P(All, LongRun, every_engine, engine_name);
+
+/// Steps of the drift case: the software rasteriser takes a minute for a hundred thousand.
+int many_steps(Kind kind, const tled::Engine& engine) {
+    const bool software = kind == Kind::Gpu && engine.description().find("llvmpipe") != std::string::npos;
+    return software ? 100000 : 1000000;
+}
+
+// A free body that turns, drifts and swings. A failure looks like: energy or momentum that creeps (the recurrence in
+// positions loses digits of float32 with every step), or a body that heats up. Energy 1e-3, momentum 1e-3 over all
+// steps.
+TEST_P(LongRun, AMillionStepsDriftNeitherInEnergyNorInMomentum) {
+    const tled::Model model = box({20, 20, 20}, {2, 2, 2}, tled::neo_hookean_lnj(3.0, 0.3), tled::Element::T4);
+    const tled::RestState rest = tled::rest_state(model);
+    const auto engine = make_engine(GetParam(), rest);
+    const Matrix3Xd mass = rest.lumped_mass.transpose().replicate(3, 1);
+    tled::DynamicsState state{Matrix3Xd::Zero(3, rest.node_count), Matrix3Xd::Zero(3, rest.node_count), 0};
+    const Vector3d centre = Vector3d::Constant(10), spin(1, 2, 3);  // 1/s
+    for (int node = 0; node < rest.node_count; ++node) {
+        const Vector3d arm = model.mesh.nodes.col(node) - centre;
+        state.velocity.col(node) = spin.cross(arm) + Vector3d(0.02, -0.01, 0.03) + 2.0 * arm.x() * Vector3d::UnitX();
+    }
+    const tled::NodalConditions free = tled::nodal_conditions({}, rest.node_count);
+    const double step = 0.7 * 2 / std::sqrt(tled::highest_mode(*engine, mass, state.displacement, 60).eigenvalue);
+    std::vector<double> totals;
+    tled::DynamicsOptions options{.step = step, .steps_per_check = 5000, .energy_tolerance = 0.05};
+    options.watch = [&](const tled::DynamicsState&, const tled::EnergyBalance& energy) {
+        totals.push_back(energy.total);
+    };
+    const auto linear = [&](const tled::DynamicsState& s) {
+        return Vector3d(mass.cwiseProduct(s.velocity).rowwise().sum());
+    };
+    const auto angular = [&](const tled::DynamicsState& s) {
+        Vector3d sum = Vector3d::Zero();
+        for (int node = 0; node < rest.node_count; ++node)
+            sum +=
+                mass(0, node) *
+                Vector3d(model.mesh.nodes.col(node) + s.displacement.col(node)).cross(Vector3d(s.velocity.col(node)));
+        return sum;
+    };
+    const Vector3d before = linear(state), turning = angular(state);
+    const int steps = many_steps(GetParam(), *engine);
+    const auto result = tled::dynamics(*engine, rest, mass, free, state, steps * step, options);
+    EXPECT_EQ(result.cuts, 0);
+    EXPECT_GE(result.steps, steps - 1);
+    const auto [least, most] = std::minmax_element(totals.begin(), totals.end());
+    EXPECT_LT(*most - *least, 0.01 * totals.front()) << "spread";
+    // Drift: the mean of the last tenth against that of the first.
+    const auto mean = [&](std::size_t from, std::size_t to) {
+        double sum = 0;
+        for (std::size_t i = from; i < to; ++i) sum += totals[i];
+        return sum / static_cast<double>(to - from);
+    };
+    const std::size_t tenth = std::max<std::size_t>(1, totals.size() / 10);
+    EXPECT_NEAR(mean(totals.size() - tenth, totals.size()), mean(0, tenth), 1e-3 * totals.front());
+    const double exchanged = mass.cwiseProduct(state.velocity).colwise().norm().sum();  // Σ m |v|
+    EXPECT_LT((linear(result.state) - before).norm(), 1e-3 * exchanged);
+    EXPECT_LT((angular(result.state) - turning).norm(), 5e-3 * turning.norm());
+}
+
+// Motion that dies away passes through numbers below 1e-38, which processors handle a hundred times slower unless they
+// are told not to. A failure looks like: steps that take ten times as long at the end, or values that are not finite.
+TEST_P(LongRun, DenormalNumbersNeitherSlowNorSpoilARun) {
+    const tled::Model model = box({20, 20, 20}, {8, 8, 8}, tled::neo_hookean_lnj(3.0, 0.3), tled::Element::T4);
+    const tled::RestState rest = tled::rest_state(model);
+    const auto engine = make_engine(GetParam(), rest);
+    const tled::NodalConditions conditions = between_plates(model, Vector3d::Zero());
+    engine->set_conditions(conditions);
+    const tled::StepCoefficients coefficients = tled::scene::stable_coefficients(model, rest);
+    const Matrix3Xd still = Matrix3Xd::Zero(3, rest.node_count);
+    const double tiny = GetParam() == Kind::CpuFloat64 ? 1e-310 : 1e-40;
+    const auto seconds = [&](double size) {
+        double best = 1e9;
+        for (int repeat = 0; repeat < 5; ++repeat) {
+            engine->set_state(size * tled::scene::wavy(model.mesh.nodes, 1.0), still);
+            const auto begin = std::chrono::steady_clock::now();
+            engine->run(20, coefficients);
+            EXPECT_TRUE(engine->displacement().allFinite());
+            best = std::min(best, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+        }
+        return best;
+    };
+    const double ordinary = seconds(0.1), denormal = seconds(tiny);
+    EXPECT_LT(denormal, 10 * ordinary);  // best of five: 20 to 100 times without the processor's flag
+}
+
+// A failure looks like: a run that blows up after an accepted step.
+TEST_P(LongRun, StepsAboveTheCriticalOneAreRefusedAndBelowItAreStable) {
+    const tled::Model model = box({20, 20, 20}, {3, 3, 3}, tled::neo_hookean_lnj(3.0, 0.45));
+    const tled::RestState rest = tled::rest_state(model);
+    const auto engine = make_engine(GetParam(), rest);
+    const Matrix3Xd mass = rest.lumped_mass.transpose().replicate(3, 1);
+    const tled::NodalConditions conditions = between_plates(model, Vector3d::Zero());
+    tled::DynamicsState state{Matrix3Xd::Zero(3, rest.node_count), Matrix3Xd::Zero(3, rest.node_count), 0};
+    state.velocity.row(1).setConstant(20);
+    const double critical = tled::dynamics(*engine, rest, mass, conditions, state, 0.001).critical_step;
+    EXPECT_THROW(tled::dynamics(*engine, rest, mass, conditions, state, 0.1, {.step = 1.02 * critical}), InvalidInput);
+    const auto result = tled::dynamics(*engine, rest, mass, conditions, state, 0.5, {.step = 0.95 * critical});
+    EXPECT_LT(result.energy.largest_growth, 0.02);
+    EXPECT_LT(result.state.displacement.colwise().norm().maxCoeff(), 5.0);
+}
+
+}  // namespace
+}  // namespace tissuewarp::stability
