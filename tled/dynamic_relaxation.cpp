@@ -134,7 +134,7 @@ private:
     [[nodiscard]] double decay() const { return -0.5 * std::log(heavy_ball(spectrum_).momentum); }
 
     [[nodiscard]] int steps_to_reach(double error) const {
-        constexpr double least = 10;
+        constexpr double least = 25;        // a solve costs as much as some thirty of them
         constexpr double first_fall = 1.5;  // neper: beside loads K₀ overestimates the first error by far
         double fall = slack * std::log(error / search_.options.tolerance_mm);
         if (linear_start_) fall = std::min(fall, first_fall);

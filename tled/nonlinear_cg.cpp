@@ -16,7 +16,7 @@ namespace {
 
 constexpr int iterations_per_evaluation = 50;  // of the residual at the iterate
 constexpr int least_iterations_per_lift = 20;
-constexpr int most_idle_lifts = 8;  // without the error falling by a tenth
+constexpr int most_idle_lifts = 4;  // without the error falling by a tenth
 constexpr int most_restarts = 8;
 constexpr double first_step = 0.3;  // of diag(K₀)⁻¹ r, whose spectrum ends near 8
 
