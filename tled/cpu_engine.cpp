@@ -251,8 +251,11 @@ public:
     }
 
     [[nodiscard]] Observation observe() override {
-        const Eigen::Matrix3Xd now = residual(), step = increment();
-        const Eigen::Matrix3Xd before = step.isZero(0.0) ? now : residual_before();
+        const Eigen::Matrix3Xd step = increment();
+        const bool still = step.isZero(0.0);
+        const Eigen::Matrix3Xd earlier = still ? Eigen::Matrix3Xd() : residual_before();
+        const Eigen::Matrix3Xd now = residual();
+        const Eigen::Matrix3Xd& before = still ? now : earlier;
 
         Observation seen;
         constexpr double infinite = std::numeric_limits<double>::infinity();

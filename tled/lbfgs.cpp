@@ -55,10 +55,9 @@ private:
 
 /// Is there tissue whose volume is so stiff that K₀, which knows it only at rest, is a poor metric?
 bool dominated_by_volume(const RestState& rest) {
-    for (int e = 0; e < (rest.pressure.count() > 0 ? rest.element_count() : 0); ++e)
-        if (rest.pressure.modulus[rest.pressure.of_element(0, e)] > volume_dominated * rest.shear_modulus[e])
-            return true;
-    return false;
+    return rest.pressure.count() > 0 && std::any_of(rest.materials.begin(), rest.materials.end(), [](const auto& each) {
+               return volumetric_modulus(each) > volume_dominated * shear_modulus(each);
+           });
 }
 
 class Lbfgs {
