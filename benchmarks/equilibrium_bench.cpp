@@ -51,6 +51,9 @@ public:
     void set_conditions(const tled::NodalConditions& conditions) override { engine_.set_conditions(conditions); }
     void set_mass(const Matrix3Xd& mass) override { engine_.set_mass(mass); }
     void set_state(const Matrix3Xd& u, const Matrix3Xd& v) override { engine_.set_state(u, v); }
+    void set_increment(const Matrix3Xd& v) override { engine_.set_increment(v); }
+    void keep_state() override { engine_.keep_state(); }
+    void return_to_kept_state() override { engine_.return_to_kept_state(); }
     void run(int steps, const tled::StepCoefficients& coefficients) override {
         for (int step = 0; step < steps; ++step) {
             engine_.run(1, coefficients);
