@@ -57,6 +57,7 @@ void run_mesh(const MeshOptions& options) {
     meshing_options.facet_distance = options.facet_distance;
     meshing_options.smoothing = options.smoothing;
     meshing_options.labels = options.only;
+    if (options.refinement == "parallel") meshing_options.refinement = meshing::Refinement::Parallel;
     const meshing::TetMesh mesh = meshing::mesh_labels(labels, meshing_options, progress);
 
     progress.begin("measuring", 0.9, 1.0);

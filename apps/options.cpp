@@ -205,6 +205,9 @@ struct Parser {
             .add_option("--only", o.only, "Labels to mesh; default: all but 0")
             ->type_name("LABEL")
             ->delimiter(',');
+        verb.text("--refinement", o.refinement,
+                  "deterministic (one thread, the same mesh every time) or parallel (faster, another mesh every time)")
+            ->check(CLI::IsMember({"deterministic", "parallel"}).description(""));
         verb.path("--json", o.json, "Also write the quality report as JSON");
         verb.common(o.common);
     }

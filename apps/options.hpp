@@ -59,6 +59,7 @@ struct MeshOptions {
     double facet_distance = 0.0;              ///< mm, 0: chosen from the edge length
     double smoothing = 0.8;                   ///< voxels
     std::vector<int> only;                    ///< labels to mesh; empty: all
+    std::string refinement = "deterministic";
 };
 
 struct WarpOptions {

@@ -80,7 +80,9 @@ TetMesh refine_every_label(const LabelGrid& grid, const detail::LabelField& fiel
     std::vector<char> thin(edges.size(), 0);
     for (int attempt = 1;; ++attempt) {
         const auto seeds = detail::surface_seeds(grid, field, edges, thin);
-        TetMesh mesh = detail::refine({grid, field, seeds, edges, facet_distance, options}, observer);
+        const auto refine =
+            options.refinement == Refinement::Parallel ? detail::refine_parallel : detail::refine_sequential;
+        TetMesh mesh = refine({grid, field, seeds, edges, facet_distance, options}, observer);
         std::vector<char> missing(edges.size(), 1);
         missing[0] = 0;
         for (int label : mesh.labels) missing[static_cast<std::size_t>(label)] = 0;

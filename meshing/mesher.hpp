@@ -10,6 +10,11 @@
 
 namespace tissuewarp::meshing {
 
+enum class Refinement {
+    Deterministic,  ///< one thread: equal input gives the equal mesh
+    Parallel,       ///< all threads: another mesh of the same quality every time
+};
+
 struct MeshingOptions {
     double edge_length = 5.0;                   ///< mm, target edge in the interior and on surfaces
     std::map<int, double> label_edge_length{};  ///< mm, per label, overriding edge_length
@@ -21,6 +26,7 @@ struct MeshingOptions {
     double perturb_seconds = 60.0;   ///< safety limit; reaching it ties the mesh to the machine; 0 skips
     double exude_seconds = 60.0;     ///< safety limit, likewise; 0 skips
     std::vector<int> labels{};       ///< labels to mesh; empty: all but 0
+    Refinement refinement = Refinement::Deterministic;
 };
 
 /// Meshes the labels of an int32 label volume. Smooth conforming interfaces: each label's indicator is smoothed and a
@@ -29,7 +35,7 @@ struct MeshingOptions {
 /// go to their surroundings (noted to the observer) unless a label has nothing larger. After refinement nodes move so
 /// that facets straddle the interfaces (no loss of volume) and the worst elements allow a longer time step.
 ///
-/// Refinement is sequential: equal input gives the equal mesh, and a head takes seconds. Throws InvalidInput (no voxel
+/// Throws InvalidInput (no voxel
 /// of a requested label, edge length not positive or finer than a memory guard) and Cancelled.
 TetMesh mesh_labels(const imaging::Volume& labels, const MeshingOptions& options = {},
                     Observer& observer = silent_observer());

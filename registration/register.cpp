@@ -42,6 +42,7 @@ public:
           result_(result),
           observer_(observer),
           engine_(detail::make_engine(prepared, options, observer)),
+          equilibrium_(options.equilibrium),
           step_mm_(options.most_step_mm),
           displacement_(Eigen::Matrix3Xd::Zero(3, prepared.rest.node_count)) {
         result_.engine = engine_->description();
@@ -70,6 +71,7 @@ private:
     UpdateResult& result_;
     Observer& observer_;
     std::unique_ptr<tled::Engine> engine_;
+    tled::EquilibriumOptions equilibrium_;
     double step_mm_;
     Eigen::Matrix3Xd displacement_;
     double matching_seconds_ = 0, solving_seconds_ = 0;
@@ -82,6 +84,7 @@ private:
                 return match_and_solve(round);
             } catch (const SolverFailure& failure) {
                 if (halving == most_halvings) throw;
+                equilibrium_.method = options_.equilibrium.method;
                 step_mm_ /= 2;
                 observer_.note("a round is repeated with steps of at most " + detail::to_text(step_mm_) +
                                " mm: " + failure.what());
@@ -114,8 +117,9 @@ private:
         record.mean_residual_mm = detail::mean_residual(matches);
         matching_seconds_ += stopwatch.lap("").seconds;
 
-        const tled::EquilibriumResult solved = tled::equilibrium(*engine_, prepared_.stiffness, conditions,
-                                                                 options_.equilibrium, &displacement_, observer_);
+        const tled::EquilibriumResult solved =
+            tled::equilibrium(*engine_, prepared_.stiffness, conditions, equilibrium_, &displacement_, observer_);
+        equilibrium_.method = solved.method;  // chosen and explained once, not in every round
         record.largest_change_mm = std::sqrt((solved.displacement - displacement_).colwise().squaredNorm().maxCoeff());
         record.force_evaluations = solved.force_evaluations;
         record.estimated_error_mm = solved.estimated_error_mm;

@@ -222,7 +222,9 @@ public:
                 node_residual(node, displacement_.data(), residual);
                 for (std::size_t c = 0; c < 3; ++c) {
                     const std::size_t at = node * record + c;
-                    increment_[at] = free_[at] * (momentum * increment_[at] + gain * inverse_mass_[at] * residual[c]);
+                    // Selected, not multiplied by zero: a blown-up state would leave NaN on constrained nodes for good.
+                    increment_[at] =
+                        free_[at] != T(0) ? momentum * increment_[at] + gain * inverse_mass_[at] * residual[c] : T(0);
                     displacement_[at] += increment_[at];
                 }
             });
@@ -249,12 +251,11 @@ public:
     }
 
     [[nodiscard]] Observation observe() override {
-        for (std::size_t i = 0; i < scratch_.size(); ++i) scratch_[i] = displacement_[i] - increment_[i];
-        corner_forces(scratch_.data());
-        const Eigen::Matrix3Xd before = residual_at(scratch_.data());
-        corner_forces(displacement_.data());
-        const Eigen::Matrix3Xd now = residual_at(displacement_.data());
         const Eigen::Matrix3Xd step = increment();
+        const bool still = step.isZero(0.0);
+        const Eigen::Matrix3Xd earlier = still ? Eigen::Matrix3Xd() : residual_before();
+        const Eigen::Matrix3Xd now = residual();
+        const Eigen::Matrix3Xd& before = still ? now : earlier;
 
         Observation seen;
         constexpr double infinite = std::numeric_limits<double>::infinity();
@@ -269,8 +270,25 @@ public:
                 seen.increment_mass += v * v / double(inverse_mass_[at]);
                 seen.increment_stiffness += v * (before(c, node) - now(c, node));
             }
-        smallest_jacobian(seen);
+        const SmallestJacobian smallest = smallest_jacobian();
+        seen.min_jacobian = smallest.value;
+        seen.min_jacobian_tet = smallest.tet;
         return seen;
+    }
+
+    [[nodiscard]] SmallestJacobian smallest_jacobian() override {
+        change_.resize(elements_.count() * batch_width);
+        for_batches(0, elements_.count(), [&](std::size_t begin, std::size_t end) {
+            detail::volume_changes(elements_, begin, end, displacement_.data(), change_.data());
+        });
+        SmallestJacobian smallest{std::numeric_limits<double>::infinity(), -1};
+        for (std::size_t e = 0; e < layout_.slot.size(); ++e) {
+            const double jacobian = 1 + double(change_[layout_.slot[e]]);
+            if (jacobian >= smallest.value) continue;
+            smallest = {jacobian, tet_[e]};
+            if (std::isnan(jacobian)) return {-std::numeric_limits<double>::infinity(), tet_[e]};
+        }
+        return smallest;
     }
 
     [[nodiscard]] std::string description() const override {
@@ -278,6 +296,7 @@ public:
                ", " + std::to_string(tbb::this_task_arena::max_concurrency()) + " threads";
     }
 
+    [[nodiscard]] Processor processor() const override { return Processor::Cpu; }
     [[nodiscard]] double precision() const override { return double(std::numeric_limits<T>::epsilon()); }
 
 private:
@@ -442,18 +461,11 @@ private:
         return result;
     }
 
-    void smallest_jacobian(Observation& seen) {
-        change_.resize(elements_.count() * batch_width);
-        for_batches(0, elements_.count(), [&](std::size_t begin, std::size_t end) {
-            detail::volume_changes(elements_, begin, end, displacement_.data(), change_.data());
-        });
-        seen.min_jacobian = std::numeric_limits<double>::infinity();
-        for (std::size_t e = 0; e < layout_.slot.size(); ++e) {
-            const double jacobian = 1 + double(change_[layout_.slot[e]]);
-            if (jacobian >= seen.min_jacobian) continue;
-            seen.min_jacobian = jacobian;
-            seen.min_jacobian_tet = tet_[e];
-        }
+    /// At u − (u − u⁻).
+    [[nodiscard]] Eigen::Matrix3Xd residual_before() {
+        for (std::size_t i = 0; i < scratch_.size(); ++i) scratch_[i] = displacement_[i] - increment_[i];
+        corner_forces(scratch_.data());
+        return residual_at(scratch_.data());
     }
 
     [[nodiscard]] Eigen::Matrix3Xd to_matrix(const std::vector<T>& records) const {

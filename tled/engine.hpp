@@ -34,6 +34,14 @@ struct Observation {
     bool finite = true;         ///< false when any displacement is not finite
 };
 
+/// Smallest det F of an element and its tetrahedron in the mesh; −∞ where none can be computed.
+struct SmallestJacobian {
+    double value = 1;
+    int tet = -1;
+};
+
+enum class Processor { Cpu, Gpu };
+
 /// State: displacement u and increment u − u⁻ (3 × N, mm), viscous stresses, nodal diagonal mass (3 × N), conditions.
 /// Copies in and out are float64 whatever the engine computes in. Forces that are read take the viscous stresses at the
 /// end of the time step that starts at the present displacement, as the next step will.
@@ -65,9 +73,12 @@ public:
     /// f_int at the present displacement, mN, constrained degrees of freedom included (reactions).
     [[nodiscard]] virtual Eigen::Matrix3Xd internal_force() = 0;
     [[nodiscard]] virtual Observation observe() = 0;
+    /// At the present displacement; a quarter of a force evaluation.
+    [[nodiscard]] virtual SmallestJacobian smallest_jacobian() = 0;
 
     /// For reports: "CPU float32, AVX-512, 2 threads", "GPU NVIDIA H100 (OpenGL 4.5)".
     [[nodiscard]] virtual std::string description() const = 0;
+    [[nodiscard]] virtual Processor processor() const = 0;
     /// Unit round-off of the arithmetic that the engine computes in.
     [[nodiscard]] virtual double precision() const = 0;
 };

@@ -1,32 +1,52 @@
 #pragma once
-/// Static equilibrium by dynamic relaxation, stopped by a checked displacement error.
+/// Static equilibrium under given conditions, stopped by a displacement error in mm that is checked.
 
 #include "core/observer.hpp"
 #include "tled/engine.hpp"
 #include "tled/rest_stiffness.hpp"
 
+#include <string>
+
 namespace tissuewarp::tled {
+
+enum class EquilibriumMethod {
+    Automatic,
+    Lbfgs,              ///< limited-memory BFGS with the factor of K₀ as metric (Liu and Nocedal 1989)
+    DynamicRelaxation,  ///< heavy ball with mass diag K₀ (Underwood 1983; Joldes, Wittek, Miller 2011)
+    NonlinearCg,        ///< conjugate gradients (Polak and Ribière 1969), preconditioned with diag K₀
+};
 
 struct EquilibriumOptions {
     double tolerance_mm = 0.05;  ///< accepted largest nodal error, by the lifted residual ‖K₀⁻¹ r‖∞
     int max_steps = 4000;        ///< force evaluations
-    int steps_per_check = 25;    ///< steps recorded between two looks at the state
+    int steps_per_check = 25;    ///< steps of dynamic relaxation recorded between two looks at the state
+    EquilibriumMethod method = EquilibriumMethod::Automatic;
+    const RestState* rest = nullptr;  ///< that of the engine: lets L-BFGS factorise a metric near the answer for tissue
+                                      ///< of which almost only the volume is stiff
 };
 
 struct EquilibriumResult {
     Eigen::Matrix3Xd displacement;  ///< 3 × N, mm
-    double estimated_error_mm = 0;  ///< lifted residual at the end
+    double estimated_error_mm = 0;  ///< by which it was accepted
     int force_evaluations = 0;
-    int lifted_residuals = 0;  ///< triangular solves spent on acceptance
+    int lifted_residuals = 0;  ///< triangular solves
     double min_jacobian = 1;
+    EquilibriumMethod method = EquilibriumMethod::Automatic;  ///< the one used
+    std::string reason;                                       ///< why this one
 };
 
-/// Relaxes the engine to equilibrium under the conditions: mass = diag K₀, damping preset from the lowest mode of K₀
-/// and adapted by the Rayleigh quotient of the motion (Joldes, Wittek, Miller 2011). Starts from the linear-elastic
-/// solution, or from `start` (3 × N mm) plus the linear-elastic answer to its residual. Throws SolverFailure when the
-/// error bound is not reached or tissue inverts for good.
+/// Brings the engine to equilibrium under the conditions. Starts from the linear-elastic solution, or from `start`
+/// (3 × N mm) plus the linear-elastic answer to its residual. Accepts by the lifted residual; soon after a linear
+/// start, or with the history of L-BFGS, by a larger estimate (docs/decisions/equilibrium.md).
+///
+/// Throws InvalidInput for options or conditions that cannot be used, and SolverFailure, which names the cause, the
+/// tetrahedron and the last good state: no admissible start, no progress, the precision of the engine reached, too many
+/// evaluations, inverted tissue.
 EquilibriumResult equilibrium(Engine& engine, const RestStiffness& stiffness, const NodalConditions& conditions,
                               const EquilibriumOptions& options = {}, const Eigen::Matrix3Xd* start = nullptr,
                               Observer& observer = silent_observer());
+
+/// "L-BFGS", "dynamic relaxation", …
+const char* name_of(EquilibriumMethod method);
 
 }  // namespace tissuewarp::tled

@@ -194,19 +194,35 @@ public:
         if (!previous_residual_known_) find_previous_residual();
         evaluate(displacement_, effects_.flags, MaskConstrained::Yes, residual_);
         reduce(node_program(shaders::observe_nodes_program()), node_partials_);
+        Observation seen;
+        const SmallestJacobian smallest = smallest_jacobian();
+        summarise_nodes(seen);
+        seen.min_jacobian = smallest.value;
+        seen.min_jacobian_tet = smallest.tet;
+        return seen;
+    }
+
+    [[nodiscard]] SmallestJacobian smallest_jacobian() override {
+        const CurrentContext current = device_.make_current();
         const Program& elements = programs_.get(shaders::observe_elements_program());
         force_.set_all_elements(elements);
         reduce(elements, element_partials_);
-        Observation seen;
-        summarise_nodes(seen);
-        summarise_elements(seen);
-        return seen;
+        float least = std::numeric_limits<float>::max();
+        std::uint32_t element = std::numeric_limits<std::uint32_t>::max();
+        for (const ElementPartial& part : element_partials_.download())
+            if (part.volume_change < least || (part.volume_change == least && part.element < element)) {
+                least = part.volume_change;
+                element = part.element;
+            }
+        if (element == std::numeric_limits<std::uint32_t>::max()) return {-std::numeric_limits<double>::infinity(), -1};
+        return {1.0 + static_cast<double>(least), tet_[element]};
     }
 
     [[nodiscard]] std::string description() const override {
         return "GPU " + device_.renderer() + " (OpenGL " + device_.version().substr(0, 3) + ")";
     }
 
+    [[nodiscard]] Processor processor() const override { return Processor::Gpu; }
     [[nodiscard]] double precision() const override {
         return static_cast<double>(std::numeric_limits<float>::epsilon());
     }
@@ -312,19 +328,6 @@ private:
         seen.increment_max = bad_displacements > 0 ? infinite : std::sqrt(increment_squared);
         seen.residual_max = bad_displacements + bad_residuals > 0 ? infinite : std::sqrt(residual_squared);
         seen.finite = bad_displacements + bad_residuals == 0;
-    }
-
-    void summarise_elements(Observation& seen) const {
-        float least = std::numeric_limits<float>::max();
-        std::uint32_t element = std::numeric_limits<std::uint32_t>::max();
-        for (const ElementPartial& part : element_partials_.download())
-            if (part.volume_change < least || (part.volume_change == least && part.element < element)) {
-                least = part.volume_change;
-                element = part.element;
-            }
-        if (element == std::numeric_limits<std::uint32_t>::max()) return;  // no J is finite, which `finite` says
-        seen.min_jacobian = 1.0 + static_cast<double>(least);
-        seen.min_jacobian_tet = tet_[element];
     }
 
     shaders::Device device_;

@@ -52,6 +52,7 @@ struct RestStiffness::Impl {
         detail::add_spring_resistance(present, x, y);
         return y;
     }
+    void factorise(const NodalConditions& present);
     void require_compatible(const NodalConditions& present) const;
     [[nodiscard]] VectorXd conjugate_gradients(const VectorXd& force, const NodalConditions& present,
                                                double relative_tolerance) const;
@@ -119,32 +120,45 @@ VectorXd RestStiffness::Impl::conjugate_gradients(const VectorXd& force, const N
     return x;
 }
 
+// Factor of `elastic` + springs on the free degrees of freedom.
+void RestStiffness::Impl::factorise(const NodalConditions& present) {
+    conditions = present;
+    std::vector<int> node_of;
+    index.assign(static_cast<std::size_t>(present.constrained.size()), -1);
+    for (int d = 0; d < static_cast<int>(index.size()); ++d) {
+        if (present.constrained.data()[d]) continue;
+        index[static_cast<std::size_t>(d)] = free_count++;
+        node_of.push_back(d / 3);
+    }
+    if (free_count == 0) return;
+
+    detail::BlockRows K = detail::assembled(elastic, detail::Triangle::Lower);
+    for (std::size_t s = 0; s < present.spring_node.size(); ++s) {
+        K.diagonal(present.spring_node[s]) += detail::spring_matrix(present, static_cast<int>(s));
+    }
+    const Eigen::SparseMatrix<double> lower = detail::scalar_matrix(K, index, detail::Triangle::Lower);
+    K = {};
+    factor = std::make_unique<detail::CholmodFactor>(lower, node_of);
+    if (factor->factorize(lower)) return;
+    throw InvalidInput(
+        "the stiffness at rest is not positive definite: a node without tetrahedra, or tissue that the springs and "
+        "prescribed displacements hold too weakly; hold it at more nodes or with stiffer springs");
+}
+
 RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& conditions)
     : impl_(std::make_unique<Impl>()) {
     detail::require_held(rest, conditions);
-    impl_->conditions = conditions;
     impl_->elastic = detail::stiffness(rest, Matrix3Xd::Zero(3, rest.node_count));
-    std::vector<int> node_of;
-    impl_->index.assign(3 * static_cast<std::size_t>(rest.node_count), -1);
-    for (int d = 0; d < 3 * rest.node_count; ++d) {
-        if (conditions.constrained.data()[d]) continue;
-        impl_->index[d] = impl_->free_count++;
-        node_of.push_back(d / 3);
-    }
-    if (impl_->free_count == 0) return;
+    impl_->factorise(conditions);
+}
 
-    detail::BlockRows K = detail::assembled(impl_->elastic, detail::Triangle::Lower);
-    for (std::size_t s = 0; s < conditions.spring_node.size(); ++s) {
-        K.diagonal(conditions.spring_node[s]) += detail::spring_matrix(conditions, static_cast<int>(s));
-    }
-    const Eigen::SparseMatrix<double> lower = detail::scalar_matrix(K, impl_->index, detail::Triangle::Lower);
-    K = {};
-    impl_->factor = std::make_unique<detail::CholmodFactor>(lower, node_of);
-    if (!impl_->factor->factorize(lower)) {
-        throw InvalidInput(
-            "the stiffness at rest is not positive definite: a node without tetrahedra, or tissue that the springs and "
-            "prescribed displacements hold too weakly; hold it at more nodes or with stiffer springs");
-    }
+RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& conditions, const Matrix3Xd& displacement)
+    : impl_(std::make_unique<Impl>()) {
+    detail::require_held(rest, conditions);
+    impl_->elastic = detail::stiffness(rest, displacement);
+    impl_->elastic.elements = detail::stiffness(rest, Matrix3Xd::Zero(3, rest.node_count)).elements;
+    impl_->elastic.pressure.stiffness = impl_->elastic.pressure.stiffness.cwiseMax(0.0);
+    impl_->factorise(conditions);
 }
 
 RestStiffness::~RestStiffness() = default;

@@ -17,6 +17,10 @@ namespace tissuewarp::tled {
 class RestStiffness {
 public:
     RestStiffness(const RestState& rest, const NodalConditions& conditions);
+    /// The same with the pressure part V_a M_a U''(J_a) ∇J_a ∇J_aᵀ taken at `displacement` (3 × N, mm): a metric near
+    /// that state, always positive definite, for tissue of which almost only the volume is stiff. Throws SolverFailure
+    /// where det F ≤ 0.
+    RestStiffness(const RestState& rest, const NodalConditions& conditions, const Eigen::Matrix3Xd& displacement);
     ~RestStiffness();
     RestStiffness(RestStiffness&&) noexcept;
     RestStiffness& operator=(RestStiffness&&) noexcept;

@@ -1,5 +1,5 @@
 #pragma once
-/// The one place that knows CGAL: Delaunay refinement of a label field (Boissonnat and Oudot 2005; Jamin et al. 2015).
+/// Delaunay refinement of a label field (Boissonnat and Oudot 2005; Jamin et al. 2015), in one thread or in many.
 
 #include "core/observer.hpp"
 #include "meshing/detail/label_field.hpp"
@@ -17,7 +17,9 @@ struct RefinementInput {
     const MeshingOptions& options;
 };
 
-/// Tetrahedra in the local frame; their labels are classes. Sequential, so that equal input gives equal meshes.
-TetMesh refine(const RefinementInput& input, Observer& observer);
+/// Tetrahedra in the local frame; their labels are classes. Sequential: equal input gives equal meshes. Parallel:
+/// another mesh of the same quality every time. Throw Cancelled.
+TetMesh refine_sequential(const RefinementInput& input, Observer& observer);
+TetMesh refine_parallel(const RefinementInput& input, Observer& observer);
 
 }  // namespace tissuewarp::meshing::detail

@@ -119,6 +119,13 @@ class SmallVerbs(PhantomTest):
         self.assertAlmostEqual(sum(values["quality"]["label_volume_mm3"].values()) / voxels, 1, delta=0.05)
         self.assertIn(f"{values['tetrahedra']} tetrahedra", run("info", mesh).stdout)
 
+    def test_mesh_refines_in_parallel_when_asked(self):
+        mesh = self.phantom.folder / "parallel.vtu"
+        result = run("mesh", self.phantom.moving_labels, "-o", mesh, "--edge-length", 5, "--refinement", "parallel")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("tetrahedra", run("info", mesh).stdout)
+        self.assert_refused(run("mesh", self.phantom.moving_labels, "-o", mesh, "--refinement", "fast"), 2, "parallel")
+
     def test_mesh_refuses_a_name_that_is_no_vtu(self):
         self.assert_refused(run("mesh", self.phantom.moving_labels, "-o", self.phantom.folder / "a.vtk"), 2, ".vtu")
 

@@ -124,6 +124,25 @@ TEST(Mesher, SameInputGivesTheSameMesh) {
     EXPECT_EQ(again.labels, balls().labels);
 }
 
+TEST(Mesher, ParallelRefinementMakesAMeshAsGoodAsTheSequentialOne) {
+    const Volume labels = paint(grid(45), two_balls(middle));
+    MeshingOptions options = with_edge(3.0);
+    const TetMesh sequential = mesh_labels(labels, options);
+    options.refinement = Refinement::Parallel;
+    const TetMesh parallel = mesh_labels(labels, options);
+    EXPECT_NO_THROW(require_valid(parallel, "balls"));
+    EXPECT_NEAR(mean_radius(parallel, 7, 3, middle), 9.0, 0.35);
+    EXPECT_NEAR(mean_radius(parallel, 3, 0, middle), 18.0, 0.35);
+    EXPECT_NEAR(static_cast<double>(parallel.tet_count()) / sequential.tet_count(), 1.0, 0.15);
+    const QualityReport report = quality(parallel);
+    EXPECT_GT(report.min_dihedral_deg.minimum, 8.0);
+    EXPECT_NEAR(report.edge_mm.median, 3.0, 0.45);
+    EXPECT_EQ(report.components, 1);
+    const Fidelity reached = fidelity(parallel, labels), expected = fidelity(sequential, labels);
+    EXPECT_LT(reached.mean_surface_distance_mm, 1.1 * expected.mean_surface_distance_mm);
+    EXPECT_LT(reached.hausdorff_95_mm, 1.1 * expected.hausdorff_95_mm);
+}
+
 TEST(Mesher, ObliqueAxesLandAtTheirPlaceInThePatient) {
     Geometry geometry = grid(45);
     geometry.direction = oblique();
@@ -214,9 +233,14 @@ TEST(Mesher, StopsWhenAsked) {
     struct Impatient : Observer {
         int polls = 0;
         bool cancel_requested() override { return ++polls > 8; }
-    } observer;
-    EXPECT_THROW(mesh_labels(paint(grid(45), two_balls(middle)), with_edge(2.0), observer), Cancelled);
-    EXPECT_EQ(observer.polls, 9);  // nothing ran on after the request
+    };
+    MeshingOptions options = with_edge(2.0);
+    for (const Refinement refinement : {Refinement::Deterministic, Refinement::Parallel}) {
+        options.refinement = refinement;
+        Impatient observer;
+        EXPECT_THROW(mesh_labels(paint(grid(45), two_balls(middle)), options, observer), Cancelled);
+        EXPECT_EQ(observer.polls, 9);  // nothing ran on after the request
+    }
 }
 
 }  // namespace

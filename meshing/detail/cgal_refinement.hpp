@@ -1,3 +1,7 @@
+#pragma once
+/// The one place that knows CGAL, for either of its concurrency tags. A translation unit instantiates one tag:
+/// compiling one takes 3.5 GB.
+
 #include "meshing/detail/delaunay_refinement.hpp"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
@@ -8,30 +12,33 @@
 #include <CGAL/make_mesh_3.h>
 
 #include <algorithm>
+#include <atomic>
+#include <thread>
 #include <unordered_map>
 
 namespace tissuewarp::meshing::detail {
 
-namespace {
-
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Domain = CGAL::Labeled_mesh_domain_3<Kernel>;
-using Triangulation = CGAL::Mesh_triangulation_3<Domain, Kernel, CGAL::Sequential_tag>::type;
-using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation>;
+template <class Concurrency>
+using Triangulation = typename CGAL::Mesh_triangulation_3<Domain, Kernel, Concurrency>::type;
+template <class Concurrency>
+using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation<Concurrency>>;
 using Point = Kernel::Point_3;
 
 /// CGAL's criteria, but facets whose surface ball is already small stay as they are: where interfaces meet in sharp
 /// edges, or labels are one voxel thin, angle and distance bounds would otherwise refine down to elements whose size
 /// then limits the time step of the whole model. (CGAL 6 calls this facet_min_size.)
-class FacetCriteria : public CGAL::Mesh_facet_criteria_3<Triangulation> {
-    using Base = CGAL::Mesh_facet_criteria_3<Triangulation>;
+template <class Tr>
+class FacetCriteria : public CGAL::Mesh_facet_criteria_3<Tr> {
+    using Base = CGAL::Mesh_facet_criteria_3<Tr>;
 
 public:
     template <class Size>
     FacetCriteria(double angle, const Size& size, double distance, double smallest)
         : Base(angle, size, distance, CGAL::FACET_VERTICES_ON_SURFACE), smallest_squared_(smallest * smallest) {}
 
-    Is_facet_bad operator()(const Triangulation& triangulation, const Triangulation::Facet& facet) const {
+    typename Base::Is_facet_bad operator()(const Tr& triangulation, const typename Tr::Facet& facet) const {
         const auto& [cell, corner] = facet;
         bool on_surface = true;
         for (int k = 1; k < 4; ++k) on_surface = on_surface && cell->vertex((corner + k) & 3)->in_dimension() < 3;
@@ -45,7 +52,8 @@ private:
     double smallest_squared_;
 };
 
-using Criteria = CGAL::Mesh_criteria_3<Triangulation, CGAL::Mesh_edge_criteria_3<Triangulation>, FacetCriteria>;
+template <class Tr>
+using Criteria = CGAL::Mesh_criteria_3<Tr, CGAL::Mesh_edge_criteria_3<Tr>, FacetCriteria<Tr>>;
 
 /// Bound on circumradii over target edge: measured on heads and balls, this makes the median edge the target.
 constexpr double radius_over_edge = 0.77;
@@ -71,15 +79,39 @@ struct SizeField {
     }
 };
 
-/// Calls of the label function between two polls of the observer: a few milliseconds.
-constexpr int calls_between_polls = 1 << 14;
+/// Asks the observer from within the label function, the one piece of ours that CGAL calls all the time and from all of
+/// its threads, but only in the thread that called the mesher. One thread stops by the exception; several would spin
+/// for ever after one, so that they see a flag: at once while refining, at the end of the pass while perturbing.
+template <class Concurrency>
+class CancelPoll {
+public:
+    explicit CancelPoll(Observer& observer) : observer_(observer), caller_(std::this_thread::get_id()) {}
 
-Domain make_domain(const RefinementInput& input, Observer& observer) {
-    const auto label = [&input, &observer, calls = 0](const Point& p) mutable {
-        if (++calls == calls_between_polls) {
-            calls = 0;
-            if (observer.cancel_requested()) throw Cancelled();
-        }
+    void operator()() {
+        thread_local int calls = 0;
+        if (++calls < calls_between_polls) return;
+        calls = 0;
+        if (stop || std::this_thread::get_id() != caller_ || !observer_.cancel_requested()) return;
+        stop = true;
+        if constexpr (std::is_same_v<Concurrency, CGAL::Sequential_tag>) throw Cancelled();
+    }
+    void require_going_on() const {
+        if (stop) throw Cancelled();
+    }
+
+    std::atomic<bool> stop = false;
+
+private:
+    static constexpr int calls_between_polls = 1 << 14;  // a few milliseconds
+
+    Observer& observer_;
+    std::thread::id caller_;
+};
+
+template <class Poll>
+Domain make_domain(const RefinementInput& input, Poll& poll) {
+    const auto label = [&input, &poll](const Point& p) {
+        poll();
         return input.field(Eigen::Array3d(p.x(), p.y(), p.z()));
     };
     const Eigen::Array3d extent =
@@ -89,20 +121,23 @@ Domain make_domain(const RefinementInput& input, Observer& observer) {
             CGAL::parameters::relative_error_bound = accuracy / extent.matrix().norm()};
 }
 
-void insert_seeds(const RefinementInput& input, const Domain& domain, Complex& complex) {
+template <class C3t3>
+void insert_seeds(const RefinementInput& input, const Domain& domain, C3t3& complex) {
+    using Tr = typename C3t3::Triangulation;
     const auto intersection = domain.construct_intersection_object();
     const auto point = [](const Eigen::Array3d& p) { return Point(p[0], p[1], p[2]); };
     for (const SurfaceSeed& seed : input.seeds) {
         const auto [place, index, dimension] = intersection(Kernel::Segment_3(point(seed.inside), point(seed.outside)));
         if (dimension == 0) continue;
-        const auto vertex = complex.triangulation().insert(Triangulation::Weighted_point(place));
-        if (vertex == Triangulation::Vertex_handle()) continue;
+        const auto vertex = complex.triangulation().insert(typename Tr::Weighted_point(place));
+        if (vertex == typename Tr::Vertex_handle()) continue;
         complex.set_dimension(vertex, 2);
         complex.set_index(vertex, index);
     }
 }
 
-TetMesh extract(const Complex& complex) {
+template <class C3t3>
+TetMesh extract(const C3t3& complex) {
     TetMesh mesh;
     const auto count = static_cast<Eigen::Index>(complex.number_of_cells_in_complex());
     mesh.tets.resize(4, count);
@@ -125,25 +160,28 @@ TetMesh extract(const Complex& complex) {
     return mesh;
 }
 
-}  // namespace
-
-TetMesh refine(const RefinementInput& input, Observer& observer) {
+template <class Concurrency>
+TetMesh refine_with(const RefinementInput& input, Observer& observer) {
+    using Tr = Triangulation<Concurrency>;
     namespace p = CGAL::parameters;
     const MeshingOptions& options = input.options;
-    const Domain domain = make_domain(input, observer);
+    CancelPoll<Concurrency> poll(observer);
+    const Domain domain = make_domain(input, poll);
     const SizeField size{&domain, &input.edge_length};
     const double shortest = *std::min_element(input.edge_length.begin() + 1, input.edge_length.end());
-    const Criteria criteria(FacetCriteria(options.facet_angle, size, input.facet_distance, smallest_facet * shortest),
-                            Criteria::Cell_criteria(options.radius_edge_ratio, size));
-    Complex complex;
+    const FacetCriteria<Tr> facets(options.facet_angle, size, input.facet_distance, smallest_facet * shortest);
+    const Criteria<Tr> criteria(facets, typename Criteria<Tr>::Cell_criteria(options.radius_edge_ratio, size));
+    Complex<Concurrency> complex;
     insert_seeds(input, domain, complex);
     observer.checkpoint("refining the mesh", 0.1);
     CGAL::refine_mesh_3(complex, domain, criteria, p::no_exude(), p::no_perturb(), p::no_odt(), p::no_lloyd(),
-                        p::no_reset_c3t3());
+                        p::no_reset_c3t3(), p::mesh_3_options(p::pointer_to_stop_atomic_boolean = &poll.stop));
+    poll.require_going_on();
     observer.checkpoint("perturbing slivers", 0.6);
     if (options.perturb_seconds > 0.0)
         CGAL::perturb_mesh_3(complex, domain, p::time_limit = options.perturb_seconds,
                              p::sliver_bound = options.min_dihedral_deg);
+    poll.require_going_on();
     observer.checkpoint("exuding slivers", 0.8);
     if (options.exude_seconds > 0.0)
         CGAL::exude_mesh_3(complex, p::time_limit = options.exude_seconds, p::sliver_bound = options.min_dihedral_deg);
