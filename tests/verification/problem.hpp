@@ -9,7 +9,6 @@
 
 #include <array>
 #include <functional>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -47,7 +46,8 @@ struct Problem {
     int stages = 1;
     Eigen::Vector3d body_force = Eigen::Vector3d::Zero();  ///< mN/mm³ of rest volume
     std::vector<Traction> tractions;
-    std::optional<double> plane_height;     ///< mm; a rigid frictionless plane: z + u_z ≤ plane_height
+    /// Height (mm) of a rigid frictionless plane at a stage: z + u_z ≤ height. Empty without contact.
+    std::function<double(int stage)> plane_height;
     std::array<int, 3> levels{};            ///< of the study with linear elements, constant ratio
     std::array<int, 3> quadratic_levels{};  ///< with quadratic ones
     std::vector<Quantity> quantities;

@@ -1,6 +1,7 @@
 #include "tests/verification/reference_file.hpp"
 
 #include "core/errors.hpp"
+#include "tests/verification/solution.hpp"
 
 #include <fstream>
 #include <limits>
@@ -63,6 +64,15 @@ Quantity component_quantity(const std::string& name, const std::string& unit, co
     return {name, unit, numbers(entry.at("value"), scale).segment(component, 1),
             numbers(entry.at("uncertainty"), scale).segment(component, 1),
             [measure = std::move(measure)](const Solution& s) { return VectorXd::Constant(1, measure(s)); }};
+}
+
+const json& values_of(const json& file, Law law) {
+    return file.at("values").at(law == Law::Iso ? "iso" : "lnJ");
+}
+
+Quantity energy_quantity(const json& values, double parts) {
+    return component_quantity("energy", "mN mm", values.at("energy"), 0, mNmm_per_J,
+                              [parts](const Solution& s) { return parts * s.energy; });
 }
 
 Quantity point_quantity(const json& points, const json& entry, const std::function<bool(const Vector3d&)>& keep,

@@ -5,7 +5,14 @@
 
 #include <nlohmann/json.hpp>
 
+#include <cmath>
+
 namespace tissuewarp::verification {
+
+/// Is a coordinate on a plane, but for rounding?
+inline bool near(double x, double plane) {
+    return std::abs(x - plane) < 1e-9 * (1.0 + std::abs(plane));
+}
 
 constexpr double mm_per_m = 1e3, mN_per_N = 1e3, kPa_per_Pa = 1e-3, mNmm_per_J = 1e6, mm3_per_m3 = 1e9;
 
@@ -31,6 +38,12 @@ Quantity quantity(const std::string& name, const std::string& unit, const nlohma
 /// The same for entry number `component` of an array.
 Quantity component_quantity(const std::string& name, const std::string& unit, const nlohmann::json& entry,
                             int component, double scale, std::function<double(const Solution&)> measure);
+
+/// The block of a law in `values`.
+const nlohmann::json& values_of(const nlohmann::json& file, Law law);
+
+/// Energy of the whole body, `parts` times that of the solved part.
+Quantity energy_quantity(const nlohmann::json& values, double parts);
 
 /// Displacements at points: those for which `keep` holds, each with the displacement that `at` finds.
 Quantity point_quantity(const nlohmann::json& points, const nlohmann::json& entry,

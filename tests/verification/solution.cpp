@@ -81,7 +81,7 @@ tled::Conditions conditions_of(const Problem& problem, const Solution& solution,
         held.node = i;
         if (touching.contains(i) && !held.constrained[2]) {
             held.constrained[2] = true;
-            held.displacement[2] = *problem.plane_height - solution.nodes()(2, i);
+            held.displacement[2] = problem.plane_height(stage) - solution.nodes()(2, i);
         }
         if (held.constrained[0] || held.constrained[1] || held.constrained[2]) conditions.prescribed.push_back(held);
     }
@@ -89,13 +89,14 @@ tled::Conditions conditions_of(const Problem& problem, const Solution& solution,
 }
 
 // Releases nodes that the plane would have to pull, adds nodes that went through it. False when nothing changed.
-bool update_contact(const Problem& problem, const Solution& solution, std::set<int>& touching) {
+bool update_contact(const Problem& problem, const Solution& solution, int stage, std::set<int>& touching) {
+    const double height = problem.plane_height(stage);
     constexpr double through_mm = 1e-7;
     std::set<int> next;
     for (int i = 0; i < solution.nodes().cols(); ++i) {
-        if (problem.hold(solution.nodes().col(i), 1).constrained[2]) continue;
+        if (problem.hold(solution.nodes().col(i), stage).constrained[2]) continue;
         const bool pushed = touching.contains(i) && solution.force(2, i) <= 0.0;
-        const bool through = solution.nodes()(2, i) + solution.displacement(2, i) > *problem.plane_height + through_mm;
+        const bool through = solution.nodes()(2, i) + solution.displacement(2, i) > height + through_mm;
         if (pushed || (!touching.contains(i) && through)) next.insert(i);
     }
     if (next == touching) return false;
@@ -125,8 +126,9 @@ Solution solve(const Problem& problem, Elements elements, int level) {
     solution.mesh = problem.mesh(level);
     const auto discretisation = discretise(problem, elements, solution);
     const tled::DiscreteEnergy& energy = *discretisation->energy;
-    solution.displacement = Matrix3Xd::Zero(3, energy.node_count());
+    solution.displacement = solution.force = Matrix3Xd::Zero(3, energy.node_count());
     std::set<int> touching;
+    if (problem.plane_height) update_contact(problem, solution, 1, touching);
     for (int stage = 1; stage <= problem.stages; ++stage) {
         for (int round = 0;; ++round) {
             tled::NewtonOptions options{.tolerance_mm = tolerance_mm};
@@ -137,7 +139,7 @@ Solution solve(const Problem& problem, Elements elements, int level) {
             solution.displacement = found.displacement;
             solution.iterations += found.iterations;
             solution.force = energy.force(found.displacement);
-            if (!problem.plane_height || !update_contact(problem, solution, touching)) break;
+            if (!problem.plane_height || !update_contact(problem, solution, stage, touching)) break;
             if (round == most_contact_rounds) throw SolverFailure("the contact set does not settle: " + problem.name);
         }
     }

@@ -3,6 +3,7 @@
 #include "meshing/primitives.hpp"
 #include "tests/verification/problems.hpp"
 #include "tests/verification/reference_file.hpp"
+#include "tests/verification/shapes.hpp"
 #include "tests/verification/solution.hpp"
 
 #include <cmath>
@@ -15,24 +16,6 @@ using nlohmann::json;
 namespace {
 
 constexpr double edge = 100.0, half = 50.0, on_plane = 1e-9;  // mm
-
-bool near(double x, double plane) {
-    return std::abs(x - plane) < on_plane;
-}
-
-// 0 … half in `cells` cells that shrink towards 0 as t^grading.
-std::vector<double> graded(int cells, double grading) {
-    std::vector<double> result;
-    for (int i = 0; i <= cells; ++i) result.push_back(half * std::pow(static_cast<double>(i) / cells, grading));
-    return result;
-}
-
-// The same and its mirror image: 0 … edge.
-std::vector<double> graded_both_ways(int cells, double grading) {
-    std::vector<double> result = graded(cells, grading);
-    for (int i = cells - 1; i >= 0; --i) result.push_back(edge - result[static_cast<std::size_t>(i)]);
-    return result;
-}
 
 // Points within 20 mm of the bonded faces are left out where their edges fold.
 std::function<bool(const Vector3d&)> away_from_plates(double margin) {
@@ -55,13 +38,13 @@ Vector3d unfold_eighth(const Solution& s, const Vector3d& X, double top) {
 // Tension or compression by `top` mm.
 Problem axial(const std::string& name, Law law, double top, double grading, double margin) {
     const json file = reference_file(name);
-    const json& values = file.at("values").at(law == Law::Iso ? "iso" : "lnJ");
+    const json& values = values_of(file, law);
     Problem problem;
     problem.name = name;
     problem.law = law;
     problem.materials[1] = material_of(file, law);
     problem.mesh = [grading](int cells) {
-        const std::vector<double> x = graded(cells, grading);
+        const std::vector<double> x = graded(half, cells, grading);
         return meshing::box_mesh({x, x, x});
     };
     problem.hold = [top](const Vector3d& X, int) {
@@ -75,9 +58,7 @@ Problem axial(const std::string& name, Law law, double top, double grading, doub
         return 4.0 * s.reaction([](const Vector3d& X) { return near(X[2], half); })[2];
     };
     problem.quantities = {
-        component_quantity("force z", "mN", values.at("force"), 0, mN_per_N, force),
-        component_quantity("energy", "mN mm", values.at("energy"), 0, mNmm_per_J,
-                           [](const Solution& s) { return 8.0 * s.energy; }),
+        component_quantity("force z", "mN", values.at("force"), 0, mN_per_N, force), energy_quantity(values, 8.0),
         point_quantity(file.at("points"), values.at("u"), away_from_plates(margin),
                        [top](const Solution& s, const Vector3d& X) { return unfold_eighth(s, X, top); })};
     return problem;
@@ -108,14 +89,14 @@ Problem cube_compression(Law law) {
 
 Problem cube_shear(Law law) {
     const json file = reference_file("p2_cube_shear");
-    const json& values = file.at("values").at(law == Law::Iso ? "iso" : "lnJ");
+    const json& values = values_of(file, law);
     Problem problem;
     problem.name = "p2_cube_shear";
     problem.law = law;
     problem.materials[1] = material_of(file, law);
     problem.mesh = [](int cells) {
-        const std::vector<double> x = graded_both_ways(cells, 1.8);
-        return meshing::box_mesh({x, graded(cells, 1.8), x});
+        const std::vector<double> x = graded_both_ways(edge, 2 * cells, 1.8);
+        return meshing::box_mesh({x, graded(half, cells, 1.8), x});
     };
     problem.hold = [](const Vector3d& X, int) {
         tled::PrescribedDisplacement held;
@@ -136,8 +117,7 @@ Problem cube_shear(Law law) {
     };
     problem.quantities = {component_quantity("force x", "mN", values.at("force"), 0, mN_per_N, force(0)),
                           component_quantity("force z", "mN", values.at("force"), 1, mN_per_N, force(2)),
-                          component_quantity("energy", "mN mm", values.at("energy"), 0, mNmm_per_J,
-                                             [](const Solution& s) { return 2.0 * s.energy; }),
+                          energy_quantity(values, 2.0),
                           point_quantity(file.at("points"), values.at("u"), away_from_plates(20.0), whole)};
     problem.levels = {4, 6, 9};
     problem.quadratic_levels = {1, 2, 4};
