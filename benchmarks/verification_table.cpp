@@ -1,23 +1,161 @@
+// Prints the tables of docs/verification.md: the problems of data/reference by Newton's method, every element, on three
+// meshes and extrapolated; then every engine against Newton's method on one mesh.
+//     verification_table [--csv FILE] [--problem PART]... [--element NAME] [--no-studies] [--no-engines] [--gpu]
+// FILE takes one line per quantity and mesh, for scripts/plot_verification.py. PART selects problems whose name holds
+// it.
+
+#include "benchmarks/verification_engines.hpp"
+#include "core/errors.hpp"
 #include "tests/verification/problems.hpp"
 #include "tests/verification/study.hpp"
+
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
-#include <cstdlib>
+#include <fstream>
 #include <string>
-#include <chrono>
+#include <vector>
+
+using namespace tissuewarp;
 using namespace tissuewarp::verification;
-int main(int argc, char** argv) {
-    std::array<int,3> L{std::atoi(argv[3]),std::atoi(argv[4]),std::atoi(argv[5])};
-    Elements el = static_cast<Elements>(std::atoi(argv[2]));
-    for (Law law : {Law::Iso, Law::LnJ}) {
-        if (argc > 6 && law == Law::LnJ) break;
-        std::string n = argv[1];
-        Problem p = n=="stretch"? cube_stretch(law): n=="mild"? cube_mild_compression(law): n=="comp"?cube_compression(law): n=="shear"?cube_shear(law): n=="cook2"?cook_plane_strain(law,atof(getenv("NU"))): n=="cook3"?*cook_3d(law,atof(getenv("NU"))):n=="twist"?bar_twist(law):n=="cant"?cantilever(law):n=="ell"?ellipsoid_plain(law):n=="inc"?ellipsoid_inclusion():n=="prone"?breast(law,Gravity::Prone):n=="supine"?breast(law,Gravity::Supine):n=="block"?block_contact(law,1):half_ball_contact(law,5);
-        auto t0=std::chrono::steady_clock::now();
-        Study s = study(p, el, L);
-        printf("%s %s nodes %d it %d minJ %.3f  %.1fs\n", p.name.c_str(), name_of(el), s.nodes[2], s.iterations[2], s.min_jacobian[2], std::chrono::duration<double>(std::chrono::steady_clock::now()-t0).count());
-        for (auto& c : s.comparisons) {
-            printf("  %s: %.5f %.5f %.5f  extrap %.5f (%.2f) ref %.5f ± %.5f mesh %.5f off %.5f  excess %.5f %s  maxoff %.5f\n", c.quantity.c_str(), c.coarse[0],c.middle[0],c.fine[0],c.extrapolated,c.order,c.reference[0],c.uncertain,c.mesh_error,c.off,c.excess(),c.met()?"MET":"not", c.largest_off);
+
+namespace {
+
+struct Arguments {
+    std::string csv;
+    std::vector<std::string> parts;
+    std::string element;
+    bool studies = true, engines = true, gpu = false;
+};
+
+Arguments parse(int argc, char** argv) {
+    Arguments result;
+    const std::vector<std::string> given(argv + 1, argv + argc);
+    for (std::size_t i = 0; i < given.size(); ++i) {
+        const bool has_value = i + 1 < given.size();
+        if (given[i] == "--csv" && has_value) {
+            result.csv = given[++i];
+        } else if (given[i] == "--problem" && has_value) {
+            result.parts.push_back(given[++i]);
+        } else if (given[i] == "--element" && has_value) {
+            result.element = given[++i];
+        } else if (given[i] == "--no-studies") {
+            result.studies = false;
+        } else if (given[i] == "--no-engines") {
+            result.engines = false;
+        } else if (given[i] == "--gpu") {
+            result.gpu = true;
+        } else {
+            throw InvalidInput("unknown argument " + given[i] + "; see the head of verification_table.cpp");
         }
-        fflush(stdout);
     }
+    return result;
+}
+
+bool selected(const Problem& problem, const std::vector<std::string>& parts) {
+    for (const std::string& part : parts) {
+        if (problem.name.find(part) != std::string::npos) return true;
+    }
+    return parts.empty();
+}
+
+void print_head(const std::string& problem) {
+    std::printf(
+        "\n### %s\n\n"
+        "| law | element | nodes | min J | quantity | finest mesh | order | extrapolated | reference | off | "
+        "mesh error | within uncertainty + mesh error |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+        problem.c_str());
+}
+
+// Differences of exact states are rounding.
+bool has_order(const Comparison& c) {
+    return !std::isnan(c.order) && (!c.single() || c.mesh_error > 1e-10 * std::abs(c.reference[0]));
+}
+
+void print_row(const Problem& problem, Elements elements, const Study& study, const Comparison& c) {
+    std::printf("| %s | %s | %d | %.2f | %s, %s | ", name_of(problem.law), name_of(elements), study.nodes[2],
+                study.min_jacobian[2], c.quantity.c_str(), c.unit.c_str());
+    if (c.single()) {
+        std::printf("%.6g | ", c.fine[0]);
+    } else {
+        std::printf("– | ");
+    }
+    if (!has_order(c)) {
+        std::printf("– | ");
+    } else {
+        std::printf("%.1f | ", c.order);
+    }
+    if (c.single() && has_order(c)) {
+        std::printf("%.6g | ", c.extrapolated);
+    } else {
+        std::printf("– | ");
+    }
+    if (c.single()) {
+        std::printf("%.6g ± %.2g | %+.3g (%+.2f %%) | ", c.reference[0], c.uncertain, c.off,
+                    100.0 * c.off / std::abs(c.reference[0]));
+    } else {
+        std::printf("± %.2g | %.3g, at most %.3g | ", c.uncertain, c.off, c.largest_off);
+    }
+    std::printf("%.3g | ", c.mesh_error);
+    if (c.met()) {
+        std::printf("met |\n");
+    } else {
+        std::printf("**not met** by %.2g |\n", c.excess());
+    }
+}
+
+void write_csv(std::ofstream& csv, const Problem& problem, Elements elements, const Study& study, const Comparison& c) {
+    const std::array<const Eigen::VectorXd*, 3> values{&c.coarse, &c.middle, &c.fine};
+    for (std::size_t k = 0; k < 3; ++k) {
+        const double off = (*values[k] - c.reference).norm() / std::sqrt(static_cast<double>(c.fine.size()));
+        csv << '"' << problem.name << "\"," << name_of(problem.law) << ',' << name_of(elements) << ",\"" << c.quantity
+            << "\"," << c.unit << ',' << study.nodes[k] << ',' << (c.single() ? (*values[k])[0] : off) << ',' << off
+            << ',' << (c.single() ? c.reference[0] : 0.0) << ',' << c.uncertain << '\n';
+    }
+    csv.flush();
+}
+
+void run_studies(const Arguments& arguments) {
+    std::ofstream csv;
+    if (!arguments.csv.empty()) {
+        csv.open(arguments.csv);
+        csv.precision(10);
+        csv << "problem,law,element,quantity,unit,nodes,value,off,reference,uncertainty\n";
+    }
+    std::vector<Problem> problems = all_problems();
+    std::stable_sort(problems.begin(), problems.end(),
+                     [](const Problem& a, const Problem& b) { return a.name < b.name; });
+    std::string last;
+    for (const Problem& problem : problems) {
+        if (!selected(problem, arguments.parts)) continue;
+        if (problem.name != last) print_head(problem.name);
+        last = problem.name;
+        for (const Elements elements : elements_for(problem)) {
+            if (!arguments.element.empty() && arguments.element != name_of(elements)) continue;
+            try {
+                const Study found = study(problem, elements);
+                for (const Comparison& c : found.comparisons) {
+                    print_row(problem, elements, found, c);
+                    if (csv.is_open()) write_csv(csv, problem, elements, found, c);
+                }
+            } catch (const SolverFailure& failure) {
+                std::printf("| %s | %s | **%s** |\n", name_of(problem.law), name_of(elements), failure.what());
+            }
+            std::fflush(stdout);
+        }
+    }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    try {
+        const Arguments arguments = parse(argc, argv);
+        if (arguments.studies) run_studies(arguments);
+        if (arguments.engines) print_engines(arguments.gpu ? GpuRows::Print : GpuRows::Omit);
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "verification_table: %s\n", error.what());
+        return 2;
+    }
+    return 0;
 }

@@ -15,6 +15,9 @@
 namespace tissuewarp::verification {
 
 enum class Law { Iso, LnJ };
+inline const char* name_of(Law law) {
+    return law == Law::Iso ? "iso" : "lnJ";
+}
 
 class Solution;
 
@@ -46,8 +49,10 @@ struct Problem {
     int stages = 1;
     Eigen::Vector3d body_force = Eigen::Vector3d::Zero();  ///< mN/mm³ of rest volume
     std::vector<Traction> tractions;
-    /// Height (mm) of a rigid frictionless plane at a stage: z + u_z ≤ height. Empty without contact.
+    /// Height (mm) of a rigid frictionless plane at a stage: z + u_z ≤ height for the nodes at positions that
+    /// `may_touch` it. Empty without contact.
     std::function<double(int stage)> plane_height;
+    std::function<bool(const Eigen::Vector3d& X)> may_touch;
     std::array<int, 3> levels{};            ///< of the study with linear elements, constant ratio
     std::array<int, 3> quadratic_levels{};  ///< with quadratic ones
     std::vector<Quantity> quantities;

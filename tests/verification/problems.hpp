@@ -4,6 +4,7 @@
 #include "tests/verification/problem.hpp"
 
 #include <optional>
+#include <vector>
 
 namespace tissuewarp::verification {
 
@@ -35,5 +36,8 @@ Problem breast(Law law, Gravity gravity);
 Problem half_ball_contact(Law law, int step);
 /// Block between two such planes, compressed by 5, 10, 20, 30 % (p9).
 Problem block_contact(Law law, int step);
+
+/// All of these, both laws where the files hold them.
+std::vector<Problem> all_problems();
 
 }  // namespace tissuewarp::verification

@@ -26,8 +26,10 @@ struct Discretisation {
 std::unique_ptr<Discretisation> discretise(const Problem& problem, Elements elements, Solution& solution) {
     auto result = std::make_unique<Discretisation>();
     if (!is_quadratic(elements)) {
-        tled::Model model{solution.mesh, problem.materials,
-                          elements == Elements::T4 ? tled::Element::T4 : tled::Element::AveragedPressureT4};
+        tled::Model model;
+        model.mesh = solution.mesh;
+        model.materials = problem.materials;
+        model.element = elements == Elements::T4 ? tled::Element::T4 : tled::Element::AveragedPressureT4;
         result->rest = tled::rest_state(model);
         result->energy = std::make_unique<tled::LinearTetrahedra>(result->rest);
         return result;
@@ -94,7 +96,8 @@ bool update_contact(const Problem& problem, const Solution& solution, int stage,
     constexpr double through_mm = 1e-7;
     std::set<int> next;
     for (int i = 0; i < solution.nodes().cols(); ++i) {
-        if (problem.hold(solution.nodes().col(i), stage).constrained[2]) continue;
+        const Vector3d X = solution.nodes().col(i);
+        if (!problem.may_touch(X) || problem.hold(X, stage).constrained[2]) continue;
         const bool pushed = touching.contains(i) && solution.force(2, i) <= 0.0;
         const bool through = solution.nodes()(2, i) + solution.displacement(2, i) > height + through_mm;
         if (pushed || (!touching.contains(i) && through)) next.insert(i);
@@ -118,6 +121,12 @@ const char* name_of(Elements elements) {
             return "T10 mixed";
     }
     return "";
+}
+
+tled::NodalConditions nodal_conditions_of(const Problem& problem, const meshing::TetMesh& mesh) {
+    Solution part;
+    part.mesh = mesh;
+    return tled::nodal_conditions(conditions_of(problem, part, problem.stages, {}), mesh.node_count());
 }
 
 Solution solve(const Problem& problem, Elements elements, int level) {

@@ -42,6 +42,9 @@ public:
     [[nodiscard]] double deformed_volume() const;
 };
 
+/// Loads and prescribed displacements of the last stage on a linear mesh, without contact.
+tled::NodalConditions nodal_conditions_of(const Problem& problem, const meshing::TetMesh& mesh);
+
 /// Newton's method, in the stages of the problem; with a rigid plane, by an exact nodal active set around it.
 Solution solve(const Problem& problem, Elements elements, int level);
 

@@ -25,6 +25,15 @@ double highest_order(Elements elements) {
     return is_quadratic(elements) ? 4.0 : 2.0;
 }
 
+std::vector<Elements> elements_for(const Problem& problem) {
+    std::vector<Elements> result{Elements::T4, Elements::AveragedPressure};
+    if (problem.plane_height) return result;
+    const bool soft = tled::poisson_ratio(problem.materials.at(1)) < 0.4, cook = problem.name.starts_with("p4_cook");
+    if (soft || cook) result.push_back(Elements::Quadratic);
+    if (!soft || cook) result.push_back(Elements::QuadraticMixed);
+    return result;
+}
+
 Comparison compare(const Quantity& quantity, const std::array<Eigen::VectorXd, 3>& values, double ratio,
                    double highest_order) {
     Comparison c{quantity.name, quantity.unit,      values[0],           values[1],

@@ -25,6 +25,11 @@ double mesh_error(double coarse_difference, double fine_difference, double ratio
 /// 2 for linear elements, 4 for quadratic ones: of forces and energies.
 double highest_order(Elements elements);
 
+/// T4 and averaged pressure; quadratic tetrahedra, with averaged pressure from ν = 0.4 on, both for Cook's membrane,
+/// none for contact: at corners of a flat face under uniform pressure their consistent nodal forces are zero, so that
+/// no nodal contact set can be told from them.
+std::vector<Elements> elements_for(const Problem& problem);
+
 /// One quantity of one problem on three meshes. Many numbers are compared in the root mean square.
 struct Comparison {
     std::string quantity, unit;

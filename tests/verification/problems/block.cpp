@@ -38,6 +38,7 @@ Problem block_contact(Law law, int step) {
     problem.plane_height = [compression, stages = problem.stages](int stage) {
         return edge * (1.0 - compression * stage / stages);
     };
+    problem.may_touch = [](const Vector3d& X) { return near(X[2], edge); };
     const auto entry = [&](const char* key) {  // closed form, printed with eight digits
         const double value = state.at(key).get<double>();
         return json{{"value", value}, {"uncertainty", 1e-7 * std::abs(value)}};

@@ -54,7 +54,7 @@ Problem breast(Law law, Gravity gravity) {
     const json file = reference_file("p7_breast");
     const bool prone = gravity == Gravity::Prone;
     const json& values = file.at("values").at(prone ? "prone" : "supine").at(law == Law::Iso ? "iso" : "lnJ");
-    Problem problem = half_ball(breast_radius, 0.8, 1.3);
+    Problem problem = half_ball(breast_radius, 0.8, 2.0);
     problem.name = prone ? "p7_breast, prone" : "p7_breast, supine";
     problem.law = law;
     problem.materials[1] = material_of(file, law);
@@ -96,6 +96,7 @@ Problem half_ball_contact(Law law, int step) {
     problem.plane_height = [depth, stages = problem.stages](int stage) {
         return ball_radius * (1.0 - depth * stage / stages);
     };
+    problem.may_touch = [](const Vector3d& X) { return near(X.norm(), ball_radius); };
     const auto force = [](const Solution& s) {  // the flat face pushes up as much as the plane pushes down
         return 4.0 * s.reaction([](const Vector3d& X) { return near(X[2], 0.0); })[2];
     };
