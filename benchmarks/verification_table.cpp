@@ -1,73 +1,161 @@
-// Prints the table of docs/verification.md: the cube problems of data/reference by Newton's method, both laws and both
-// elements, on three meshes and extrapolated.
-//     verification_table [coarse middle fine cells an edge, constant ratio; default 8 12 18]
+// Prints the tables of docs/verification.md: the problems of data/reference by Newton's method, every element, on three
+// meshes and extrapolated; then every engine against Newton's method on one mesh.
+//     verification_table [--csv FILE] [--problem PART]... [--element NAME] [--no-studies] [--no-engines] [--gpu]
+// FILE takes one line per quantity and mesh, for scripts/plot_verification.py. PART selects problems whose name holds
+// it.
 
-#include "tests/verification/cube_reference.hpp"
+#include "benchmarks/verification_engines.hpp"
+#include "core/errors.hpp"
+#include "tests/verification/problems.hpp"
+#include "tests/verification/study.hpp"
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
+#include <fstream>
 #include <string>
+#include <vector>
 
 using namespace tissuewarp;
 using namespace tissuewarp::verification;
 
 namespace {
 
-constexpr double N = 1e-3, J = 1e-6;  // of mN and of mN mm
+struct Arguments {
+    std::string csv;
+    std::vector<std::string> parts;
+    std::string element;
+    bool studies = true, engines = true, gpu = false;
+};
 
-using Levels = std::array<int, 3>;
+Arguments parse(int argc, char** argv) {
+    Arguments result;
+    const std::vector<std::string> given(argv + 1, argv + argc);
+    for (std::size_t i = 0; i < given.size(); ++i) {
+        const bool has_value = i + 1 < given.size();
+        if (given[i] == "--csv" && has_value) {
+            result.csv = given[++i];
+        } else if (given[i] == "--problem" && has_value) {
+            result.parts.push_back(given[++i]);
+        } else if (given[i] == "--element" && has_value) {
+            result.element = given[++i];
+        } else if (given[i] == "--no-studies") {
+            result.studies = false;
+        } else if (given[i] == "--no-engines") {
+            result.engines = false;
+        } else if (given[i] == "--gpu") {
+            result.gpu = true;
+        } else {
+            throw InvalidInput("unknown argument " + given[i] + "; see the head of verification_table.cpp");
+        }
+    }
+    return result;
+}
 
-// "value (order) | difference %" or dashes where three meshes show no order of convergence yet.
-void print_extrapolation(const Extrapolation& found, double expected, double unit) {
-    if (!(found.order > 0.5)) {
-        std::printf(" – | – |");
+bool selected(const Problem& problem, const std::vector<std::string>& parts) {
+    for (const std::string& part : parts) {
+        if (problem.name.find(part) != std::string::npos) return true;
+    }
+    return parts.empty();
+}
+
+void print_head(const std::string& problem) {
+    std::printf(
+        "\n### %s\n\n"
+        "| law | element | nodes | min J | quantity | finest mesh | order | extrapolated | reference | off | "
+        "mesh error | within uncertainty + mesh error |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+        problem.c_str());
+}
+
+// Differences of exact states are rounding.
+bool has_order(const Comparison& c) {
+    return !std::isnan(c.order) && (!c.single() || c.mesh_error > 1e-10 * std::abs(c.reference[0]));
+}
+
+void print_row(const Problem& problem, Elements elements, const Study& study, const Comparison& c) {
+    std::printf("| %s | %s | %d | %.2f | %s, %s | ", name_of(problem.law), name_of(elements), study.nodes[2],
+                study.min_jacobian[2], c.quantity.c_str(), c.unit.c_str());
+    if (c.single()) {
+        std::printf("%.6g | ", c.fine[0]);
     } else {
-        std::printf(" %.4f (%.2f) | %+.2f |", unit * found.value, found.order,
-                    100 * (found.value - expected) / std::abs(expected));
+        std::printf("– | ");
+    }
+    if (!has_order(c)) {
+        std::printf("– | ");
+    } else {
+        std::printf("%.1f | ", c.order);
+    }
+    if (c.single() && has_order(c)) {
+        std::printf("%.6g | ", c.extrapolated);
+    } else {
+        std::printf("– | ");
+    }
+    if (c.single()) {
+        std::printf("%.6g ± %.2g | %+.3g (%+.2f %%) | ", c.reference[0], c.uncertain, c.off,
+                    100.0 * c.off / std::abs(c.reference[0]));
+    } else {
+        std::printf("± %.2g | %.3g, at most %.3g | ", c.uncertain, c.off, c.largest_off);
+    }
+    std::printf("%.3g | ", c.mesh_error);
+    if (c.met()) {
+        std::printf("met |\n");
+    } else {
+        std::printf("**not met** by %.2g |\n", c.excess());
     }
 }
 
-void print_row(const CubeReference& reference, Law law, tled::Element element, const Levels& levels, int component) {
-    std::array<CubeSolution, 3> solutions;
-    for (std::size_t k = 0; k < 3; ++k) solutions[k] = solve_cube(reference, element, levels[k]);
-    const double ratio = static_cast<double>(levels[2]) / levels[1];
-    const double expected = reference.force[component];
-    const Extrapolation force =
-        richardson(solutions[0].force[component], solutions[1].force[component], solutions[2].force[component], ratio);
-    const Extrapolation energy = richardson(solutions[0].energy, solutions[1].energy, solutions[2].energy, ratio);
-    std::printf("| %s | %s | %s | %c |", reference.name.c_str(), law == Law::Iso ? "iso" : "lnJ",
-                element == tled::Element::T4 ? "T4" : "averaged pressure", "xyz"[component]);
-    for (const CubeSolution& solution : solutions) std::printf(" %.4f |", N * solution.force[component]);
-    std::printf(" %.4f ± %.4f |", N * expected, N * reference.force_uncertainty[component]);
-    print_extrapolation(force, expected, N);
-    print_extrapolation(energy, reference.energy, J);
-    for (const CubeSolution& solution : solutions) std::printf(" %.3f |", largest_point_error(reference, solution));
-    std::printf(" %.2f |\n", solutions[2].min_jacobian);
-    std::fflush(stdout);
+void write_csv(std::ofstream& csv, const Problem& problem, Elements elements, const Study& study, const Comparison& c) {
+    const std::array<const Eigen::VectorXd*, 3> values{&c.coarse, &c.middle, &c.fine};
+    for (std::size_t k = 0; k < 3; ++k) {
+        const double off = (*values[k] - c.reference).norm() / std::sqrt(static_cast<double>(c.fine.size()));
+        csv << '"' << problem.name << "\"," << name_of(problem.law) << ',' << name_of(elements) << ",\"" << c.quantity
+            << "\"," << c.unit << ',' << study.nodes[k] << ',' << (c.single() ? (*values[k])[0] : off) << ',' << off
+            << ',' << (c.single() ? c.reference[0] : 0.0) << ',' << c.uncertain << '\n';
+    }
+    csv.flush();
+}
+
+void run_studies(const Arguments& arguments) {
+    std::ofstream csv;
+    if (!arguments.csv.empty()) {
+        csv.open(arguments.csv);
+        csv.precision(10);
+        csv << "problem,law,element,quantity,unit,nodes,value,off,reference,uncertainty\n";
+    }
+    std::vector<Problem> problems = all_problems();
+    std::stable_sort(problems.begin(), problems.end(),
+                     [](const Problem& a, const Problem& b) { return a.name < b.name; });
+    std::string last;
+    for (const Problem& problem : problems) {
+        if (!selected(problem, arguments.parts)) continue;
+        if (problem.name != last) print_head(problem.name);
+        last = problem.name;
+        for (const Elements elements : elements_for(problem)) {
+            if (!arguments.element.empty() && arguments.element != name_of(elements)) continue;
+            try {
+                const Study found = study(problem, elements);
+                for (const Comparison& c : found.comparisons) {
+                    print_row(problem, elements, found, c);
+                    if (csv.is_open()) write_csv(csv, problem, elements, found, c);
+                }
+            } catch (const SolverFailure& failure) {
+                std::printf("| %s | %s | **%s** |\n", name_of(problem.law), name_of(elements), failure.what());
+            }
+            std::fflush(stdout);
+        }
+    }
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-    const Levels levels =
-        argc == 4 ? Levels{std::atoi(argv[1]), std::atoi(argv[2]), std::atoi(argv[3])} : Levels{8, 12, 18};
-    std::printf(
-        "| problem | law | element | force | n=%d, N | n=%d, N | n=%d, N | reference, N | extrapolated, N (order) | "
-        "off, %% | "
-        "energy extrapolated, J (order) | off, %% | points n=%d, mm | n=%d, mm | n=%d, mm | min J |\n",
-        levels[0], levels[1], levels[2], levels[0], levels[1], levels[2]);
-    std::printf("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
-    const std::string folder = std::string(TISSUEWARP_SOURCE_DIR) + "/data/reference/";
-    for (const char* problem : {"p1_cube_stretch", "p2_cube_compress_mild", "p2_cube_shear"}) {
-        for (Law law : {Law::Iso, Law::LnJ}) {
-            const CubeReference reference = cube_reference(folder + problem + ".json", law);
-            const int component = std::string(problem) == "p2_cube_shear" ? 0 : 2;
-            for (tled::Element element : {tled::Element::T4, tled::Element::AveragedPressureT4}) {
-                print_row(reference, law, element, levels, component);
-            }
-        }
+    try {
+        const Arguments arguments = parse(argc, argv);
+        if (arguments.studies) run_studies(arguments);
+        if (arguments.engines) print_engines(arguments.gpu ? GpuRows::Print : GpuRows::Omit);
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "verification_table: %s\n", error.what());
+        return 2;
     }
     return 0;
 }

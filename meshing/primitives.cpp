@@ -7,6 +7,7 @@
 #include <cmath>
 #include <random>
 #include <string>
+#include <vector>
 
 namespace tissuewarp::meshing {
 
@@ -27,6 +28,21 @@ void require_box(const Eigen::Vector3d& size, const std::array<int, 3>& cells) {
     }
     if (8.0 * cells[0] * cells[1] * cells[2] > 2e9)
         throw InvalidInput("box_mesh: more than 2.5e8 cells do not fit 32-bit indices; use fewer cells");
+}
+
+void require_ascending(const std::array<std::vector<double>, 3>& coordinates) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        const std::vector<double>& list = coordinates[axis];
+        if (list.size() < 2)
+            throw InvalidInput("box_mesh: " + std::to_string(list.size()) + " coordinates along axis " +
+                               std::to_string(axis) + "; at least 2 are needed");
+        for (std::size_t i = 0; i + 1 < list.size(); ++i) {
+            if (list[i] < list[i + 1] && std::isfinite(list[i + 1] - list[i])) continue;
+            throw InvalidInput("box_mesh: coordinate " + std::to_string(list[i + 1]) + " mm along axis " +
+                               std::to_string(axis) + " does not follow " + std::to_string(list[i]) +
+                               " mm; the lists must ascend");
+        }
+    }
 }
 
 /// Uniform in [−1, 1); std::uniform_real_distribution differs between standard libraries, the engine does not.
@@ -69,6 +85,18 @@ TetMesh box_mesh(const Eigen::Vector3d& size, const std::array<int, 3>& cells, d
                     ++next;
                 }
     if (jitter > 0.0) require_valid(mesh, "box_mesh");
+    return mesh;
+}
+
+TetMesh box_mesh(const std::array<std::vector<double>, 3>& coordinates) {
+    require_ascending(coordinates);
+    std::array<int, 3> cells;
+    for (std::size_t axis = 0; axis < 3; ++axis) cells[axis] = static_cast<int>(coordinates[axis].size()) - 1;
+    TetMesh mesh = box_mesh(Eigen::Vector3d::Ones(), cells);
+    Eigen::Index node = 0;
+    for (const double z : coordinates[2])
+        for (const double y : coordinates[1])
+            for (const double x : coordinates[0]) mesh.nodes.col(node++) << x, y, z;
     return mesh;
 }
 

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <vector>
 
 namespace tissuewarp::meshing {
 
@@ -15,5 +16,9 @@ namespace tissuewarp::meshing {
 /// positive, and where jitter inverts a tetrahedron; below 1/6 it cannot (the edge matrix stays diagonally dominant).
 TetMesh box_mesh(const Eigen::Vector3d& size, const std::array<int, 3>& cells, double jitter = 0.0,
                  std::uint32_t seed = 1);
+
+/// The same cells between planes at the given coordinates (mm, at least two an axis, ascending), for meshes graded
+/// towards a face or cut at an inner one. Throws InvalidInput otherwise.
+TetMesh box_mesh(const std::array<std::vector<double>, 3>& coordinates);
 
 }  // namespace tissuewarp::meshing

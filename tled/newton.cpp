@@ -18,12 +18,27 @@ namespace {
 
 constexpr int max_backtracks = 40;
 
+// K x from the lower triangle.
+Matrix3Xd multiply(const detail::BlockRows& lower, const Matrix3Xd& x) {
+    Matrix3Xd y = Matrix3Xd::Zero(3, lower.rows());
+    for (int i = 0; i < lower.rows(); ++i) {
+        for (int k = lower.offset[i]; k < lower.offset[i + 1]; ++k) {
+            const int j = lower.column[k];
+            y.col(i) += lower.block[k] * x.col(j);
+            if (j != i) y.col(j) += lower.block[k].transpose() * x.col(i);
+        }
+    }
+    return y;
+}
+
 /// Minimises E(u) + ½ u·K_s u − t u·(K_s target + f_ext) over the free degrees of freedom with u = t · imposed on the
-/// others, where the load factor t goes from 0 to 1. Nocedal & Wright, Numerical Optimization (2006), algorithms 3.1
+/// others, where the load factor t goes from 0 to 1. From a given start, u goes to the imposed values from those of the
+/// start, and the forces act in full. Nocedal & Wright, Numerical Optimization (2006), algorithms 3.1
 /// to 3.3.
 class Newton {
 public:
-    Newton(const RestState& rest, const NodalConditions& conditions, const NewtonOptions& options, Observer& observer);
+    Newton(const DiscreteEnergy& energy, const NodalConditions& conditions, const NewtonOptions& options,
+           Observer& observer);
     NewtonResult run();
 
 private:
@@ -31,36 +46,40 @@ private:
     [[nodiscard]] Matrix3Xd residual(const Matrix3Xd& u) const;
     [[nodiscard]] VectorXd reduced(const Matrix3Xd& x) const;
     [[nodiscard]] Matrix3Xd expanded(const VectorXd& x) const;
-    [[nodiscard]] detail::Stiffness factorise(const Matrix3Xd& u);
+    [[nodiscard]] detail::BlockRows factorise(const Matrix3Xd& u);
     void raise_load(double increment);
     void equilibrate(double tolerance_mm);
     [[nodiscard]] double line_search(const Matrix3Xd& direction, double slope);
     [[noreturn]] void fail(const std::string& cause) const;
 
-    const RestState& rest_;
+    const DiscreteEnergy& energy_;
     const NodalConditions& conditions_;
     const NewtonOptions& options_;
     Observer& observer_;
     Matrix3Xd applied_;         // K_s target + f_ext, mN
+    Matrix3Xd start_, change_;  // mm; of the prescribed components, change_ is imposed − start
     std::vector<int> index_;    // 3·node + component → free number or −1
     std::vector<int> node_of_;  // node of each free degree of freedom
     std::unique_ptr<detail::CholmodFactor> factor_;
     Matrix3Xd u_;             // mm
     double load_factor_ = 0;  // t
+    [[nodiscard]] double force_factor() const { return options_.start.size() > 0 ? 1.0 : load_factor_; }
     double last_raise_mm_ = 0;
     NewtonResult result_;
 };
 
-Newton::Newton(const RestState& rest, const NodalConditions& conditions, const NewtonOptions& options,
+Newton::Newton(const DiscreteEnergy& energy, const NodalConditions& conditions, const NewtonOptions& options,
                Observer& observer)
-    : rest_(rest),
+    : energy_(energy),
       conditions_(conditions),
       options_(options),
       observer_(observer),
       applied_(detail::applied_force(conditions)),
-      index_(3 * static_cast<std::size_t>(rest.node_count), -1),
-      u_(Matrix3Xd::Zero(3, rest.node_count)) {
-    for (int d = 0; d < 3 * rest.node_count; ++d) {
+      start_(options.start.size() > 0 ? options.start : Matrix3Xd::Zero(3, energy.node_count())),
+      change_(conditions.constrained.select(conditions.imposed - start_, 0.0)),
+      index_(3 * static_cast<std::size_t>(energy.node_count()), -1),
+      u_(start_) {
+    for (int d = 0; d < 3 * energy.node_count(); ++d) {
         if (conditions.constrained.data()[d]) continue;
         index_[static_cast<std::size_t>(d)] = static_cast<int>(node_of_.size());
         node_of_.push_back(d / 3);
@@ -84,15 +103,15 @@ NewtonResult Newton::run() {
 }
 
 double Newton::potential(const Matrix3Xd& u) const {
-    Matrix3Xd resistance = Matrix3Xd::Zero(3, rest_.node_count);
+    Matrix3Xd resistance = Matrix3Xd::Zero(3, energy_.node_count());
     detail::add_spring_resistance(conditions_, u, resistance);
-    return elastic_energy(rest_, u) + u.cwiseProduct(0.5 * resistance - load_factor_ * applied_).sum();
+    return energy_.energy(u) + u.cwiseProduct(0.5 * resistance - force_factor() * applied_).sum();
 }
 
 Matrix3Xd Newton::residual(const Matrix3Xd& u) const {
-    Matrix3Xd resistance = internal_force(rest_, u);
+    Matrix3Xd resistance = energy_.force(u);
     detail::add_spring_resistance(conditions_, u, resistance);
-    return load_factor_ * applied_ - resistance;
+    return force_factor() * applied_ - resistance;
 }
 
 VectorXd Newton::reduced(const Matrix3Xd& x) const {
@@ -104,23 +123,23 @@ VectorXd Newton::reduced(const Matrix3Xd& x) const {
 }
 
 Matrix3Xd Newton::expanded(const VectorXd& x) const {
-    Matrix3Xd result = Matrix3Xd::Zero(3, rest_.node_count);
+    Matrix3Xd result = Matrix3Xd::Zero(3, energy_.node_count());
     for (std::size_t d = 0; d < index_.size(); ++d) {
         if (index_[d] >= 0) result.data()[d] = x[index_[d]];
     }
     return result;
 }
 
-// Factor of K + springs (+ σ |diagonal| with the smallest tried σ that makes it positive definite). Returns K.
-detail::Stiffness Newton::factorise(const Matrix3Xd& u) {
+// Factor of K + springs (+ σ |diagonal| with the smallest tried σ that makes it positive definite). Returns the lower
+// triangle of K + springs.
+detail::BlockRows Newton::factorise(const Matrix3Xd& u) {
     constexpr double first_shift = 1e-3, shift_growth = 4.0, last_shift = 1e4;
-    detail::Stiffness K = detail::stiffness(rest_, u);
-    if (node_of_.empty()) return K;
-    detail::BlockRows rows = detail::assembled(K, detail::Triangle::Lower);
+    detail::BlockRows rows = energy_.stiffness(u);
     for (int s = 0; s < static_cast<int>(conditions_.spring_node.size()); ++s) {
         const int node = conditions_.spring_node[static_cast<std::size_t>(s)];
         rows.diagonal(node) += detail::spring_matrix(conditions_, s);
     }
+    if (node_of_.empty()) return rows;
     Eigen::SparseMatrix<double> lower = detail::scalar_matrix(rows, index_, detail::Triangle::Lower);
     if (!factor_) factor_ = std::make_unique<detail::CholmodFactor>(lower, node_of_);
     const VectorXd diagonal = lower.diagonal();
@@ -128,32 +147,30 @@ detail::Stiffness Newton::factorise(const Matrix3Xd& u) {
         if (shift > last_shift) fail("no shift of the diagonal makes the tangent stiffness positive definite");
         lower.diagonal() = diagonal + shift * diagonal.cwiseAbs();
     }
-    return K;
+    return rows;
 }
 
-// Adds up to `increment` to the load factor along the tangent: du_c = increment · imposed and
+// Adds up to `increment` to the load factor along the tangent: du_c = increment · change and
 // K_ff du_f = increment · applied_f − K_fc du_c, as far as every J stays above a part of its present value.
 void Newton::raise_load(double increment) {
     constexpr double kept_J = 0.2;
-    const detail::Stiffness K = factorise(u_);
-    Matrix3Xd direction = increment * conditions_.imposed;
+    const detail::BlockRows K = factorise(u_);
+    Matrix3Xd direction = increment * change_;
     if (factor_) {
-        Matrix3Xd force = increment * applied_ - K.multiply(direction);
-        Matrix3Xd resistance = Matrix3Xd::Zero(3, rest_.node_count);
-        detail::add_spring_resistance(conditions_, direction, resistance);
-        force -= resistance;
+        Matrix3Xd force = -multiply(K, direction);
+        if (options_.start.size() == 0) force += increment * applied_;
         direction += expanded(factor_->solve(reduced(force)));
     }
-    const VectorXd J = jacobians(rest_, u_);
+    const VectorXd J = energy_.jacobians(u_);
     double part = 1.0;
-    for (int k = 0; k < max_backtracks && (jacobians(rest_, u_ + part * direction).array() <= kept_J * J.array()).any();
-         ++k) {
+    for (int k = 0;
+         k < max_backtracks && (energy_.jacobians(u_ + part * direction).array() <= kept_J * J.array()).any(); ++k) {
         part *= 0.5;
     }
     u_ += part * direction;
     load_factor_ += part * increment;
     if (load_factor_ > 1.0 - 1e-9) load_factor_ = 1.0;
-    u_ = conditions_.constrained.select(load_factor_ * conditions_.imposed, u_);  // without the rounding of the sums
+    u_ = conditions_.constrained.select(start_ + load_factor_ * change_, u_);  // without the rounding of the sums
     last_raise_mm_ = part * direction.colwise().norm().maxCoeff();
 }
 
@@ -180,7 +197,7 @@ void Newton::equilibrate(double tolerance_mm) {
 double Newton::line_search(const Matrix3Xd& direction, double slope) {
     constexpr double armijo = 1e-4, rounding = 1e-12;
     const double start = potential(u_);
-    const double scale = std::abs(elastic_energy(rest_, u_)) + std::abs(load_factor_ * u_.cwiseProduct(applied_).sum());
+    const double scale = std::abs(energy_.energy(u_)) + std::abs(force_factor() * u_.cwiseProduct(applied_).sum());
     for (int k = 0; k < max_backtracks; ++k) {
         const double step = std::ldexp(1.0, -k);
         if (potential(u_ + step * direction) <= start + armijo * step * slope + rounding * scale) return step;
@@ -189,23 +206,37 @@ double Newton::line_search(const Matrix3Xd& direction, double slope) {
 }
 
 void Newton::fail(const std::string& cause) const {
+    const SmallestJacobian smallest = smallest_jacobian(energy_, u_);
     throw SolverFailure("Newton's method stopped: " + cause + "; last good state: load factor " +
                         std::to_string(load_factor_) + ", " + std::to_string(result_.iterations) +
                         " iterations, last correction " + std::to_string(result_.last_correction_mm) +
-                        " mm, smallest det F " + std::to_string(jacobians(rest_, u_).minCoeff()) +
-                        ". Use more load steps or smaller displacements");
+                        " mm, smallest det F " + std::to_string(smallest.value) + " in element " +
+                        std::to_string(smallest.element) + ". Use more load steps or smaller displacements");
 }
 
 }  // namespace
 
-NewtonResult newton_equilibrium(const RestState& rest, const NodalConditions& conditions, const NewtonOptions& options,
-                                Observer& observer) {
+NewtonResult newton_equilibrium(const DiscreteEnergy& energy, const NodalConditions& conditions,
+                                const NewtonOptions& options, Observer& observer) {
     if (options.load_steps < 1 || options.max_iterations < 1 || !(options.tolerance_mm > 0.0)) {
         throw InvalidInput(
             "Newton's options need load_steps and max_iterations of at least 1 and a positive tolerance");
     }
+    if (conditions.constrained.cols() != energy.node_count()) {
+        throw InvalidInput("conditions of " + std::to_string(conditions.constrained.cols()) +
+                           " nodes do not fit a discretisation of " + std::to_string(energy.node_count()));
+    }
+    if (options.start.size() > 0 && options.start.cols() != energy.node_count()) {
+        throw InvalidInput("Newton's start has " + std::to_string(options.start.cols()) + " nodes instead of " +
+                           std::to_string(energy.node_count()));
+    }
+    return Newton(energy, conditions, options, observer).run();
+}
+
+NewtonResult newton_equilibrium(const RestState& rest, const NodalConditions& conditions, const NewtonOptions& options,
+                                Observer& observer) {
     detail::require_held(rest, conditions);
-    return Newton(rest, conditions, options, observer).run();
+    return newton_equilibrium(LinearTetrahedra(rest), conditions, options, observer);
 }
 
 }  // namespace tissuewarp::tled

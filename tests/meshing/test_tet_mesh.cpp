@@ -56,6 +56,16 @@ TEST(BoxMesh, JitterDependsOnTheSeedAlone) {
     EXPECT_NE(box_mesh({1, 1, 1}, {3, 3, 3}, 0.1, 7).nodes, box_mesh({1, 1, 1}, {3, 3, 3}, 0.1, 8).nodes);
 }
 
+TEST(BoxMesh, CellsLieBetweenTheGivenPlanes) {
+    const TetMesh mesh = box_mesh({{{0.0, 1.0, 4.0}, {-2.0, 3.0}, {5.0, 6.0, 8.0, 12.0}}});
+    EXPECT_EQ(mesh.tet_count(), 6 * 2 * 1 * 3);
+    EXPECT_EQ(mesh.nodes.col(1 + 3 * (1 + 2 * 2)), Eigen::Vector3d(1.0, 3.0, 8.0));
+    EXPECT_NEAR(tet_volumes(mesh).minCoeff(), 5.0 / 6.0, 1e-12);
+    EXPECT_NEAR(tet_volumes(mesh).sum(), 4.0 * 5.0 * 7.0, 1e-12);
+    EXPECT_THROW(box_mesh({{{0.0, 1.0}, {0.0}, {0.0, 1.0}}}), InvalidInput);
+    EXPECT_THROW(box_mesh({{{0.0, 1.0}, {0.0, 0.0}, {0.0, 1.0}}}), InvalidInput);
+}
+
 TEST(BoxMesh, RefusesEmptyBoxesAndInvertingJitter) {
     EXPECT_THROW(box_mesh({0, 1, 1}, {1, 1, 1}), InvalidInput);
     EXPECT_THROW(box_mesh({1, 1, 1}, {1, 0, 1}), InvalidInput);

@@ -129,6 +129,24 @@ TEST_P(NewtonTest, LoadStepsDoNotChangeTheAnswer) {
     EXPECT_LT((once - many).cwiseAbs().maxCoeff(), 1e-9);  // mm
 }
 
+// Half of the way, then on from there: imposed displacements start where the first solution left them, forces are
+// whole.
+TEST_P(NewtonTest, GoesOnFromAStart) {
+    const Model model = box(GetParam(), seed_iso, 0.1);
+    const RestState rest = rest_state(model);
+    const auto pulled = [&](double top) {
+        Conditions conditions = bonded(model, {0.0, 0.0, top});
+        conditions.external_force = Matrix3Xd::Constant(3, rest.node_count, 2.0);  // mN
+        return nodal_conditions(conditions, rest.node_count);
+    };
+    NewtonOptions options{.tolerance_mm = 1e-10};
+    const Matrix3Xd direct = newton_equilibrium(rest, pulled(16.0), options).displacement;
+    options.start = newton_equilibrium(rest, pulled(8.0), options).displacement;
+    EXPECT_LT((newton_equilibrium(rest, pulled(16.0), options).displacement - direct).cwiseAbs().maxCoeff(), 1e-9);
+    options.start.resize(3, 5);
+    EXPECT_THROW(static_cast<void>(newton_equilibrium(rest, pulled(16.0), options)), InvalidInput);
+}
+
 // Springs to a rotated copy: zero energy at the rigid rotation, far from the start.
 TEST_P(NewtonTest, SpringsTurnTheTissueRigidly) {
     const Model model = box(GetParam(), seed_iso, 0.0);

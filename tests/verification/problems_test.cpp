@@ -1,0 +1,92 @@
+// The problems of data/reference on small meshes: the finest of three agrees within the reference's uncertainty plus
+// the mesh error that the three show. The whole set on finer meshes: benchmarks/verification_table.
+
+#include "tests/verification/problems.hpp"
+#include "tests/verification/study.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace tissuewarp::verification {
+namespace {
+
+void expect_met(const Problem& problem, const Study& study) {
+    for (const Comparison& c : study.comparisons) {
+        EXPECT_TRUE(c.met()) << problem.name << ", " << c.quantity << ": off by " << c.off << " " << c.unit
+                             << ", reference known to " << c.uncertain << ", mesh error " << c.mesh_error;
+    }
+}
+
+double relative_off(const Quantity& quantity, const Solution& solution) {
+    return std::abs(quantity.measure(solution)[0] / quantity.reference[0] - 1.0);
+}
+
+// The deflection of the tip, mm, on 16 × 16 cells: T4 locks as ν → ½, the others do not.
+TEST(CookVerification, OnlyPlainLinearTetrahedraLock) {
+    for (const double nu : {0.3, 0.49, 0.4999}) {
+        const Problem problem = cook_plane_strain(Law::Iso, nu);
+        const Quantity& tip = problem.quantities[1];
+        const auto off = [&](Elements elements, int level) {
+            return relative_off(tip, solve(problem, elements, level));
+        };
+        if (nu > 0.4) {
+            EXPECT_GT(off(Elements::T4, 16), nu > 0.499 ? 0.5 : 0.2) << nu;
+        }
+        EXPECT_LT(off(Elements::AveragedPressure, 16), 0.1) << nu;
+        EXPECT_LT(off(Elements::QuadraticMixed, 8), 0.02) << nu;
+    }
+}
+
+TEST(CookVerification, PlaneStrain) {
+    const Problem problem = cook_plane_strain(Law::LnJ, 0.499);
+    expect_met(problem, study(problem, Elements::AveragedPressure, {8, 16, 32}));
+}
+
+TEST(CookVerification, ThreeDimensions) {
+    const Problem problem = *cook_3d(Law::Iso, 0.499);
+    expect_met(problem, study(problem, Elements::AveragedPressure, {4, 8, 16}));
+}
+
+TEST(BarVerification, Twist) {
+    const Problem problem = bar_twist(Law::LnJ);
+    const Solution found = solve(problem, Elements::Quadratic, 3);
+    for (const int q : {0, 2}) EXPECT_LT(relative_off(problem.quantities[static_cast<std::size_t>(q)], found), 0.03);
+}
+
+TEST(BarVerification, Cantilever) {
+    const Problem problem = cantilever(Law::Iso);
+    expect_met(problem, study(problem, Elements::AveragedPressure, {2, 4, 8}));
+}
+
+TEST(EllipsoidVerification, Plain) {
+    const Problem problem = ellipsoid_plain(Law::LnJ);
+    expect_met(problem, study(problem, Elements::AveragedPressure, {2, 4, 8}));
+}
+
+TEST(BreastVerification, GravityBothWays) {
+    for (const Gravity gravity : {Gravity::Prone, Gravity::Supine}) {
+        const Problem problem = breast(Law::Iso, gravity);
+        expect_met(problem, study(problem, Elements::AveragedPressure, {3, 6, 12}));
+    }
+}
+
+TEST(ContactVerification, BlockBetweenPlanesMeetsTheClosedForm) {
+    for (const Law law : {Law::Iso, Law::LnJ}) {
+        for (const int step : {0, 1, 2, 3}) {
+            const Problem problem = block_contact(law, step);
+            const Solution found = solve(problem, Elements::AveragedPressure, 2);
+            for (const Quantity& q : problem.quantities) {
+                EXPECT_NEAR(q.measure(found)[0], q.reference[0], 1e-6 * std::abs(q.reference[0])) << q.name;
+            }
+        }
+    }
+}
+
+TEST(ContactVerification, HalfBall) {
+    const Problem problem = half_ball_contact(Law::Iso, 7);
+    EXPECT_LT(relative_off(problem.quantities[0], solve(problem, Elements::AveragedPressure, 7)), 0.04);
+}
+
+}  // namespace
+}  // namespace tissuewarp::verification
