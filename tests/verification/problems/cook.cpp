@@ -19,16 +19,21 @@ namespace {
 constexpr double width = 48.0, left_height = 44.0, right_low = 44.0, right_high = 60.0;  // mm
 constexpr double traction_kpa = 0.08, youngs_modulus_kpa = 3.0;
 
-// n × n cells graded towards the edges, most towards the fixed one, and the given planes along z.
-meshing::TetMesh membrane(int n, const std::vector<double>& z) {
-    std::vector<double> x = graded_both_ways(1.0, n, 1.6);
-    for (double& along : x) along = std::pow(along, 1.4);
+// Cells between the planes x (0 … 1 from the fixed face to the loaded one), n graded ones across, and the planes z.
+meshing::TetMesh membrane(const std::vector<double>& x, int n, const std::vector<double>& z) {
     meshing::TetMesh mesh = meshing::box_mesh({x, graded_both_ways(1.0, n, 1.7), z});
     for (auto X : mesh.nodes.colwise()) {
         const double low = right_low * X[0], high = left_height + (right_high - left_height) * X[0];
         X.head<2>() << width * X[0], low + (high - low) * X[1];
     }
     return mesh;
+}
+
+// Towards both ends, most towards the fixed one, whose corners are singular.
+std::vector<double> along(int n) {
+    std::vector<double> x = graded_both_ways(1.0, n, 1.6);
+    for (double& t : x) t = std::pow(t, 1.4);
+    return x;
 }
 
 const json* poisson_values(const json& file, Law law, double nu) {
@@ -63,7 +68,7 @@ Problem cook_plane_strain(Law law, double nu) {
     const json& values = *poisson_values(file, law, nu);
     Problem problem = loaded("p4_cook_plane_strain", law, nu);
     const auto thickness = [](int n) { return width / n; };
-    problem.mesh = [thickness](int n) { return membrane(n, {0.0, thickness(n)}); };
+    problem.mesh = [thickness](int n) { return membrane(along(n), n, {0.0, thickness(n)}); };
     problem.hold = [](const Vector3d& X, int) {
         tled::PrescribedDisplacement held;
         held.constrained = {near(X[0], 0.0), near(X[0], 0.0), true};
@@ -102,7 +107,7 @@ std::optional<Problem> cook_3d(Law law, double nu) {
     const json* values = poisson_values(file, law, nu);
     if (values == nullptr) return std::nullopt;
     Problem problem = loaded("p4_cook_3d", law, nu);
-    problem.mesh = [](int n) { return membrane(n, graded_up(5.0, std::max(1, n / 4), 1.5)); };
+    problem.mesh = [](int n) { return membrane(graded(1.0, n, 2.2), n, graded_up(5.0, std::max(1, n / 4), 1.5)); };
     problem.hold = [](const Vector3d& X, int) {
         tled::PrescribedDisplacement held;
         const bool fixed = near(X[0], 0.0);

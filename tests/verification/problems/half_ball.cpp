@@ -103,8 +103,11 @@ Problem half_ball_contact(Law law, int step) {
     const auto bulge = [](const Solution& s) {
         return (s.nodes() + s.displacement).topRows<2>().colwise().norm().maxCoeff();
     };
-    problem.quantities = {component_quantity("force", "mN", values.at("force_N"), step, mN_per_N, force),
-                          component_quantity("bulge", "mm", values.at("max_radius_m"), step, mm_per_m, bulge)};
+    problem.quantities = {component_quantity("force", "mN", values.at("force_N"), step, mN_per_N, force)};
+    if (!values.at("max_radius_m").at("value").at(static_cast<std::size_t>(step)).is_null()) {
+        problem.quantities.push_back(
+            component_quantity("bulge", "mm", values.at("max_radius_m"), step, mm_per_m, bulge));
+    }
     problem.levels = {4, 8, 16};
     return problem;
 }
