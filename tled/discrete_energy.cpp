@@ -8,7 +8,7 @@ namespace tissuewarp::tled {
 using Eigen::Matrix3Xd;
 using Eigen::VectorXd;
 
-SmallestJacobian smallest_jacobian(const DiscreteEnergy& energy, const Matrix3Xd& u) {
+ElementJacobian smallest_element_jacobian(const DiscreteEnergy& energy, const Matrix3Xd& u) {
     const VectorXd J = energy.jacobians(u);
     Eigen::Index place = 0;
     const double value = J.minCoeff(&place);

@@ -39,11 +39,11 @@ public:
 };
 
 /// The smallest det F and the element of the mesh that holds it.
-struct SmallestJacobian {
+struct ElementJacobian {
     double value = 1.0;
     int element = -1;
 };
-SmallestJacobian smallest_jacobian(const DiscreteEnergy& energy, const Eigen::Matrix3Xd& u);
+ElementJacobian smallest_element_jacobian(const DiscreteEnergy& energy, const Eigen::Matrix3Xd& u);
 
 /// The linear tetrahedra of a RestState, with or without averaged pressure: the functions of tled/reference.hpp.
 class LinearTetrahedra final : public DiscreteEnergy {

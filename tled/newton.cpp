@@ -206,7 +206,7 @@ double Newton::line_search(const Matrix3Xd& direction, double slope) {
 }
 
 void Newton::fail(const std::string& cause) const {
-    const SmallestJacobian smallest = smallest_jacobian(energy_, u_);
+    const ElementJacobian smallest = smallest_element_jacobian(energy_, u_);
     throw SolverFailure("Newton's method stopped: " + cause + "; last good state: load factor " +
                         std::to_string(load_factor_) + ", " + std::to_string(result_.iterations) +
                         " iterations, last correction " + std::to_string(result_.last_correction_mm) +

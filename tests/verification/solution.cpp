@@ -153,7 +153,7 @@ Solution solve(const Problem& problem, Elements elements, int level) {
         }
     }
     solution.energy = energy.energy(solution.displacement);
-    solution.min_jacobian = tled::smallest_jacobian(energy, solution.displacement).value;
+    solution.min_jacobian = tled::smallest_element_jacobian(energy, solution.displacement).value;
     return solution;
 }
 
