@@ -76,6 +76,7 @@ public:
         return engine_.observe();
     }
     [[nodiscard]] tled::SmallestJacobian smallest_jacobian() override { return engine_.smallest_jacobian(); }
+    [[nodiscard]] bool admits_inversion() const override { return engine_.admits_inversion(); }
     [[nodiscard]] std::string description() const override { return engine_.description(); }
     [[nodiscard]] tled::Processor processor() const override { return engine_.processor(); }
     [[nodiscard]] double precision() const override { return engine_.precision(); }

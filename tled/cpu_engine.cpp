@@ -126,6 +126,7 @@ public:
           kinematics_(rest.pressure.count() > 0 ? Kinematics::AveragedPressure : Kinematics::T4),
           node_count_(static_cast<std::size_t>(rest.node_count)),
           tet_(rest.tet),
+          admits_inversion_(tled::admits_inversion(rest)),
           force_offset_(rest.incidence.offset),
           force_entry_(gather_list(rest.incidence, layout_, true)) {
         const std::size_t vector_size = node_count_ * record;
@@ -276,6 +277,8 @@ public:
         return seen;
     }
 
+    [[nodiscard]] bool admits_inversion() const override { return admits_inversion_; }
+
     [[nodiscard]] SmallestJacobian smallest_jacobian() override {
         change_.resize(elements_.count() * batch_width);
         for_batches(0, elements_.count(), [&](std::size_t begin, std::size_t end) {
@@ -306,6 +309,7 @@ private:
     Kinematics kinematics_;
     std::size_t node_count_;
     std::vector<int> tet_;
+    bool admits_inversion_;
 
     std::vector<int> force_offset_;
     std::vector<std::uint32_t> force_entry_;

@@ -90,7 +90,8 @@ private:
             search_.engine.run(now, coefficients);
             steps -= now;
             const Matrix3Xd u = search_.engine.displacement();
-            if (!u.allFinite() || !(search_.engine.smallest_jacobian().value > 0)) {
+            const bool inverted = !(search_.engine.smallest_jacobian().value > 0);
+            if (!u.allFinite() || (inverted && !search_.engine.admits_inversion())) {
                 restart();
                 return false;
             }

@@ -75,6 +75,8 @@ public:
     [[nodiscard]] virtual Observation observe() = 0;
     /// At the present displacement; a quarter of a force evaluation.
     [[nodiscard]] virtual SmallestJacobian smallest_jacobian() = 0;
+    /// Whether every material's energy is finite for det F ≤ 0, so that inverted tissue finds back.
+    [[nodiscard]] virtual bool admits_inversion() const = 0;
 
     /// For reports: "CPU float32, AVX-512, 2 threads", "GPU NVIDIA H100 (OpenGL 4.5)".
     [[nodiscard]] virtual std::string description() const = 0;

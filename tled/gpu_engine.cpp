@@ -68,6 +68,7 @@ public:
           programs_((require_limits(device_), device_)),
           node_count_(rest.node_count),
           tet_(rest.tet),
+          admits_inversion_(tled::admits_inversion(rest)),
           force_(device_, programs_, rest, blocks_),
           displacement_(node_vectors("displacements")),
           increment_(node_vectors("increments")),
@@ -202,6 +203,8 @@ public:
         return seen;
     }
 
+    [[nodiscard]] bool admits_inversion() const override { return admits_inversion_; }
+
     [[nodiscard]] SmallestJacobian smallest_jacobian() override {
         const CurrentContext current = device_.make_current();
         const Program& elements = programs_.get(shaders::observe_elements_program());
@@ -334,6 +337,7 @@ private:
     shaders::ProgramCache programs_;
     int node_count_;
     std::vector<int> tet_;
+    bool admits_inversion_;
     BlockBuffers blocks_;
     detail::GpuForce force_;
     Buffer<Float4> displacement_, increment_, inverse_mass_, residual_, previous_residual_, previous_displacement_,

@@ -164,6 +164,11 @@ RestState rest_state(const Model& model) {
     return rest;
 }
 
+bool admits_inversion(const RestState& rest) {
+    return std::all_of(rest.materials.begin(), rest.materials.end(),
+                       [](const Material& material) { return admits_inversion(material); });
+}
+
 std::vector<int> material_of_elements(const RestState& rest) {
     std::vector<int> result(rest.tet.size());
     for (const MaterialBlock& block : rest.blocks)

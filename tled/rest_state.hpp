@@ -57,6 +57,9 @@ struct RestState {
 /// Index into RestState::materials of every element.
 std::vector<int> material_of_elements(const RestState& rest);
 
+/// Whether every material's energy is finite for det F ≤ 0.
+bool admits_inversion(const RestState& rest);
+
 /// Throws InvalidInput through require_valid(model).
 RestState rest_state(const Model& model);
 

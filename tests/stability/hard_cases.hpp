@@ -5,6 +5,7 @@
 #include "meshing/primitives.hpp"
 #include "tests/tled/engine_scene.hpp"
 #include "tled/equilibrium.hpp"
+#include "tled/load_path.hpp"
 #include "tled/reference.hpp"
 
 #include <gtest/gtest.h>
@@ -73,6 +74,7 @@ inline Matrix3Xd solved(Kind kind, const tled::RestState& rest, const tled::Noda
     tled::EquilibriumOptions options;
     options.tolerance_mm = tolerance_mm;
     options.max_steps = 40000;
+    options.rest = &rest;
     const auto found = tled::equilibrium(*engine, stiffness, conditions, options, start);
     EXPECT_TRUE(found.displacement.allFinite());
     EXPECT_LE(found.estimated_error_mm, tolerance_mm);
@@ -83,18 +85,19 @@ inline Matrix3Xd by_newton(const tled::RestState& rest, const tled::NodalConditi
     return tled::newton_equilibrium(rest, conditions, {.tolerance_mm = 1e-7, .load_steps = load_steps}).displacement;
 }
 
-/// Equilibrium as the load grows in equal parts, each from the last.
-inline Matrix3Xd solved_in_steps(Kind kind, const tled::RestState& rest, const tled::NodalConditions& conditions,
-                                 double tolerance_mm, int load_steps) {
-    Matrix3Xd u = Matrix3Xd::Zero(3, rest.node_count);
-    for (int step = 1; step <= load_steps; ++step) {
-        tled::NodalConditions part = conditions;
-        part.imposed *= static_cast<double>(step) / load_steps;
-        part.spring_force *= static_cast<double>(step) / load_steps;
-        part.external_force *= static_cast<double>(step) / load_steps;
-        u = solved(kind, rest, part, tolerance_mm, &u);
-    }
-    return u;
+/// Equilibrium by way of smaller loads.
+inline Matrix3Xd solved_in_parts(Kind kind, const tled::RestState& rest, const tled::NodalConditions& conditions,
+                                 double tolerance_mm, int first_parts = 1) {
+    const auto engine = make_engine(kind, rest);
+    const tled::RestStiffness stiffness(rest, conditions);
+    tled::LoadPathOptions options;
+    options.equilibrium.tolerance_mm = tolerance_mm;
+    options.equilibrium.rest = &rest;
+    options.first_parts = first_parts;
+    const auto found = tled::equilibrium_along_load(*engine, stiffness, conditions, options);
+    EXPECT_TRUE(found.displacement.allFinite());
+    EXPECT_LE(found.estimated_error_mm, tolerance_mm);
+    return found.displacement;
 }
 
 }  // namespace tissuewarp::stability

@@ -51,7 +51,7 @@ Matrix3Xd EquilibriumSearch::begin(const Matrix3Xd* start) {
         fail("the linear-elastic solution is not finite", "check the springs and forces for extreme values");
     for (double part = 1; part > 0.01; part *= 0.7) {
         Matrix3Xd u = base + part * correction;
-        if (!admissible(u) || smallest_.value <= least_starting_jacobian) continue;
+        if (!admissible(u) || (smallest_.value <= least_starting_jacobian && !engine.admits_inversion())) continue;
         correction_mm_ = part * largest_norm(correction);
         return conditions.constrained.select(conditions.imposed, u);
     }
@@ -63,7 +63,7 @@ bool EquilibriumSearch::admissible(const Matrix3Xd& displacement) {
     if (!displacement.allFinite()) return false;
     engine.set_state(displacement, Matrix3Xd::Zero(3, displacement.cols()));
     smallest_ = engine.smallest_jacobian();
-    return smallest_.value > 0;
+    return smallest_.value > 0 || (engine.admits_inversion() && std::isfinite(smallest_.value));
 }
 
 void EquilibriumSearch::require_evaluations(int count) {
@@ -97,7 +97,7 @@ void EquilibriumSearch::keep(const Matrix3Xd& displacement, double error_mm) {
 }
 
 EquilibriumResult EquilibriumSearch::finish() {
-    if (!admissible(good_))
+    if (!admissible(good_) || !(smallest_.value > 0))
         fail("it holds inverted tissue (" + place(smallest_) + ")", "use a finer mesh there or softer springs");
     result_.displacement = engine.displacement();
     result_.estimated_error_mm = good_error_mm_;

@@ -20,7 +20,8 @@ public:
     /// answer as leaves every det F positive: loads applied at once would tear the nodes next to them.
     Eigen::Matrix3Xd begin(const Eigen::Matrix3Xd* start);
 
-    /// Moves the engine there at rest; false when a displacement is not finite or a tetrahedron is inverted.
+    /// Moves the engine there at rest; false when a displacement is not finite or a tetrahedron is inverted whose law
+    /// does not admit it.
     [[nodiscard]] bool admissible(const Eigen::Matrix3Xd& displacement);
     /// At the engine's state. Counted; throws when too many or not finite.
     [[nodiscard]] Eigen::Matrix3Xd residual();

@@ -1,0 +1,118 @@
+#include "tled/load_path.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "core/errors.hpp"
+
+namespace tissuewarp::tled {
+
+using Eigen::Matrix3Xd;
+
+namespace {
+
+class LoadPath {
+public:
+    LoadPath(Engine& engine, const RestStiffness& stiffness, const NodalConditions& conditions,
+             const LoadPathOptions& options, const Matrix3Xd* start, Observer& observer)
+        : engine_(engine),
+          stiffness_(stiffness),
+          conditions_(conditions),
+          options_(options),
+          observer_(observer),
+          from_rest_(start == nullptr),
+          origin_(from_rest_ ? Matrix3Xd::Zero(3, conditions.constrained.cols()) : *start),
+          now_{0, origin_} {}
+
+    EquilibriumResult run() {
+        double part = 1.0 / options_.first_parts;
+        while (now_.load < 1) {
+            const double load = now_.load + part > 1 - 1e-9 ? 1 : now_.load + part;
+            if (advance(load)) {
+                part *= 1.5;
+            } else {
+                part = 0.5 * (load - now_.load);
+                if (part < options_.smallest_part) give_up();
+            }
+        }
+        return std::move(result_);
+    }
+
+private:
+    struct Point {
+        double load;
+        Matrix3Xd displacement;
+    };
+
+    [[nodiscard]] NodalConditions at(double load) const {
+        NodalConditions partial = conditions_;
+        const Matrix3Xd origin = conditions_.constrained.select(origin_, Matrix3Xd::Zero(3, origin_.cols()));
+        partial.imposed = origin + load * (conditions_.imposed - origin);
+        if (!from_rest_) return partial;
+        partial.spring_force *= load;
+        partial.external_force *= load;
+        return partial;
+    }
+
+    /// On the line through the last two equilibria; from the first only with the imposed displacements moved.
+    [[nodiscard]] Matrix3Xd predicted(double load, const NodalConditions& partial) const {
+        Matrix3Xd u = now_.displacement;
+        if (before_) u += (load - now_.load) / (now_.load - before_->load) * (u - before_->displacement);
+        return partial.constrained.select(partial.imposed, u);
+    }
+
+    bool advance(double load) {
+        const NodalConditions partial = at(load);
+        EquilibriumOptions options = options_.equilibrium;
+        constexpr double loose = 10;  // of the tolerance, on the way
+        if (load < 1) options.tolerance_mm *= loose;
+        const bool first = from_rest_ && !before_ && now_.load == 0;
+        const Matrix3Xd prediction = predicted(load, partial);
+        try {
+            EquilibriumResult found =
+                equilibrium(engine_, stiffness_, partial, options, first ? nullptr : &prediction, observer_);
+            found.force_evaluations += result_.force_evaluations;
+            found.lifted_residuals += result_.lifted_residuals;
+            before_ = std::exchange(now_, {load, found.displacement});
+            result_ = std::move(found);
+            return true;
+        } catch (const SolverFailure& failure) {
+            cause_ = failure.what();
+            return false;
+        }
+    }
+
+    [[noreturn]] void give_up() {
+        engine_.set_conditions(at(now_.load));
+        engine_.set_state(now_.displacement, Matrix3Xd::Zero(3, origin_.cols()));
+        throw SolverFailure("the load could be applied to " + std::to_string(100 * now_.load) +
+                            " % only, where the engine is left: " + cause_);
+    }
+
+    Engine& engine_;
+    const RestStiffness& stiffness_;
+    const NodalConditions& conditions_;
+    const LoadPathOptions& options_;
+    Observer& observer_;
+    bool from_rest_;
+    Matrix3Xd origin_;
+    Point now_;
+    std::optional<Point> before_;
+    std::string cause_;
+    EquilibriumResult result_;
+};
+
+}  // namespace
+
+EquilibriumResult equilibrium_along_load(Engine& engine, const RestStiffness& stiffness,
+                                         const NodalConditions& conditions, const LoadPathOptions& options,
+                                         const Matrix3Xd* start, Observer& observer) {
+    if (options.first_parts < 1 || !(options.smallest_part > 0))
+        throw InvalidInput("a load path needs at least one part and a positive smallest part");
+    return LoadPath(engine, stiffness, conditions, options, start, observer).run();
+}
+
+}  // namespace tissuewarp::tled
