@@ -14,7 +14,9 @@ namespace tissuewarp::registration {
 namespace {
 
 tled::Model model_of(meshing::TetMesh mesh, const PrepareOptions& options) {
-    tled::Model model{std::move(mesh), options.materials, tled::Element::T4};
+    tled::Model model;
+    model.mesh = std::move(mesh);
+    model.materials = options.materials;
     for (const int label : model.mesh.labels) model.materials.try_emplace(label, options.default_material);
     model.element = options.element.value_or(tled::suggested_element(model.materials));
     return model;
