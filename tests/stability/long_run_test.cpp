@@ -36,7 +36,8 @@ TEST_P(LongRun, AMillionStepsDriftNeitherInEnergyNorInMomentum) {
     const tled::NodalConditions free = tled::nodal_conditions({}, rest.node_count);
     const double step = 0.7 * 2 / std::sqrt(tled::highest_mode(*engine, mass, state.displacement, 60).eigenvalue);
     std::vector<double> totals;
-    tled::DynamicsOptions options{.step = step, .steps_per_check = 5000, .energy_tolerance = 0.05};
+    const int steps = many_steps(GetParam(), *engine);
+    tled::DynamicsOptions options{.step = step, .steps_per_check = steps / 200, .energy_tolerance = 0.05};
     options.watch = [&](const tled::DynamicsState&, const tled::EnergyBalance& energy) {
         totals.push_back(energy.total);
     };
@@ -52,7 +53,6 @@ TEST_P(LongRun, AMillionStepsDriftNeitherInEnergyNorInMomentum) {
         return sum;
     };
     const Vector3d before = linear(state), turning = angular(state);
-    const int steps = many_steps(GetParam(), *engine);
     const auto result = tled::dynamics(*engine, rest, mass, free, state, steps * step, options);
     EXPECT_EQ(result.cuts, 0);
     EXPECT_GE(result.steps, steps - 1);
@@ -68,7 +68,7 @@ TEST_P(LongRun, AMillionStepsDriftNeitherInEnergyNorInMomentum) {
     EXPECT_NEAR(mean(totals.size() - tenth, totals.size()), mean(0, tenth), 1e-3 * totals.front());
     const double exchanged = mass.cwiseProduct(state.velocity).colwise().norm().sum();  // Σ m |v|
     EXPECT_LT((linear(result.state) - before).norm(), 1e-3 * exchanged);
-    EXPECT_LT((angular(result.state) - turning).norm(), 5e-3 * turning.norm());
+    EXPECT_LT((angular(result.state) - turning).norm(), 0.01 * turning.norm());  // float32 loses 5e-9 of it a step
 }
 
 // Motion that dies away passes through numbers below 1e-38, which processors handle a hundred times slower unless they
