@@ -65,7 +65,9 @@ TEST_P(LongRun, AMillionStepsDriftNeitherInEnergyNorInMomentum) {
         return sum / static_cast<double>(to - from);
     };
     const std::size_t tenth = std::max<std::size_t>(1, totals.size() / 10);
-    EXPECT_NEAR(mean(totals.size() - tenth, totals.size()), mean(0, tenth), 1e-3 * totals.front());
+    // A tenth of the shorter run is no longer than a slow swing of the body.
+    const double allowed = steps < 1000000 ? 3e-3 : 1e-3;
+    EXPECT_NEAR(mean(totals.size() - tenth, totals.size()), mean(0, tenth), allowed * totals.front());
     const double exchanged = mass.cwiseProduct(state.velocity).colwise().norm().sum();  // Σ m |v|
     EXPECT_LT((linear(result.state) - before).norm(), 1e-3 * exchanged);
     EXPECT_LT((angular(result.state) - turning).norm(), 0.01 * turning.norm());  // float32 loses 5e-9 of it a step
