@@ -38,7 +38,7 @@ Eigen::Matrix3Xd internal_force(const RestState& rest, const Eigen::Matrix3Xd& d
 /// ∂²E/∂u² (3N × 3N, mN/mm, symmetric, both triangles stored), degree of freedom 3·node + component.
 Eigen::SparseMatrix<double> tangent_stiffness(const RestState& rest, const Eigen::Matrix3Xd& displacement);
 
-/// det F of every tetrahedron, in the order of the mesh.
+/// det F of every element, tetrahedra before hexahedra, in the order of the mesh.
 Eigen::VectorXd jacobians(const RestState& rest, const Eigen::Matrix3Xd& displacement);
 
 struct NewtonOptions {
