@@ -92,8 +92,8 @@ void cube(int cells, double coefficient) {
         tled::newton_equilibrium(rest, tled::nodal_conditions(conditions, rest.node_count), options).displacement;
     const double force = tled::internal_force(rest, u).rightCols(layer).row(2).sum();
     const Vector3d side = u.col(cells + (cells + 1) * (cells / 2 + (cells + 1) * (cells / 2)));
-    std::printf("| %d | %.3f | %.1f | %.2f %% | %.3f | %.3f |\n", cells, coefficient, force,
-                100 * (force / 6085.2 - 1), side.x(), hourglassing(rest, u));
+    std::printf("| %d | %.3f | %.1f | %.2f %% | %.3f | %.3f |\n", cells, coefficient, force, 100 * (force / 6085.2 - 1),
+                side.x(), hourglassing(rest, u));
     std::fflush(stdout);
 }
 
@@ -109,7 +109,8 @@ int main(int count, char** arguments) {
             for (const double c : coefficients) cantilever(cells, c);
         }
     } else {
-        std::printf("| cells | c | force, mN | error | side, mm (−5.371) | hourglassing |\n|---|---|---|---|---|---|\n");
+        std::printf(
+            "| cells | c | force, mN | error | side, mm (−5.371) | hourglassing |\n|---|---|---|---|---|---|\n");
         for (const int cells : {4, 8, 12, 16}) {
             cube(cells, 0.0);
             for (const double c : coefficients) cube(cells, c);

@@ -44,7 +44,8 @@ void add_triangle(const HexCorners& x, int a, int b, int c, HexCorners& B) {
     for (const int corner : {a, b, c}) B.col(corner) += third;
 }
 
-/// ∮ N n dA of a bilinear face; the integrand is quadratic in each coordinate, so that two Gauss points a way are exact.
+/// ∮ N n dA of a bilinear face; the integrand is quadratic in each coordinate, so that two Gauss points a way are
+/// exact.
 void add_bilinear(const HexCorners& x, const std::array<int, 4>& face, HexCorners& B) {
     const double point = 1.0 / std::sqrt(3.0);
     for (const double s : {-point, point})

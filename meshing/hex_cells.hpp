@@ -40,8 +40,8 @@ std::vector<FaceShapes> face_shapes(const TetMesh& mesh, const HexCells& cells);
 
 HexCorners hex_corners(const Eigen::Matrix3Xd& nodes, const HexCells& cells, int hex);
 
-/// B_iI = ∮ N_I n_i dA over the surface, 3 × 8, mm²: V times the mean of ∂N_I/∂x_i (Flanagan and Belytschko 1981, eq. 14,
-/// whose bilinear faces it has by default). Σ_I B_iI = 0 and Σ_I B_iI x_jI = V δ_ij for faces of either shape.
+/// B_iI = ∮ N_I n_i dA over the surface, 3 × 8, mm²: V times the mean of ∂N_I/∂x_i (Flanagan and Belytschko 1981, eq.
+/// 14, whose bilinear faces it has by default). Σ_I B_iI = 0 and Σ_I B_iI x_jI = V δ_ij for faces of either shape.
 HexCorners surface_gradient(const HexCorners& corners, const FaceShapes& faces = {});
 
 /// Volume within bilinear faces, mm³.

@@ -5,7 +5,8 @@
 namespace tissuewarp::meshing {
 
 MixedMesh box_hexes(const Eigen::Vector3d& size, const std::array<int, 3>& cells, double jitter, std::uint32_t seed) {
-    return mixed_box(size, cells, [](int, int, int) { return true; }, jitter, seed);
+    return mixed_box(
+        size, cells, [](int, int, int) { return true; }, jitter, seed);
 }
 
 MixedMesh mixed_box(const Eigen::Vector3d& size, const std::array<int, 3>& cells,

@@ -14,8 +14,8 @@ namespace tissuewarp::meshing {
 MixedMesh box_hexes(const Eigen::Vector3d& size, const std::array<int, 3>& cells, double jitter = 0.0,
                     std::uint32_t seed = 1);
 
-/// The same box with a hexahedron where `is_hexahedron(i, j, k)` and six Kuhn tetrahedra elsewhere, both in the order of
-/// the cells.
+/// The same box with a hexahedron where `is_hexahedron(i, j, k)` and six Kuhn tetrahedra elsewhere, both in the order
+/// of the cells.
 MixedMesh mixed_box(const Eigen::Vector3d& size, const std::array<int, 3>& cells,
                     const std::function<bool(int, int, int)>& is_hexahedron, double jitter = 0.0,
                     std::uint32_t seed = 1);

@@ -57,8 +57,7 @@ void precompute_hexahedra(const Model& model, const std::vector<Material>& mater
         state.rest_hourglass.col(e) = (X * base).reshaped();
         const Material& material = materials[static_cast<std::size_t>(material_of[static_cast<std::size_t>(e)])];
         state.volumetric_modulus[e] = volumetric_modulus(material);
-        state.hourglass_stiffness[e] =
-            model.hourglass_coefficient * shear_modulus(material) * B.squaredNorm() / volume;
+        state.hourglass_stiffness[e] = model.hourglass_coefficient * shear_modulus(material) * B.squaredNorm() / volume;
         for (const int node : state.nodes.col(e)) lumped_mass[node] += model.density * volume / 8;
     }
 }
@@ -100,7 +99,8 @@ double hex_energy(const RestState& rest, const Matrix3Xd& displacement) {
     tbb::parallel_for(0, state.count(), [&](int e) {
         const Material material = hex_material(rest, material_of[static_cast<std::size_t>(e)], e);
         const Matrix3d F = hex_deformation_gradient(state, displacement, e);
-        const auto q = corner_displacements(state, displacement, e) * hourglass_vectors(state, e);
+        const Eigen::Matrix<double, 3, 4> q =
+            corner_displacements(state, displacement, e) * hourglass_vectors(state, e);
         energy[e] = state.volume[e] * strain_energy(material, F) + 0.5 * state.hourglass_stiffness[e] * q.squaredNorm();
     });
     double sum = 0.0;
@@ -117,8 +117,8 @@ Matrix3Xd hex_corner_forces(const RestState& rest, const Matrix3Xd& displacement
         const Matrix3d P = first_piola_kirchhoff_stress(material, hex_deformation_gradient(state, displacement, e));
         const Matrix84 gamma = hourglass_vectors(state, e);
         const Eigen::Matrix<double, 3, 4> q = corner_displacements(state, displacement, e) * gamma;
-        force.middleCols<8>(8 * e) = state.volume[e] * P * hex_shape_gradients(state, e) +
-                                     state.hourglass_stiffness[e] * q * gamma.transpose();
+        force.middleCols<8>(8 * e) =
+            state.volume[e] * P * hex_shape_gradients(state, e) + state.hourglass_stiffness[e] * q * gamma.transpose();
     });
     return force;
 }

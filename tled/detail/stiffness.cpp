@@ -29,8 +29,8 @@ using Matrix34 = Eigen::Matrix<double, 3, 4>;
 // The block of corners a, b is V Σ_jl ∂P_ij/∂F_kl ∂N_a/∂X_j ∂N_b/∂X_l.
 template <int corners>
 struct CellTerms {
-    Eigen::Matrix<double, 9, 9> tangent;          // times V_e
-    Eigen::Matrix<double, 3, corners> gradient;   // ∇N, a column per corner
+    Eigen::Matrix<double, 9, 9> tangent;         // times V_e
+    Eigen::Matrix<double, 3, corners> gradient;  // ∇N, a column per corner
 
     [[nodiscard]] Matrix3d block(int row, int column) const {
         Eigen::Matrix<double, 9, 3> half = gradient(0, column) * tangent.template leftCols<3>();
@@ -152,8 +152,7 @@ BlockRows element_rows(const RestState& rest, const std::vector<ElementTerms>& t
     tbb::parallel_for(0, rest.node_count, [&](int node) {
         const int* begin = &result.column[result.offset[node]];
         Row row{begin, begin + result.offset[node + 1] - result.offset[node], &result.block[result.offset[node]]};
-        for_each_at<4>(rest.incidence, node,
-                       [&](int e, int corner) { row.add(rest.nodes, e, corner, terms[e]); });
+        for_each_at<4>(rest.incidence, node, [&](int e, int corner) { row.add(rest.nodes, e, corner, terms[e]); });
         for_each_at<8>(hexahedra.incidence, node,
                        [&](int e, int corner) { row.add(hexahedra.nodes, e, corner, hex_terms[e]); });
     });
