@@ -23,7 +23,7 @@ struct Model {
                                ///< hexahedra; or empty
     /// One-point hexahedra on the nodes of `mesh`, beside its tetrahedra or without any (docs/decisions/hexahedra.md).
     meshing::HexCells hexahedra{};
-    double hourglass_coefficient = 0.05;  ///< c of the hourglass stiffness c μ V Σ|∇N|², without dimension
+    double hourglass_coefficient = 0.04;  ///< c of the hourglass stiffness c μ V Σ|∇N|², without dimension
 };
 
 /// Throws InvalidInput when a label has no material, a modulus is not positive, or the mesh is invalid.
