@@ -142,7 +142,7 @@ private:
         if (seen.min_jacobian > 0) return {};
         const bool admitted = std::any_of(rest_.materials.begin(), rest_.materials.end(), admits_inversion);
         if (admitted) return {};
-        return "tetrahedron " + std::to_string(seen.min_jacobian_tet) +
+        return name_of_element(seen.min_jacobian_tet, seen.min_jacobian_hex) +
                " has det F = " + std::to_string(seen.min_jacobian);
     }
 

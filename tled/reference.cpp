@@ -104,33 +104,46 @@ double elastic_energy(const RestState& rest, const Matrix3Xd& displacement) {
 }
 
 ViscousStresses unstressed(const RestState& rest) {
-    ViscousStresses stresses(rest.tet.size());
+    ViscousStresses stresses(rest.tet.size() + rest.hexahedra.hex.size());
     if (rest.viscosity.empty()) return stresses;
-    for (const MaterialBlock& block : rest.blocks)
-        for (int e = block.begin; e < block.end; ++e)
-            stresses[e].assign(rest.viscosity[block.material].terms.size(), Matrix3d::Zero());
+    const auto assign = [&](const std::vector<MaterialBlock>& blocks, int first) {
+        for (const MaterialBlock& block : blocks)
+            for (int e = block.begin; e < block.end; ++e)
+                stresses[first + e].assign(rest.viscosity[block.material].terms.size(), Matrix3d::Zero());
+    };
+    assign(rest.blocks, 0);
+    assign(rest.hexahedra.blocks, rest.element_count());
     return stresses;
 }
 
 ViscousStresses advanced(const RestState& rest, ViscousStresses stresses, const Matrix3Xd& displacement,
                          double time_step) {
     if (rest.viscosity.empty()) return stresses;
-    const std::vector<int> material_of = material_of_elements(rest);
-    tbb::parallel_for(0, rest.element_count(), [&](int e) {
-        const std::vector<PronyTerm>& terms = rest.viscosity[material_of[e]].terms;
+    const auto advance = [&](std::vector<Matrix3d>& q, int material, const Material& law, const Matrix3d& F) {
+        const std::vector<PronyTerm>& terms = rest.viscosity[material].terms;
         if (terms.empty()) return;
-        const Matrix3d F = detail::deformation_gradient(rest, displacement, e);
-        const Matrix3d S = F.inverse() * shear_stress(detail::element_material(rest, material_of[e], e), F);
+        const Matrix3d S = F.inverse() * shear_stress(law, F);
         for (std::size_t k = 0; k < terms.size(); ++k) {
             const auto [g, tau] = terms[k];
-            stresses[e][k] = (time_step * g * S + tau * stresses[e][k]) / (time_step + tau);
+            q[k] = (time_step * g * S + tau * q[k]) / (time_step + tau);
         }
+    };
+    const std::vector<int> material_of = material_of_elements(rest);
+    tbb::parallel_for(0, rest.element_count(), [&](int e) {
+        advance(stresses[e], material_of[e], detail::element_material(rest, material_of[e], e),
+                detail::deformation_gradient(rest, displacement, e));
+    });
+    const std::vector<int> material_of_hex = material_of_elements(rest.hexahedra.blocks);
+    tbb::parallel_for(0, rest.hexahedra.count(), [&](int e) {
+        advance(stresses[rest.element_count() + e], material_of_hex[e],
+                detail::hex_material(rest, material_of_hex[e], e),
+                detail::hex_deformation_gradient(rest.hexahedra, displacement, e));
     });
     return stresses;
 }
 
 Matrix3Xd internal_force(const RestState& rest, const Matrix3Xd& displacement) {
-    return internal_force(rest, displacement, ViscousStresses(rest.tet.size()));
+    return internal_force(rest, displacement, ViscousStresses(rest.tet.size() + rest.hexahedra.hex.size()));
 }
 
 Matrix3Xd internal_force(const RestState& rest, const Matrix3Xd& displacement, const ViscousStresses& stresses) {
@@ -160,7 +173,7 @@ Matrix3Xd internal_force(const RestState& rest, const Matrix3Xd& displacement, c
     };
     gather(rest.incidence, corner_force);
     if (rest.hexahedra.count() > 0) {
-        gather(rest.hexahedra.incidence, detail::hex_corner_forces(rest, displacement));
+        gather(rest.hexahedra.incidence, detail::hex_corner_forces(rest, displacement, stresses));
     }
     return force;
 }

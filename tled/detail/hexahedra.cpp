@@ -108,13 +108,15 @@ double hex_energy(const RestState& rest, const Matrix3Xd& displacement) {
     return sum;
 }
 
-Matrix3Xd hex_corner_forces(const RestState& rest, const Matrix3Xd& displacement) {
+Matrix3Xd hex_corner_forces(const RestState& rest, const Matrix3Xd& displacement, const ViscousStresses& stresses) {
     const HexState& state = rest.hexahedra;
     const std::vector<int> material_of = material_of_elements(state.blocks);
     Matrix3Xd force(3, 8 * state.count());
     tbb::parallel_for(0, state.count(), [&](int e) {
         const Material material = hex_material(rest, material_of[static_cast<std::size_t>(e)], e);
-        const Matrix3d P = first_piola_kirchhoff_stress(material, hex_deformation_gradient(state, displacement, e));
+        const Matrix3d F = hex_deformation_gradient(state, displacement, e);
+        Matrix3d P = first_piola_kirchhoff_stress(material, F);
+        for (const Matrix3d& q : stresses[static_cast<std::size_t>(rest.element_count() + e)]) P -= F * q;
         const Matrix84 gamma = hourglass_vectors(state, e);
         const Eigen::Matrix<double, 3, 4> q = corner_displacements(state, displacement, e) * gamma;
         force.middleCols<8>(8 * e) =

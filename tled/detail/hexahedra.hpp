@@ -2,6 +2,7 @@
 /// The one-point hexahedron in plain float64: rest data, energy and its derivatives (tled/hex_state.hpp).
 
 #include "tled/constitutive.hpp"
+#include "tled/reference.hpp"
 #include "tled/rest_state.hpp"
 
 #include <Eigen/Core>
@@ -33,8 +34,10 @@ Eigen::VectorXd hex_jacobians(const HexState& state, const Eigen::Matrix3Xd& dis
 /// Energy of all hexahedra, mN·mm.
 double hex_energy(const RestState& rest, const Eigen::Matrix3Xd& displacement);
 
-/// ∂E/∂u by corners: column 8·element + corner, mN. Precondition: require_positive_hexahedra.
-Eigen::Matrix3Xd hex_corner_forces(const RestState& rest, const Eigen::Matrix3Xd& displacement);
+/// Internal forces by corners, viscous stresses taken off: column 8·element + corner, mN. Precondition:
+/// require_positive_hexahedra.
+Eigen::Matrix3Xd hex_corner_forces(const RestState& rest, const Eigen::Matrix3Xd& displacement,
+                                   const ViscousStresses& stresses);
 
 /// Throws SolverFailure naming the first hexahedron with det F ≤ 0 whose law does not admit it.
 void require_positive_hexahedra(const RestState& rest, const Eigen::VectorXd& jacobian);
