@@ -211,7 +211,7 @@ Pass GpuForce::ranged_hexahedra(const shaders::Program& program, int begin, int 
 }
 
 void GpuForce::set_all_hexahedra(const shaders::Program& program) const {
-    ranged_hexahedra(program, 0, static_cast<int>(hex_count_));
+    static_cast<void>(ranged_hexahedra(program, 0, static_cast<int>(hex_count_)));
 }
 
 void GpuForce::set_all_elements(const shaders::Program& program) const {
