@@ -4,9 +4,11 @@ namespace tissuewarp::tled::detail {
 
 namespace {
 
-/// Writes rows of a per-element matrix in structure of arrays: batch × rows × width.
+/// Writes rows of a per-element matrix in structure of arrays: batch × rows × width; nothing for a matrix without
+/// columns.
 template <class T, class Matrix>
 std::vector<T> batched(const Matrix& matrix, const BatchLayout& layout) {
+    if (matrix.cols() == 0) return {};
     const auto rows = static_cast<std::size_t>(matrix.rows());
     std::vector<T> result(layout.element.size() * rows);
     int last = 0;  // padding repeats the last element
@@ -57,7 +59,7 @@ ElementBatches<T> element_batches(const RestState& rest, const BatchLayout& layo
     batches.node = batched<std::int32_t>(record * rest.nodes, layout);
     batches.pressure = batched<std::int32_t>(rest.pressure.of_element, layout);
     batches.gradient = batched<T>(rest.gradient, layout);
-    if (rest.fibre.size() > 0) batches.fibre = batched<T>(rest.fibre, layout);
+    batches.fibre = batched<T>(rest.fibre, layout);
     batches.volume = slotted<T>(rest.volume, layout);
     batches.volumetric_modulus = slotted<T>(rest.volumetric_modulus, layout);
     return batches;
@@ -68,7 +70,7 @@ HexBatches<T> hex_batches(const HexState& hexahedra, const BatchLayout& layout) 
     HexBatches<T> batches;
     batches.node = batched<std::int32_t>(record * hexahedra.nodes, layout);
     batches.gradient = batched<T>(hexahedra.gradient, layout);
-    if (hexahedra.fibre.size() > 0) batches.fibre = batched<T>(hexahedra.fibre, layout);
+    batches.fibre = batched<T>(hexahedra.fibre, layout);
     batches.volume = slotted<T>(hexahedra.volume, layout);
     batches.volumetric_modulus = slotted<T>(hexahedra.volumetric_modulus, layout);
     batches.rest_hourglass = batched<T>(hexahedra.rest_hourglass, layout);
