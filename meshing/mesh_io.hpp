@@ -1,6 +1,7 @@
 #pragma once
 /// Mesh files. VTU is written by hand (appended raw binary, little-endian) so that ParaView and Slicer read it.
 
+#include "meshing/hex_cells.hpp"
 #include "meshing/tet_mesh.hpp"
 
 #include <filesystem>
@@ -9,7 +10,7 @@
 
 namespace tissuewarp::meshing {
 
-/// A named array on nodes or tetrahedra: C × N, float64 in memory, float32 in the file.
+/// A named array on nodes or cells: C × N, float64 in memory, float32 in the file.
 struct MeshArray {
     std::string name;
     Eigen::MatrixXd values;
@@ -19,10 +20,15 @@ struct MeshArray {
 /// Complete or absent: written to a temporary name and renamed. Throws IoError.
 void write_vtu(const TetMesh& mesh, const std::filesystem::path& path, const std::vector<MeshArray>& point_arrays = {},
                const std::vector<MeshArray>& cell_arrays = {});
+/// The same for tetrahedra and hexahedra; cell arrays have the columns of the tetrahedra before those of the hexahedra.
+void write_vtu(const MixedMesh& mesh, const std::filesystem::path& path,
+               const std::vector<MeshArray>& point_arrays = {}, const std::vector<MeshArray>& cell_arrays = {});
 
 /// Reads a .vtu of tetrahedra: what write_vtu makes, and the ascii, base64-inline and raw-appended (uncompressed)
 /// variants that VTK and meshio write. A missing `label` array means label 1. Throws IoError or InvalidInput.
 TetMesh read_vtu(const std::filesystem::path& path);
+/// The same for a mesh of tetrahedra, hexahedra (VTK types 10 and 12) or both.
+MixedMesh read_mixed_vtu(const std::filesystem::path& path);
 
 /// Surface with optional unit normals per node (3 × N or empty).
 struct Surface {

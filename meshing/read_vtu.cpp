@@ -1,5 +1,6 @@
-// The subset of VTK's XML unstructured grids that holds tetrahedra: ascii, inline base64 and raw or base64 appended
-// data, uncompressed, little-endian, one piece. The XML is scanned for tags; there is no general parser behind it.
+// The subset of VTK's XML unstructured grids that holds tetrahedra and hexahedra: ascii, inline base64 and raw or
+// base64 appended data, uncompressed, little-endian, one piece. The XML is scanned for tags; there is no general parser
+// behind it.
 
 #include "core/errors.hpp"
 #include "meshing/detail/file_reader.hpp"
@@ -9,6 +10,7 @@
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <numeric>
 #include <optional>
 
 namespace tissuewarp::meshing {
@@ -264,35 +266,72 @@ int checked_integer(double value, int lowest, int highest, const char* what, con
     return static_cast<int>(value);
 }
 
+enum class Accepted { Tetrahedra, TetrahedraAndHexahedra };
+
+/// Corners of each cell by its VTK type, and in sum the size of the connectivity. Offsets must agree with them.
+std::vector<int> cell_corners(const Content& content, Accepted accepted, const FileReader& file) {
+    std::vector<int> corners;
+    const auto& offsets = required(content, "Cells/offsets", content.cells, file);
+    double end = 0.0;
+    for (const double type : required(content, "Cells/types", content.cells, file)) {
+        const bool hexahedron = type == 12.0 && accepted == Accepted::TetrahedraAndHexahedra;
+        if (type != 10.0 && !hexahedron)
+            file.refuse("has a cell of VTK type " + std::to_string(static_cast<int>(type)) +
+                        (accepted == Accepted::Tetrahedra
+                             ? "; only linear tetrahedra (10) are read"
+                             : "; only linear tetrahedra (10) and hexahedra (12) are read"));
+        end += hexahedron ? 8.0 : 4.0;
+        if (offsets[corners.size()] != end) file.refuse("has cell offsets that do not count the corners of its cells");
+        corners.push_back(hexahedron ? 8 : 4);
+    }
+    return corners;
+}
+
+MixedMesh read_cells(const std::filesystem::path& path, Accepted accepted) {
+    FileReader file(path);
+    const Content content = read_content(file);
+    const std::vector<int> corners = cell_corners(content, accepted, file);
+    const auto total = static_cast<std::size_t>(std::accumulate(corners.begin(), corners.end(), std::int64_t{0}));
+    const auto hex_count = std::count(corners.begin(), corners.end(), 8);
+    const auto& points = required(content, "Points/", 3 * content.points, file);
+    const auto& nodes = required(content, "Cells/connectivity", total, file);
+    const bool labelled = content.arrays.contains("CellData/label");
+    if (labelled) required(content, "CellData/label", content.cells, file);
+
+    MixedMesh result;
+    TetMesh& mesh = result.mesh;
+    HexCells& hexahedra = result.hexahedra;
+    mesh.nodes = Eigen::Map<const Eigen::Matrix3Xd>(points.data(), 3, static_cast<Eigen::Index>(content.points));
+    mesh.tets.resize(4, static_cast<Eigen::Index>(corners.size()) - hex_count);
+    mesh.labels = Eigen::VectorXi::Ones(mesh.tets.cols());
+    hexahedra.hexes.resize(8, hex_count);
+    hexahedra.labels = Eigen::VectorXi::Ones(hex_count);
+    int *tet = mesh.tets.data(), *hex = hexahedra.hexes.data(), *tet_label = mesh.labels.data(),
+        *hex_label = hexahedra.labels.data();
+    auto node = nodes.begin();
+    for (std::size_t cell = 0; cell < corners.size(); ++cell) {
+        int*& corner = corners[cell] == 8 ? hex : tet;
+        for (int k = 0; k < corners[cell]; ++k)
+            *corner++ = checked_integer(*node++, 0, mesh.node_count() - 1, "node index", file);
+        int*& label = corners[cell] == 8 ? hex_label : tet_label;
+        if (labelled)
+            *label++ = checked_integer(content.arrays.at("CellData/label")[cell], 1, 2147483647, "label", file);
+    }
+    orient(mesh);
+    const std::string name = path.string();
+    if (hex_count > 0) require_valid(mesh.nodes, hexahedra, name.c_str());
+    if (mesh.tet_count() > 0 || hex_count == 0) require_valid(mesh, name.c_str());
+    return result;
+}
+
 }  // namespace
 
 TetMesh read_vtu(const std::filesystem::path& path) {
-    FileReader file(path);
-    const Content content = read_content(file);
-    for (double type : required(content, "Cells/types", content.cells, file))
-        if (type != 10.0)
-            file.refuse("has a cell of VTK type " + std::to_string(static_cast<int>(type)) +
-                        "; only linear tetrahedra (10) are read");
-    const auto& offsets = required(content, "Cells/offsets", content.cells, file);
-    for (std::size_t t = 0; t < content.cells; ++t)
-        if (offsets[t] != 4.0 * static_cast<double>(t + 1)) file.refuse("has cell offsets that do not count by four");
+    return read_cells(path, Accepted::Tetrahedra).mesh;
+}
 
-    const auto& points = required(content, "Points/", 3 * content.points, file);
-    const auto& nodes = required(content, "Cells/connectivity", 4 * content.cells, file);
-    TetMesh mesh;
-    mesh.nodes = Eigen::Map<const Eigen::Matrix3Xd>(points.data(), 3, static_cast<Eigen::Index>(content.points));
-    mesh.tets.resize(4, static_cast<Eigen::Index>(content.cells));
-    for (std::size_t i = 0; i < nodes.size(); ++i)
-        mesh.tets.data()[i] = checked_integer(nodes[i], 0, mesh.node_count() - 1, "node index", file);
-    mesh.labels = Eigen::VectorXi::Ones(mesh.tets.cols());
-    if (content.arrays.contains("CellData/label")) {
-        const auto& labels = required(content, "CellData/label", content.cells, file);
-        for (std::size_t t = 0; t < labels.size(); ++t)
-            mesh.labels[static_cast<Eigen::Index>(t)] = checked_integer(labels[t], 1, 2147483647, "label", file);
-    }
-    orient(mesh);
-    require_valid(mesh, path.string().c_str());
-    return mesh;
+MixedMesh read_mixed_vtu(const std::filesystem::path& path) {
+    return read_cells(path, Accepted::TetrahedraAndHexahedra);
 }
 
 }  // namespace tissuewarp::meshing

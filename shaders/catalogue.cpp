@@ -28,6 +28,28 @@ void add_law(ProgramSource& source, Law law) {
     source.chunks.emplace_back(law_chunk.at(static_cast<std::size_t>(law)));
 }
 
+std::string kinematics_chunk(Cell cell) {
+    return cell == Cell::Tetrahedron ? "element" : "element.hexahedron";
+}
+
+/// Kinematics, law and viscosity of an element pass; the pressure follows.
+ProgramSource law_program(std::string kernel, Cell cell, const ElementForces& forces) {
+    ProgramSource source{
+        std::move(kernel),
+        {"index", "bindings", "numbers", "deformation", kinematics_chunk(cell), "material", "isochoric"},
+        {},
+        {}};
+    add_law(source, forces.law);
+    const bool viscous = forces.viscosity != Viscosity::None;
+    source.defines = {{"WORKGROUP_SIZE", workgroup_size}, {"USES_SHEAR", "1"}, {"HAS_VISCOSITY", flag(viscous)}};
+    if (viscous) {
+        source.chunks.emplace_back("viscosity.prony");
+        source.defines["PRONY_TERMS"] = std::to_string(forces.prony_terms) + "u";
+        source.defines["ADVANCES_TIME"] = flag(forces.viscosity == Viscosity::Advance);
+    }
+    return source;
+}
+
 ProgramSource node_program(std::string kernel, const NodeEffects& effects) {
     ProgramSource source{std::move(kernel), {"index", "bindings", "node"}, {}, {}};
     if (effects.springs) source.chunks.emplace_back("node.springs");
@@ -42,15 +64,7 @@ ProgramSource node_program(std::string kernel, const NodeEffects& effects) {
 }  // namespace
 
 ProgramSource element_force_program(const ElementForces& forces) {
-    ProgramSource source{"element_force", {"index", "bindings", "numbers", "element", "material", "isochoric"}, {}, {}};
-    add_law(source, forces.law);
-    const bool viscous = forces.viscosity != Viscosity::None;
-    source.defines = {{"WORKGROUP_SIZE", workgroup_size}, {"USES_SHEAR", "1"}, {"HAS_VISCOSITY", flag(viscous)}};
-    if (viscous) {
-        source.chunks.emplace_back("viscosity.prony");
-        source.defines["PRONY_TERMS"] = std::to_string(forces.prony_terms) + "u";
-        source.defines["ADVANCES_TIME"] = flag(forces.viscosity == Viscosity::Advance);
-    }
+    ProgramSource source = law_program("element_force", Cell::Tetrahedron, forces);
     if (forces.pressure == PressureRule::Element) {
         source.chunks.emplace_back("pressure.element");
     } else {
@@ -60,8 +74,15 @@ ProgramSource element_force_program(const ElementForces& forces) {
     return source;
 }
 
+ProgramSource hexahedron_force_program(const ElementForces& forces) {
+    ProgramSource source = law_program("hexahedron_force", Cell::Hexahedron, forces);
+    source.chunks.emplace_back("pressure.element");
+    return source;
+}
+
 ProgramSource element_volume_program() {
-    return {"element_volume", {"index", "bindings", "element"}, {{"WORKGROUP_SIZE", workgroup_size}}, {}};
+    return {
+        "element_volume", {"index", "bindings", "deformation", "element"}, {{"WORKGROUP_SIZE", workgroup_size}}, {}};
 }
 
 ProgramSource nodal_pressure_program(Law law) {
@@ -98,22 +119,26 @@ ProgramSource observe_nodes_program() {
             {}};
 }
 
-ProgramSource observe_elements_program() {
+ProgramSource observe_elements_program(Cell cell) {
     ProgramSource source = observe_nodes_program();
     source.kernel = "observe_elements";
-    source.chunks.emplace_back("element");
+    source.chunks.emplace_back("deformation");
+    source.chunks.emplace_back(kinematics_chunk(cell));
     return source;
 }
 
 std::vector<ProgramSource> every_program() {
-    std::vector<ProgramSource> all{element_volume_program(), impose_program(), previous_displacement_program(),
-                                   observe_nodes_program(), observe_elements_program()};
+    std::vector<ProgramSource> all{element_volume_program(),        impose_program(),
+                                   previous_displacement_program(), observe_nodes_program(),
+                                   observe_elements_program(),      observe_elements_program(Cell::Hexahedron)};
     for (int index = 0; index < law_count; ++index) {
         const auto law = static_cast<Law>(index);
         for (const PressureRule rule :
              {PressureRule::Element, PressureRule::Averaged, PressureRule::AveragedWithElementPart})
             for (const Viscosity viscosity : {Viscosity::None, Viscosity::Hold, Viscosity::Advance})
                 all.push_back(element_force_program({law, rule, viscosity, 3}));
+        for (const Viscosity viscosity : {Viscosity::None, Viscosity::Hold, Viscosity::Advance})
+            all.push_back(hexahedron_force_program({law, PressureRule::Element, viscosity, 3}));
         all.push_back(nodal_pressure_program(law));
     }
     for (const bool springs : {false, true})

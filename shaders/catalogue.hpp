@@ -38,6 +38,9 @@ struct ElementForces {
     int prony_terms = 0;  ///< of the scene's materials, the most; at least 1 with viscosity
 };
 
+/// The kinematics of the element passes: chunks element*.glsl.
+enum class Cell { Tetrahedron, Hexahedron };
+
 /// Effects that act on nodes; what is absent costs no read and no instruction.
 struct NodeEffects {
     bool springs = false;
@@ -48,6 +51,8 @@ enum class StoreResidual { No, Yes };
 enum class MaskConstrained { No, Yes };
 
 ProgramSource element_force_program(const ElementForces& forces);
+/// Of hexahedra, whose pressure rule is Element.
+ProgramSource hexahedron_force_program(const ElementForces& forces);
 ProgramSource element_volume_program();
 ProgramSource nodal_pressure_program(Law law);
 ProgramSource node_step_program(const NodeEffects& effects, StoreResidual store);
@@ -58,7 +63,7 @@ ProgramSource previous_displacement_program();
 /// Workgroups of the observing programs, each of which leaves one partial result.
 inline constexpr int observe_partials = 128;
 ProgramSource observe_nodes_program();
-ProgramSource observe_elements_program();
+ProgramSource observe_elements_program(Cell cell = Cell::Tetrahedron);
 
 /// Every program that the functions above can make, for checking them all.
 std::vector<ProgramSource> every_program();

@@ -2,6 +2,7 @@
 // element forces, gather by node, central-difference update. All sums run in a fixed order.
 
 #include "core/errors.hpp"
+#include "tled/detail/cpu_batches.hpp"
 #include "tled/detail/cpu_kernels.hpp"
 #include "tled/detail/kernel_parameters.hpp"
 #include "tled/detail/prony_coefficients.hpp"
@@ -21,82 +22,10 @@ namespace {
 
 using detail::Advance;
 using detail::batch_width;
+using detail::BatchBlock;
 using detail::ElementBatches;
 using detail::Kinematics;
 using detail::record;
-
-struct BatchBlock {
-    int material;            // of RestState::materials
-    std::size_t begin, end;  // batches
-};
-
-/// Position of internal element e in the padded batches.
-struct BatchLayout {
-    std::vector<BatchBlock> blocks;
-    std::vector<std::size_t> slot;  // element → batch·width + lane
-    std::vector<int> element;       // slot → element, −1 for padding
-};
-
-BatchLayout batch_layout(const RestState& rest) {
-    BatchLayout layout;
-    layout.slot.resize(static_cast<std::size_t>(rest.element_count()));
-    for (const MaterialBlock& block : rest.blocks) {
-        const std::size_t begin = layout.element.size() / batch_width;
-        for (int e = block.begin; e < block.end; ++e) {
-            layout.slot[static_cast<std::size_t>(e)] = layout.element.size();
-            layout.element.push_back(e);
-        }
-        while (layout.element.size() % batch_width != 0) layout.element.push_back(-1);
-        layout.blocks.push_back({block.material, begin, layout.element.size() / batch_width});
-    }
-    return layout;
-}
-
-template <class T>
-ElementBatches<T> element_batches(const RestState& rest, const BatchLayout& layout) {
-    ElementBatches<T> batches;
-    const std::size_t slots = layout.element.size();
-    const bool averaged = rest.pressure.count() > 0;
-    batches.node.resize(slots * 4);
-    if (averaged) batches.pressure.resize(slots * 4);
-    batches.gradient.resize(slots * 9);
-    if (rest.fibre.size() > 0) batches.fibre.resize(slots * 3);
-    batches.volume.assign(slots, T(0));
-    batches.volumetric_modulus.assign(slots, T(0));
-    int last = 0;
-    for (std::size_t s = 0; s < slots; ++s) {
-        const bool padding = layout.element[s] < 0;
-        const int e = padding ? last : layout.element[s];
-        last = e;
-        const std::size_t batch = s / batch_width, lane = s % batch_width;
-        for (std::size_t corner = 0; corner < 4; ++corner) {
-            const std::size_t at = (batch * 4 + corner) * batch_width + lane;
-            batches.node[at] = record * rest.nodes(static_cast<int>(corner), e);
-            if (averaged) batches.pressure[at] = rest.pressure.of_element(static_cast<int>(corner), e);
-        }
-        for (std::size_t k = 0; k < 9; ++k)
-            batches.gradient[(batch * 9 + k) * batch_width + lane] = T(rest.gradient(static_cast<int>(k), e));
-        for (std::size_t c = 0; rest.fibre.size() > 0 && c < 3; ++c)
-            batches.fibre[(batch * 3 + c) * batch_width + lane] = T(rest.fibre(static_cast<int>(c), e));
-        if (padding) continue;
-        batches.volume[s] = T(rest.volume[e]);
-        batches.volumetric_modulus[s] = T(rest.volumetric_modulus[e]);
-    }
-    return batches;
-}
-
-/// Offsets of corner-force records (or slots, for `corners == false`) that a node gathers.
-std::vector<std::uint32_t> gather_list(const Incidence& incidence, const BatchLayout& layout, bool corners) {
-    std::vector<std::uint32_t> list;
-    list.reserve(incidence.entry.size());
-    for (const int entry : incidence.entry) {
-        const std::size_t slot = layout.slot[static_cast<std::size_t>(entry / 4)];
-        const std::size_t corner = static_cast<std::size_t>(entry % 4);
-        const std::size_t force = (slot / batch_width * 4 + corner) * batch_width + slot % batch_width;
-        list.push_back(static_cast<std::uint32_t>(corners ? force : slot));
-    }
-    return list;
-}
 
 template <class T>
 std::vector<detail::KernelMaterial<T>> kernel_materials(const RestState& rest) {
@@ -120,21 +49,23 @@ template <class T>
 class CpuEngine final : public Engine {
 public:
     explicit CpuEngine(const RestState& rest)
-        : layout_(batch_layout(rest)),
-          elements_(element_batches<T>(rest, layout_)),
+        : layout_(detail::batch_layout(rest.blocks)),
+          elements_(detail::element_batches<T>(rest, layout_)),
+          hex_layout_(detail::batch_layout(rest.hexahedra.blocks)),
+          hexahedra_(detail::hex_batches<T>(rest.hexahedra, hex_layout_)),
           materials_(kernel_materials<T>(rest)),
           kinematics_(rest.pressure.count() > 0 ? Kinematics::AveragedPressure : Kinematics::T4),
           node_count_(static_cast<std::size_t>(rest.node_count)),
           tet_(rest.tet),
+          hex_(rest.hexahedra.hex),
           admits_inversion_(tled::admits_inversion(rest)),
-          force_offset_(rest.incidence.offset),
-          force_entry_(gather_list(rest.incidence, layout_, true)) {
+          forces_(detail::force_lists(rest, layout_, hex_layout_)) {
         const std::size_t vector_size = node_count_ * record;
         displacement_.assign(vector_size, T(0));
         increment_ = scratch_ = force_load_ = displacement_;
         inverse_mass_.assign(vector_size, T(0));
         spring_of_node_.assign(node_count_, -1);
-        corner_force_.assign(elements_.count() * 4 * batch_width * record, T(0));
+        corner_force_.assign(first_hex_force() + hexahedra_.count() * 8 * batch_width * record, T(0));
         if (kinematics_ == Kinematics::AveragedPressure) prepare_pressure(rest.pressure);
         prepare_viscosity(rest);
         free_.assign(vector_size, T(1));
@@ -274,23 +205,23 @@ public:
         const SmallestJacobian smallest = smallest_jacobian();
         seen.min_jacobian = smallest.value;
         seen.min_jacobian_tet = smallest.tet;
+        seen.min_jacobian_hex = smallest.hex;
         return seen;
     }
 
     [[nodiscard]] bool admits_inversion() const override { return admits_inversion_; }
 
     [[nodiscard]] SmallestJacobian smallest_jacobian() override {
-        change_.resize(elements_.count() * batch_width);
+        change_.resize(std::max(elements_.count(), hexahedra_.count()) * batch_width);
+        SmallestJacobian smallest{std::numeric_limits<double>::infinity()};
         for_batches(0, elements_.count(), [&](std::size_t begin, std::size_t end) {
             detail::volume_changes(elements_, begin, end, displacement_.data(), change_.data());
         });
-        SmallestJacobian smallest{std::numeric_limits<double>::infinity(), -1};
-        for (std::size_t e = 0; e < layout_.slot.size(); ++e) {
-            const double jacobian = 1 + double(change_[layout_.slot[e]]);
-            if (jacobian >= smallest.value) continue;
-            smallest = {jacobian, tet_[e]};
-            if (std::isnan(jacobian)) return {-std::numeric_limits<double>::infinity(), tet_[e]};
-        }
+        note_smallest(layout_.slot, smallest, [&](std::size_t e) { return std::pair{tet_[e], -1}; });
+        for_batches(0, hexahedra_.count(), [&](std::size_t begin, std::size_t end) {
+            detail::hex_volume_changes(hexahedra_, begin, end, displacement_.data(), change_.data());
+        });
+        note_smallest(hex_layout_.slot, smallest, [&](std::size_t e) { return std::pair{-1, hex_[e]}; });
         return smallest;
     }
 
@@ -303,17 +234,18 @@ public:
     [[nodiscard]] double precision() const override { return double(std::numeric_limits<T>::epsilon()); }
 
 private:
-    BatchLayout layout_;
+    detail::BatchLayout layout_;
     ElementBatches<T> elements_;
+    detail::BatchLayout hex_layout_;
+    detail::HexBatches<T> hexahedra_;
     std::vector<detail::KernelMaterial<T>> materials_;
     Kinematics kinematics_;
     std::size_t node_count_;
-    std::vector<int> tet_;
+    std::vector<int> tet_, hex_;
     bool admits_inversion_;
 
-    std::vector<int> force_offset_;
-    std::vector<std::uint32_t> force_entry_;
-    std::vector<T> corner_force_;
+    detail::ForceLists forces_;
+    std::vector<T> corner_force_;  // of tetrahedra, then of hexahedra
 
     // averaged pressure
     std::vector<int> pressure_offset_;
@@ -321,7 +253,7 @@ private:
     std::vector<T> inverse_pressure_volume_, pressure_modulus_, nodal_change_, nodal_pressure_, change_;
     std::vector<BatchBlock> pressure_runs_;  // runs of pressure nodes that share a material
 
-    // by material; empty where none is viscous
+    // by material, for tetrahedra and then again for hexahedra; empty where none is viscous
     std::vector<PronySeries> viscosity_;
     std::vector<detail::ViscousBatches<T>> viscous_;
 
@@ -339,7 +271,7 @@ private:
     void prepare_pressure(const PressureNodes& pressure) {
         const auto count = static_cast<std::size_t>(pressure.count());
         pressure_offset_ = pressure.incidence.offset;
-        pressure_entry_ = gather_list(pressure.incidence, layout_, false);
+        pressure_entry_ = detail::pressure_slots(pressure, layout_);
         inverse_pressure_volume_.resize(count);
         pressure_modulus_.resize(count);
         nodal_change_.assign(count, T(0));
@@ -385,16 +317,35 @@ private:
                                                    end, u, nodal_pressure_.data(), corner_force_.data());
             });
         }
+        T* hex_force = corner_force_.data() + first_hex_force();
+        for (const BatchBlock& block : hex_layout_.blocks) {
+            const auto m = static_cast<std::size_t>(block.material), v = viscosity_.size() + m;
+            for_batches(block.begin, block.end, [&](std::size_t begin, std::size_t end) {
+                if (viscous_.empty() || viscous_[v].coefficient.empty())
+                    detail::hex_forces(materials_[m], hexahedra_, begin, end, u, hex_force);
+                else
+                    detail::viscous_hex_forces(materials_[m], viscous_[v], advance, hexahedra_, begin, end, u,
+                                               hex_force);
+            });
+        }
     }
+
+    [[nodiscard]] std::size_t first_hex_force() const { return elements_.count() * 4 * batch_width * record; }
 
     void prepare_viscosity(const RestState& rest) {
         viscosity_ = rest.viscosity;
-        viscous_.resize(viscosity_.size());
-        for (const BatchBlock& block : layout_.blocks) {
-            if (viscosity_.empty()) break;
-            const auto m = static_cast<std::size_t>(block.material);
-            viscous_[m].first_batch = block.begin;
-            viscous_[m].stress.assign((block.end - block.begin) * viscosity_[m].terms.size() * 6 * batch_width, T(0));
+        viscous_.resize(2 * viscosity_.size());
+        const auto prepare = [&](const std::vector<BatchBlock>& blocks, std::size_t first) {
+            for (const BatchBlock& block : blocks) {
+                const auto m = static_cast<std::size_t>(block.material);
+                viscous_[first + m].first_batch = block.begin;
+                viscous_[first + m].stress.assign(
+                    (block.end - block.begin) * viscosity_[m].terms.size() * 6 * batch_width, T(0));
+            }
+        };
+        if (!viscosity_.empty()) {
+            prepare(layout_.blocks, 0);
+            prepare(hex_layout_.blocks, viscosity_.size());
         }
         set_time_step(0);
     }
@@ -402,7 +353,7 @@ private:
     void set_time_step(double time_step) {
         for (std::size_t m = 0; m < viscous_.size(); ++m) {
             viscous_[m].coefficient.clear();
-            for (const auto& [a, b] : detail::prony_coefficients(viscosity_[m], time_step))
+            for (const auto& [a, b] : detail::prony_coefficients(viscosity_[m % viscosity_.size()], time_step))
                 viscous_[m].coefficient.push_back({T(a), T(b)});
         }
     }
@@ -433,8 +384,8 @@ private:
 
     void gathered_force(std::size_t node, T (&sum)[3]) const {
         sum[0] = sum[1] = sum[2] = 0;
-        for (int k = force_offset_[node]; k < force_offset_[node + 1]; ++k) {
-            const T* f = &corner_force_[static_cast<std::size_t>(force_entry_[static_cast<std::size_t>(k)]) * record];
+        for (int k = forces_.offset[node]; k < forces_.offset[node + 1]; ++k) {
+            const T* f = &corner_force_[static_cast<std::size_t>(forces_.entry[static_cast<std::size_t>(k)]) * record];
             for (int c = 0; c < 3; ++c) sum[c] += f[c];
         }
     }
@@ -463,6 +414,19 @@ private:
             for (Eigen::Index c = 0; c < 3; ++c) result(c, static_cast<Eigen::Index>(node)) = double(residual[c]);
         });
         return result;
+    }
+
+    /// Takes the smallest of `change_` where it is below what is known; place(e) is its tetrahedron and hexahedron.
+    template <class Place>
+    void note_smallest(const std::vector<std::size_t>& slot, SmallestJacobian& smallest, const Place& place) const {
+        for (std::size_t e = 0; e < slot.size(); ++e) {
+            const double jacobian = 1 + double(change_[slot[e]]);
+            if (jacobian >= smallest.value) continue;
+            const auto [tet, hex] = place(e);
+            const bool unknown = std::isnan(jacobian);
+            smallest = {unknown ? -std::numeric_limits<double>::infinity() : jacobian, tet, hex};
+            if (unknown) return;
+        }
     }
 
     /// At u − (u − u⁻).

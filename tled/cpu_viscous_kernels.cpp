@@ -62,6 +62,16 @@ void viscous_element_forces_any(const KernelMaterial<T>& material, ViscousBatche
     });
 }
 
+template <class T>
+void viscous_hex_forces_any(const KernelMaterial<T>& material, ViscousBatches<T>& viscous, Advance advance,
+                            const HexBatches<T>& hexahedra, std::size_t begin, std::size_t end, const T* u, T* force) {
+    with_law(material.law, [&]<class Law>() {
+        element_forces_of<Law, Kinematics::T4>(material.parameter.data(), hexahedra, begin, end, u,
+                                               static_cast<const T*>(nullptr), force,
+                                               PronyRelaxation<T>{&viscous, advance});
+    });
+}
+
 // Highway dispatches plain functions: one name for each scalar type.
 void viscous_element_forces_f32(const KernelMaterial<float>& material, ViscousBatches<float>& viscous, Advance advance,
                                 Kinematics kinematics, const ElementBatches<float>& elements, std::size_t begin,
@@ -74,6 +84,16 @@ void viscous_element_forces_f64(const KernelMaterial<double>& material, ViscousB
                                 double* force) {
     viscous_element_forces_any(material, viscous, advance, kinematics, elements, begin, end, u, pressure, force);
 }
+void viscous_hex_forces_f32(const KernelMaterial<float>& material, ViscousBatches<float>& viscous, Advance advance,
+                            const HexBatches<float>& hexahedra, std::size_t begin, std::size_t end, const float* u,
+                            float* force) {
+    viscous_hex_forces_any(material, viscous, advance, hexahedra, begin, end, u, force);
+}
+void viscous_hex_forces_f64(const KernelMaterial<double>& material, ViscousBatches<double>& viscous, Advance advance,
+                            const HexBatches<double>& hexahedra, std::size_t begin, std::size_t end, const double* u,
+                            double* force) {
+    viscous_hex_forces_any(material, viscous, advance, hexahedra, begin, end, u, force);
+}
 
 }  // namespace HWY_NAMESPACE
 }  // namespace tissuewarp::tled::detail
@@ -84,6 +104,8 @@ namespace tissuewarp::tled::detail {
 
 HWY_EXPORT(viscous_element_forces_f32);
 HWY_EXPORT(viscous_element_forces_f64);
+HWY_EXPORT(viscous_hex_forces_f32);
+HWY_EXPORT(viscous_hex_forces_f64);
 
 template <>
 void viscous_element_forces(const KernelMaterial<float>& material, ViscousBatches<float>& viscous, Advance advance,
@@ -98,6 +120,18 @@ void viscous_element_forces(const KernelMaterial<double>& material, ViscousBatch
                             std::size_t end, const double* u, const double* pressure, double* force) {
     HWY_DYNAMIC_DISPATCH(viscous_element_forces_f64)
     (material, viscous, advance, kinematics, elements, begin, end, u, pressure, force);
+}
+template <>
+void viscous_hex_forces(const KernelMaterial<float>& material, ViscousBatches<float>& viscous, Advance advance,
+                        const HexBatches<float>& hexahedra, std::size_t begin, std::size_t end, const float* u,
+                        float* force) {
+    HWY_DYNAMIC_DISPATCH(viscous_hex_forces_f32)(material, viscous, advance, hexahedra, begin, end, u, force);
+}
+template <>
+void viscous_hex_forces(const KernelMaterial<double>& material, ViscousBatches<double>& viscous, Advance advance,
+                        const HexBatches<double>& hexahedra, std::size_t begin, std::size_t end, const double* u,
+                        double* force) {
+    HWY_DYNAMIC_DISPATCH(viscous_hex_forces_f64)(material, viscous, advance, hexahedra, begin, end, u, force);
 }
 
 }  // namespace tissuewarp::tled::detail

@@ -69,6 +69,7 @@ public:
           programs_((require_limits(device_), device_)),
           node_count_(rest.node_count),
           tet_(rest.tet),
+          hex_(rest.hexahedra.hex),
           admits_inversion_(tled::admits_inversion(rest)),
           force_(device_, programs_, rest, blocks_),
           displacement_(node_vectors("displacements")),
@@ -201,6 +202,7 @@ public:
         summarise_nodes(seen);
         seen.min_jacobian = smallest.value;
         seen.min_jacobian_tet = smallest.tet;
+        seen.min_jacobian_hex = smallest.hex;
         return seen;
     }
 
@@ -208,18 +210,20 @@ public:
 
     [[nodiscard]] SmallestJacobian smallest_jacobian() override {
         const CurrentContext current = device_.make_current();
+        SmallestJacobian smallest{std::numeric_limits<double>::infinity()};
         const Program& elements = programs_.get(shaders::observe_elements_program());
         force_.set_all_elements(elements);
         reduce(elements, element_partials_);
-        float least = std::numeric_limits<float>::max();
-        std::uint32_t element = std::numeric_limits<std::uint32_t>::max();
-        for (const ElementPartial& part : element_partials_.download())
-            if (part.volume_change < least || (part.volume_change == least && part.element < element)) {
-                least = part.volume_change;
-                element = part.element;
-            }
-        if (element == std::numeric_limits<std::uint32_t>::max()) return {-std::numeric_limits<double>::infinity(), -1};
-        return {1.0 + static_cast<double>(least), tet_[element]};
+        if (const auto [jacobian, e] = least_partial(); jacobian < smallest.value) smallest = {jacobian, tet_[e]};
+        if (!hex_.empty()) {
+            const Program& hexahedra = programs_.get(shaders::observe_elements_program(shaders::Cell::Hexahedron));
+            force_.set_all_hexahedra(hexahedra);
+            reduce(hexahedra, element_partials_);
+            if (const auto [jacobian, e] = least_partial(); jacobian < smallest.value)
+                smallest = {jacobian, -1, hex_[e]};
+        }
+        if (std::isinf(smallest.value)) smallest.value = -smallest.value;  // no J is finite
+        return smallest;
     }
 
     [[nodiscard]] std::string description() const override {
@@ -334,10 +338,28 @@ private:
         seen.finite = bad_displacements + bad_residuals == 0;
     }
 
+    struct LeastJacobian {
+        double value;  ///< +∞ where no J is finite
+        std::size_t element;
+    };
+
+    /// Merges the partial results of the last reduction over elements.
+    [[nodiscard]] LeastJacobian least_partial() const {
+        float least = std::numeric_limits<float>::max();
+        std::uint32_t element = std::numeric_limits<std::uint32_t>::max();
+        for (const ElementPartial& part : element_partials_.download())
+            if (part.volume_change < least || (part.volume_change == least && part.element < element)) {
+                least = part.volume_change;
+                element = part.element;
+            }
+        if (element == std::numeric_limits<std::uint32_t>::max()) return {std::numeric_limits<double>::infinity(), 0};
+        return {1.0 + static_cast<double>(least), element};
+    }
+
     shaders::Device device_;
     shaders::ProgramCache programs_;
     int node_count_;
-    std::vector<int> tet_;
+    std::vector<int> tet_, hex_;
     bool admits_inversion_;
     BlockBuffers blocks_;
     detail::GpuForce force_;
@@ -357,7 +379,9 @@ Matrix3Xd test_displacement(const RestState& rest) {
     double least_height = std::numeric_limits<double>::infinity();
     for (int e = 0; e < rest.element_count(); ++e)
         least_height = std::min(least_height, 1 / detail::shape_gradients(rest, e).colwise().norm().maxCoeff());
-    const double size = std::min(0.01 * std::cbrt(6 * rest.volume.mean()), 0.05 * least_height);
+    const double volume = rest.volume.sum() + rest.hexahedra.volume.sum();
+    const double edge = std::cbrt(volume / (rest.element_count() / 6.0 + rest.hexahedra.count()));
+    const double size = std::min(0.01 * edge, 0.05 * least_height);
     Matrix3Xd u(3, rest.node_count);
     for (Eigen::Index a = 0; a < u.cols(); ++a)
         u.col(a) << std::sin(0.37 * static_cast<double>(a)), std::cos(0.23 * static_cast<double>(a)),

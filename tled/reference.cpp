@@ -8,6 +8,7 @@
 #include <string>
 
 #include "core/errors.hpp"
+#include "tled/detail/hexahedra.hpp"
 #include "tled/detail/kinematics.hpp"
 #include "tled/detail/stiffness.hpp"
 
@@ -96,45 +97,59 @@ double elastic_energy(const RestState& rest, const Matrix3Xd& displacement) {
             energy[e] +=
                 rest.volume[e] * rest.volumetric_modulus[e] * volumetric_function(material, jacobian[e]).energy;
     });
-    double sum = std::accumulate(energy.begin(), energy.end(), 0.0);
+    double sum = std::accumulate(energy.begin(), energy.end(), 0.0) + detail::hex_energy(rest, displacement);
     const std::vector<VolumetricFunction> nodal = detail::nodal_volumetric(rest, jacobian);
     for (int a = 0; a < rest.pressure.count(); ++a) sum += rest.pressure.volume[a] * nodal[a].energy;
     return sum;
 }
 
 ViscousStresses unstressed(const RestState& rest) {
-    ViscousStresses stresses(rest.tet.size());
+    ViscousStresses stresses(rest.tet.size() + rest.hexahedra.hex.size());
     if (rest.viscosity.empty()) return stresses;
-    for (const MaterialBlock& block : rest.blocks)
-        for (int e = block.begin; e < block.end; ++e)
-            stresses[e].assign(rest.viscosity[block.material].terms.size(), Matrix3d::Zero());
+    const auto assign = [&](const std::vector<MaterialBlock>& blocks, int first) {
+        for (const MaterialBlock& block : blocks)
+            for (int e = block.begin; e < block.end; ++e)
+                stresses[first + e].assign(rest.viscosity[block.material].terms.size(), Matrix3d::Zero());
+    };
+    assign(rest.blocks, 0);
+    assign(rest.hexahedra.blocks, rest.element_count());
     return stresses;
 }
 
 ViscousStresses advanced(const RestState& rest, ViscousStresses stresses, const Matrix3Xd& displacement,
                          double time_step) {
     if (rest.viscosity.empty()) return stresses;
-    const std::vector<int> material_of = material_of_elements(rest);
-    tbb::parallel_for(0, rest.element_count(), [&](int e) {
-        const std::vector<PronyTerm>& terms = rest.viscosity[material_of[e]].terms;
+    const auto advance = [&](std::vector<Matrix3d>& q, int material, const Material& law, const Matrix3d& F) {
+        const std::vector<PronyTerm>& terms = rest.viscosity[material].terms;
         if (terms.empty()) return;
-        const Matrix3d F = detail::deformation_gradient(rest, displacement, e);
-        const Matrix3d S = F.inverse() * shear_stress(detail::element_material(rest, material_of[e], e), F);
+        const Matrix3d S = F.inverse() * shear_stress(law, F);
         for (std::size_t k = 0; k < terms.size(); ++k) {
             const auto [g, tau] = terms[k];
-            stresses[e][k] = (time_step * g * S + tau * stresses[e][k]) / (time_step + tau);
+            q[k] = (time_step * g * S + tau * q[k]) / (time_step + tau);
         }
+    };
+    const std::vector<int> material_of = material_of_elements(rest);
+    tbb::parallel_for(0, rest.element_count(), [&](int e) {
+        advance(stresses[e], material_of[e], detail::element_material(rest, material_of[e], e),
+                detail::deformation_gradient(rest, displacement, e));
+    });
+    const std::vector<int> material_of_hex = material_of_elements(rest.hexahedra.blocks);
+    tbb::parallel_for(0, rest.hexahedra.count(), [&](int e) {
+        advance(stresses[rest.element_count() + e], material_of_hex[e],
+                detail::hex_material(rest, material_of_hex[e], e),
+                detail::hex_deformation_gradient(rest.hexahedra, displacement, e));
     });
     return stresses;
 }
 
 Matrix3Xd internal_force(const RestState& rest, const Matrix3Xd& displacement) {
-    return internal_force(rest, displacement, ViscousStresses(rest.tet.size()));
+    return internal_force(rest, displacement, ViscousStresses(rest.tet.size() + rest.hexahedra.hex.size()));
 }
 
 Matrix3Xd internal_force(const RestState& rest, const Matrix3Xd& displacement, const ViscousStresses& stresses) {
     const VectorXd jacobian = detail::element_jacobians(rest, displacement);
     detail::require_positive(rest, jacobian);
+    detail::require_positive_hexahedra(rest, detail::hex_jacobians(rest.hexahedra, displacement));
     const std::vector<VolumetricFunction> nodal = detail::nodal_volumetric(rest, jacobian);
     const std::vector<int> material_of = material_of_elements(rest);
 
@@ -149,11 +164,17 @@ Matrix3Xd internal_force(const RestState& rest, const Matrix3Xd& displacement, c
     });
 
     Matrix3Xd force = Matrix3Xd::Zero(3, rest.node_count);
-    tbb::parallel_for(0, rest.node_count, [&](int a) {
-        for (int k = rest.incidence.offset[a]; k < rest.incidence.offset[a + 1]; ++k) {
-            force.col(a) += corner_force.col(rest.incidence.entry[k]);
-        }
-    });
+    const auto gather = [&](const Incidence& incidence, const Matrix3Xd& corners) {
+        tbb::parallel_for(0, rest.node_count, [&](int a) {
+            for (int k = incidence.offset[a]; k < incidence.offset[a + 1]; ++k) {
+                force.col(a) += corners.col(incidence.entry[k]);
+            }
+        });
+    };
+    gather(rest.incidence, corner_force);
+    if (rest.hexahedra.count() > 0) {
+        gather(rest.hexahedra.incidence, detail::hex_corner_forces(rest, displacement, stresses));
+    }
     return force;
 }
 
@@ -166,8 +187,10 @@ Eigen::SparseMatrix<double> tangent_stiffness(const RestState& rest, const Matri
 
 VectorXd jacobians(const RestState& rest, const Matrix3Xd& displacement) {
     const VectorXd internal = detail::element_jacobians(rest, displacement);
-    VectorXd result(internal.size());
+    const VectorXd hexahedra = detail::hex_jacobians(rest.hexahedra, displacement);
+    VectorXd result(internal.size() + hexahedra.size());
     for (int e = 0; e < internal.size(); ++e) result[rest.tet[e]] = internal[e];
+    for (int e = 0; e < hexahedra.size(); ++e) result[internal.size() + rest.hexahedra.hex[e]] = hexahedra[e];
     return result;
 }
 

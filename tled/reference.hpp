@@ -20,8 +20,8 @@ double elastic_energy(const RestState& rest, const Eigen::Matrix3Xd& displacemen
 /// f_int = ∂E/∂u, mN, 3 × N.
 Eigen::Matrix3Xd internal_force(const RestState& rest, const Eigen::Matrix3Xd& displacement);
 
-/// Viscous stresses q_i (second Piola–Kirchhoff, kPa) of every element, in the internal order; elements of elastic
-/// materials have none.
+/// Viscous stresses q_i (second Piola–Kirchhoff, kPa) of every element, in the internal order, tetrahedra before
+/// hexahedra; elements of elastic materials have none.
 using ViscousStresses = std::vector<std::vector<Eigen::Matrix3d>>;
 
 /// No stress in any term.
@@ -38,7 +38,7 @@ Eigen::Matrix3Xd internal_force(const RestState& rest, const Eigen::Matrix3Xd& d
 /// ∂²E/∂u² (3N × 3N, mN/mm, symmetric, both triangles stored), degree of freedom 3·node + component.
 Eigen::SparseMatrix<double> tangent_stiffness(const RestState& rest, const Eigen::Matrix3Xd& displacement);
 
-/// det F of every tetrahedron, in the order of the mesh.
+/// det F of every element, tetrahedra before hexahedra, in the order of the mesh.
 Eigen::VectorXd jacobians(const RestState& rest, const Eigen::Matrix3Xd& displacement);
 
 struct NewtonOptions {

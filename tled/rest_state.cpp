@@ -1,6 +1,7 @@
 #include "tled/rest_state.hpp"
 
 #include "core/errors.hpp"
+#include "tled/detail/hexahedra.hpp"
 
 #include <Eigen/LU>
 
@@ -25,7 +26,8 @@ PronySeries viscosity_of(const Model& model, int label) {
 }
 
 DistinctMaterials distinct_materials(const Model& model) {
-    const std::set<int> labels(model.mesh.labels.begin(), model.mesh.labels.end());
+    std::set<int> labels(model.mesh.labels.begin(), model.mesh.labels.end());
+    labels.insert(model.hexahedra.labels.begin(), model.hexahedra.labels.end());
     std::vector<int> by_law(labels.begin(), labels.end());
     std::stable_sort(by_law.begin(), by_law.end(),
                      [&](int a, int b) { return model.materials.at(a).index() < model.materials.at(b).index(); });
@@ -39,9 +41,7 @@ DistinctMaterials distinct_materials(const Model& model) {
     return result;
 }
 
-/// Groups tetrahedra by material, keeping the mesh's order within a group.
-void order_by_material(const Model& model, RestState& rest) {
-    const DistinctMaterials distinct = distinct_materials(model);
+void set_materials(const DistinctMaterials& distinct, RestState& rest) {
     bool viscous = false;
     for (const auto& [material, series] : distinct.materials) {
         rest.materials.push_back(material);
@@ -49,35 +49,43 @@ void order_by_material(const Model& model, RestState& rest) {
         viscous = viscous || !series.terms.empty();
     }
     if (!viscous) rest.viscosity.clear();
-    const auto material_of = [&](int tet) { return distinct.of_label.at(model.mesh.labels[tet]); };
-    rest.tet.resize(static_cast<std::size_t>(model.mesh.tet_count()));
-    std::iota(rest.tet.begin(), rest.tet.end(), 0);
-    std::stable_sort(rest.tet.begin(), rest.tet.end(), [&](int a, int b) { return material_of(a) < material_of(b); });
-    const int count = rest.element_count();
+}
+
+/// Groups elements by material, keeping the mesh's order within a group.
+void order_by_material(const Eigen::VectorXi& labels, const std::map<int, int>& material_of_label,
+                       std::vector<int>& order, std::vector<MaterialBlock>& blocks) {
+    const auto material_of = [&](int element) { return material_of_label.at(labels[element]); };
+    order.resize(static_cast<std::size_t>(labels.size()));
+    std::iota(order.begin(), order.end(), 0);
+    std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return material_of(a) < material_of(b); });
+    const int count = static_cast<int>(order.size());
     for (int begin = 0; begin < count;) {
-        const int material = material_of(rest.tet[static_cast<std::size_t>(begin)]);
+        const int material = material_of(order[static_cast<std::size_t>(begin)]);
         int end = begin;
-        while (end < count && material_of(rest.tet[static_cast<std::size_t>(end)]) == material) ++end;
-        rest.blocks.push_back({material, begin, end});
+        while (end < count && material_of(order[static_cast<std::size_t>(end)]) == material) ++end;
+        blocks.push_back({material, begin, end});
         begin = end;
     }
 }
 
-/// Directions of the mesh where it has them, else of the material; zero in tissue without fibres.
-void set_fibres(const Model& model, RestState& rest) {
+/// Directions of the elements `order` of the model where it has them, else of the material; zero in tissue without
+/// fibres. `first` is the place of the first element of this kind in Model::fibre.
+Eigen::Matrix3Xd fibres(const Model& model, const std::vector<Material>& materials,
+                        const std::vector<MaterialBlock>& blocks, const std::vector<int>& order, int first) {
     const auto has_fibres = [](const Material& material) {
         return std::holds_alternative<TransverselyIsotropic>(material);
     };
-    if (std::none_of(rest.materials.begin(), rest.materials.end(), has_fibres)) return;
-    rest.fibre = Eigen::Matrix3Xd::Zero(3, rest.element_count());
-    for (const MaterialBlock& block : rest.blocks) {
-        const auto* law = std::get_if<TransverselyIsotropic>(&rest.materials[static_cast<std::size_t>(block.material)]);
+    if (std::none_of(materials.begin(), materials.end(), has_fibres)) return {};
+    Eigen::Matrix3Xd result = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(order.size()));
+    for (const MaterialBlock& block : blocks) {
+        const auto* law = std::get_if<TransverselyIsotropic>(&materials[static_cast<std::size_t>(block.material)]);
         if (law == nullptr) continue;
         for (int e = block.begin; e < block.end; ++e) {
-            const int tet = rest.tet[static_cast<std::size_t>(e)];
-            rest.fibre.col(e) = model.fibre.size() > 0 ? Eigen::Vector3d(model.fibre.col(tet)) : law->fibre;
+            const int element = first + order[static_cast<std::size_t>(e)];
+            result.col(e) = model.fibre.size() > 0 ? Eigen::Vector3d(model.fibre.col(element)) : law->fibre;
         }
     }
+    return result;
 }
 
 void precompute_elements(const Model& model, RestState& rest) {
@@ -104,7 +112,7 @@ void precompute_elements(const Model& model, RestState& rest) {
     }
 }
 
-Incidence incidence_of(const Eigen::Matrix4Xi& of_element, int count) {
+Incidence incidence_of(const Eigen::Ref<const Eigen::MatrixXi>& of_element, int count) {
     Incidence lists;
     lists.offset.assign(static_cast<std::size_t>(count) + 1, 0);
     for (const int target : of_element.reshaped()) ++lists.offset[static_cast<std::size_t>(target) + 1];
@@ -154,13 +162,23 @@ RestState rest_state(const Model& model) {
     require_valid(model);
     RestState rest;
     rest.node_count = model.mesh.node_count();
-    order_by_material(model, rest);
+    rest.position = model.mesh.nodes;
+    const DistinctMaterials distinct = distinct_materials(model);
+    set_materials(distinct, rest);
+    order_by_material(model.mesh.labels, distinct.of_label, rest.tet, rest.blocks);
     precompute_elements(model, rest);
-    if ((rest.lumped_mass.array() <= 0).any())
-        throw InvalidInput("the model's mesh has nodes that belong to no tetrahedron; remove them");
     rest.incidence = incidence_of(rest.nodes, rest.node_count);
+    rest.fibre = fibres(model, rest.materials, rest.blocks, rest.tet, 0);
+    if (model.hexahedra.count() > 0) {
+        HexState& hexahedra = rest.hexahedra;
+        order_by_material(model.hexahedra.labels, distinct.of_label, hexahedra.hex, hexahedra.blocks);
+        detail::precompute_hexahedra(model, rest.materials, hexahedra, rest.lumped_mass);
+        hexahedra.incidence = incidence_of(hexahedra.nodes, rest.node_count);
+        hexahedra.fibre = fibres(model, rest.materials, hexahedra.blocks, hexahedra.hex, model.mesh.tet_count());
+    }
+    if ((rest.lumped_mass.array() <= 0).any())
+        throw InvalidInput("the model's mesh has nodes that belong to no element; remove them");
     if (model.element == Element::AveragedPressureT4) rest.pressure = pressure_nodes(rest);
-    set_fibres(model, rest);
     return rest;
 }
 
@@ -169,11 +187,14 @@ bool admits_inversion(const RestState& rest) {
                        [](const Material& material) { return admits_inversion(material); });
 }
 
-std::vector<int> material_of_elements(const RestState& rest) {
-    std::vector<int> result(rest.tet.size());
-    for (const MaterialBlock& block : rest.blocks)
-        std::fill(result.begin() + block.begin, result.begin() + block.end, block.material);
+std::vector<int> material_of_elements(const std::vector<MaterialBlock>& blocks) {
+    std::vector<int> result;
+    for (const MaterialBlock& block : blocks) result.resize(static_cast<std::size_t>(block.end), block.material);
     return result;
+}
+
+std::vector<int> material_of_elements(const RestState& rest) {
+    return material_of_elements(rest.blocks);
 }
 
 }  // namespace tissuewarp::tled

@@ -22,6 +22,8 @@
 #define BINDING_FIBRE 17               // unit vector of element
 #define BINDING_PRONY 18
 #define BINDING_VISCOUS_STRESS 19      // kPa
+#define BINDING_HEX_NODES 20
+#define BINDING_HEX_REST 21
 
 // Outside of a step, these take the place of blocks that the kernel at hand does not use.
 #define BINDING_PARTIAL 6

@@ -13,7 +13,7 @@ namespace {
 
 using namespace scene;
 
-class Engines : public ::testing::TestWithParam<std::tuple<Kind, Element, Laws>> {
+class Engines : public ::testing::TestWithParam<std::tuple<Kind, Cells, Laws>> {
 protected:
     Kind kind = std::get<0>(GetParam());
     Model model = cube(5, std::get<1>(GetParam()), std::get<2>(GetParam()));
@@ -23,17 +23,16 @@ protected:
     Matrix3Xd zero = Matrix3Xd::Zero(3, rest.node_count);
 };
 
-INSTANTIATE_TEST_SUITE_P(All, Engines,
-                         ::testing::Combine(::testing::Values(Kind::CpuFloat64, Kind::CpuFloat32, Kind::Gpu),
-                                            ::testing::Values(Element::T4, Element::AveragedPressureT4),
-                                            ::testing::Values(Laws::Iso, Laws::LnJ, Laws::Stable, Laws::Polynomial,
-                                                              Laws::ArrudaBoyce, Laws::Ogden, Laws::Fibres,
-                                                              Laws::Mixed)),
-                         [](const auto& each) {
-                             const std::string element =
-                                 std::get<1>(each.param) == Element::T4 ? "T4" : "AveragedPressure";
-                             return name_of(std::get<0>(each.param)) + element + name_of(std::get<2>(each.param));
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    All, Engines,
+    ::testing::Combine(::testing::Values(Kind::CpuFloat64, Kind::CpuFloat32, Kind::Gpu),
+                       ::testing::Values(Cells::T4, Cells::AveragedPressure, Cells::Hexahedra, Cells::Mixed),
+                       ::testing::Values(Laws::Iso, Laws::LnJ, Laws::Stable, Laws::Polynomial, Laws::ArrudaBoyce,
+                                         Laws::Ogden, Laws::Fibres, Laws::Mixed)),
+    [](const auto& each) {
+        return std::string(name_of(std::get<0>(each.param))) + name_of(std::get<1>(each.param)) +
+               name_of(std::get<2>(each.param));
+    });
 
 TEST_P(Engines, InternalForceIsTheReferences) {
     for (const double amplitude : {1.0, 0.01}) {
@@ -98,10 +97,12 @@ TEST_P(Engines, ObservesWhatTheHostComputes) {
     EXPECT_NEAR(seen.increment_mass, increment_mass, 1e-4 * increment_mass);
     const double increment_stiffness = plain.v.cwiseProduct(plain.previous_residual - residual).sum();
     EXPECT_NEAR(seen.increment_stiffness, increment_stiffness, 1e-3 * std::abs(increment_stiffness));
-    Eigen::Index tet = -1;
-    const double least = jacobians(rest, plain.u).minCoeff(&tet);
+    Eigen::Index element = -1;
+    const double least = jacobians(rest, plain.u).minCoeff(&element);
     EXPECT_NEAR(seen.min_jacobian, least, 1e-5);
-    EXPECT_EQ(seen.min_jacobian_tet, static_cast<int>(tet));
+    const int tets = model.mesh.tet_count(), number = static_cast<int>(element);
+    EXPECT_EQ(seen.min_jacobian_tet, number < tets ? number : -1);
+    EXPECT_EQ(seen.min_jacobian_hex, number < tets ? -1 : number - tets);
 }
 
 TEST_P(Engines, RepeatsBitByBit) {

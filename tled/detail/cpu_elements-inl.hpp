@@ -1,4 +1,5 @@
-// The element pass of total Lagrangian dynamics (Miller et al. 2007, section 3) for batches of linear tetrahedra:
+// The element pass of total Lagrangian dynamics (Miller et al. 2007, section 3) for batches of linear tetrahedra
+// and one-point hexahedra:
 // displacement gradient from precomputed derivatives, first Piola–Kirchhoff stress, corner forces f_a = V P ∂N_a/∂X.
 // Included once for each instruction set (Highway's convention for -inl files).
 //
@@ -17,6 +18,7 @@
 
 #include "tled/detail/cpu_kernels.hpp"
 #include "tled/detail/cpu_laws-inl.hpp"
+#include "tled/hex_state.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace tissuewarp::tled::detail {
@@ -96,6 +98,50 @@ Strain<D> strain_of(D d, const ElementBatches<T>& elements, std::size_t batch, i
     return strain;
 }
 
+/// The strain of hexahedra and their hourglass displacements q_α = Σ_I Γ_αI (u_I − u_0) − H X^Γ_α.
+template <class D>
+struct HexStrain : Strain<D> {
+    Vec<D> hourglass[4][3];
+};
+
+template <class D, class T>
+HexStrain<D> strain_of(D d, const HexBatches<T>& hexahedra, std::size_t batch, int lane, const T* u) {
+    const std::int32_t* node = &hexahedra.node[batch * 8 * batch_width + lane];
+    const T* gradient = &hexahedra.gradient[batch * 21 * batch_width + lane];
+    const T* rest_hourglass = &hexahedra.rest_hourglass[batch * 12 * batch_width + lane];
+    HexStrain<D> strain;
+    for (int i = 0; i < 3; ++i) {
+        const auto u0 = gather(d, u + i, node);
+        for (int j = 0; j < 3; ++j) strain.H[i][j] = hn::Zero(d);
+        for (int alpha = 0; alpha < 4; ++alpha) strain.hourglass[alpha][i] = hn::Zero(d);
+        for (int k = 0; k < 7; ++k) {
+            const auto difference = gather(d, u + i, node + (k + 1) * batch_width) - u0;
+            for (int j = 0; j < 3; ++j)
+                strain.H[i][j] =
+                    hn::MulAdd(difference, hn::LoadU(d, gradient + (3 * k + j) * batch_width), strain.H[i][j]);
+            for (int alpha = 0; alpha < 4; ++alpha) {
+                auto& q = strain.hourglass[alpha][i];
+                q = hourglass_base[alpha][k + 1] > 0 ? q + difference : q - difference;
+            }
+        }
+        for (int alpha = 0; alpha < 4; ++alpha)
+            for (int j = 0; j < 3; ++j)
+                strain.hourglass[alpha][i] =
+                    hn::NegMulAdd(strain.H[i][j], hn::LoadU(d, rest_hourglass + (3 * alpha + j) * batch_width),
+                                  strain.hourglass[alpha][i]);
+    }
+    finish_strain(d, static_cast<Strain<D>&>(strain));
+    return strain;
+}
+
+/// V p, kPa mm³, of hexahedra.
+template <class Law, Kinematics kinematics, class D, class T>
+Vec<D> scaled_pressure(D d, const HexBatches<T>& hexahedra, std::size_t batch, int lane, Vec<D> volume, Vec<D> change,
+                       const T* /*pressure*/) {
+    const auto modulus = hn::LoadU(d, &hexahedra.volumetric_modulus[batch * batch_width + lane]);
+    return volume * (modulus * Response<Law>::pressure_factor(d, change));
+}
+
 /// V p, kPa mm³.
 template <class Law, Kinematics kinematics, class D, class T>
 Vec<D> scaled_pressure(D d, const ElementBatches<T>& elements, std::size_t batch, int lane, Vec<D> volume,
@@ -114,8 +160,8 @@ Vec<D> scaled_pressure(D d, const ElementBatches<T>& elements, std::size_t batch
 
 /// f_a = V P ∂N_a/∂X for the scaled stress V P; the first corner takes minus the sum of the others.
 template <class D, class T>
-void store_corner_forces(D d, const ElementBatches<T>& elements, std::size_t batch, int lane, const Vec<D> (&P)[3][3],
-                         T* force) {
+void store_corner_forces(D d, const ElementBatches<T>& elements, std::size_t batch, int lane,
+                         const Strain<D>& /*strain*/, const Vec<D> (&P)[3][3], T* force) {
     const T* gradient = &elements.gradient[batch * 9 * batch_width + static_cast<std::size_t>(lane)];
     T* out = force + (batch * 4 * batch_width + static_cast<std::size_t>(lane)) * record;
     const auto zero = hn::Zero(d);
@@ -134,6 +180,41 @@ void store_corner_forces(D d, const ElementBatches<T>& elements, std::size_t bat
     hn::StoreInterleaved4(f0[0], f0[1], f0[2], zero, d, out);
 }
 
+/// f_I = (V P − k Σ_α q_α ⊗ X^Γ_α) ∂N_I/∂X + k Σ_α Γ_αI q_α; the first corner takes minus the sum of the others.
+template <class D, class T>
+void store_corner_forces(D d, const HexBatches<T>& hexahedra, std::size_t batch, int lane, const HexStrain<D>& strain,
+                         const Vec<D> (&P)[3][3], T* force) {
+    const T* gradient = &hexahedra.gradient[batch * 21 * batch_width + lane];
+    const T* rest_hourglass = &hexahedra.rest_hourglass[batch * 12 * batch_width + lane];
+    const auto stiffness = hn::LoadU(d, &hexahedra.hourglass_stiffness[batch * batch_width + lane]);
+    Vec<D> A[3][3], q[4][3];
+    for (int i = 0; i < 3; ++i) {
+        for (int alpha = 0; alpha < 4; ++alpha) q[alpha][i] = stiffness * strain.hourglass[alpha][i];
+        for (int j = 0; j < 3; ++j) {
+            A[i][j] = P[i][j];
+            for (int alpha = 0; alpha < 4; ++alpha)
+                A[i][j] =
+                    hn::NegMulAdd(q[alpha][i], hn::LoadU(d, rest_hourglass + (3 * alpha + j) * batch_width), A[i][j]);
+        }
+    }
+    T* out = force + (batch * 8 * batch_width + lane) * record;
+    const auto zero = hn::Zero(d);
+    Vec<D> f0[3] = {zero, zero, zero};
+    for (int k = 0; k < 7; ++k) {
+        Vec<D> f[3];
+        for (int i = 0; i < 3; ++i) {
+            f[i] = zero;
+            for (int j = 0; j < 3; ++j)
+                f[i] = hn::MulAdd(A[i][j], hn::LoadU(d, gradient + (3 * k + j) * batch_width), f[i]);
+            for (int alpha = 0; alpha < 4; ++alpha)
+                f[i] = hourglass_base[alpha][k + 1] > 0 ? f[i] + q[alpha][i] : f[i] - q[alpha][i];
+            f0[i] = f0[i] - f[i];
+        }
+        hn::StoreInterleaved4(f[0], f[1], f[2], zero, d, out + (k + 1) * batch_width * record);
+    }
+    hn::StoreInterleaved4(f0[0], f0[1], f0[2], zero, d, out);
+}
+
 /// Elastic tissue: nothing happens to the stress of a batch.
 struct Elastic {
     template <class D>
@@ -141,16 +222,17 @@ struct Elastic {
                     Vec<D> (&/*P*/)[3][3]) const {}
 };
 
-/// `after_shear(d, batch, lane, strain, P)` may change the shear stress P (times volume) of each batch.
-template <class Law, Kinematics kinematics, class T, class AfterShear = Elastic>
-void element_forces_of(const T* parameter, const ElementBatches<T>& elements, std::size_t begin, std::size_t end,
-                       const T* u, const T* pressure, T* force, const AfterShear& after_shear = {}) {
+/// `after_shear(d, batch, lane, strain, P)` may change the shear stress P (times volume) of each batch. Hexahedra have
+/// no averaged pressure: their `kinematics` is T4.
+template <class Law, Kinematics kinematics, class T, class Batches, class AfterShear = Elastic>
+void element_forces_of(const T* parameter, const Batches& elements, std::size_t begin, std::size_t end, const T* u,
+                       const T* pressure, T* force, const AfterShear& after_shear = {}) {
     const hn::CappedTag<T, batch_width> d;
     using D = hn::CappedTag<T, batch_width>;
     const int lanes = static_cast<int>(hn::Lanes(d));
     for (std::size_t batch = begin; batch < end; ++batch)
         for (int lane = 0; lane < batch_width; lane += lanes) {
-            Strain<D> strain = strain_of(d, elements, batch, lane, u);
+            auto strain = strain_of(d, elements, batch, lane, u);
             strain.change = admissible<Law>(d, strain.change);
             Tissue<D> tissue;
             tissue.parameter = parameter;
@@ -164,18 +246,17 @@ void element_forces_of(const T* parameter, const ElementBatches<T>& elements, st
             const auto p = scaled_pressure<Law, kinematics>(d, elements, batch, lane, volume, strain.change, pressure);
             for (int i = 0; i < 3; ++i)
                 for (int j = 0; j < 3; ++j) P[i][j] = hn::MulAdd(p, strain.cof[i][j], P[i][j]);
-            store_corner_forces(d, elements, batch, lane, P, force);
+            store_corner_forces(d, elements, batch, lane, strain, P, force);
         }
 }
 
-template <class T>
-void volume_changes_of(const ElementBatches<T>& elements, std::size_t begin, std::size_t end, const T* u, T* change) {
+template <class T, class Batches>
+void volume_changes_of(const Batches& elements, std::size_t begin, std::size_t end, const T* u, T* change) {
     const hn::CappedTag<T, batch_width> d;
-    using D = hn::CappedTag<T, batch_width>;
     const int lanes = static_cast<int>(hn::Lanes(d));
     for (std::size_t batch = begin; batch < end; ++batch)
         for (int lane = 0; lane < batch_width; lane += lanes)
-            hn::StoreU(strain_of<D>(d, elements, batch, lane, u).change, d,
+            hn::StoreU(strain_of(d, elements, batch, lane, u).change, d,
                        change + batch * batch_width + static_cast<std::size_t>(lane));
 }
 

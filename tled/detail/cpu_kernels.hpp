@@ -29,10 +29,26 @@ struct ElementBatches {
     [[nodiscard]] std::size_t count() const { return volume.size() / batch_width; }
 };
 
+/// One-point hexahedra (tled/hex_state.hpp), in the same batches.
+template <class T>
+struct HexBatches {
+    std::vector<std::int32_t> node;      ///< batch × 8 corners × width: 4·node
+    std::vector<T> gradient;             ///< batch × 21 × width, 1/mm
+    std::vector<T> volume;               ///< batch × width, mm³
+    std::vector<T> volumetric_modulus;   ///< batch × width, kPa
+    std::vector<T> rest_hourglass;       ///< batch × 12 × width, mm
+    std::vector<T> hourglass_stiffness;  ///< batch × width, mN/mm
+    std::vector<T> fibre;                ///< batch × 3 × width; empty where no material has fibres
+    [[nodiscard]] std::size_t count() const { return volume.size() / batch_width; }
+};
+
 /// det F − 1 of each element of batches [begin, end) at displacement `u` (records).
 template <class T>
 void volume_changes(const ElementBatches<T>& elements, std::size_t begin, std::size_t end, const T* u,
                     T* jacobian_minus_1);
+template <class T>
+void hex_volume_changes(const HexBatches<T>& hexahedra, std::size_t begin, std::size_t end, const T* u,
+                        T* jacobian_minus_1);
 
 /// A material as the kernels take it: `law` indexes the alternatives of Material, the parameters are those of
 /// detail/kernel_parameters.hpp.
@@ -47,6 +63,11 @@ struct KernelMaterial {
 template <class T>
 void element_forces(const KernelMaterial<T>& material, Kinematics kinematics, const ElementBatches<T>& elements,
                     std::size_t begin, std::size_t end, const T* u, const T* pressure, T* force);
+
+/// The same for the eight corners of hexahedra, records at batch·8·width + corner·width + lane.
+template <class T>
+void hex_forces(const KernelMaterial<T>& material, const HexBatches<T>& hexahedra, std::size_t begin, std::size_t end,
+                const T* u, T* force);
 
 enum class Advance { No, Yes };
 
@@ -63,6 +84,10 @@ template <class T>
 void viscous_element_forces(const KernelMaterial<T>& material, ViscousBatches<T>& viscous, Advance advance,
                             Kinematics kinematics, const ElementBatches<T>& elements, std::size_t begin,
                             std::size_t end, const T* u, const T* pressure, T* force);
+
+template <class T>
+void viscous_hex_forces(const KernelMaterial<T>& material, ViscousBatches<T>& viscous, Advance advance,
+                        const HexBatches<T>& hexahedra, std::size_t begin, std::size_t end, const T* u, T* force);
 
 /// M U'(J) for J = 1 + `change`, per pressure node of one law.
 template <class T>

@@ -73,13 +73,15 @@ GpuForce::Viscous::Viscous(const shaders::Device& device, const RestState& rest)
     : series(rest.viscosity),
       terms(most_terms(series)),
       coefficients(device, series.size() * terms, "Prony coefficients"),
-      stress(device, 2 * terms * static_cast<std::size_t>(rest.element_count()), "viscous stresses"),
+      stress(device, 2 * terms * static_cast<std::size_t>(rest.element_count() + rest.hexahedra.count()),
+             "viscous stresses"),
       kept(device, stress.size(), "kept viscous stresses") {}
 
 GpuForce::GpuForce(const shaders::Device& device, shaders::ProgramCache& programs, const RestState& rest,
                    BlockBuffers& blocks)
     : element_count_(static_cast<std::size_t>(rest.element_count())),
-      corner_force_(device, 4 * element_count_, "corner forces") {
+      hex_count_(static_cast<std::size_t>(rest.hexahedra.count())),
+      corner_force_(device, 4 * element_count_ + 8 * hex_count_, "corner forces") {
     const shaders::CurrentContext current = device.make_current();
     {
         const GpuElements layout = gpu_elements(rest);
@@ -95,6 +97,11 @@ GpuForce::GpuForce(const shaders::Device& device, shaders::ProgramCache& program
     blocks.set("CornerForce", corner_force_);
     blocks.set("MaterialParameters", *materials_);
     if (fibre_) blocks.set("Fibre", *fibre_);
+    if (hex_count_ > 0) {
+        hexahedra_.emplace(device, gpu_hexahedra(rest.hexahedra));
+        blocks.set("HexNodes", hexahedra_->nodes);
+        blocks.set("HexRest", hexahedra_->rest);
+    }
     std::vector<MaterialBlock> pressure_blocks;
     if (rest.pressure.count() > 0) {
         const GpuPressure layout = gpu_pressure(rest);
@@ -148,6 +155,12 @@ Stage GpuForce::force_stage(shaders::ProgramCache& programs, const RestState& re
         stage.push_back(
             ranged(programs.get(shaders::element_force_program(forces)), run.begin, run.end, element_count_));
     }
+    forces.pressure = shaders::PressureRule::Element;
+    for (const LawRun& run : law_runs(rest, rest.hexahedra.blocks)) {
+        forces.law = run.law;
+        const shaders::Program& program = programs.get(shaders::hexahedron_force_program(forces));
+        stage.push_back(ranged_hexahedra(program, run.begin, run.end));
+    }
     return stage;
 }
 
@@ -190,6 +203,15 @@ void GpuForce::keep_viscous_stresses() {
 
 void GpuForce::return_to_kept_viscous_stresses() {
     if (viscous_) viscous_->stress.copy_from(viscous_->kept, viscous_->stress.bytes());
+}
+
+Pass GpuForce::ranged_hexahedra(const shaders::Program& program, int begin, int end) const {
+    program.set(3, unsigned_count(element_count_));
+    return ranged(program, begin, end, hex_count_);
+}
+
+void GpuForce::set_all_hexahedra(const shaders::Program& program) const {
+    static_cast<void>(ranged_hexahedra(program, 0, static_cast<int>(hex_count_)));
 }
 
 void GpuForce::set_all_elements(const shaders::Program& program) const {

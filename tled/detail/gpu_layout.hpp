@@ -1,5 +1,5 @@
 #pragma once
-/// The rest state in the arrays that the GLSL kernels read (contracts in shaders/chunks/element.glsl, node.glsl and
+/// The rest state in the arrays that the GLSL kernels read (contracts in shaders/chunks/element*.glsl, node.glsl and
 /// shaders/kernels/nodal_pressure.comp).
 
 #include "tled/conditions.hpp"
@@ -19,10 +19,17 @@ struct GpuElements {
     std::vector<Uint4> nodes;                   ///< M
     std::vector<Float4> rest;                   ///< 3 M
     std::vector<Float4> materials;              ///< two for each material
-    std::vector<Float4> fibre;                  ///< M, or empty
-    std::vector<std::uint32_t> node_incidence;  ///< N + 1 offsets, 4 M positions of corner forces
+    std::vector<Float4> fibre;                  ///< M, then those of hexahedra; or empty
+    std::vector<std::uint32_t> node_incidence;  ///< N + 1 offsets, 4 M (+ 8 hexahedra) positions of corner forces
 };
 GpuElements gpu_elements(const RestState& rest);
+
+/// What chunks/element.hexahedron.glsl reads.
+struct GpuHexahedra {
+    std::vector<Uint4> nodes;  ///< 2 M
+    std::vector<Float4> rest;  ///< 10 M
+};
+GpuHexahedra gpu_hexahedra(const HexState& hexahedra);
 
 struct GpuPressure {
     std::vector<Uint4> corners;            ///< M

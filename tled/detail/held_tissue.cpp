@@ -17,40 +17,23 @@ using Eigen::Vector3d;
 
 namespace {
 
-// X_k − X_0 in the columns: the inverse of the gradients ∂N_k/∂X_j (row k).
-Matrix3d rest_edges(const RestState& rest, int element) {
-    const Matrix3d gradient = rest.gradient.col(element).reshaped(3, 3).transpose();
-    return gradient.inverse();
-}
-
-// Nodes connected with `seed` by tetrahedra, with rest positions relative to it. `visited` marks them.
-struct Piece {
-    std::vector<int> nodes;
-    std::vector<Vector3d> positions;  // mm
-};
-
-Piece connected_piece(const RestState& rest, int seed, std::vector<bool>& visited) {
-    Piece piece{{seed}, {Vector3d::Zero()}};
+// Nodes connected with `seed` by elements. `visited` marks them.
+std::vector<int> connected_nodes(const RestState& rest, int seed, std::vector<bool>& visited) {
+    std::vector<int> piece{seed};
     visited[seed] = true;
-    for (std::size_t next = 0; next < piece.nodes.size(); ++next) {
-        const int node = piece.nodes[next];
-        for (int k = rest.incidence.offset[node]; k < rest.incidence.offset[node + 1]; ++k) {
-            const int e = rest.incidence.entry[k] / 4, corner = rest.incidence.entry[k] % 4;
-            if (visited[rest.nodes(0, e)] && visited[rest.nodes(1, e)] && visited[rest.nodes(2, e)] &&
-                visited[rest.nodes(3, e)]) {
-                continue;
-            }
-            const Matrix3d edges = rest_edges(rest, e);
-            const auto local = [&](int c) -> Vector3d {
-                return c == 0 ? Vector3d::Zero() : Vector3d(edges.col(c - 1));
-            };
-            for (int c = 0; c < 4; ++c) {
-                const int other = rest.nodes(c, e);
-                if (visited[other]) continue;
-                visited[other] = true;
-                piece.nodes.push_back(other);
-                piece.positions.push_back(piece.positions[next] + local(c) - local(corner));
-            }
+    const auto add = [&](int node) {
+        if (!visited[node]) piece.push_back(node);
+        visited[node] = true;
+    };
+    const Incidence &tets = rest.incidence, &hexes = rest.hexahedra.incidence;
+    for (std::size_t next = 0; next < piece.size(); ++next) {
+        const int node = piece[next];
+        for (int k = tets.offset[node]; k < tets.offset[node + 1]; ++k) {
+            for (int other : rest.nodes.col(tets.entry[k] / 4)) add(other);
+        }
+        if (hexes.offset.empty()) continue;
+        for (int k = hexes.offset[node]; k < hexes.offset[node + 1]; ++k) {
+            for (int other : rest.hexahedra.nodes.col(hexes.entry[k] / 8)) add(other);
         }
     }
     return piece;
@@ -58,22 +41,22 @@ Piece connected_piece(const RestState& rest, int seed, std::vector<bool>& visite
 
 // Rᵀ K R of what holds the piece, for R the three translations and three rotations (scaled by the piece's radius) about
 // its centre. Springs count by the ratio to the stiffest one, prescribed components as one.
-Eigen::Matrix<double, 6, 6> rigid_resistance(const Piece& piece, const NodalConditions& conditions,
-                                             const std::vector<int>& spring_of, double spring_scale) {
+Eigen::Matrix<double, 6, 6> rigid_resistance(const RestState& rest, const std::vector<int>& piece,
+                                             const NodalConditions& conditions, const std::vector<int>& spring_of,
+                                             double spring_scale) {
     Vector3d centre = Vector3d::Zero();
-    for (const Vector3d& x : piece.positions) centre += x / static_cast<double>(piece.positions.size());
+    for (const int node : piece) centre += rest.position.col(node) / static_cast<double>(piece.size());
     double radius = 0.0;
-    for (const Vector3d& x : piece.positions) radius = std::max(radius, (x - centre).norm());
+    for (const int node : piece) radius = std::max(radius, (rest.position.col(node) - centre).norm());
 
     Eigen::Matrix<double, 6, 6> resistance = Eigen::Matrix<double, 6, 6>::Zero();
-    for (std::size_t n = 0; n < piece.nodes.size(); ++n) {
-        const int node = piece.nodes[n];
+    for (const int node : piece) {
         Matrix3d hold = conditions.constrained.col(node).cast<double>().asDiagonal();
         if (spring_of[node] >= 0) {
             hold += spring_matrix(conditions, spring_of[node]) / spring_scale;
         }
         if (hold.isZero(0.0)) continue;
-        const Vector3d x = radius > 0.0 ? Vector3d((piece.positions[n] - centre) / radius) : Vector3d::Zero();
+        const Vector3d x = radius > 0.0 ? Vector3d((rest.position.col(node) - centre) / radius) : Vector3d::Zero();
         Eigen::Matrix<double, 3, 6> motion;
         motion << Matrix3d::Identity(), Matrix3d{{0, x[2], -x[1]}, {-x[2], 0, x[0]}, {x[1], -x[0], 0}};
         resistance += motion.transpose() * hold * motion;
@@ -94,14 +77,14 @@ void require_held(const RestState& rest, const NodalConditions& conditions) {
     std::vector<bool> visited(rest.node_count, false);
     for (int seed = 0; seed < rest.node_count; ++seed) {
         if (visited[seed]) continue;
-        const Piece piece = connected_piece(rest, seed, visited);
-        if (piece.nodes.size() == 1 && conditions.constrained.col(seed).all()) continue;
-        const auto resistance = rigid_resistance(piece, conditions, spring_of, largest > 0 ? largest : 1.0);
+        const std::vector<int> piece = connected_nodes(rest, seed, visited);
+        if (piece.size() == 1 && conditions.constrained.col(seed).all()) continue;
+        const auto resistance = rigid_resistance(rest, piece, conditions, spring_of, largest > 0 ? largest : 1.0);
         const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> modes(resistance, Eigen::EigenvaluesOnly);
         if (modes.eigenvalues()[0] > rigid * modes.eigenvalues()[5]) continue;
         const int free = static_cast<int>((modes.eigenvalues().array() <= rigid * modes.eigenvalues()[5]).count());
         throw InvalidInput(
-            "nothing holds the tissue: the piece of " + std::to_string(piece.nodes.size()) +
+            "nothing holds the tissue: the piece of " + std::to_string(piece.size()) +
             " connected nodes that holds node " + std::to_string(seed) + " can still move in " + std::to_string(free) +
             " of 6 rigid motions; add springs or prescribed displacements on at least three of its nodes, "
             "not on one line");
