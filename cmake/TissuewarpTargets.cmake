@@ -10,8 +10,8 @@ target_compile_options(tissuewarp_warnings INTERFACE
 
 if(TISSUEWARP_SANITIZE)
   # GCC 12 sees uninitialised values inside <regex> and <functional> when it instruments them.
-  add_compile_options(-fsanitize=address,undefined -fno-omit-frame-pointer -Wno-maybe-uninitialized)
-  add_link_options(-fsanitize=address,undefined)
+  add_compile_options(-fsanitize=${TISSUEWARP_SANITIZE} -fno-omit-frame-pointer -Wno-maybe-uninitialized)
+  add_link_options(-fsanitize=${TISSUEWARP_SANITIZE})
 endif()
 
 # tissuewarp_library(<folder> SOURCES … [PUBLIC libs…] [PRIVATE libs…])

@@ -5,11 +5,10 @@
 #include "tled/detail/cpu_batches.hpp"
 #include "tled/detail/cpu_kernels.hpp"
 #include "tled/detail/kernel_parameters.hpp"
+#include "tled/detail/parallel.hpp"
 #include "tled/detail/prony_coefficients.hpp"
 #include "tled/engine.hpp"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -288,19 +287,14 @@ private:
 
     template <class Body>
     void for_nodes(const Body& body) const {
-        tbb::parallel_for(
-            tbb::blocked_range<std::size_t>(0, node_count_, 1024),
-            [&](const auto& range) {
-                for (std::size_t node = range.begin(); node != range.end(); ++node) body(node);
-            },
-            tbb::static_partitioner());
+        parallel_ranges(0, node_count_, 1024, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t node = begin; node != end; ++node) body(node);
+        });
     }
 
     template <class Body>
     static void for_batches(std::size_t begin, std::size_t end, const Body& body) {
-        tbb::parallel_for(
-            tbb::blocked_range<std::size_t>(begin, end, 32),
-            [&](const auto& range) { body(range.begin(), range.end()); }, tbb::static_partitioner());
+        parallel_ranges(begin, end, 32, body);
     }
 
     /// Element pass: corner forces at displacement `u`, nodal pressures first where the element needs them.
@@ -363,19 +357,16 @@ private:
         for_batches(0, elements_.count(), [&](std::size_t begin, std::size_t end) {
             detail::volume_changes(elements_, begin, end, u, change_.data());
         });
-        tbb::parallel_for(
-            tbb::blocked_range<std::size_t>(0, nodal_change_.size(), 1024),
-            [&](const auto& range) {
-                for (std::size_t a = range.begin(); a != range.end(); ++a) {
-                    T sum = 0;
-                    for (int k = pressure_offset_[a]; k < pressure_offset_[a + 1]; ++k) {
-                        const std::uint32_t slot = pressure_entry_[static_cast<std::size_t>(k)];
-                        sum += elements_.volume[slot] * change_[slot];
-                    }
-                    nodal_change_[a] = T(0.25) * sum * inverse_pressure_volume_[a];
+        parallel_ranges(0, nodal_change_.size(), 1024, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t a = begin; a != end; ++a) {
+                T sum = 0;
+                for (int k = pressure_offset_[a]; k < pressure_offset_[a + 1]; ++k) {
+                    const std::uint32_t slot = pressure_entry_[static_cast<std::size_t>(k)];
+                    sum += elements_.volume[slot] * change_[slot];
                 }
-            },
-            tbb::static_partitioner());
+                nodal_change_[a] = T(0.25) * sum * inverse_pressure_volume_[a];
+            }
+        });
         for (const BatchBlock& run : pressure_runs_)
             detail::nodal_pressures(materials_[static_cast<std::size_t>(run.material)].law,
                                     &pressure_modulus_[run.begin], &nodal_change_[run.begin],

@@ -1,4 +1,5 @@
 #include "tled/quadratic.hpp"
+#include "tled/detail/parallel.hpp"
 
 #include "core/errors.hpp"
 #include "tled/constitutive.hpp"
@@ -6,8 +7,6 @@
 #include "tled/detail/stiffness.hpp"
 
 #include <Eigen/LU>
-
-#include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
 #include <string>
@@ -97,7 +96,7 @@ Matrix3d QuadraticTetrahedra::deformation_gradient(const Matrix3Xd& u, int eleme
 
 VectorXd QuadraticTetrahedra::jacobians(const Matrix3Xd& u) const {
     VectorXd J(weight_.size());
-    tbb::parallel_for(0, static_cast<int>(tets_.cols()), [&](int e) {
+    parallel_for(0, static_cast<int>(tets_.cols()), [&](int e) {
         for (int q = 0; q < points_; ++q) J[e * points_ + q] = deformation_gradient(u, e, q).determinant();
     });
     return J;
@@ -127,7 +126,7 @@ double QuadraticTetrahedra::nodal_jacobian(int a, const VectorXd& J) const {
 
 VectorXd QuadraticTetrahedra::nodal_pressure(const VectorXd& J) const {
     VectorXd result(static_cast<Eigen::Index>(pressure_nodes_.size()));
-    tbb::parallel_for(0, static_cast<int>(result.size()), [&](int a) {
+    parallel_for(0, static_cast<int>(result.size()), [&](int a) {
         const Material& material = pressure_nodes_[static_cast<std::size_t>(a)].material;
         result[a] = volumetric_modulus(material) * volumetric_function(material, nodal_jacobian(a, J)).first;
     });
@@ -150,7 +149,7 @@ double QuadraticTetrahedra::energy(const Matrix3Xd& u) const {
     const VectorXd J = jacobians(u);
     if (!(J.minCoeff() > 0.0)) return std::numeric_limits<double>::infinity();
     VectorXd part(tets_.cols());
-    tbb::parallel_for(0, static_cast<int>(tets_.cols()), [&](int e) {
+    parallel_for(0, static_cast<int>(tets_.cols()), [&](int e) {
         const Material& material = material_[static_cast<std::size_t>(e)];
         part[e] = 0.0;
         for (int q = 0; q < points_; ++q) {
@@ -172,7 +171,7 @@ double QuadraticTetrahedra::energy(const Matrix3Xd& u) const {
 Matrix3Xd QuadraticTetrahedra::force(const Matrix3Xd& u) const {
     const VectorXd J = checked_jacobians(u), nodal = nodal_pressure(J);
     std::vector<Gradients> part(static_cast<std::size_t>(tets_.cols()));
-    tbb::parallel_for(0, static_cast<int>(tets_.cols()), [&](int e) {
+    parallel_for(0, static_cast<int>(tets_.cols()), [&](int e) {
         Gradients& f = part[static_cast<std::size_t>(e)];
         f.setZero();
         for (int q = 0; q < points_; ++q) {
@@ -223,8 +222,8 @@ void QuadraticTetrahedra::add_element_matrices(const Matrix3Xd& u, const VectorX
     std::vector<ElementMatrix> matrices(static_cast<std::size_t>(std::min(chunk, count)));
     for (int begin = 0; begin < count; begin += chunk) {
         const int end = std::min(begin + chunk, count);
-        tbb::parallel_for(
-            begin, end, [&](int e) { matrices[static_cast<std::size_t>(e - begin)] = element_matrix(u, e, J, nodal); });
+        parallel_for(begin, end,
+                     [&](int e) { matrices[static_cast<std::size_t>(e - begin)] = element_matrix(u, e, J, nodal); });
         for (int e = begin; e < end; ++e) {
             for (int a = 0; a < 10; ++a) {
                 const int i = tets_(a, e);

@@ -1,8 +1,7 @@
 #include "tled/reference.hpp"
+#include "tled/detail/parallel.hpp"
 
 #include <Eigen/LU>
-
-#include <oneapi/tbb/parallel_for.h>
 
 #include <numeric>
 #include <string>
@@ -42,14 +41,14 @@ Material element_material(const RestState& rest, int material, int element) {
 
 VectorXd element_jacobians(const RestState& rest, const Matrix3Xd& displacement) {
     VectorXd result(rest.element_count());
-    tbb::parallel_for(0, rest.element_count(),
-                      [&](int e) { result[e] = deformation_gradient(rest, displacement, e).determinant(); });
+    parallel_for(0, rest.element_count(),
+                 [&](int e) { result[e] = deformation_gradient(rest, displacement, e).determinant(); });
     return result;
 }
 
 std::vector<VolumetricFunction> nodal_volumetric(const RestState& rest, const VectorXd& jacobian) {
     std::vector<VolumetricFunction> result(rest.pressure.count());
-    tbb::parallel_for(0, rest.pressure.count(), [&](int a) {
+    parallel_for(0, rest.pressure.count(), [&](int a) {
         const Incidence& incidence = rest.pressure.incidence;
         double volume = 0.0;
         for (int k = incidence.offset[a]; k < incidence.offset[a + 1]; ++k) {
@@ -88,7 +87,7 @@ void require_positive(const RestState& rest, const VectorXd& jacobian) {
 double elastic_energy(const RestState& rest, const Matrix3Xd& displacement) {
     const std::vector<int> material_of = material_of_elements(rest);
     VectorXd energy(rest.element_count()), jacobian(rest.element_count());
-    tbb::parallel_for(0, rest.element_count(), [&](int e) {
+    parallel_for(0, rest.element_count(), [&](int e) {
         const Material material = detail::element_material(rest, material_of[e], e);
         const Matrix3d F = detail::deformation_gradient(rest, displacement, e);
         jacobian[e] = F.determinant();
@@ -129,12 +128,12 @@ ViscousStresses advanced(const RestState& rest, ViscousStresses stresses, const 
         }
     };
     const std::vector<int> material_of = material_of_elements(rest);
-    tbb::parallel_for(0, rest.element_count(), [&](int e) {
+    parallel_for(0, rest.element_count(), [&](int e) {
         advance(stresses[e], material_of[e], detail::element_material(rest, material_of[e], e),
                 detail::deformation_gradient(rest, displacement, e));
     });
     const std::vector<int> material_of_hex = material_of_elements(rest.hexahedra.blocks);
-    tbb::parallel_for(0, rest.hexahedra.count(), [&](int e) {
+    parallel_for(0, rest.hexahedra.count(), [&](int e) {
         advance(stresses[rest.element_count() + e], material_of_hex[e],
                 detail::hex_material(rest, material_of_hex[e], e),
                 detail::hex_deformation_gradient(rest.hexahedra, displacement, e));
@@ -154,7 +153,7 @@ Matrix3Xd internal_force(const RestState& rest, const Matrix3Xd& displacement, c
     const std::vector<int> material_of = material_of_elements(rest);
 
     Matrix3Xd corner_force(3, 4 * rest.element_count());
-    tbb::parallel_for(0, rest.element_count(), [&](int e) {
+    parallel_for(0, rest.element_count(), [&](int e) {
         const Material material = detail::element_material(rest, material_of[e], e);
         const Matrix3d F = detail::deformation_gradient(rest, displacement, e);
         const double pressure = detail::element_pressure(rest, e, material, jacobian[e], nodal);
@@ -165,7 +164,7 @@ Matrix3Xd internal_force(const RestState& rest, const Matrix3Xd& displacement, c
 
     Matrix3Xd force = Matrix3Xd::Zero(3, rest.node_count);
     const auto gather = [&](const Incidence& incidence, const Matrix3Xd& corners) {
-        tbb::parallel_for(0, rest.node_count, [&](int a) {
+        parallel_for(0, rest.node_count, [&](int a) {
             for (int k = incidence.offset[a]; k < incidence.offset[a + 1]; ++k) {
                 force.col(a) += corners.col(incidence.entry[k]);
             }

@@ -1,8 +1,7 @@
 #include "tled/detail/hexahedra.hpp"
+#include "tled/detail/parallel.hpp"
 
 #include <Eigen/LU>
-
-#include <oneapi/tbb/parallel_for.h>
 
 #include <string>
 
@@ -87,8 +86,8 @@ Material hex_material(const RestState& rest, int material, int element) {
 
 VectorXd hex_jacobians(const HexState& state, const Matrix3Xd& displacement) {
     VectorXd result(state.count());
-    tbb::parallel_for(0, state.count(),
-                      [&](int e) { result[e] = hex_deformation_gradient(state, displacement, e).determinant(); });
+    parallel_for(0, state.count(),
+                 [&](int e) { result[e] = hex_deformation_gradient(state, displacement, e).determinant(); });
     return result;
 }
 
@@ -96,7 +95,7 @@ double hex_energy(const RestState& rest, const Matrix3Xd& displacement) {
     const HexState& state = rest.hexahedra;
     const std::vector<int> material_of = material_of_elements(state.blocks);
     VectorXd energy(state.count());
-    tbb::parallel_for(0, state.count(), [&](int e) {
+    parallel_for(0, state.count(), [&](int e) {
         const Material material = hex_material(rest, material_of[static_cast<std::size_t>(e)], e);
         const Matrix3d F = hex_deformation_gradient(state, displacement, e);
         const Eigen::Matrix<double, 3, 4> q =
@@ -112,7 +111,7 @@ Matrix3Xd hex_corner_forces(const RestState& rest, const Matrix3Xd& displacement
     const HexState& state = rest.hexahedra;
     const std::vector<int> material_of = material_of_elements(state.blocks);
     Matrix3Xd force(3, 8 * state.count());
-    tbb::parallel_for(0, state.count(), [&](int e) {
+    parallel_for(0, state.count(), [&](int e) {
         const Material material = hex_material(rest, material_of[static_cast<std::size_t>(e)], e);
         const Matrix3d F = hex_deformation_gradient(state, displacement, e);
         Matrix3d P = first_piola_kirchhoff_stress(material, F);

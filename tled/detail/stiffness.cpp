@@ -1,9 +1,9 @@
 #include "tled/detail/stiffness.hpp"
+#include "tled/detail/parallel.hpp"
 
 #include <Eigen/LU>
 
 #include <oneapi/tbb/enumerable_thread_specific.h>
-#include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -94,7 +94,7 @@ template <typename Gather>
 void build_pattern(int rows, int columns, const Gather& gather, std::vector<int>& offset, std::vector<int>& column) {
     Gatherers gatherers([&] { return RowGatherer(columns); });
     offset.assign(rows + 1, 0);
-    tbb::parallel_for(0, rows, [&](int row) {
+    parallel_for(0, rows, [&](int row) {
         RowGatherer& gatherer = gatherers.local();
         gather(row, gatherer);
         offset[row + 1] = static_cast<int>(gatherer.columns.size());
@@ -102,7 +102,7 @@ void build_pattern(int rows, int columns, const Gather& gather, std::vector<int>
     });
     accumulate_counts(offset);
     column.resize(offset[rows]);
-    tbb::parallel_for(0, rows, [&](int row) {
+    parallel_for(0, rows, [&](int row) {
         RowGatherer& gatherer = gatherers.local();
         gather(row, gatherer);
         std::sort(gatherer.columns.begin(), gatherer.columns.end());
@@ -149,7 +149,7 @@ BlockRows element_rows(const RestState& rest, const std::vector<ElementTerms>& t
     build_pattern(rest.node_count, rest.node_count, gather, result.offset, result.column);
 
     result.block.assign(result.column.size(), Matrix3d::Zero());
-    tbb::parallel_for(0, rest.node_count, [&](int node) {
+    parallel_for(0, rest.node_count, [&](int node) {
         const int* begin = &result.column[result.offset[node]];
         Row row{begin, begin + result.offset[node + 1] - result.offset[node], &result.block[result.offset[node]]};
         for_each_at<4>(rest.incidence, node, [&](int e, int corner) { row.add(rest.nodes, e, corner, terms[e]); });
@@ -165,7 +165,7 @@ std::vector<HexTerms> hex_terms(const RestState& rest, const Matrix3Xd& displace
     require_positive_hexahedra(rest, hex_jacobians(state, displacement));
     const std::vector<int> material_of = material_of_elements(state.blocks);
     std::vector<HexTerms> terms(state.count());
-    tbb::parallel_for(0, state.count(), [&](int e) {
+    parallel_for(0, state.count(), [&](int e) {
         const Material material = hex_material(rest, material_of[e], e);
         Tangent tangent = shear_tangent(material, hex_deformation_gradient(state, displacement, e));
         const VolumetricFunction U = volumetric_function(material, tangent.F.determinant());
@@ -207,7 +207,7 @@ PressureRows pressure_rows(const RestState& rest, const std::vector<ElementTerms
 
     result.stiffness.resize(pressure.count());
     result.gradient.assign(result.node.size(), Vector3d::Zero());
-    tbb::parallel_for(0, pressure.count(), [&](int a) {
+    parallel_for(0, pressure.count(), [&](int a) {
         result.stiffness[a] = pressure.volume[a] * nodal[a].second;
         const auto begin = result.node.begin() + result.offset[a], end = result.node.begin() + result.offset[a + 1];
         for (int k = incidence.offset[a]; k < incidence.offset[a + 1]; ++k) {
@@ -241,7 +241,7 @@ Stiffness stiffness(const RestState& rest, const Matrix3Xd& displacement) {
     const std::vector<int> material_of = material_of_elements(rest);
 
     std::vector<ElementTerms> terms(rest.element_count());
-    tbb::parallel_for(0, rest.element_count(), [&](int e) {
+    parallel_for(0, rest.element_count(), [&](int e) {
         const Material material = element_material(rest, material_of[e], e);
         Tangent tangent = shear_tangent(material, deformation_gradient(rest, displacement, e));
         add_volumetric_tangent(tangent, element_pressure(rest, e, material, jacobian[e], nodal),
@@ -258,7 +258,7 @@ Stiffness stiffness(const RestState& rest, const Matrix3Xd& displacement) {
 
 Matrix3Xd Stiffness::multiply(const Matrix3Xd& x) const {
     VectorXd rate(pressure.rows());  // stiffness_a ∇J_a·x
-    tbb::parallel_for(0, pressure.rows(), [&](int a) {
+    parallel_for(0, pressure.rows(), [&](int a) {
         double sum = 0.0;
         for (int k = pressure.offset[a]; k < pressure.offset[a + 1]; ++k) {
             sum += pressure.gradient[k].dot(x.col(pressure.node[k]));
@@ -266,7 +266,7 @@ Matrix3Xd Stiffness::multiply(const Matrix3Xd& x) const {
         rate[a] = pressure.stiffness[a] * sum;
     });
     Matrix3Xd y(3, elements.rows());
-    tbb::parallel_for(0, elements.rows(), [&](int i) {
+    parallel_for(0, elements.rows(), [&](int i) {
         Vector3d sum = Vector3d::Zero();
         for (int k = elements.offset[i]; k < elements.offset[i + 1]; ++k) {
             sum += elements.block[k] * x.col(elements.column[k]);
@@ -282,7 +282,7 @@ Matrix3Xd Stiffness::multiply(const Matrix3Xd& x) const {
 
 std::vector<Matrix3d> Stiffness::diagonal_blocks() const {
     std::vector<Matrix3d> result(elements.rows());
-    tbb::parallel_for(0, elements.rows(), [&](int i) {
+    parallel_for(0, elements.rows(), [&](int i) {
         result[i] = elements.diagonal(i);
         for (int k = pressure.node_offset[i]; k < pressure.node_offset[i + 1]; ++k) {
             const int entry = pressure.node_entry[k];
@@ -312,7 +312,7 @@ BlockRows assembled(const Stiffness& stiffness, Triangle triangle) {
 
     result.block.assign(result.column.size(), Matrix3d::Zero());
     Gatherers gatherers([&] { return RowGatherer(elements.rows()); });
-    tbb::parallel_for(0, elements.rows(), [&](int i) {
+    parallel_for(0, elements.rows(), [&](int i) {
         RowGatherer& gatherer = gatherers.local();
         for (int k = result.offset[i]; k < result.offset[i + 1]; ++k) gatherer.insert(result.column[k]);
         gatherer.sort();
@@ -351,14 +351,14 @@ Eigen::SparseMatrix<double> scalar_matrix(const BlockRows& matrix, const std::ve
     Eigen::SparseMatrix<double> result(size, size);
     std::vector<int> offset(size + 1, 0);
     const int columns = static_cast<int>(index.size());
-    tbb::parallel_for(0, columns, [&](int column) {
+    parallel_for(0, columns, [&](int column) {
         if (index[column] < 0) return;
         visit(column, [&](int, double) { ++offset[index[column] + 1]; });
     });
     accumulate_counts(offset);
     result.resizeNonZeros(offset[size]);
     std::copy(offset.begin(), offset.end(), result.outerIndexPtr());
-    tbb::parallel_for(0, columns, [&](int column) {
+    parallel_for(0, columns, [&](int column) {
         if (index[column] < 0) return;
         int place = offset[index[column]];
         visit(column, [&](int row, double value) {
