@@ -5,6 +5,7 @@
 #include "core/errors.hpp"
 #include "shaders/catalogue.hpp"
 #include "tled/detail/gpu_force.hpp"
+#include "tled/detail/hexahedra.hpp"
 #include "tled/detail/kinematics.hpp"
 #include "tled/engine.hpp"
 #include "tled/reference.hpp"
@@ -379,6 +380,9 @@ Matrix3Xd test_displacement(const RestState& rest) {
     double least_height = std::numeric_limits<double>::infinity();
     for (int e = 0; e < rest.element_count(); ++e)
         least_height = std::min(least_height, 1 / detail::shape_gradients(rest, e).colwise().norm().maxCoeff());
+    for (int e = 0; e < rest.hexahedra.count(); ++e)
+        least_height =
+            std::min(least_height, 1 / detail::hex_shape_gradients(rest.hexahedra, e).colwise().norm().maxCoeff());
     const double volume = rest.volume.sum() + rest.hexahedra.volume.sum();
     const double edge = std::cbrt(volume / (rest.element_count() / 6.0 + rest.hexahedra.count()));
     const double size = std::min(0.01 * edge, 0.05 * least_height);

@@ -27,7 +27,7 @@ const std::map<std::string, std::set<std::string>> may_include{
 
 /// Files of meshing that belong to the mesher: they name it, its label field, its seeds or its fidelity.
 bool is_mesher(const std::string& file) {
-    static const std::regex names("mesher|label|seed|fidelity|refine|relaxation");
+    static const std::regex names("mesher|label|voxel|seed|fidelity|refine|relaxation");
     return std::regex_search(file, names);
 }
 
