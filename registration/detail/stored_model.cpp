@@ -60,6 +60,10 @@ tled::MaterialTable read_materials(const Hdf5Input& file, const std::string& gro
 }
 
 void write_model(Hdf5Output& file, const tled::Model& model) {
+    if (model.hexahedra.count() > 0 || !model.viscosity.empty() || model.fibre.size() > 0)
+        throw InvalidInput(
+            "a record holds tetrahedra and elastic materials only: this model has hexahedra, viscosity or fibre "
+            "directions by element");
     file.columns<double>("mesh/nodes", model.mesh.nodes, "mm");
     file.attribute("mesh/nodes", "frame", "moving image, LPS");
     file.columns<int>("mesh/tetrahedra", model.mesh.tets, "1");

@@ -12,7 +12,7 @@ with open(sys.argv[2]) as stream:
     nodes, tets = map(int, stream.readline().split())
     rows = [list(map(float, line.split())) for line in stream]
 assert record.attrs["format"] == "tissuewarp registration record"
-assert record.attrs["format_version"] == 1
+assert record.attrs["format_version"] == 2
 assert np.array_equal(record["mesh/nodes"][:], np.array(rows[:nodes]))
 assert np.array_equal(record["displacement"][:], np.array(rows[nodes : 2 * nodes]))
 assert np.array_equal(record["placement"][:], np.array(rows[2 * nodes :]))

@@ -1,5 +1,6 @@
 /// Records and prepared models survive the disk bit by bit, and what is damaged or foreign is refused in words.
 #include "registration/record.hpp"
+#include "registration/detail/stored_model.hpp"
 #include "registration/prepared_io.hpp"
 #include "tests/registration/shapes.hpp"
 
@@ -99,7 +100,7 @@ TEST_F(Records, ComeBackBitByBit) {
     write();
     const Record record = read_record(path);
     const UpdateResult result = some_result();
-    EXPECT_EQ(record.format_version, 1);
+    EXPECT_EQ(record.format_version, 2);
     EXPECT_EQ(record.deformation.mesh.nodes, prepared().model.mesh.nodes);
     EXPECT_EQ(record.deformation.mesh.tets, prepared().model.mesh.tets);
     EXPECT_EQ(record.deformation.mesh.labels, prepared().model.mesh.labels);
@@ -118,6 +119,33 @@ TEST_F(Records, ComeBackBitByBit) {
     EXPECT_EQ(soft.lame_lambda, std::get<tled::NeoHookeanLnJ>(prepared().model.materials.at(1)).lame_lambda);
     EXPECT_EQ(stiff.bulk_modulus, std::get<tled::NeoHookeanIso>(prepared().model.materials.at(7)).bulk_modulus);
     EXPECT_EQ(stiff.shear_modulus, std::get<tled::NeoHookeanIso>(prepared().model.materials.at(7)).shear_modulus);
+}
+
+TEST_F(Records, HoldEveryLaw) {
+    const tled::MaterialTable materials{
+        {0, tled::NeoHookeanStable{1.0, 49.0}},
+        {1, tled::Polynomial{0.3, 0.15, 0.08, 0.06, 0.04, 0.02, 50.0}},
+        {2, tled::ArrudaBoyce{1.0, 1.1, 50.0}},
+        {5, tled::Ogden{{tled::OgdenTerm{0.8, 2.5}, tled::OgdenTerm{-0.3, -3.0}}, 50.0}},
+        {9, tled::TransverselyIsotropic{1.0, 50.0, 2.0, Eigen::Vector3d::UnitY()}},
+    };
+    {
+        detail::Hdf5Output file(path, "materials", 1);
+        detail::write_materials(file, "materials", materials);
+    }
+    const detail::Hdf5Input file(path, "materials", 1);
+    EXPECT_EQ(detail::read_materials(file, "materials"), materials);
+}
+
+TEST_F(Records, RefuseModelsThatTheyCannotHold) {
+    tled::Model viscous = prepared().model, fibrous = viscous, mixed = viscous;
+    viscous.viscosity[1] = {{{0.3, 1.0}}};
+    fibrous.fibre = Eigen::Matrix3Xd::Constant(3, fibrous.mesh.tet_count(), std::sqrt(1.0 / 3));
+    mixed.hexahedra.hexes = Eigen::Matrix<int, 8, 1>::Zero();
+    for (const tled::Model& model : {viscous, fibrous, mixed}) {
+        detail::Hdf5Output file(path, "model", 1);
+        EXPECT_THROW(detail::write_model(file, model), InvalidInput);
+    }
 }
 
 TEST_F(Records, HoldTheJacobianOfAnAffineMap) {
@@ -193,11 +221,11 @@ TEST_F(Records, OfAnotherVersionAreRefused) {
     write();
     const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
     const hid_t attribute = H5Aopen(file, "format_version", H5P_DEFAULT);
-    const int version = 2;
+    const int version = 3;
     ASSERT_GE(H5Awrite(attribute, H5T_NATIVE_INT, &version), 0);
     H5Aclose(attribute);
     H5Fclose(file);
-    EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr("format version 2")));
+    EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr("format version 3")));
 }
 
 TEST_F(Records, WithNodeIndicesOutOfRangeAreRefused) {
