@@ -9,8 +9,12 @@ float trace_excess(Deformation d) {
     return 2.0 * d.trace_H + dot(d.H[0], d.H[0]) + dot(d.H[1], d.H[1]) + dot(d.H[2], d.H[2]);
 }
 
-/// F - F⁻ᵀ = H + (J I - cof F) / J.
-mat3 stretch_difference(Deformation d) { return d.H + d.J_I_minus_cofactor_F * (1.0 / (1.0 + d.volume_change)); }
+/// F - F⁻ᵀ = (J H + (J I - cof F)) / J. The quotient is one factor of the whole: its rounding error on one of the terms
+/// alone would be a stress whose moments do not balance, which turns a rotating body faster or slower.
+mat3 stretch_difference(Deformation d) {
+    float J = 1.0 + d.volume_change;
+    return (J * d.H + d.J_I_minus_cofactor_F) * reciprocal(J);
+}
 
 /// psi_1 times the derivative of J^(-2/3) tr C: 2 psi_1 j (F - (tr C)/3 F⁻ᵀ); with tr C = 3 + x the bracket is
 /// F - F⁻ᵀ - x/3 cof F / J.

@@ -13,4 +13,4 @@ mat3 shear_stress(uint e, Deformation d, Parameters p) {
 #endif
 
 /// U'(J) = ln J / J from J - 1.
-float volumetric_derivative(float volume_change) { return log_one_plus(volume_change) / (1.0 + volume_change); }
+float volumetric_derivative(float volume_change) { return log_one_plus(volume_change) * reciprocal(1.0 + volume_change); }

@@ -6,13 +6,19 @@ bool is_finite(vec3 x) { return is_finite(x.x) && is_finite(x.y) && is_finite(x.
 
 float not_a_number() { return uintBitsToFloat(0x7fc00000u); }
 
+/// 1 / x to the last place or so: a device's own may be off by 2.5, always to one side, which adds up over many steps.
+float reciprocal(float x) {
+    float inverse = 1.0 / x;
+    return fma(fma(-x, inverse, 1.0), inverse, inverse);
+}
+
 /// ln(1 + x) to a few units of the last place, NaN for x <= -1. GLSL's log() is only good to 2⁻²¹ absolutely near 1, which
 /// the large volumetric modulus turns into noise; near 1 use ln(1 + x) = 2 artanh(x / (2 + x)), whose terms past s¹³ are
 /// below 2e-8 of the sum for |x| <= 1/2.
 float log_one_plus(float x) {
     if (!(x > -1.0)) return not_a_number();
     if (abs(x) > 0.5) return log(1.0 + x);
-    float s = x / (2.0 + x);
+    float s = x * reciprocal(2.0 + x);
     float s2 = s * s;
     float series = 1.0 / 13.0;
     series = series * s2 + 1.0 / 11.0;
