@@ -4,32 +4,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 
 #include "core/errors.hpp"
 #include "tled/detail/kinematics.hpp"
+#include "tled/detail/vectors.hpp"
 
 namespace tissuewarp::tled {
 
+using detail::fixed_vector;
+using detail::largest_norm;
 using Eigen::Matrix3Xd;
-
-namespace {
-
-double largest_norm(const Matrix3Xd& vectors) {
-    return std::sqrt(vectors.colwise().squaredNorm().maxCoeff());
-}
-
-Matrix3Xd fixed_vector(Eigen::Index count) {
-    Matrix3Xd vector(3, count);
-    std::uint32_t state = 1;
-    for (double& x : vector.reshaped()) {
-        state = 1664525u * state + 1013904223u;
-        x = state / 4294967296.0 - 0.5;
-    }
-    return vector;
-}
-
-}  // namespace
 
 HighestMode highest_mode(Engine& engine, const Matrix3Xd& mass, const Matrix3Xd& displacement, int iterations,
                          const Matrix3Xd* start) {

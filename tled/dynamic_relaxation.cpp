@@ -26,17 +26,6 @@ StepCoefficients heavy_ball(const Spectrum& spectrum) {
     return {ratio * ratio, 4 / ((high + low) * (high + low))};
 }
 
-/// A fixed start vector with every frequency in it, so that repeated runs give the same bits.
-Matrix3Xd fixed_vector(Eigen::Index count) {
-    Matrix3Xd vector(3, count);
-    std::uint32_t state = 1;
-    for (double& x : vector.reshaped()) {
-        state = 1664525u * state + 1013904223u;
-        x = double(state) / 4294967296.0 - 0.5;
-    }
-    return vector;
-}
-
 constexpr int lanczos_steps = 10;       // within 1 % of λ_max; power iteration takes 20 for 3 %
 constexpr double step_safety = 1.05;    // on λ_max: Lanczos approaches from below, stiffness grows under load
 constexpr double damping_factor = 1.4;  // on the lowest eigenvalue of K₀: the slowest mode carries little of the error

@@ -26,10 +26,6 @@ std::string place(const SmallestJacobian& smallest) {
 
 }  // namespace
 
-double largest_norm(const Matrix3Xd& vectors) {
-    return std::sqrt(vectors.colwise().squaredNorm().maxCoeff());
-}
-
 EquilibriumSearch::EquilibriumSearch(Engine& engine_, const RestStiffness& stiffness_,
                                      const NodalConditions& conditions_, const EquilibriumOptions& options_,
                                      Observer& observer_)

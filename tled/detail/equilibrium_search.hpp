@@ -2,14 +2,12 @@
 /// What the methods of equilibrium() share: the start, counted evaluations, the lifted residual, refusals that name the
 /// last good state.
 
+#include "tled/detail/vectors.hpp"
 #include "tled/equilibrium.hpp"
 
 #include <string>
 
 namespace tissuewarp::tled::detail {
-
-/// Largest Euclidean norm of a column.
-double largest_norm(const Eigen::Matrix3Xd& vectors);
 
 class EquilibriumSearch {
 public:
