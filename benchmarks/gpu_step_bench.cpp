@@ -1,12 +1,15 @@
 // Time of a step on the GPU, and how far its float32 strays from the float64 CPU engine. The cube of Taylor, Cheng and
 // Ourselin (2008): edge 100 mm, ends bonded, stretched by 20 %, mu = 1.007 kPa, lambda = 49.329 kPa, 1000 kg/m³.
 //     gpu_step_bench [--list] [--device N] [--cells 14,24,55,128] [--steps N] [--repeats N] [--compare-limit ELEMENTS]
-//                    [--element t4|averaged] [--law lnj|iso]
+//                    [--element t4|averaged] [--law lnj|iso] [--mesh FILE.vtu] [--shapes TETS:FAN:WORKGROUP,…]
 // Without options: on hardware 14, 24, 55 and 128 cells an edge and 1000 steps, on a software rasteriser 14 and 24
 // cells and 50 steps; five repeats, the median is printed; both elements, both laws. The float64 engine runs the same
-// steps where the mesh has no more than --compare-limit elements (1 100 000).
+// steps where the mesh has no more than --compare-limit elements (1 100 000). A mesh file of about that cube is
+// measured after those of --cells. Shapes are those of tled::GpuStepShape, 0:0:0 the two passes; without them the
+// suggested one.
 
 #include "core/errors.hpp"
+#include "meshing/mesh_io.hpp"
 #include "meshing/primitives.hpp"
 #include "shaders/device.hpp"
 #include "tled/engine.hpp"
@@ -37,6 +40,8 @@ struct Options {
     int repeats = 5;
     int compare_limit = 1100000;
     std::string element, law;  // empty: both
+    std::string mesh;
+    std::vector<tled::GpuStepShape> shapes;  // empty: the suggested one
 };
 
 double now() {
@@ -55,16 +60,19 @@ struct Scene {
     Matrix3Xd start;
 };
 
-Scene stretched_cube(int cells) {
+/// Nodes within a hundredth of the height from either end are held.
+Scene stretched_cube(meshing::TetMesh mesh) {
     Scene scene;
-    scene.mesh = meshing::box_mesh({edge, edge, edge}, {cells, cells, cells});
+    scene.mesh = std::move(mesh);
+    const Eigen::RowVectorXd z = scene.mesh.nodes.row(2);
+    const double bottom = z.minCoeff(), height = z.maxCoeff() - bottom;
     const int count = scene.mesh.node_count();
     scene.start = Matrix3Xd::Zero(3, count);
     tled::Conditions conditions;
     for (int node = 0; node < count; ++node) {
-        const double z = scene.mesh.nodes(2, node);
-        scene.start(2, node) = stretch * z;
-        if (z < 1e-9 || z > edge - 1e-9)
+        const double part = (z[node] - bottom) / height;
+        scene.start(2, node) = stretch * height * part;
+        if (part < 0.01 || part > 0.99)
             conditions.prescribed.push_back({node, {true, true, true}, scene.start.col(node)});
     }
     scene.conditions = tled::nodal_conditions(conditions, count);
@@ -105,15 +113,16 @@ double timed_steps(tled::Engine& engine, int steps, const tled::StepCoefficients
     return ((middle - begin) - (now() - middle)) / steps;
 }
 
-void report(const Scene& scene, const tled::RestState& rest, const std::string& name, int cells,
-            const Options& options) {
+void report(const Scene& scene, const tled::RestState& rest, const std::string& name, const std::string& mesh,
+            const tled::GpuStepShape& shape, const Options& options) {
     const tled::StepCoefficients step = coefficients(rest, 1e-6);
     const double begin = now();
-    const auto gpu = tled::make_gpu_engine(rest, options.device);
+    const auto gpu = tled::make_gpu_engine(rest, options.device, shape);
     const double start_seconds = now() - begin;
     Matrix3Xd result;
     prepare(*gpu, scene);
-    timed_steps(*gpu, std::min(options.steps, 50), step, result);
+    // A device at rest takes most of a second to reach its clock under load.
+    for (const double start = now(); now() - start < 1;) timed_steps(*gpu, std::min(options.steps, 1000), step, result);
     std::vector<double> seconds;
     for (int repeat = 0; repeat < options.repeats; ++repeat) {
         prepare(*gpu, scene);
@@ -121,8 +130,10 @@ void report(const Scene& scene, const tled::RestState& rest, const std::string& 
     }
     const tled::Observation seen = gpu->observe();
     const double per_step = median(seconds);
-    std::printf("| %-12s | %4d | %9d | %9.2f | %9.1f | %6.2f | %6.3f ", name.c_str(), cells, rest.element_count(),
-                per_step * 1e6, per_step / rest.element_count() * 1e12, start_seconds, seen.min_jacobian);
+    std::printf("| %-12s | %-8s | %9d | %4d:%d:%d%s | %9.2f | %9.1f | %6.2f | %6.3f ", name.c_str(), mesh.c_str(),
+                rest.element_count(), shape.patch_tets, shape.longest_fan, shape.workgroup,
+                shape.many_at_once ? "m" : "", per_step * 1e6, per_step / rest.element_count() * 1e12, start_seconds,
+                seen.min_jacobian);
     if (!seen.finite) {
         std::printf("| not finite |\n");
     } else if (rest.element_count() > options.compare_limit) {
@@ -137,8 +148,8 @@ void report(const Scene& scene, const tled::RestState& rest, const std::string& 
     std::fflush(stdout);
 }
 
-void measure(int cells, const Options& options) {
-    const Scene scene = stretched_cube(cells);
+void measure(meshing::TetMesh mesh, const std::string& mesh_name, const Options& options) {
+    const Scene scene = stretched_cube(std::move(mesh));
     const tled::NeoHookeanLnJ lnj{shear, lambda};
     const tled::NeoHookeanIso iso{shear, lambda + 2 * shear / 3};
     for (const bool averaged : {false, true}) {
@@ -149,10 +160,13 @@ void measure(int cells, const Options& options) {
         model.element = averaged ? tled::Element::AveragedPressureT4 : tled::Element::T4;
         tled::RestState rest = tled::rest_state(model);
         const std::string element = averaged ? "averaged " : "T4 ";
-        if (options.law != "iso") report(scene, rest, element + "lnJ", cells, options);
+        std::vector<tled::GpuStepShape> shapes = options.shapes;
+        if (shapes.empty()) shapes = {tled::suggested_gpu_step_shape(rest.element_count())};
+        for (const tled::GpuStepShape& shape : shapes)
+            if (options.law != "iso") report(scene, rest, element + "lnJ", mesh_name, shape, options);
         if (options.law == "lnj") continue;
         use_law(rest, iso);
-        report(scene, rest, element + "iso", cells, options);
+        for (const tled::GpuStepShape& shape : shapes) report(scene, rest, element + "iso", mesh_name, shape, options);
     }
 }
 
@@ -182,7 +196,18 @@ Options parsed(int argc, char** argv) {
             options.element = value;
         else if (name == "--law")
             options.law = value;
-        else if (name == "--cells") {
+        else if (name == "--mesh")
+            options.mesh = value;
+        else if (name == "--shapes") {
+            std::istringstream list(value);
+            tled::GpuStepShape shape;
+            char colon = 0;
+            for (std::string one; std::getline(list, one, ',');) {
+                std::istringstream(one) >> shape.patch_tets >> colon >> shape.longest_fan >> colon >> shape.workgroup;
+                shape.many_at_once = one.back() == 'm';
+                options.shapes.push_back(shape);
+            }
+        } else if (name == "--cells") {
             std::istringstream list(value);
             for (std::string cells; std::getline(list, cells, ',');) options.cells.push_back(std::stoi(cells));
         } else
@@ -206,13 +231,18 @@ int main(int argc, char** argv) try {
         std::printf("device %d: %s, %s, OpenGL %s, %s\n", device.index(), device.renderer().c_str(),
                     device.vendor().c_str(), device.version().c_str(), hardware ? "hardware" : "software");
     }
-    if (options.cells.empty()) options.cells = hardware ? std::vector<int>{14, 24, 55, 128} : std::vector<int>{14, 24};
+    if (options.cells.empty() && options.mesh.empty())
+        options.cells = hardware ? std::vector<int>{14, 24, 55, 128} : std::vector<int>{14, 24};
     if (options.steps <= 0) options.steps = hardware ? 1000 : 50;
     std::printf("%d steps, median of %d runs\n\n", options.steps, options.repeats);
     std::printf(
-        "| element, law | cells | elements | µs/step | ps/element-step | start s | min J | largest difference to "
-        "float64 / largest displacement |\n|---|---|---|---|---|---|---|---|\n");
-    for (const int cells : options.cells) measure(cells, options);
+        "| element, law | mesh | elements | shape | µs/step | ps/element-step | start s | min J | largest difference "
+        "to "
+        "float64 / largest displacement |\n|---|---|---|---|---|---|---|---|---|\n");
+    for (const int cells : options.cells)
+        measure(meshing::box_mesh({edge, edge, edge}, {cells, cells, cells}), std::to_string(cells) + " cells",
+                options);
+    if (!options.mesh.empty()) measure(meshing::read_vtu(options.mesh), "file", options);
     return 0;
 } catch (const std::exception& error) {
     std::fprintf(stderr, "gpu_step_bench: %s\n", error.what());

@@ -61,6 +61,16 @@ ProgramSource node_program(std::string kernel, const NodeEffects& effects) {
     return source;
 }
 
+constexpr std::array<PatchStages, 7> every_patch_stages{{
+    {.forces = true},
+    {.advances = true, .forces = true},
+    {.advances = true, .forces = true, .persists = true},
+    {.volumes = true, .averages = true},
+    {.forces = true, .averages = true},
+    {.advances = true, .volumes = true, .averages = true},
+    {.advances = true, .volumes = true, .forces = true, .averages = true, .persists = true},
+}};
+
 }  // namespace
 
 ProgramSource element_force_program(const ElementForces& forces) {
@@ -102,6 +112,55 @@ ProgramSource node_residual_program(const NodeEffects& effects, MaskConstrained 
     ProgramSource source = node_program("node_residual", effects);
     source.defines["MASKS_CONSTRAINED"] = flag(mask == MaskConstrained::Yes);
     return source;
+}
+
+ProgramSource patch_step_program(Law law, const NodeEffects& effects, const PatchSizes& sizes,
+                                 const PatchStages& stages) {
+    ProgramSource source{"patch_step", {"index", "bindings", "numbers"}, {}, {}};
+    const auto add = [&](const char* chunk) { source.chunks.emplace_back(chunk); };
+    const auto define = [&](const char* name, const std::string& value) { source.defines[name] = value; };
+    const auto define_count = [&](const char* name, int count) { define(name, std::to_string(count) + "u"); };
+    if (stages.forces)
+        for (const char* chunk : {"deformation", "material", "isochoric"}) add(chunk);
+    if (stages.forces || stages.averages) {
+        add_law(source, law);
+        define("USES_SHEAR", flag(stages.forces));
+    }
+    if (effects.springs) add("node.springs");
+    if (effects.external_force) add("node.external_force");
+    for (const char* chunk : {"patch", "patch.exchange", "patch.nodes", "patch.units", "patch.fans"}) add(chunk);
+    if (stages.averages) add("patch.pressure.averaged");
+    if (stages.forces) {
+        if (!stages.averages) add("patch.pressure.element");
+        add("patch.forces");
+    }
+    if (stages.persists) {
+        add("patch.neighbours");
+        define_count("NEIGHBOURS", sizes.neighbours);
+    }
+    define("WORKGROUP_SIZE", std::to_string(sizes.workgroup));
+    define("ADVANCES", flag(stages.advances));
+    define("VOLUMES", flag(stages.volumes));
+    define("FORCES", flag(stages.forces));
+    define("AVERAGES", flag(stages.averages));
+    define("PERSISTS", flag(stages.persists));
+    define("HAS_SPRINGS", flag(effects.springs));
+    define("HAS_EXTERNAL_FORCE", flag(effects.external_force));
+    define("COHERENT", stages.persists ? "coherent" : "");
+    define("CONTRIBUTIONS", std::to_string(sizes.contributions) + ".0");
+    define_count("PATCHES", sizes.patches);
+    define_count("SLOTS", sizes.slots);
+    define_count("FANS", sizes.fans);
+    define_count("SOURCES", sizes.sources);
+    return source;
+}
+
+ProgramSource patch_load_program() {
+    return {"patch_load", {"index", "bindings"}, {{"WORKGROUP_SIZE", workgroup_size}}, {}};
+}
+
+ProgramSource patch_store_program() {
+    return {"patch_store", {"index", "bindings"}, {{"WORKGROUP_SIZE", workgroup_size}}, {}};
 }
 
 ProgramSource impose_program() {
@@ -148,7 +207,13 @@ std::vector<ProgramSource> every_program() {
                 all.push_back(node_step_program(effects, store));
             for (const MaskConstrained mask : {MaskConstrained::No, MaskConstrained::Yes})
                 all.push_back(node_residual_program(effects, mask));
+            for (int law = 0; law < law_count; ++law)
+                for (const PatchStages& stages : every_patch_stages)
+                    if (static_cast<Law>(law) != Law::TransverselyIsotropic)  // patches hold no fibres
+                        all.push_back(patch_step_program(static_cast<Law>(law), effects, {}, stages));
         }
+    all.push_back(patch_load_program());
+    all.push_back(patch_store_program());
     return all;
 }
 

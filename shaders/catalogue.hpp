@@ -57,6 +57,24 @@ ProgramSource element_volume_program();
 ProgramSource nodal_pressure_program(Law law);
 ProgramSource node_step_program(const NodeEffects& effects, StoreResidual store);
 ProgramSource node_residual_program(const NodeEffects& effects, MaskConstrained mask);
+
+/// Sizes that are constants of the programs over patches: members of tled's PatchCapacity, and the workgroup.
+struct PatchSizes {
+    int patches = 1, slots = 1, fans = 1, sources = 1, neighbours = 1, contributions = 1;
+    int workgroup = 128;
+};
+/// What one dispatch over patches does (kernels/patch_step.comp).
+struct PatchStages {
+    bool advances = false, volumes = false, forces = false;
+    bool averages = false;  ///< the pressure
+    bool persists = false;  ///< goes on for many steps
+};
+/// One workgroup for each patch; springs and forces as effects name them.
+ProgramSource patch_step_program(Law law, const NodeEffects& effects, const PatchSizes& sizes,
+                                 const PatchStages& stages);
+ProgramSource patch_load_program();
+ProgramSource patch_store_program();
+
 ProgramSource impose_program();
 ProgramSource previous_displacement_program();
 

@@ -5,6 +5,7 @@
 #include "core/errors.hpp"
 #include "shaders/catalogue.hpp"
 #include "tled/detail/gpu_force.hpp"
+#include "tled/detail/gpu_patches.hpp"
 #include "tled/detail/hexahedra.hpp"
 #include "tled/detail/kinematics.hpp"
 #include "tled/engine.hpp"
@@ -65,7 +66,7 @@ struct Effects {
 
 class GpuEngine final : public Engine {
 public:
-    GpuEngine(const RestState& rest, int device)
+    GpuEngine(const RestState& rest, int device, const GpuStepShape& shape)
         : device_(device),
           programs_((require_limits(device_), device_)),
           node_count_(rest.node_count),
@@ -93,6 +94,8 @@ public:
         blocks_.set("PreviousDisplacement", previous_displacement_);
         blocks_.set("Imposed", imposed_);
         upload_inverse_mass();
+        if (shape.patch_tets > 0 && detail::GpuPatches::suit(rest, device_))
+            patches_.emplace(device_, programs_, rest, shape, blocks_);
     }
 
     void set_conditions(const NodalConditions& conditions) override {
@@ -106,7 +109,7 @@ public:
         upload_inverse_mass();
         imposed_.upload(detail::packed(conditions.imposed));
         impose();
-        previous_residual_known_ = false;
+        state_changed();
     }
 
     void set_mass(const Matrix3Xd& mass) override {
@@ -118,6 +121,7 @@ public:
         const CurrentContext current = device_.make_current();
         mass_ = mass;
         upload_inverse_mass();
+        if (patches_) patches_->forget_state();
     }
 
     void set_state(const Matrix3Xd& displacement, const Matrix3Xd& increment) override {
@@ -128,7 +132,7 @@ public:
         increment_.upload(detail::packed(increment));
         force_.forget_viscous_stresses();
         impose();
-        previous_residual_known_ = false;
+        state_changed();
     }
 
     void set_increment(const Matrix3Xd& increment) override {
@@ -136,7 +140,7 @@ public:
         const CurrentContext current = device_.make_current();
         increment_.upload(detail::packed(increment));
         impose();
-        previous_residual_known_ = false;
+        state_changed();
     }
 
     void keep_state() override {
@@ -151,12 +155,18 @@ public:
         displacement_.copy_from(kept_displacement_, displacement_.bytes());
         increment_.copy_from(kept_increment_, increment_.bytes());
         force_.return_to_kept_viscous_stresses();
-        previous_residual_known_ = false;
+        state_changed();
     }
 
     void run(int steps, const StepCoefficients& coefficients) override {
         if (steps <= 0) return;
         const CurrentContext current = device_.make_current();
+        if (patches_) {
+            blocks_.set("Displacement", displacement_);
+            patches_->run(steps, coefficients, effects_.flags, blocks_);
+            previous_residual_known_ = false;
+            return;
+        }
         const Program& step = node_program(shaders::node_step_program(effects_.flags, StoreResidual::No));
         const Program& last = node_program(shaders::node_step_program(effects_.flags, StoreResidual::Yes));
         for (const Program* program : {&step, &last}) {
@@ -239,6 +249,11 @@ public:
 private:
     [[nodiscard]] std::size_t nodes() const { return static_cast<std::size_t>(node_count_); }
     [[nodiscard]] Buffer<Float4> node_vectors(const char* what) const { return {device_, nodes(), what}; }
+
+    void state_changed() {
+        previous_residual_known_ = false;
+        if (patches_) patches_->forget_state();
+    }
 
     [[nodiscard]] Matrix3Xd downloaded(const Buffer<Float4>& buffer) const {
         const CurrentContext current = device_.make_current();
@@ -364,6 +379,7 @@ private:
     bool admits_inversion_;
     BlockBuffers blocks_;
     detail::GpuForce force_;
+    std::optional<detail::GpuPatches> patches_;  ///< absent where patches do not know the scene
     Buffer<Float4> displacement_, increment_, inverse_mass_, residual_, previous_residual_, previous_displacement_,
         imposed_, kept_displacement_, kept_increment_;
     Buffer<NodePartial> node_partials_;
@@ -409,8 +425,17 @@ void require_right_forces(Engine& engine, const RestState& rest) {
 
 }  // namespace
 
+GpuStepShape suggested_gpu_step_shape(int element_count) {
+    static_cast<void>(element_count);
+    return {};
+}
+
 std::unique_ptr<Engine> make_gpu_engine(const RestState& rest, int device) {
-    auto engine = std::make_unique<GpuEngine>(rest, device);
+    return make_gpu_engine(rest, device, suggested_gpu_step_shape(rest.element_count()));
+}
+
+std::unique_ptr<Engine> make_gpu_engine(const RestState& rest, int device, const GpuStepShape& shape) {
+    auto engine = std::make_unique<GpuEngine>(rest, device, shape);
     require_right_forces(*engine, rest);
     return engine;
 }

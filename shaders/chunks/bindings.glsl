@@ -25,6 +25,20 @@
 #define BINDING_HEX_NODES 20
 #define BINDING_HEX_REST 21
 
+// Steps over patches, whose programs share displacements, springs, external forces and materials with the others.
+#define BINDING_PATCH_HEAD 3
+#define BINDING_PATCH_REST 4
+#define BINDING_PATCH_STATE 5
+#define BINDING_PATCH_FORCES 6
+#define BINDING_PATCH_SOURCES 10
+#define BINDING_PATCH_FANS 11
+#define BINDING_PATCH_LARGEST 12
+#define BINDING_PATCH_NEIGHBOURS 13
+#define BINDING_PATCH_PROGRESS 14
+#define BINDING_PATCH_NODE 15
+#define BINDING_PATCH_VOLUMES 17
+#define BINDING_PATCH_SLOT 18
+
 // Outside of a step, these take the place of blocks that the kernel at hand does not use.
 #define BINDING_PARTIAL 6
 #define BINDING_PREVIOUS_RESIDUAL 7

@@ -7,23 +7,33 @@ float trace(mat3 A) { return A[0][0] + A[1][1] + A[2][2]; }
 
 struct Deformation {
     mat3 H;               // displacement gradient
-    mat3 cofactor_F;      // J F⁻ᵀ
-    mat3 J_I_minus_cofactor_F;  // = J (I - F⁻ᵀ), without the cancellation of its two terms
+    mat3 Q;               // Hᵀ - cof H
     float trace_H;
+    float higher;         // J - 1 - tr H
     float volume_change;  // J - 1
 };
 
-/// With I₂ = ½ (tr² H - tr H²) = tr cof H: cof F = (1 + tr H) I - Hᵀ + cof H and J - 1 = tr H + I₂ + det H.
+/// With I₂ = ½ (tr² H - tr H²) = tr cof H: J - 1 = tr H + I₂ + det H.
 Deformation deformation(mat3 H) {
     mat3 cofactor_H = cofactor(H);
-    mat3 H_transposed = transpose(H);
     float trace_H = trace(H);
     float higher = trace(cofactor_H) + dot(H[0], cofactor_H[0]);
-    Deformation d;
-    d.H = H;
-    d.cofactor_F = mat3(1.0 + trace_H) - H_transposed + cofactor_H;
-    d.J_I_minus_cofactor_F = mat3(higher) + H_transposed - cofactor_H;
-    d.trace_H = trace_H;
-    d.volume_change = trace_H + higher;
-    return d;
+    return Deformation(H, transpose(H) - cofactor_H, trace_H, higher, trace_H + higher);
+}
+
+/// J F⁻ᵀ = (1 + tr H) I - Hᵀ + cof H.
+mat3 cofactor_F(Deformation d) { return mat3(1.0 + d.trace_H) - d.Q; }
+
+/// J (I - F⁻ᵀ), without the cancellation of its two terms.
+mat3 J_I_minus_cofactor_F(Deformation d) { return mat3(d.higher) + d.Q; }
+
+/// First Piola-Kirchhoff stress of a law of tr C and J, as most are.
+struct StressFactors {
+    float of_H, of_J_I_minus_cofactor_F, of_cofactor_F;
+};
+
+/// The sum of the three matrices, of which only H and Q are made.
+mat3 stress_of(StressFactors f, Deformation d) {
+    float of_I = f.of_J_I_minus_cofactor_F * d.higher + f.of_cofactor_F * (1.0 + d.trace_H);
+    return mat3(of_I) + f.of_H * d.H + (f.of_J_I_minus_cofactor_F - f.of_cofactor_F) * d.Q;
 }

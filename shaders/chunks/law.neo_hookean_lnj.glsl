@@ -1,14 +1,13 @@
 // Law W = mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)².
-// Needs: numbers; element, material and isochoric where shear_stress is used (define USES_SHEAR 1).
-// Gives: shear_stress, the first Piola-Kirchhoff stress of the part with mu (kPa), and volumetric_derivative, U'(J) of
+// Needs: numbers; element, material and isochoric where stress is used (define USES_SHEAR 1).
+// Gives: stress, the first Piola-Kirchhoff stress (kPa) of the part with mu and of a pressure, and volumetric_derivative, U'(J) of
 // U = (ln J)²/2. NaN where J <= 0: the energy is infinite there.
 //! define USES_SHEAR
 
 #if USES_SHEAR
-/// P = mu (F - F⁻ᵀ).
-mat3 shear_stress(uint e, Deformation d, Parameters p) {
-    if (!(d.volume_change > -1.0)) return mat3(not_a_number());
-    return p.a.x * stretch_difference(d);
+/// P = mu (F - F⁻ᵀ) + pressure cof F.
+mat3 stress(uint e, Deformation d, Parameters p, float pressure) {
+    return stress_of(stretch_difference(d, p.a.x, d.volume_change > -1.0 ? pressure : not_a_number()), d);
 }
 #endif
 

@@ -1,7 +1,7 @@
 // Law W = sum mu_p/alpha_p (l1^alpha_p + l2^alpha_p + l3^alpha_p - 3) + kappa/2 (J - 1)² of the isochoric principal
 // stretches l = J^(-1/3) lambda (Ogden 1972).
-// Needs: volume.quadratic; numbers, element, material and isochoric where shear_stress is used (define USES_SHEAR 1).
-// Gives: shear_stress (kPa) of the isochoric part, NaN where J <= 0.
+// Needs: volume.quadratic; numbers, element, material and isochoric where stress is used (define USES_SHEAR 1).
+// Gives: stress (kPa) of the isochoric part and of a pressure, NaN where J <= 0.
 //! define USES_SHEAR
 
 #if USES_SHEAR
@@ -33,8 +33,8 @@ vec3 ogden_term(float modulus, float exponent, vec3 log_stretch) {
     return modulus * (y - vec3((y.x + y.y + y.z) * (1.0 / 3.0)));
 }
 
-/// S = sum T_i / c_i n_i n_iᵀ, P = F S; c_i = 1 + the eigenvalues of C - I, by cyclic Jacobi rotations.
-mat3 shear_stress(uint e, Deformation d, Parameters p) {
+/// S = sum T_i / c_i n_i n_iᵀ, P = F S + pressure cof F; c_i = 1 + the eigenvalues of C - I, by cyclic Jacobi rotations.
+mat3 stress(uint e, Deformation d, Parameters p, float pressure) {
     if (!(d.volume_change > -1.0)) return mat3(not_a_number());
     mat3 E = strain_excess(d);
     float xx = E[0][0], yy = E[1][1], zz = E[2][2], xy = E[0][1], yz = E[1][2], zx = E[2][0];
@@ -52,6 +52,7 @@ mat3 shear_stress(uint e, Deformation d, Parameters p) {
     if (p.b.x != 0.0) T += ogden_term(p.b.x, p.b.y, log_stretch);
     vec3 S = T / (1.0 + value);
     return (mat3(1.0) + d.H) *
-           (S.x * outerProduct(n0, n0) + S.y * outerProduct(n1, n1) + S.z * outerProduct(n2, n2));
+               (S.x * outerProduct(n0, n0) + S.y * outerProduct(n1, n1) + S.z * outerProduct(n2, n2)) +
+           pressure * cofactor_F(d);
 }
 #endif

@@ -16,8 +16,6 @@ float reciprocal(float x) {
 /// the large volumetric modulus turns into noise; near 1 use ln(1 + x) = 2 artanh(x / (2 + x)), whose terms past s¹³ are
 /// below 2e-8 of the sum for |x| <= 1/2.
 float log_one_plus(float x) {
-    if (!(x > -1.0)) return not_a_number();
-    if (abs(x) > 0.5) return log(1.0 + x);
     float s = x * reciprocal(2.0 + x);
     float s2 = s * s;
     float series = 1.0 / 13.0;
@@ -26,7 +24,9 @@ float log_one_plus(float x) {
     series = series * s2 + 1.0 / 7.0;
     series = series * s2 + 1.0 / 5.0;
     series = series * s2 + 1.0 / 3.0;
-    return 2.0 * s + 2.0 * s * s2 * series;
+    float near = 2.0 * s + 2.0 * s * s2 * series;
+    float far = x > -1.0 ? log(1.0 + x) : not_a_number();
+    return abs(x) > 0.5 ? far : near;
 }
 
 /// exp(x) - 1 to a few units of the last place; the series' terms past x⁷ are below 1e-8 of the sum for |x| <= 1/4.

@@ -11,7 +11,7 @@ layout(std430, binding = BINDING_VISCOUS_STRESS) buffer ViscousStress { vec4 vis
 
 /// S = F⁻¹ P = (cof F)ᵀ P / J.
 mat3 viscous_stress_of(uint e, uint material, Deformation d, mat3 P) {
-    mat3 S = (1.0 / (1.0 + d.volume_change)) * (transpose(d.cofactor_F) * P);
+    mat3 S = (1.0 / (1.0 + d.volume_change)) * (transpose(cofactor_F(d)) * P);
     vec4 S_a = vec4(S[0][0], S[1][1], S[2][2], S[1][0]);
     vec4 S_b = vec4(S[2][1], S[2][0], 0.0, 0.0);
     vec4 sum_a = vec4(0.0);

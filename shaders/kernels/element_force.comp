@@ -12,12 +12,14 @@ void main() {
     Deformation d = deformation(displacement_gradient(e, rest));
     float p = pressure_of_element(e, d.volume_change, rest.volumetric_modulus);
     uint material = uint(rest.material);
-    mat3 stress = shear_stress(e, d, parameters_of(material));
 #if HAS_VISCOSITY
-    mat3 viscous_stress = viscous_stress_of(e, material, d, stress);  // not in `stress -= …`: README, traps
-    stress = stress - viscous_stress;
+    mat3 P = stress(e, d, parameters_of(material), 0.0);
+    mat3 viscous_stress = viscous_stress_of(e, material, d, P);  // not in `P -= …`: README, traps
+    P = P - viscous_stress + p * cofactor_F(d);
+#else
+    mat3 P = stress(e, d, parameters_of(material), p);
 #endif
-    mat3 scaled_stress = rest.volume * (stress + p * d.cofactor_F);
+    mat3 scaled_stress = rest.volume * P;
     vec3 f1 = scaled_stress * rest.gradient_1;
     vec3 f2 = scaled_stress * rest.gradient_2;
     vec3 f3 = scaled_stress * rest.gradient_3;

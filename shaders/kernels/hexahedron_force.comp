@@ -14,14 +14,16 @@ void main() {
     mat3 H = displacement_gradient(m, rest);
     Deformation d = deformation(H);
     uint material = uint(rest.material);
-    mat3 stress = shear_stress(tetrahedron_count + e, d, parameters_of(material));
-#if HAS_VISCOSITY
-    // Not in `stress -= …`: README, traps.
-    mat3 viscous_stress = viscous_stress_of(2u * PRONY_TERMS * tetrahedron_count + e, material, d, stress);
-    stress = stress - viscous_stress;
-#endif
     float p = pressure_of_element(e, d.volume_change, rest.volumetric_modulus);
-    mat3 scaled_stress = rest.volume * (stress + p * d.cofactor_F);
+#if HAS_VISCOSITY
+    mat3 P = stress(tetrahedron_count + e, d, parameters_of(material), 0.0);
+    // Not in `P -= …`: README, traps.
+    mat3 viscous_stress = viscous_stress_of(2u * PRONY_TERMS * tetrahedron_count + e, material, d, P);
+    P = P - viscous_stress + p * cofactor_F(d);
+#else
+    mat3 P = stress(tetrahedron_count + e, d, parameters_of(material), p);
+#endif
+    mat3 scaled_stress = rest.volume * P;
     mat3x4 q = rest.hourglass_stiffness * hourglass_displacements(m, H, rest);
     for (uint i = 0u; i < 3u; ++i)
         for (uint j = 0u; j < 3u; ++j) scaled_stress[j][i] -= dot(q[i], rest.rest_hourglass[j]);

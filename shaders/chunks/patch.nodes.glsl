@@ -1,0 +1,68 @@
+// Needs: bindings, patch; node.springs and node.external_force where their flags are 1.
+// Gives: the nodes of a patch in shared memory: load_node, node, advance_node, store_displacement.
+//! define HAS_SPRINGS
+//! define HAS_EXTERNAL_FORCE
+
+/// Planes of all slots: X.x, X.y, X.z (mm, from a point of the patch), inverse mass x, y, z, and 1 / V_a (1/mm³) of the averaged
+/// pressure.
+layout(std430, binding = BINDING_PATCH_REST) readonly buffer PatchRest { float patch_rest[]; };
+/// Planes of all slots: u.x, u.y, u.z, v.x, v.y, v.z, mm.
+layout(std430, binding = BINDING_PATCH_STATE) buffer PatchState { float patch_state[]; };
+#if HAS_SPRINGS || HAS_EXTERNAL_FORCE
+layout(std430, binding = BINDING_PATCH_NODE) readonly buffer PatchNode { uint node_of_slot[]; };
+#endif
+
+shared vec2 node_a[SLOTS], node_b[SLOTS], node_c[SLOTS];  // (X.xy), (X.z, u.x), (u.yz)
+
+struct Node {
+    vec3 X, u;
+};
+
+Node node(uint i) {
+    vec2 b = node_b[i];
+    return Node(vec3(node_a[i], b.x), vec3(b.y, node_c[i]));
+}
+
+vec3 rest_plane(uint s, uint plane) {
+    return vec3(patch_rest[plane * slots_of_all + s], patch_rest[(plane + 1u) * slots_of_all + s],
+                patch_rest[(plane + 2u) * slots_of_all + s]);
+}
+
+vec3 state_plane(uint s, uint plane) {
+    return vec3(patch_state[plane * slots_of_all + s], patch_state[(plane + 1u) * slots_of_all + s],
+                patch_state[(plane + 2u) * slots_of_all + s]);
+}
+
+void store_state(uint s, uint plane, vec3 value) {
+    patch_state[plane * slots_of_all + s] = value.x;
+    patch_state[(plane + 1u) * slots_of_all + s] = value.y;
+    patch_state[(plane + 2u) * slots_of_all + s] = value.z;
+}
+
+/// Slot i of the patch, s of all.
+void load_node(uint s, uint i) {
+    vec3 X = rest_plane(s, 0u);
+    vec3 u = state_plane(s, 0u);
+    node_a[i] = X.xy;
+    node_b[i] = vec2(X.z, u.x);
+    node_c[i] = u.yz;
+}
+
+void store_displacement(uint s, uint i) { store_state(s, 0u, vec3(node_b[i].y, node_c[i])); }
+
+/// The time step in increment form under the internal force f, mN: v⁺ = momentum v + gain r / m, u⁺ = u + v⁺.
+void advance_node(uint s, uint i, vec3 f, float momentum, float gain) {
+    vec3 u = vec3(node_b[i].y, node_c[i]);
+    vec3 residual = -f;
+#if HAS_SPRINGS
+    residual += spring_force(node_of_slot[s], u);
+#endif
+#if HAS_EXTERNAL_FORCE
+    residual += external_force(node_of_slot[s]);
+#endif
+    vec3 v = momentum * state_plane(s, 3u) + gain * (residual * rest_plane(s, 3u));
+    u += v;
+    store_state(s, 3u, v);
+    node_b[i].y = u.x;
+    node_c[i] = u.yz;
+}

@@ -1,0 +1,189 @@
+#include "tled/detail/gpu_patches.hpp"
+
+#include <algorithm>
+#include <array>
+
+namespace tissuewarp::tled::detail {
+namespace {
+
+using shaders::Law;
+using shaders::PatchStages;
+using shaders::Program;
+
+/// Recorded steps are handed over in portions of this many, so that the device starts while the host still records.
+constexpr int steps_per_flush = 64;
+constexpr int steps_per_dispatch = 500;
+constexpr int storage_blocks = 14;  // of patch_step with all effects
+
+Law law_of(const RestState& rest) {
+    return static_cast<Law>(rest.materials[static_cast<std::size_t>(rest.blocks.front().material)].index());
+}
+
+bool every_node_has_tetrahedra(const RestState& rest) {
+    const std::vector<int>& offset = rest.incidence.offset;
+    return std::adjacent_find(offset.begin(), offset.end()) == offset.end();
+}
+
+/// Whether elements keep a part of an averaged pressure.
+bool keeps_a_part(const RestState& rest) {
+    return rest.pressure.count() > 0 && rest.volumetric_modulus.cwiseAbs().maxCoeff() > 0;
+}
+
+/// Bytes of shared memory that the patches' programs take.
+std::size_t shared_bytes(int slots, bool averages) {
+    return static_cast<std::size_t>(slots) * (averages ? 44 : 36) + 16;
+}
+
+/// Patches that are so tiny that too many meet at a node grow; those that do not fit into shared memory shrink.
+PatchLayout fitting_layout(const RestState& rest, const GpuStepShape& shape, std::size_t shared_memory) {
+    PatchShape cut{shape.patch_tets, shape.longest_fan};
+    std::vector<Patch> patches = cut_into_patches(rest, cut);
+    const auto fits = [&] {
+        const auto larger = std::max_element(patches.begin(), patches.end(), [](const Patch& a, const Patch& b) {
+            return a.node.size() < b.node.size();
+        });
+        return shared_bytes(static_cast<int>(larger->node.size()), rest.pressure.count() > 0) <= shared_memory;
+    };
+    while (!fits()) {
+        cut.tets = cut.tets * 7 / 8;
+        patches = cut_into_patches(rest, cut);
+    }
+    while (most_sharing(rest.node_count, patches) > most_sharing_patches) {
+        cut.tets *= 2;
+        patches = cut_into_patches(rest, cut);
+    }
+    return patch_layout(rest, patches);
+}
+
+constexpr std::array<PatchStages, 1> first_forces{{{.forces = true}}};
+constexpr std::array<PatchStages, 1> one_step{{{.advances = true, .forces = true}}};
+constexpr std::array<PatchStages, 1> many_steps{{{.advances = true, .forces = true, .persists = true}}};
+constexpr std::array<PatchStages, 2> averaged_first_forces{
+    {{.volumes = true, .averages = true}, {.forces = true, .averages = true}}};
+constexpr std::array<PatchStages, 2> averaged_one_step{
+    {{.advances = true, .volumes = true, .averages = true}, {.forces = true, .averages = true}}};
+constexpr std::array<PatchStages, 1> averaged_many_steps{
+    {{.advances = true, .volumes = true, .forces = true, .averages = true, .persists = true}}};
+
+}  // namespace
+
+bool GpuPatches::suit(const RestState& rest, const shaders::Device& device) {
+    if (rest.blocks.empty() || rest.hexahedra.count() > 0 || keeps_a_part(rest) || !rest.viscosity.empty() ||
+        rest.fibre.cols() > 0 || device.limits().storage_blocks < storage_blocks)
+        return false;
+    const auto follows_the_law = [&](const MaterialBlock& block) {
+        return rest.materials[static_cast<std::size_t>(block.material)].index() ==
+               static_cast<std::size_t>(law_of(rest));
+    };
+    return std::all_of(rest.blocks.begin(), rest.blocks.end(), follows_the_law) && every_node_has_tetrahedra(rest);
+}
+
+GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& programs, const RestState& rest,
+                       const GpuStepShape& shape, BlockBuffers& blocks)
+    : programs_(programs),
+      law_(law_of(rest)),
+      averages_(rest.pressure.count() > 0),
+      many_at_once_(shape.many_at_once),
+      node_count_(static_cast<std::size_t>(rest.node_count)) {
+    const PatchLayout layout = fitting_layout(rest, shape, device.limits().shared_memory_bytes);
+    const PatchCapacity& c = layout.capacity;
+    sizes_ = {c.patches, c.slots, c.fans, c.sources, c.neighbours, c.contributions, shape.workgroup};
+    slot_count_ = layout.node_of_slot.size();
+    head_.emplace(device, layout.head, "heads of patches");
+    fans_.emplace(device, layout.fans, "fans of patches");
+    rest_.emplace(device, layout.rest, "rest data of patches");
+    state_.emplace(device, 6 * slot_count_, "state of patches");
+    sources_.emplace(device, layout.sources, "sources of forces");
+    neighbours_.emplace(device, layout.neighbours, "neighbours of patches");
+    progress_.emplace(device, static_cast<std::size_t>(c.patches) + 1, "progress of patches");
+    largest_.emplace(device, static_cast<std::size_t>(c.patches), "largest forces of patches");
+    volumes_.emplace(device, averages_ ? slot_count_ + 1 : 1, "volume changes of patches");
+    node_of_slot_.emplace(device, layout.node_of_slot, "nodes of slots");
+    slot_of_node_.emplace(device, layout.slot_of_node, "slots of nodes");
+    forces_.emplace(device, 2 * slot_count_ + 1, "forces of patches");
+    blocks.set("PatchHead", *head_);
+    blocks.set("PatchFans", *fans_);
+    blocks.set("PatchRest", *rest_);
+    blocks.set("PatchState", *state_);
+    blocks.set("PatchSources", *sources_);
+    blocks.set("PatchNeighbours", *neighbours_);
+    blocks.set("PatchProgress", *progress_);
+    blocks.set("PatchLargest", *largest_);
+    blocks.set("PatchNode", *node_of_slot_);
+    blocks.set("PatchSlot", *slot_of_node_);
+    blocks.set("PatchForces", *forces_);
+    blocks.set("PatchVolumes", *volumes_);
+}
+
+void GpuPatches::run(int steps, const StepCoefficients& coefficients, const shaders::NodeEffects& effects,
+                     const BlockBuffers& blocks) {
+    if (!loaded_) load(effects, blocks);
+    if (many_at_once_) {
+        step_many(steps, coefficients, effects, blocks);
+        // The nodes still hold the state that the run began with.
+        if (gave_up()) {
+            many_at_once_ = false;
+            load(effects, blocks);
+        }
+    }
+    if (!many_at_once_)
+        dispatch(averages_ ? Stages(averaged_one_step) : one_step, steps, 1, coefficients, effects, blocks);
+    store(blocks);
+    shaders::check_errors("time steps over patches");
+}
+
+void GpuPatches::step_many(int steps, const StepCoefficients& coefficients, const shaders::NodeEffects& effects,
+                           const BlockBuffers& blocks) {
+    const Stages stages = averages_ ? averaged_many_steps : many_steps;
+    dispatch(stages, steps / steps_per_dispatch, steps_per_dispatch, coefficients, effects, blocks);
+    if (const int left = steps % steps_per_dispatch; left > 0) dispatch(stages, 1, left, coefficients, effects, blocks);
+}
+
+void GpuPatches::dispatch(Stages stages, int repeats, int steps, const StepCoefficients& coefficients,
+                          const shaders::NodeEffects& effects, const BlockBuffers& blocks) {
+    std::vector<const Program*> programs;
+    for (const PatchStages& each : stages) {
+        programs.push_back(&programs_.get(shaders::patch_step_program(law_, effects, sizes_, each)));
+        blocks.bind(*programs.back());
+        programs.back()->set(1, static_cast<float>(coefficients.momentum));
+        programs.back()->set(2, static_cast<float>(coefficients.gain));
+        programs.back()->set(3, static_cast<std::uint32_t>(steps));
+    }
+    for (int i = 1; i <= repeats; ++i) {
+        for (const Program* program : programs) {
+            program->set(0, step_);
+            program->dispatch(static_cast<std::size_t>(sizes_.patches) * static_cast<std::size_t>(sizes_.workgroup));
+            shaders::storage_barrier();
+        }
+        step_ += static_cast<std::uint32_t>(steps);
+        if (i % steps_per_flush == 0) shaders::flush();
+    }
+}
+
+/// State from nodes to slots, and the forces that the first step starts from.
+void GpuPatches::load(const shaders::NodeEffects& effects, const BlockBuffers& blocks) {
+    largest_->clear();
+    const Program& load = programs_.get(shaders::patch_load_program());
+    blocks.bind(load);
+    load.dispatch(slot_count_);
+    shaders::storage_barrier();
+    dispatch(averages_ ? Stages(averaged_first_forces) : first_forces, 1, 1, {}, effects, blocks);
+    loaded_ = true;
+}
+
+void GpuPatches::store(const BlockBuffers& blocks) {
+    const Program& store = programs_.get(shaders::patch_store_program());
+    store.set(0, static_cast<std::uint32_t>(node_count_));
+    store.set(1, static_cast<std::uint32_t>(slot_count_));
+    blocks.bind(store);
+    store.dispatch(node_count_);
+    shaders::storage_barrier();
+}
+
+bool GpuPatches::gave_up() const {
+    std::array<std::uint32_t, 1> flag{};
+    progress_->download(flag, progress_->size() - 1);
+    return flag[0] != 0;
+}
+
+}  // namespace tissuewarp::tled::detail

@@ -1,0 +1,54 @@
+#pragma once
+/// Time steps of one dispatch each over patches of the mesh (shaders/kernels/patch_step.comp): the fast twin of the two
+/// passes over elements and nodes. Needs the device's context current, except construction.
+
+#include "tled/detail/gpu_force.hpp"
+#include "tled/detail/patch_layout.hpp"
+#include "tled/engine.hpp"
+
+#include <span>
+
+namespace tissuewarp::tled::detail {
+
+class GpuPatches {
+public:
+    /// Whether patches can compute the scene on the device: T4 of one law without fibres and viscosity, no hexahedra,
+    /// no node outside of all tetrahedra.
+    static bool suit(const RestState& rest, const shaders::Device& device);
+
+    GpuPatches(const shaders::Device& device, shaders::ProgramCache& programs, const RestState& rest,
+               const GpuStepShape& shape, BlockBuffers& blocks);
+
+    /// Advances what is bound as Displacement and Increment.
+    void run(int steps, const StepCoefficients& coefficients, const shaders::NodeEffects& effects,
+             const BlockBuffers& blocks);
+    /// Displacement, Increment, masses or conditions were changed from outside.
+    void forget_state() { loaded_ = false; }
+
+private:
+    using Stages = std::span<const shaders::PatchStages>;
+    /// Dispatches of the stages, `repeats` times, each of which counts `steps`.
+    void dispatch(Stages stages, int repeats, int steps, const StepCoefficients& coefficients,
+                  const shaders::NodeEffects& effects, const BlockBuffers& blocks);
+    void step_many(int steps, const StepCoefficients& coefficients, const shaders::NodeEffects& effects,
+                   const BlockBuffers& blocks);
+    void load(const shaders::NodeEffects& effects, const BlockBuffers& blocks);
+    void store(const BlockBuffers& blocks);
+    /// Whether a patch waited too long for its neighbours: the state is then not that of any step.
+    [[nodiscard]] bool gave_up() const;
+
+    shaders::ProgramCache& programs_;
+    shaders::Law law_;
+    bool averages_, many_at_once_;
+    std::size_t node_count_, slot_count_;
+    shaders::PatchSizes sizes_;
+    std::optional<shaders::Buffer<Uint4>> head_, fans_;
+    std::optional<shaders::Buffer<float>> rest_, state_, volumes_;
+    std::optional<shaders::Buffer<std::uint32_t>> sources_, neighbours_, progress_, node_of_slot_, slot_of_node_;
+    std::optional<shaders::Buffer<std::array<std::uint32_t, 2>>> largest_;
+    std::optional<shaders::Buffer<Float4>> forces_;
+    std::uint32_t step_ = 0;
+    bool loaded_ = false;
+};
+
+}  // namespace tissuewarp::tled::detail
