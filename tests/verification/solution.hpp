@@ -15,6 +15,7 @@ enum class Elements {
     AveragedPressure,
     Quadratic,       ///< T10, pressure in the elements
     QuadraticMixed,  ///< T10 with a linear continuous pressure
+    Hexahedra,       ///< one point each, one for the six tetrahedra of a cell
 };
 const char* name_of(Elements elements);
 inline bool is_quadratic(Elements elements) {
@@ -25,6 +26,7 @@ inline bool is_quadratic(Elements elements) {
 class Solution {
 public:
     meshing::TetMesh mesh;                      ///< of the corners
+    meshing::HexCells hexahedra;                ///< instead of its tetrahedra, which then interpolate only
     std::optional<tled::QuadraticMesh> curved;  ///< with middle nodes, for T10
     Eigen::Matrix3Xd displacement, force;       ///< u (mm) and ∂E/∂u (mN) of all nodes
     double energy = 0;                          ///< mN mm
