@@ -74,13 +74,13 @@ double bulge_radius(const Solution& s, double cap) {
         if (X.head<2>().norm() < ball_radius * (std::sin(cap) - 1e-9)) continue;
         meridians[std::lround(1e6 * std::atan2(X[1], X[0]))].emplace_back(x.head<2>().norm(), x[2]);
     }
-    double sum = 0.0, weights = 0.0;  // the two on the symmetry planes stand for half as much as the others
+    double sum = 0.0, shares = 0.0;  // the two on the symmetry planes stand for half as much as the others
     for (const auto& [azimuth, points] : meridians) {
-        const double weight = azimuth == meridians.begin()->first || azimuth == meridians.rbegin()->first ? 0.5 : 1.0;
-        sum += weight * farthest_of_curve(points);
-        weights += weight;
+        const double share = azimuth == meridians.begin()->first || azimuth == meridians.rbegin()->first ? 0.5 : 1.0;
+        sum += share * farthest_of_curve(points);
+        shares += share;
     }
-    return sum / weights;
+    return sum / shares;
 }
 
 }  // namespace
