@@ -113,7 +113,7 @@ Problem breast(Law law, Gravity gravity) {
     add_points("points", "points", "u_rz");
     add_points("surface points", "surface_points_rz", "u_surface_rz");
     problem.levels = {4, 8, 16};
-    problem.quadratic_levels = {2, 4, 8};
+    problem.quadratic_levels = {4, 6, 9};
     return problem;
 }
 
