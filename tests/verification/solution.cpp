@@ -170,7 +170,7 @@ tled::NodalConditions nodal_conditions_of(const Problem& problem, const meshing:
 }
 
 Solution solve(const Problem& problem, Elements elements, int level) {
-    constexpr int most_contact_rounds = 40;
+    constexpr int most_contact_rounds = 40, most_iterations = 300;  // near ν = ½ under full load, some 100
     Solution solution;
     solution.mesh = problem.mesh(level);
     const auto discretisation = discretise(problem, elements, solution);
@@ -180,7 +180,7 @@ Solution solve(const Problem& problem, Elements elements, int level) {
     if (problem.plane_height) update_contact(problem, solution, 1, touching);
     for (int stage = 1; stage <= problem.stages; ++stage) {
         for (int round = 0;; ++round) {
-            tled::NewtonOptions options{.tolerance_mm = tolerance_mm};
+            tled::NewtonOptions options{.tolerance_mm = tolerance_mm, .max_iterations = most_iterations};
             if (stage > 1 || round > 0) options.start = solution.displacement;
             const tled::NewtonResult found = tled::newton_equilibrium(
                 energy, tled::nodal_conditions(conditions_of(problem, solution, stage, touching), energy.node_count()),
