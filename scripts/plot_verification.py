@@ -1,12 +1,14 @@
 #!/usr/bin/python3
-"""Draws docs/figures/verification_convergence.svg and cook_locking.svg from the lines that verification_table writes.
+"""Draws docs/figures/verification_convergence.svg and cook_locking.svg from the lines that verification_table writes,
+and prints how many quantities each element meets.
     plot_verification.py verification.csv docs/figures"""
 import csv
 import math
 import pathlib
 import sys
 
-COLOURS = {"T4": "#c2410c", "averaged pressure": "#1d4ed8", "T10": "#6b7280", "T10 mixed": "#047857"}
+COLOURS = {"T4": "#c2410c", "averaged pressure": "#1d4ed8", "T10": "#6b7280", "T10 mixed": "#047857",
+           "H8": "#a21caf"}
 PANELS = [("p1_cube_stretch", "iso", "force z", "Cube pulled by 20 %: force"),
           ("p2_cube_shear", "iso", "force x", "Cube sheared by 50 %: force"),
           ("p4_cook_plane_strain, nu 0.499", "iso", "tip y", "Cook's membrane, ν = 0.499: tip"),
@@ -127,6 +129,29 @@ def locking(rows):
     return svg(580, 380, parts)
 
 
+def counts(rows):
+    """A Markdown table: one line per element, plain tetrahedra apart where they are expected to lock."""
+    finest = {(r["problem"], r["law"], r["element"], r["quantity"]): r for r in rows}  # the last line of each
+    groups = {}
+    for r in finest.values():
+        locks = r["expected_to_lock"] == "yes"
+        groups.setdefault(r["element"] + (", ν > 0.46: expected to lock" if locks else ""), []).append(r)
+    lines = ["| element | quantities | within uncertainty + mesh error | with safety factor | largest miss, of the bar |",
+             "|---|---|---|---|---|"]
+    for name, group in groups.items():
+        off, known, mesh, safety = (column(group, c) for c in ("off", "uncertainty", "mesh_error", "safety"))
+        bars = [k + m for k, m in zip(known, mesh)]
+        excess = max(o / b - 1 for o, b in zip(off, bars))
+        lines.append(f"| {name} | {len(group)} | {sum(o <= b for o, b in zip(off, bars))} | "
+                     f"{sum(o <= k + s * m for o, k, s, m in zip(off, known, safety, mesh))} | "
+                     f"{f'{100 * excess:.2g} %' if excess > 0 else '–'} |")
+    return "\n".join(lines)
+
+
+def column(rows, name):
+    return [float(r[name]) for r in rows]
+
+
 def main():
     with open(sys.argv[1], newline="") as stream:
         rows = list(csv.DictReader(stream))
@@ -134,6 +159,7 @@ def main():
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "verification_convergence.svg").write_text(convergence(rows))
     (folder / "cook_locking.svg").write_text(locking(rows))
+    print(counts(rows))
 
 
 main()

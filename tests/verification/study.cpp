@@ -32,11 +32,12 @@ bool expected_to_lock(const Problem& problem, Elements elements) {
 }
 
 double highest_order(Elements elements) {
-    return is_quadratic(elements) ? 4.0 : 2.0;
+    return elements == Elements::Quadratic ? 4.0 : 2.0;
 }
 
 std::vector<Elements> elements_for(const Problem& problem) {
-    std::vector<Elements> result{Elements::T4, Elements::AveragedPressure, Elements::Hexahedra};
+    std::vector<Elements> result{Elements::T4, Elements::AveragedPressure};
+    if (problem.materials.size() == 1) result.push_back(Elements::Hexahedra);
     if (problem.plane_height) return result;
     const bool soft = tled::poisson_ratio(problem.materials.at(1)) < 0.4, cook = problem.name.starts_with("p4_cook");
     if (soft || cook) result.push_back(Elements::Quadratic);

@@ -31,10 +31,13 @@ double safety_factor(double observed_order, double highest_order);
 /// are expected there and counted apart.
 bool expected_to_lock(const Problem& problem, Elements elements);
 
-/// 2 for linear elements, 4 for quadratic ones: of forces and energies.
+/// Of forces and energies: 2 for linear elements, 4 for quadratic ones with the pressure in their points, 2 for those
+/// with averages of J, which are projections by a lumped mass matrix: their error of second order in h, times 1/κ,
+/// vanishes only as ν → ½.
 double highest_order(Elements elements);
 
-/// T4, averaged pressure and one-point hexahedra; quadratic tetrahedra, with averaged pressure from ν = 0.4 on, both
+/// T4, averaged pressure and one-point hexahedra, these without the stiff ball, between whose shells and the surface
+/// hexahedra fold at the rims; quadratic tetrahedra, with averaged pressure from ν = 0.4 on, both
 /// for Cook's membrane, none for contact: at corners of a flat face under uniform pressure their consistent nodal
 /// forces are zero, so that no nodal contact set can be told from them.
 std::vector<Elements> elements_for(const Problem& problem);
