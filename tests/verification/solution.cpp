@@ -28,16 +28,8 @@ struct Discretisation {
 std::unique_ptr<Discretisation> discretise(const Problem& problem, Elements elements, Solution& solution) {
     auto result = std::make_unique<Discretisation>();
     if (!is_quadratic(elements)) {
-        tled::Model model;
-        model.mesh = solution.mesh;
-        model.materials = problem.materials;
-        model.element = elements == Elements::T4 ? tled::Element::T4 : tled::Element::AveragedPressureT4;
-        if (elements == Elements::Hexahedra) {
-            solution.hexahedra = hexahedra_of(solution.mesh);
-            model.hexahedra = solution.hexahedra;
-            model.mesh.tets.resize(4, 0);
-            model.mesh.labels.resize(0);
-        }
+        const tled::Model model = linear_model(problem, elements, solution.mesh);
+        solution.hexahedra = model.hexahedra;
         result->rest = tled::rest_state(model);
         result->energy = std::make_unique<tled::LinearTetrahedra>(result->rest);
         return result;
@@ -163,9 +155,23 @@ const char* name_of(Elements elements) {
     return "";
 }
 
-tled::NodalConditions nodal_conditions_of(const Problem& problem, const meshing::TetMesh& mesh) {
+tled::Model linear_model(const Problem& problem, Elements elements, const meshing::TetMesh& mesh) {
+    tled::Model model;
+    model.mesh = mesh;
+    model.materials = problem.materials;
+    model.element = elements == Elements::T4 ? tled::Element::T4 : tled::Element::AveragedPressureT4;
+    if (elements == Elements::Hexahedra) {
+        model.hexahedra = hexahedra_of(mesh);
+        model.mesh.tets.resize(4, 0);
+        model.mesh.labels.resize(0);
+    }
+    return model;
+}
+
+tled::NodalConditions nodal_conditions_of(const Problem& problem, Elements elements, const meshing::TetMesh& mesh) {
     Solution part;
     part.mesh = mesh;
+    if (elements == Elements::Hexahedra) part.hexahedra = hexahedra_of(mesh);
     return tled::nodal_conditions(conditions_of(problem, part, problem.stages, {}), mesh.node_count());
 }
 

@@ -2,6 +2,7 @@
 /// A problem solved on one mesh with one element.
 
 #include "tests/verification/problem.hpp"
+#include "tled/model.hpp"
 #include "tled/quadratic.hpp"
 
 #include <functional>
@@ -44,8 +45,11 @@ public:
     [[nodiscard]] double deformed_volume() const;
 };
 
-/// Loads and prescribed displacements of the last stage on a linear mesh, without contact.
-tled::NodalConditions nodal_conditions_of(const Problem& problem, const meshing::TetMesh& mesh);
+/// The problem's tissue in linear elements: the tetrahedra of a mesh, or the hexahedra of its cells.
+tled::Model linear_model(const Problem& problem, Elements elements, const meshing::TetMesh& mesh);
+
+/// Loads and prescribed displacements of the last stage on linear elements, without contact.
+tled::NodalConditions nodal_conditions_of(const Problem& problem, Elements elements, const meshing::TetMesh& mesh);
 
 /// Newton's method, in the stages of the problem; with a rigid plane, by an exact nodal active set around it.
 Solution solve(const Problem& problem, Elements elements, int level);
