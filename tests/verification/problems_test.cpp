@@ -39,6 +39,18 @@ TEST(CookVerification, OnlyPlainLinearTetrahedraLock) {
     }
 }
 
+// What highest_order() says: at ν = 0.3 halving the cells divides the error of the tip by nearly 4 with averages of J,
+// by more than 8 with the pressure in the points.
+TEST(CookVerification, LumpedAveragesOfJErrInSecondOrder) {
+    const Problem problem = cook_plane_strain(Law::Iso, 0.3);
+    const Quantity& tip = problem.quantities[1];
+    const auto fall = [&](Elements elements) {
+        return relative_off(tip, solve(problem, elements, 8)) / relative_off(tip, solve(problem, elements, 16));
+    };
+    EXPECT_NEAR(fall(Elements::QuadraticMixed), 3.5, 0.5);
+    EXPECT_GT(fall(Elements::Quadratic), 8.0);
+}
+
 TEST(CookVerification, PlaneStrain) {
     const Problem problem = cook_plane_strain(Law::LnJ, 0.499);
     expect_met(problem, study(problem, Elements::AveragedPressure, {8, 16, 32}));

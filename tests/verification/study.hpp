@@ -37,9 +37,9 @@ bool expected_to_lock(const Problem& problem, Elements elements);
 double highest_order(Elements elements);
 
 /// T4, averaged pressure and one-point hexahedra, these without the stiff ball, between whose shells and the surface
-/// hexahedra fold at the rims; quadratic tetrahedra, with averaged pressure from ν = 0.4 on, both
-/// for Cook's membrane, none for contact: at corners of a flat face under uniform pressure their consistent nodal
-/// forces are zero, so that no nodal contact set can be told from them.
+/// hexahedra fold at the rims; quadratic tetrahedra, with averaged pressure from ν = 0.4 on, both for Cook's membrane,
+/// none for contact: at corners of a flat face under uniform pressure their consistent nodal forces are zero, so that
+/// no nodal contact set can be told from them.
 std::vector<Elements> elements_for(const Problem& problem);
 
 /// One quantity of one problem on three meshes. Many numbers are compared in the root mean square.
