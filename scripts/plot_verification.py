@@ -138,7 +138,8 @@ def counts(rows):
         groups.setdefault(r["element"] + (", ν > 0.46: expected to lock" if locks else ""), []).append(r)
     lines = ["| element | quantities | within uncertainty + mesh error | with safety factor | largest miss, of the bar |",
              "|---|---|---|---|---|"]
-    for name, group in groups.items():
+    order = list(COLOURS)
+    for name, group in sorted(groups.items(), key=lambda item: order.index(item[1][0]["element"])):
         off, known, mesh, safety = (column(group, c) for c in ("off", "uncertainty", "mesh_error", "safety"))
         bars = [k + m for k, m in zip(known, mesh)]
         excess = max(o / b - 1 for o, b in zip(off, bars))
