@@ -125,7 +125,8 @@ def locking(rows):
                 points.append((place[nu], top + height * (1.1 - ratio) / 1.1))
         if points:
             parts.append(curve(points, colour))
-    parts.append(text(left + 8, top + height - 12, "coarsest mesh: 16 × 16 linear cells, 4 × 4 quadratic ones", 10, "start"))
+    parts.append(text(left + 8, top + height - 12, "coarsest mesh: 16 × 16 linear cells, 4 × 4 quadratic ones", 10,
+                      "start"))
     return svg(580, 380, parts)
 
 
@@ -136,7 +137,8 @@ def counts(rows):
     for r in finest.values():
         locks = r["expected_to_lock"] == "yes"
         groups.setdefault(r["element"] + (", ν > 0.46: expected to lock" if locks else ""), []).append(r)
-    lines = ["| element | quantities | within uncertainty + mesh error | with safety factor | largest miss, of the bar |",
+    lines = ["| element | quantities | within uncertainty + mesh error | with safety factor | "
+             "largest miss, of the strict bar |",
              "|---|---|---|---|---|"]
     order = list(COLOURS)
     for name, group in sorted(groups.items(), key=lambda item: order.index(item[1][0]["element"])):
