@@ -20,13 +20,11 @@ struct Case {
     int level;
 };
 
-void print_engine(const Problem& problem, tled::Element element, tled::Engine& engine,
-                  const tled::RestStiffness& stiffness, const tled::NodalConditions& conditions,
-                  const Matrix3Xd& newton, double tolerance_mm) {
+void print_engine(const Problem& problem, Elements elements, tled::Engine& engine, const tled::RestStiffness& stiffness,
+                  const tled::NodalConditions& conditions, const Matrix3Xd& newton, double tolerance_mm) {
     const double largest = std::sqrt(newton.colwise().squaredNorm().maxCoeff());
-    std::printf("| %s | %s | %s | %d | %s | ", problem.name.c_str(), name_of(problem.law),
-                element == tled::Element::T4 ? "T4" : "averaged pressure", static_cast<int>(newton.cols()),
-                engine.description().c_str());
+    std::printf("| %s | %s | %s | %d | %s | ", problem.name.c_str(), name_of(problem.law), name_of(elements),
+                static_cast<int>(newton.cols()), engine.description().c_str());
     try {
         const tled::EquilibriumResult found =
             tled::equilibrium(engine, stiffness, conditions, {.tolerance_mm = tolerance_mm, .max_steps = 60000});
@@ -38,18 +36,15 @@ void print_engine(const Problem& problem, tled::Element element, tled::Engine& e
     std::fflush(stdout);
 }
 
-void print_case(const Case& each, tled::Element element, GpuRows gpu) {
-    tled::Model model;
-    model.mesh = each.problem.mesh(each.level);
-    model.materials = each.problem.materials;
-    model.element = element;
-    const tled::RestState rest = tled::rest_state(model);
-    const tled::NodalConditions conditions = nodal_conditions_of(each.problem, model.mesh);
+void print_case(const Case& each, Elements elements, GpuRows gpu) {
+    const meshing::TetMesh mesh = each.problem.mesh(each.level);
+    const tled::RestState rest = tled::rest_state(linear_model(each.problem, elements, mesh));
+    const tled::NodalConditions conditions = nodal_conditions_of(each.problem, elements, mesh);
     const Matrix3Xd newton = tled::newton_equilibrium(rest, conditions).displacement;
     const tled::RestStiffness stiffness(rest, conditions);
     constexpr double fine_mm = 1e-7, single_mm = 1e-3;
     const auto print = [&](std::unique_ptr<tled::Engine> engine, double tolerance_mm) {
-        print_engine(each.problem, element, *engine, stiffness, conditions, newton, tolerance_mm);
+        print_engine(each.problem, elements, *engine, stiffness, conditions, newton, tolerance_mm);
     };
     print(tled::make_cpu_engine(rest, tled::Scalar::Float64), fine_mm);
     print(tled::make_cpu_engine(rest, tled::Scalar::Float32), single_mm);
@@ -68,8 +63,8 @@ void print_engines(GpuRows gpu) {
                                   {cook_3d(Law::Iso, 0.49).value(), 8},
                                   {breast(Law::LnJ, Gravity::Supine), 6}};
     for (const Case& each : cases) {
-        for (const tled::Element element : {tled::Element::T4, tled::Element::AveragedPressureT4}) {
-            print_case(each, element, gpu);
+        for (const Elements elements : {Elements::T4, Elements::AveragedPressure, Elements::Hexahedra}) {
+            print_case(each, elements, gpu);
         }
     }
 }

@@ -63,7 +63,8 @@ void print_head(const std::string& problem) {
     std::printf(
         "\n### %s\n\n"
         "| law | element | nodes | min J | quantity | finest mesh | order | extrapolated | reference | off | "
-        "mesh error | within uncertainty + mesh error |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+        "mesh error | within uncertainty + mesh error | with safety factor |\n"
+        "|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
         problem.c_str());
 }
 
@@ -98,10 +99,13 @@ void print_row(const Problem& problem, Elements elements, const Study& study, co
     }
     std::printf("%.3g | ", c.mesh_error);
     if (c.met()) {
-        std::printf("met |\n");
+        std::printf("met | ");
+    } else if (expected_to_lock(problem, elements)) {
+        std::printf("locks, by %.2g | ", c.excess());
     } else {
-        std::printf("**not met** by %.2g |\n", c.excess());
+        std::printf("**not met** by %.2g | ", c.excess());
     }
+    std::printf("%g: %s |\n", c.safety, c.met_within_index() ? "met" : "not met");
 }
 
 void write_csv(std::ofstream& csv, const Problem& problem, Elements elements, const Study& study, const Comparison& c) {
@@ -110,7 +114,8 @@ void write_csv(std::ofstream& csv, const Problem& problem, Elements elements, co
         const double off = (*values[k] - c.reference).norm() / std::sqrt(static_cast<double>(c.fine.size()));
         csv << '"' << problem.name << "\"," << name_of(problem.law) << ',' << name_of(elements) << ",\"" << c.quantity
             << "\"," << c.unit << ',' << study.nodes[k] << ',' << (c.single() ? (*values[k])[0] : off) << ',' << off
-            << ',' << (c.single() ? c.reference[0] : 0.0) << ',' << c.uncertain << '\n';
+            << ',' << (c.single() ? c.reference[0] : 0.0) << ',' << c.uncertain << ',' << c.mesh_error << ','
+            << c.safety << ',' << (expected_to_lock(problem, elements) ? "yes" : "no") << '\n';
     }
     csv.flush();
 }
@@ -120,7 +125,8 @@ void run_studies(const Arguments& arguments) {
     if (!arguments.csv.empty()) {
         csv.open(arguments.csv);
         csv.precision(10);
-        csv << "problem,law,element,quantity,unit,nodes,value,off,reference,uncertainty\n";
+        csv << "problem,law,element,quantity,unit,nodes,value,off,reference,uncertainty,mesh_error,safety,"
+               "expected_to_lock\n";
     }
     std::vector<Problem> problems = all_problems();
     std::stable_sort(problems.begin(), problems.end(),

@@ -1,12 +1,14 @@
 #!/usr/bin/python3
-"""Draws docs/figures/verification_convergence.svg and cook_locking.svg from the lines that verification_table writes.
+"""Draws docs/figures/verification_convergence.svg and cook_locking.svg from the lines that verification_table writes,
+and prints how many quantities each element meets.
     plot_verification.py verification.csv docs/figures"""
 import csv
 import math
 import pathlib
 import sys
 
-COLOURS = {"T4": "#c2410c", "averaged pressure": "#1d4ed8", "T10": "#6b7280", "T10 mixed": "#047857"}
+COLOURS = {"T4": "#c2410c", "averaged pressure": "#1d4ed8", "T10": "#6b7280", "T10 mixed": "#047857",
+           "H8": "#a21caf"}
 PANELS = [("p1_cube_stretch", "iso", "force z", "Cube pulled by 20 %: force"),
           ("p2_cube_shear", "iso", "force x", "Cube sheared by 50 %: force"),
           ("p4_cook_plane_strain, nu 0.499", "iso", "tip y", "Cook's membrane, ν = 0.499: tip"),
@@ -123,8 +125,33 @@ def locking(rows):
                 points.append((place[nu], top + height * (1.1 - ratio) / 1.1))
         if points:
             parts.append(curve(points, colour))
-    parts.append(text(left + 8, top + height - 12, "coarsest mesh: 16 × 16 linear cells, 4 × 4 quadratic ones", 10, "start"))
+    parts.append(text(left + 8, top + height - 12, "coarsest mesh: 16 × 16 linear cells, 4 × 4 quadratic ones", 10,
+                      "start"))
     return svg(580, 380, parts)
+
+
+def counts(rows):
+    """A Markdown table: one line per element, plain tetrahedra apart where they are expected to lock."""
+    finest = {(r["problem"], r["law"], r["element"], r["quantity"]): r for r in rows}  # the last line of each
+    groups = {}
+    for r in finest.values():
+        locks = r["expected_to_lock"] == "yes"
+        groups.setdefault(r["element"] + (", ν > 0.46: expected to lock" if locks else ""), []).append(r)
+    lines = ["| element | quantities | within uncertainty + mesh error | with safety factor | "
+             "largest distance / strict bar |",
+             "|---|---|---|---|---|"]
+    order = list(COLOURS)
+    for name, group in sorted(groups.items(), key=lambda item: order.index(item[1][0]["element"])):
+        off, known, mesh, safety = (column(group, c) for c in ("off", "uncertainty", "mesh_error", "safety"))
+        bars = [k + m for k, m in zip(known, mesh)]
+        lines.append(f"| {name} | {len(group)} | {sum(o <= b for o, b in zip(off, bars))} | "
+                     f"{sum(o <= k + s * m for o, k, s, m in zip(off, known, safety, mesh))} | "
+                     f"{max(o / b for o, b in zip(off, bars)):.3g} |")
+    return "\n".join(lines)
+
+
+def column(rows, name):
+    return [float(r[name]) for r in rows]
 
 
 def main():
@@ -134,6 +161,7 @@ def main():
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "verification_convergence.svg").write_text(convergence(rows))
     (folder / "cook_locking.svg").write_text(locking(rows))
+    print(counts(rows))
 
 
 main()

@@ -30,6 +30,37 @@ TEST(Richardson, RecoversLimitAndOrder) {
     EXPECT_DOUBLE_EQ(mesh_error(64.0, 1.0, 2.0, 2.0), 1.0 / 3.0);  // no better than second order is believed
 }
 
+// Oberkampf & Roy 2010, table 8.1: a miss of the order by more than a tenth, and no order at all, cost a factor of 3.
+TEST(Richardson, SafetyFactorTrustsOnlyTheElementsOwnOrder) {
+    EXPECT_EQ(safety_factor(2.0, 2.0), 1.25);
+    EXPECT_EQ(safety_factor(1.85, 2.0), 1.25);
+    EXPECT_EQ(safety_factor(1.7, 2.0), 3.0);
+    EXPECT_EQ(safety_factor(2.5, 4.0), 3.0);
+    EXPECT_EQ(safety_factor(std::nan(""), 2.0), 3.0);
+    EXPECT_EQ(safety_factor(-1.0, 2.0), 3.0);
+}
+
+// The weaker bar stands beside the strict one and never replaces it.
+TEST(Richardson, ComparisonHoldsBothBars) {
+    const Quantity quantity{"length", "mm", Eigen::VectorXd::Constant(1, 10.0), Eigen::VectorXd::Constant(1, 0.1), {}};
+    const auto value = [](double v) { return Eigen::VectorXd(Eigen::VectorXd::Constant(1, v)); };
+    const Comparison c = compare(quantity, {value(14.0), value(12.0), value(11.0)}, 2.0, 2.0);  // order 1: error 1
+    EXPECT_DOUBLE_EQ(c.mesh_error, 1.0);
+    EXPECT_TRUE(c.met());
+    const Comparison farther = compare(quantity, {value(15.0), value(13.0), value(12.0)}, 2.0, 2.0);
+    EXPECT_NEAR(farther.excess(), 0.9, 1e-12);
+    EXPECT_FALSE(farther.met());
+    EXPECT_TRUE(farther.met_within_index());
+    EXPECT_FALSE(compare(quantity, {value(17.0), value(15.0), value(14.0)}, 2.0, 2.0).met_within_index());
+}
+
+// Misses of plain tetrahedra are forgiven by Poisson's ratio alone: 0.45 is not beyond the rule, 0.49 is.
+TEST(Richardson, LockingIsExpectedByPoissonsRatio) {
+    EXPECT_FALSE(expected_to_lock(cook_plane_strain(Law::Iso, 0.45), Elements::T4));
+    EXPECT_TRUE(expected_to_lock(cook_plane_strain(Law::Iso, 0.49), Elements::T4));
+    EXPECT_FALSE(expected_to_lock(cook_plane_strain(Law::Iso, 0.49), Elements::Hexahedra));
+}
+
 // 6085.2 and 6118.4 mN, known to 0.02.
 TEST(CubeVerification, StretchAveragedPressure) {
     for (const Law law : {Law::Iso, Law::LnJ}) {
@@ -38,6 +69,17 @@ TEST(CubeVerification, StretchAveragedPressure) {
         expect_all_met(problem, found);
         EXPECT_LT(std::abs(found.comparisons[0].off), 0.006 * found.comparisons[0].reference[0]);
         EXPECT_NEAR(found.comparisons[0].order, 2.0, 0.15);
+    }
+}
+
+// Twice as close as averaged pressure on the same nodes; a wrong order of the corners would turn elements inside out.
+TEST(CubeVerification, StretchHexahedra) {
+    for (const Law law : {Law::Iso, Law::LnJ}) {
+        const Problem problem = cube_stretch(law);
+        const Study found = study(problem, Elements::Hexahedra, {4, 6, 9});
+        expect_all_met(problem, found);
+        EXPECT_LT(std::abs(found.comparisons[0].off), 0.003 * found.comparisons[0].reference[0]);
+        EXPECT_NEAR(found.comparisons[0].order, 1.8, 0.15);
     }
 }
 

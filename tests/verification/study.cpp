@@ -1,5 +1,7 @@
 #include "tests/verification/study.hpp"
 
+#include "tled/model.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -21,12 +23,21 @@ double mesh_error(double coarse_difference, double fine_difference, double ratio
     return std::abs(fine_difference) / (std::pow(ratio, order) - 1.0);
 }
 
+double safety_factor(double observed_order, double highest_order) {
+    return std::abs(observed_order - highest_order) <= 0.1 * highest_order ? 1.25 : 3.0;
+}
+
+bool expected_to_lock(const Problem& problem, Elements elements) {
+    return elements == Elements::T4 && tled::suggested_element(problem.materials) != tled::Element::T4;
+}
+
 double highest_order(Elements elements) {
-    return is_quadratic(elements) ? 4.0 : 2.0;
+    return elements == Elements::Quadratic ? 4.0 : 2.0;
 }
 
 std::vector<Elements> elements_for(const Problem& problem) {
     std::vector<Elements> result{Elements::T4, Elements::AveragedPressure};
+    if (problem.materials.size() == 1) result.push_back(Elements::Hexahedra);
     if (problem.plane_height) return result;
     const bool soft = tled::poisson_ratio(problem.materials.at(1)) < 0.4, cook = problem.name.starts_with("p4_cook");
     if (soft || cook) result.push_back(Elements::Quadratic);
@@ -47,6 +58,7 @@ Comparison compare(const Quantity& quantity, const std::array<Eigen::VectorXd, 3
         const Extrapolation limit = richardson(c.coarse[0], c.middle[0], c.fine[0], ratio);
         c.extrapolated = limit.value;
         c.order = limit.order;
+        c.safety = safety_factor(c.order, highest_order);
         return c;
     }
     const double root = std::sqrt(static_cast<double>(c.fine.size()));
@@ -54,6 +66,7 @@ Comparison compare(const Quantity& quantity, const std::array<Eigen::VectorXd, 3
     c.uncertain = c.uncertainty.norm() / root;
     c.mesh_error = mesh_error(coarse_change.norm(), fine_change.norm(), ratio, highest_order) / root;
     c.order = std::log(coarse_change.norm() / fine_change.norm()) / std::log(ratio);
+    c.safety = safety_factor(c.order, highest_order);
     return c;
 }
 

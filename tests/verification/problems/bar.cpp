@@ -43,7 +43,7 @@ Problem bar_twist(Law law) {
     problem.materials[1] = material_of(file, law);
     problem.mesh = [](int n) {
         return meshing::box_mesh(
-            {centred(bar_width, n, 1.0), centred(bar_width, n, 1.0), graded_both_ways(bar_length, 3 * n, 1.3)});
+            {centred(bar_width, n, 1.3), centred(bar_width, n, 1.3), graded_both_ways(bar_length, 3 * n, 1.3)});
     };
     problem.stages = 8;
     problem.hold = [stages = problem.stages](const Vector3d& X, int stage) {
@@ -69,7 +69,7 @@ Problem bar_twist(Law law) {
                                              [on_top](const Solution& s) { return s.reaction(on_top)[2]; }),
                           energy_quantity(values, 1.0),
                           all_points(file, values, [](const Solution& s, const Vector3d& X) { return s.at(X); })};
-    problem.levels = {4, 6, 9};
+    problem.levels = {3, 6, 12};
     problem.quadratic_levels = {1, 2, 4};
     return problem;
 }

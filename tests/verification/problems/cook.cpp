@@ -21,7 +21,7 @@ constexpr double traction_kpa = 0.08, youngs_modulus_kpa = 3.0;
 
 // Cells between the planes x (0 … 1 from the fixed face to the loaded one), n graded ones across, and the planes z.
 meshing::TetMesh membrane(const std::vector<double>& x, int n, const std::vector<double>& z) {
-    meshing::TetMesh mesh = meshing::box_mesh({x, graded_both_ways(1.0, n, 1.7), z});
+    meshing::TetMesh mesh = meshing::box_mesh({x, graded_both_ways(1.0, n, 2.2), z});
     for (auto X : mesh.nodes.colwise()) {
         const double low = right_low * X[0], high = left_height + (right_high - left_height) * X[0];
         X.head<2>() << width * X[0], low + (high - low) * X[1];
@@ -32,7 +32,7 @@ meshing::TetMesh membrane(const std::vector<double>& x, int n, const std::vector
 // Towards both ends, most towards the fixed one, whose corners are singular.
 std::vector<double> along(int n) {
     std::vector<double> x = graded_both_ways(1.0, n, 1.6);
-    for (double& t : x) t = std::pow(t, 1.4);
+    for (double& t : x) t = std::pow(t, 1.6);
     return x;
 }
 
@@ -107,7 +107,7 @@ std::optional<Problem> cook_3d(Law law, double nu) {
     const json* values = poisson_values(file, law, nu);
     if (values == nullptr) return std::nullopt;
     Problem problem = loaded("p4_cook_3d", law, nu);
-    problem.mesh = [](int n) { return membrane(graded(1.0, n, 2.2), n, graded_up(5.0, std::max(1, n / 4), 1.5)); };
+    problem.mesh = [](int n) { return membrane(graded(1.0, n, 2.6), n, graded_up(5.0, std::max(1, n / 4), 1.5)); };
     problem.hold = [](const Vector3d& X, int) {
         tled::PrescribedDisplacement held;
         const bool fixed = near(X[0], 0.0);

@@ -21,6 +21,7 @@ constexpr double grading = 1.5;
 
 const Vector3d centre(20.0, 0.0, 5.0);  // of the inclusion, mm
 constexpr double radius = 10.0, stiffer = 20.0;
+constexpr double shell_grading = 2.0;  // of the cells between it and the surface, half as many as without it
 
 // −1 … 1 by mirroring.
 std::vector<double> mirrored(const std::vector<double>& positive) {
@@ -117,7 +118,7 @@ Problem ellipsoid_inclusion() {
     problem.materials[2] = inclusion;
     problem.mesh = [](int n) {
         std::vector<double> t = graded(interface, n / 2, 1.0);
-        for (const double outer : graded_up(1.0, n / 2, grading)) {
+        for (const double outer : graded_up(1.0, n / 2, shell_grading)) {
             if (outer > 0.0) t.push_back(interface + (1.0 - interface) * outer);
         }
         std::vector<double> all = mirrored(t);
