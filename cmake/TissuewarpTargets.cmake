@@ -9,9 +9,11 @@ target_compile_options(tissuewarp_warnings INTERFACE
   $<$<BOOL:${TISSUEWARP_WERROR}>:-Werror>)
 
 if(TISSUEWARP_SANITIZE)
-  # The first finding ends the program: a report alone would not fail a test. GCC 12 sees uninitialised values inside
-  # <regex> and <functional> when it instruments them.
-  add_compile_options(-fsanitize=${TISSUEWARP_SANITIZE} -fno-sanitize-recover=undefined -fno-omit-frame-pointer
+  if(TISSUEWARP_SANITIZE MATCHES undefined)
+    set(first_finding_ends -fno-sanitize-recover=undefined)  # a report alone would not fail a test
+  endif()
+  # GCC 12 sees uninitialised values inside <regex> and <functional> when it instruments them.
+  add_compile_options(-fsanitize=${TISSUEWARP_SANITIZE} ${first_finding_ends} -fno-omit-frame-pointer
                       -Wno-maybe-uninitialized)
   add_link_options(-fsanitize=${TISSUEWARP_SANITIZE})
 endif()
