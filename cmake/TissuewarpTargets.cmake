@@ -9,8 +9,12 @@ target_compile_options(tissuewarp_warnings INTERFACE
   $<$<BOOL:${TISSUEWARP_WERROR}>:-Werror>)
 
 if(TISSUEWARP_SANITIZE)
+  if(TISSUEWARP_SANITIZE MATCHES undefined)
+    set(first_finding_ends -fno-sanitize-recover=undefined)  # a report alone would not fail a test
+  endif()
   # GCC 12 sees uninitialised values inside <regex> and <functional> when it instruments them.
-  add_compile_options(-fsanitize=${TISSUEWARP_SANITIZE} -fno-omit-frame-pointer -Wno-maybe-uninitialized)
+  add_compile_options(-fsanitize=${TISSUEWARP_SANITIZE} ${first_finding_ends} -fno-omit-frame-pointer
+                      -Wno-maybe-uninitialized)
   add_link_options(-fsanitize=${TISSUEWARP_SANITIZE})
 endif()
 
@@ -32,11 +36,15 @@ function(tissuewarp_library name)
   set_property(GLOBAL APPEND PROPERTY TISSUEWARP_LIBRARIES ${target})
 endfunction()
 
-# tissuewarp_test(<name> SOURCES … LIBS … [TIMEOUT seconds] [LABELS …]): a GoogleTest program; every TEST is a ctest test.
+# tissuewarp_test(<name> SOURCES … LIBS … [TIMEOUT seconds] [LABELS …]): a GoogleTest program; every TEST is a ctest test,
+# labelled with <name> where no label is given.
 function(tissuewarp_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LIBS;LABELS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
+  endif()
+  if(NOT ARG_LABELS)
+    set(ARG_LABELS ${name})
   endif()
   add_executable(test_${name} ${ARG_SOURCES})
   target_link_libraries(test_${name} PRIVATE ${ARG_LIBS} GTest::gmock GTest::gtest_main tissuewarp_warnings)

@@ -27,8 +27,8 @@ struct PronyRelaxation {
         const auto inverse_J = hn::Set(d, 1) / (hn::Set(d, 1) + strain.change);
         Vec<D> S[6], sum[6];
         for (int k = 0; k < 6; ++k) {
-            auto product = strain.cof[0][row[k]] * P[0][column[k]];
-            for (int m = 1; m < 3; ++m) product = hn::MulAdd(strain.cof[m][row[k]], P[m][column[k]], product);
+            auto product = cof(d, strain, 0, row[k]) * P[0][column[k]];
+            for (int m = 1; m < 3; ++m) product = hn::MulAdd(cof(d, strain, m, row[k]), P[m][column[k]], product);
             S[k] = product * inverse_J;
             sum[k] = hn::Zero(d);
         }

@@ -1,5 +1,6 @@
 // Stiff beside soft, slivers, and springs from a breath to a wall.
 
+#include "meshing/quality.hpp"
 #include "tests/stability/hard_cases.hpp"
 #include "tled/critical_step.hpp"
 #include "tled/dynamics.hpp"
@@ -32,44 +33,11 @@ TEST_P(Contrast, AnInterfaceOfTenThousandToOne) {
         }
 }
 
-/// A box whose innermost node is pushed against a face of its cells, so that some tetrahedra have angles of half a
-/// degree.
-tled::Model with_slivers() {
-    tled::Model model = box({40, 40, 40}, {4, 4, 4}, tled::neo_hookean_lnj(3.0, 0.45));
-    Eigen::Index inner = 0;
-    (model.mesh.nodes.colwise() - Vector3d(20, 20, 20)).colwise().norm().minCoeff(&inner);
-    model.mesh.nodes(2, inner) += 9.93;
-    return model;
-}
-
-/// Smallest dihedral angle of a mesh, degrees.
-double smallest_dihedral(const meshing::TetMesh& mesh) {
-    double least = 180;
-    for (int t = 0; t < mesh.tet_count(); ++t) {
-        std::array<Vector3d, 4> x;
-        for (int c = 0; c < 4; ++c) x[static_cast<std::size_t>(c)] = mesh.nodes.col(mesh.tets(c, t));
-        for (std::size_t i = 0; i < 4; ++i)
-            for (std::size_t j = i + 1; j < 4; ++j) {
-                std::array<std::size_t, 2> others{};
-                for (std::size_t k = 0, n = 0; k < 4; ++k)
-                    if (k != i && k != j) others[n++] = k;
-                const Vector3d edge = (x[j] - x[i]).normalized();
-                const auto side = [&](std::size_t k) {
-                    const Vector3d v = x[k] - x[i];
-                    return Vector3d(v - v.dot(edge) * edge).normalized();
-                };
-                const double cosine = side(others[0]).dot(side(others[1]));
-                least = std::min(least, std::acos(std::clamp(cosine, -1.0, 1.0)) * 180 / 3.14159265358979);
-            }
-    }
-    return least;
-}
-
 // A failure looks like: an inverted sliver, a step so small that nothing converges, a bump around the slivers. The
 // sliver's own node is free to move in its flat elements: 0.1 mm of 6 mm.
 TEST_P(Contrast, SliversOfHalfADegreeAreSurvived) {
     const tled::Model model = with_slivers();
-    ASSERT_LT(smallest_dihedral(model.mesh), 0.6);
+    ASSERT_LT(meshing::dihedral_angles(model.mesh).row(0).minCoeff(), 0.6);
     const tled::RestState rest = tled::rest_state(model);
     const tled::NodalConditions conditions = between_plates(model, {3, 0, 5});
     const Matrix3Xd truth = by_newton(rest, conditions, 4);

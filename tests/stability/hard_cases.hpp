@@ -23,6 +23,13 @@ using tled::scene::Kind;
 using tled::scene::make_engine;
 using tled::scene::name_of;
 
+/// Whether a sanitizer watches, which makes a step 10 to 100 times longer.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+inline constexpr bool sanitized = true;
+#else
+inline constexpr bool sanitized = false;
+#endif
+
 /// Largest nodal distance, mm; infinite when a value is not finite.
 inline double distance(const Matrix3Xd& a, const Matrix3Xd& b) {
     if (!a.allFinite() || !b.allFinite()) return std::numeric_limits<double>::infinity();
@@ -43,6 +50,16 @@ inline tled::Model box(const Vector3d& size, const std::array<int, 3>& cells, co
     model.mesh = meshing::box_mesh(size, cells);
     model.materials[1] = material;
     model.element = element;
+    return model;
+}
+
+/// A cube of 40 mm whose innermost node is pushed against a face of its cells, so that some tetrahedra have angles of
+/// half a degree.
+inline tled::Model with_slivers() {
+    tled::Model model = box({40, 40, 40}, {4, 4, 4}, tled::neo_hookean_lnj(3.0, 0.45));
+    Eigen::Index inner = 0;
+    (model.mesh.nodes.colwise() - Vector3d(20, 20, 20)).colwise().norm().minCoeff(&inner);
+    model.mesh.nodes(2, inner) += 9.93;
     return model;
 }
 

@@ -43,6 +43,18 @@ TEST_P(Engines, InternalForceIsTheReferences) {
     }
 }
 
+// Strains far below the last place of 1 keep their digits. A failure looks like: a force of another direction, because
+// a law took the difference of 1 + strain and 1.
+TEST_P(Engines, ForceOfTinyStrainsIsThatOfSmallOnesScaledDown) {
+    const auto scaled = [&](int exponent) -> Matrix3Xd {
+        engine->set_state(std::ldexp(1.0, exponent) * wavy(X), zero);
+        return engine->internal_force() * std::ldexp(1.0, -exponent);
+    };
+    const Matrix3Xd linear = scaled(-20);
+    const int tiny = kind == Kind::CpuFloat64 ? -70 : -40;
+    EXPECT_LT(largest(scaled(tiny) - linear), 1e-5 * largest(linear));
+}
+
 TEST_P(Engines, ARigidRotationCausesNoForce) {
     const Matrix3d R = Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
     engine->set_state((R - Matrix3d::Identity()) * X, zero);

@@ -62,22 +62,20 @@ void cofactor(const Vec<D> (&A)[3][3], Vec<D> (&cof)[3][3]) {
         }
 }
 
-/// Fills `cof` with cof F = (1 + tr H) I − Hᵀ + cof H, and `change` with J − 1 = tr H + tr cof H + det H.
+/// Fills `cof_excess` with cof F − I = tr H I − Hᵀ + cof H, and `change` with J − 1 = tr H + tr cof H + det H.
 template <class D>
-void finish_strain(D d, Strain<D>& strain) {
-    cofactor<D>(strain.H, strain.cof);  // cof H for now
+void finish_strain(Strain<D>& strain) {
+    auto& cof = strain.cof_excess;
+    cofactor<D>(strain.H, cof);  // cof H for now
     const auto trace = strain.H[0][0] + strain.H[1][1] + strain.H[2][2];
-    const auto second = strain.cof[0][0] + strain.cof[1][1] + strain.cof[2][2];
+    const auto second = cof[0][0] + cof[1][1] + cof[2][2];
     const auto determinant =
-        hn::MulAdd(strain.H[0][0], strain.cof[0][0],
-                   hn::MulAdd(strain.H[0][1], strain.cof[0][1], strain.H[0][2] * strain.cof[0][2]));
+        hn::MulAdd(strain.H[0][0], cof[0][0], hn::MulAdd(strain.H[0][1], cof[0][1], strain.H[0][2] * cof[0][2]));
     strain.change = trace + second + determinant;
-    const auto diagonal = hn::Set(d, 1) + trace;
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            strain.cof[i][j] = strain.cof[i][j] - strain.H[j][i];
-            if (i == j) strain.cof[i][j] = strain.cof[i][j] + diagonal;
-        }
+    for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) cof[i][j] = cof[i][j] - strain.H[j][i];
+        cof[i][i] = cof[i][i] + trace;
+    }
 }
 
 /// J − 1 where J > 0, NaN elsewhere for laws that know no inverted state: Highway's logarithm gives a finite number for
@@ -94,7 +92,7 @@ template <class D, class T>
 Strain<D> strain_of(D d, const ElementBatches<T>& elements, std::size_t batch, int lane, const T* u) {
     Strain<D> strain;
     displacement_gradient(d, elements, batch, lane, u, strain.H);
-    finish_strain(d, strain);
+    finish_strain(strain);
     return strain;
 }
 
@@ -130,7 +128,7 @@ HexStrain<D> strain_of(D d, const HexBatches<T>& hexahedra, std::size_t batch, i
                     hn::NegMulAdd(strain.H[i][j], hn::LoadU(d, rest_hourglass + (3 * alpha + j) * batch_width),
                                   strain.hourglass[alpha][i]);
     }
-    finish_strain(d, static_cast<Strain<D>&>(strain));
+    finish_strain(static_cast<Strain<D>&>(strain));
     return strain;
 }
 
@@ -245,7 +243,7 @@ void element_forces_of(const T* parameter, const Batches& elements, std::size_t 
             after_shear(d, batch, lane, strain, P);
             const auto p = scaled_pressure<Law, kinematics>(d, elements, batch, lane, volume, strain.change, pressure);
             for (int i = 0; i < 3; ++i)
-                for (int j = 0; j < 3; ++j) P[i][j] = hn::MulAdd(p, strain.cof[i][j], P[i][j]);
+                for (int j = 0; j < 3; ++j) P[i][j] = hn::MulAdd(p, cof(d, strain, i, j), P[i][j]);
             store_corner_forces(d, elements, batch, lane, strain, P, force);
         }
 }

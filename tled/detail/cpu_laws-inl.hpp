@@ -25,13 +25,18 @@ using Vec = hn::Vec<D>;
 template <class D>
 using Scalar = hn::TFromD<D>;
 
-/// Kinematics of a batch of elements: H, cof F and J − 1.
+/// Kinematics of a batch of elements: H, cof F − I and J − 1.
 template <class D>
 struct Strain {
     Vec<D> H[3][3];
-    Vec<D> cof[3][3];
-    Vec<D> change;  // J − 1
+    Vec<D> cof_excess[3][3];  // cof F − I, whose small numbers the 1 of cof F would round away
+    Vec<D> change;            // J − 1
 };
+
+template <class D>
+Vec<D> cof(D d, const Strain<D>& strain, int i, int j) {
+    return i == j ? strain.cof_excess[i][i] + hn::Set(d, 1) : strain.cof_excess[i][j];
+}
 
 /// What a law knows beside the strain: its parameters (detail/kernel_parameters.hpp), and the fibre where it has one.
 template <class D>
@@ -48,9 +53,9 @@ Vec<D> dot(const Vec<D> (&a)[3], const Vec<D> (&b)[3]) {
 
 /// J F − cof F = J H + (J I − cof F), without the cancelling unit parts: J I − cof F = (J − 1) I − (cof F − I).
 template <class D>
-Vec<D> stretch_difference(D d, const Strain<D>& strain, Vec<D> J, int i, int j) {
-    if (i != j) return hn::MulSub(J, strain.H[i][j], strain.cof[i][j]);
-    return hn::MulSub(J, strain.H[i][j], strain.cof[i][j] - hn::Set(d, 1)) + strain.change;
+Vec<D> stretch_difference(const Strain<D>& strain, Vec<D> J, int i, int j) {
+    const auto difference = hn::MulSub(J, strain.H[i][j], strain.cof_excess[i][j]);
+    return i == j ? difference + strain.change : difference;
 }
 
 /// tr C − 3 = 2 tr H + H : H.
@@ -96,7 +101,7 @@ struct Response<NeoHookeanLnJ> {
         const auto J = hn::Set(d, 1) + strain.change;
         const auto scale = volume * hn::Set(d, tissue.parameter[0]) / J;
         for (int i = 0; i < 3; ++i)
-            for (int j = 0; j < 3; ++j) P[i][j] = scale * stretch_difference(d, strain, J, i, j);
+            for (int j = 0; j < 3; ++j) P[i][j] = scale * stretch_difference(strain, J, i, j);
     }
     /// U' = ln J / J
     template <class D>
@@ -120,9 +125,8 @@ struct Response<NeoHookeanStable> : QuadraticVolume {
         const auto growth = mu * excess / (four * (four + excess));
         for (int i = 0; i < 3; ++i)
             for (int j = 0; j < 3; ++j) {
-                const auto unit_free = i == j ? strain.cof[i][j] - one : strain.cof[i][j];
                 const auto F = i == j ? strain.H[i][j] + one : strain.H[i][j];
-                P[i][j] = hn::MulAdd(three_quarters, strain.H[i][j] - unit_free, growth * F);
+                P[i][j] = hn::MulAdd(three_quarters, strain.H[i][j] - strain.cof_excess[i][j], growth * F);
             }
     }
 };
@@ -140,7 +144,7 @@ void set_first_invariant_stress(D d, const Strain<D>& strain, Vec<D> excess, Vec
     const auto third = excess * hn::Set(d, Scalar<D>(1.0 / 3));
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
-            P[i][j] = scale * hn::NegMulAdd(third, strain.cof[i][j], stretch_difference(d, strain, J, i, j));
+            P[i][j] = scale * hn::NegMulAdd(third, cof(d, strain, i, j), stretch_difference(strain, J, i, j));
 }
 
 template <>
@@ -213,9 +217,9 @@ struct Response<Polynomial> : QuadraticVolume {
             for (int k = 0; k < 3; ++k) {
                 auto F_E = E[i][k];  // F E = E + H E
                 for (int m = 0; m < 3; ++m) F_E = hn::MulAdd(strain.H[i][m], E[m][k], F_E);
-                auto bracket = hn::MulSub(t, strain.H[i][k], F_E) + two_over_J * stretch_difference(d, strain, J, i, k);
+                auto bracket = hn::MulSub(t, strain.H[i][k], F_E) + two_over_J * stretch_difference(strain, J, i, k);
                 if (i == k) bracket = bracket + t;
-                P[i][k] = hn::MulAdd(scale, hn::NegMulAdd(q, strain.cof[i][k], bracket), P[i][k]);
+                P[i][k] = hn::MulAdd(scale, hn::NegMulAdd(q, cof(d, strain, i, k), bracket), P[i][k]);
             }
     }
 };
@@ -244,7 +248,7 @@ struct Response<TransverselyIsotropic> : QuadraticVolume {
         const auto third = I4 * hn::Set(d, Scalar<D>(1.0 / 3)) / (hn::Set(d, 1) + strain.change);
         for (int i = 0; i < 3; ++i)
             for (int k = 0; k < 3; ++k) {
-                const auto bracket = hn::NegMulAdd(third, strain.cof[i][k], f[i] * tissue.fibre[k]);
+                const auto bracket = hn::NegMulAdd(third, cof(d, strain, i, k), f[i] * tissue.fibre[k]);
                 P[i][k] = hn::MulAdd(scale, bracket, P[i][k]);
             }
     }
