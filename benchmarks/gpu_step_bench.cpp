@@ -1,15 +1,18 @@
 // Time of a step on the GPU, and how far its float32 strays from the float64 CPU engine. The cube of Taylor, Cheng and
 // Ourselin (2008): edge 100 mm, ends bonded, stretched by 20 %, mu = 1.007 kPa, lambda = 49.329 kPa, 1000 kg/m³.
 //     gpu_step_bench [--list] [--device N] [--cells 14,24,55,128] [--steps N] [--repeats N] [--compare-limit ELEMENTS]
-//                    [--element t4|averaged] [--law lnj|iso]
+//                    [--element t4|averaged] [--law lnj|iso] [--render-passes]
 // Without options: on hardware 14, 24, 55 and 128 cells an edge and 1000 steps, on a software rasteriser 14 and 24
 // cells and 50 steps; five repeats, the median is printed; both elements, both laws. The float64 engine runs the same
-// steps where the mesh has no more than --compare-limit elements (1 100 000).
+// steps where the mesh has no more than --compare-limit elements (1 100 000). --render-passes adds the fragment shaders
+// of 2007 for T4.
 
 #include "core/errors.hpp"
 #include "meshing/primitives.hpp"
 #include "shaders/device.hpp"
 #include "tled/engine.hpp"
+#include "tled/reference.hpp"
+#include "tled/render_pass_engine.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -37,6 +40,7 @@ struct Options {
     int repeats = 5;
     int compare_limit = 1100000;
     std::string element, law;  // empty: both
+    bool render_passes = false;
 };
 
 double now() {
@@ -90,13 +94,19 @@ tled::StepCoefficients coefficients(const tled::RestState& rest, double density)
     return {(1 - 0.01) / (1 + 0.01), time_step * time_step / (1 + 0.01)};
 }
 
-void prepare(tled::Engine& engine, const Scene& scene) {
+void set_start(tled::Engine& engine, const Scene& scene) {
     engine.set_conditions(scene.conditions);
     engine.set_state(scene.start, Matrix3Xd::Zero(3, scene.start.cols()));
 }
 
+/// The render passes have their conditions from construction.
+void set_start(tled::RenderPassEngine& engine, const Scene& scene) {
+    engine.set_state(scene.start, Matrix3Xd::Zero(3, scene.start.cols()));
+}
+
 /// Seconds per step: the download that waits for the device is timed again alone and taken off.
-double timed_steps(tled::Engine& engine, int steps, const tled::StepCoefficients& step, Matrix3Xd& result) {
+template <class AnyEngine>
+double timed_steps(AnyEngine& engine, int steps, const tled::StepCoefficients& step, Matrix3Xd& result) {
     const double begin = now();
     engine.run(steps, step);
     result = engine.displacement();
@@ -105,36 +115,46 @@ double timed_steps(tled::Engine& engine, int steps, const tled::StepCoefficients
     return ((middle - begin) - (now() - middle)) / steps;
 }
 
-void report(const Scene& scene, const tled::RestState& rest, const std::string& name, int cells,
-            const Options& options) {
+/// One row of the table: an engine that took `start_seconds` to make.
+template <class AnyEngine>
+void report(AnyEngine& engine, double start_seconds, const Scene& scene, const tled::RestState& rest,
+            const std::string& name, int cells, const Options& options) {
     const tled::StepCoefficients step = coefficients(rest, 1e-6);
-    const double begin = now();
-    const auto gpu = tled::make_gpu_engine(rest, options.device);
-    const double start_seconds = now() - begin;
     Matrix3Xd result;
-    prepare(*gpu, scene);
-    timed_steps(*gpu, std::min(options.steps, 50), step, result);
+    set_start(engine, scene);
+    timed_steps(engine, std::min(options.steps, 50), step, result);
     std::vector<double> seconds;
     for (int repeat = 0; repeat < options.repeats; ++repeat) {
-        prepare(*gpu, scene);
-        seconds.push_back(timed_steps(*gpu, options.steps, step, result));
+        set_start(engine, scene);
+        seconds.push_back(timed_steps(engine, options.steps, step, result));
     }
-    const tled::Observation seen = gpu->observe();
     const double per_step = median(seconds);
-    std::printf("| %-12s | %4d | %9d | %9.2f | %9.1f | %6.2f | %6.3f ", name.c_str(), cells, rest.element_count(),
-                per_step * 1e6, per_step / rest.element_count() * 1e12, start_seconds, seen.min_jacobian);
-    if (!seen.finite) {
+    std::printf("| %-16s | %4d | %9d | %9.2f | %9.1f | %6.2f | %6.3f ", name.c_str(), cells, rest.element_count(),
+                per_step * 1e6, per_step / rest.element_count() * 1e12, start_seconds,
+                tled::jacobians(rest, result).minCoeff());
+    if (!result.allFinite()) {
         std::printf("| not finite |\n");
     } else if (rest.element_count() > options.compare_limit) {
         std::printf("| – |\n");
     } else {
         const auto cpu = tled::make_cpu_engine(rest, tled::Scalar::Float64);
-        prepare(*cpu, scene);
+        set_start(*cpu, scene);
         cpu->run(options.steps, step);
         const Matrix3Xd exact = cpu->displacement();
         std::printf("| %.1e |\n", (result - exact).cwiseAbs().maxCoeff() / exact.cwiseAbs().maxCoeff());
     }
     std::fflush(stdout);
+}
+
+void report_engines(const Scene& scene, const tled::RestState& rest, const std::string& name, int cells,
+                    const Options& options) {
+    double begin = now();
+    const auto gpu = tled::make_gpu_engine(rest, options.device);
+    report(*gpu, now() - begin, scene, rest, name, cells, options);
+    if (!options.render_passes || rest.pressure.count() > 0) return;
+    begin = now();
+    tled::RenderPassEngine passes(rest, scene.conditions, rest.lumped_mass.transpose().replicate(3, 1), options.device);
+    report(passes, now() - begin, scene, rest, name + ", 2007", cells, options);
 }
 
 void measure(int cells, const Options& options) {
@@ -149,10 +169,10 @@ void measure(int cells, const Options& options) {
         model.element = averaged ? tled::Element::AveragedPressureT4 : tled::Element::T4;
         tled::RestState rest = tled::rest_state(model);
         const std::string element = averaged ? "averaged " : "T4 ";
-        if (options.law != "iso") report(scene, rest, element + "lnJ", cells, options);
+        if (options.law != "iso") report_engines(scene, rest, element + "lnJ", cells, options);
         if (options.law == "lnj") continue;
         use_law(rest, iso);
-        report(scene, rest, element + "iso", cells, options);
+        report_engines(scene, rest, element + "iso", cells, options);
     }
 }
 
@@ -168,6 +188,10 @@ Options parsed(int argc, char** argv) {
     Options options;
     for (int i = 1; i < argc; ++i) {
         const std::string name = argv[i];
+        if (name == "--render-passes") {
+            options.render_passes = true;
+            continue;
+        }
         if (++i == argc) throw InvalidInput(name + " needs a value");
         const std::string value = argv[i];
         if (name == "--device")
