@@ -58,7 +58,7 @@ Framebuffer::Framebuffer(const Device& device, const std::vector<const TextureSt
     std::vector<GLenum> outputs;
     for (const TextureStorage* target : targets) {
         outputs.push_back(GL_COLOR_ATTACHMENT0 + static_cast<GLenum>(outputs.size()));
-        glNamedFramebufferTexture(id_, outputs.back(), target->id(), 0);
+        glNamedFramebufferTexture(id_, outputs.back(), target->id_, 0);
     }
     glNamedFramebufferDrawBuffers(id_, static_cast<GLsizei>(outputs.size()), outputs.data());
     const GLenum status = glCheckNamedFramebufferStatus(id_, GL_DRAW_FRAMEBUFFER);
@@ -70,6 +70,11 @@ Framebuffer::Framebuffer(const Device& device, const std::vector<const TextureSt
 
 Framebuffer::~Framebuffer() {
     detail::release_with_context(device_, [this] { glDeleteFramebuffers(1, &id_); });
+}
+
+void Framebuffer::bind() const {
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, id_);
+    glViewport(0, 0, shape_.width, shape_.height);
 }
 
 FragmentProgram::FragmentProgram(const Device& device, const ComposedSource& fragment) : device_(device) {
@@ -93,8 +98,7 @@ void FragmentProgram::set(int location, float value) const {
 }
 
 void FragmentProgram::draw(const Framebuffer& target) const {
-    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, target.id());
-    glViewport(0, 0, target.shape().width, target.shape().height);
+    target.bind();
     glUseProgram(id_);
     glBindVertexArray(no_attributes_);
     glDrawArrays(GL_TRIANGLES, 0, 3);

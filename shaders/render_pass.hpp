@@ -20,8 +20,8 @@ public:
     Framebuffer(const Framebuffer&) = delete;
     Framebuffer& operator=(const Framebuffer&) = delete;
 
-    [[nodiscard]] const TextureShape& shape() const { return shape_; }
-    [[nodiscard]] unsigned id() const { return id_; }
+    /// Makes this, whole, what the next draws write.
+    void bind() const;
 
 private:
     const Device& device_;

@@ -24,7 +24,7 @@ struct TextureShape {
     /// Column and row of entry i in the form of chunks/texels.glsl: 15 bits each.
     [[nodiscard]] std::uint32_t coordinates(std::size_t i) const {
         const auto row = static_cast<std::size_t>(width);
-        return static_cast<std::uint32_t>(i % row | i / row << 15U);
+        return static_cast<std::uint32_t>((i % row) | ((i / row) << 15U));
     }
 };
 
@@ -49,7 +49,6 @@ public:
 
     [[nodiscard]] const TextureShape& shape() const { return shape_; }
     [[nodiscard]] const std::string& what() const { return what_; }
-    [[nodiscard]] unsigned id() const { return id_; }
 
 protected:
     /// All texels of the shape, row by row.
@@ -57,6 +56,8 @@ protected:
     void read(std::span<std::byte> texels) const;
 
 private:
+    friend class Framebuffer;  // attaches it
+
     const Device& device_;
     TexelFormat format_;
     std::string what_;

@@ -37,13 +37,17 @@ void require_columns(const Matrix3Xd& matrix, int node_count, const char* what) 
                            std::to_string(node_count) + " nodes");
 }
 
+bool is_neo_hookean(const Material& material) {
+    return std::holds_alternative<NeoHookeanIso>(material) || std::holds_alternative<NeoHookeanLnJ>(material) ||
+           std::holds_alternative<NeoHookeanStable>(material);
+}
+
 void require_known(const RestState& rest) {
     refuse_if(rest.hexahedra.count() > 0, "hexahedra");
     refuse_if(rest.pressure.count() > 0, "averaged pressure");
     refuse_if(!rest.viscosity.empty(), "viscosity");
     for (const Material& material : rest.materials) {
-        refuse_if(material.index() > static_cast<std::size_t>(Law::NeoHookeanStable),
-                  "the law " + law_name(material) + ", only neo-Hookean ones");
+        refuse_if(!is_neo_hookean(material), "the law " + law_name(material) + ", only neo-Hookean ones");
         refuse_if(material.index() != rest.materials.front().index(), "several laws in one scene");
     }
 }

@@ -1,4 +1,4 @@
-/// The render passes of 2007 against the CPU engine in float64 and against the plain loop.
+/// The render passes of 2007 against the CPU engine in float64.
 #include "core/errors.hpp"
 #include "tests/tled/engine_scene.hpp"
 #include "tled/render_pass_engine.hpp"
@@ -6,11 +6,12 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
-#include <functional>
 #include <map>
 #include <random>
 #include <set>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace tissuewarp::tled {
 namespace {
@@ -43,15 +44,33 @@ struct Scene {
     Matrix3Xd start, still;
 };
 
-/// What is left of a jittered box inside a ball, its nodes renumbered at random: no grid's valences, no order in which
-/// a wrong look-up would be right by chance.
+/// The tetrahedra around `hub` cut into four at their centres: the hub gets three times as many, the new nodes four.
+void add_hub(meshing::TetMesh& mesh, int hub) {
+    for (int t = 0, count = mesh.tet_count(); t < count; ++t) {
+        const Eigen::Vector4i corners = mesh.tets.col(t);
+        if ((corners.array() != hub).all()) continue;
+        const int centre = mesh.node_count(), added = mesh.tet_count();
+        mesh.nodes.conservativeResize(3, centre + 1);
+        mesh.nodes.col(centre) = mesh.nodes(Eigen::all, corners).rowwise().mean();
+        mesh.tets.conservativeResize(4, added + 3);
+        for (int k = 0; k < 4; ++k) {
+            Eigen::Vector4i part = corners;
+            part[k] = centre;
+            mesh.tets.col(k == 0 ? t : added + k - 1) = part;
+        }
+    }
+    mesh.labels.setOnes(mesh.tet_count());
+}
+
+/// What is left of a jittered box inside a ball, with a hub, its nodes renumbered at random: no grid's valences, no
+/// order in which a wrong look-up would be right by chance.
 Model irregular_ball() {
-    const meshing::TetMesh box = meshing::box_mesh({30, 30, 30}, {7, 7, 7}, 0.15, 11);
+    meshing::TetMesh box = meshing::box_mesh({30, 30, 30}, {7, 7, 7}, 0.15, 11);
+    add_hub(box, 3 + 8 * (3 + 8 * 3));
     std::vector<int> tets;
     std::set<int> nodes;
     for (int t = 0; t < box.tet_count(); ++t) {
-        Vector3d centre = Vector3d::Zero();
-        for (const int node : box.tets.col(t)) centre += box.nodes.col(node) / 4;
+        const Vector3d centre = box.nodes(Eigen::all, box.tets.col(t)).rowwise().mean();
         if ((centre - Vector3d(15, 15, 14)).norm() > 14.5) continue;
         tets.push_back(t);
         nodes.insert(box.tets.col(t).begin(), box.tets.col(t).end());
@@ -81,7 +100,7 @@ void hold_poles(Scene& scene) {
     scene.conditions = nodal_conditions(conditions, scene.rest.node_count);
 }
 
-/// Displacement and increment of the float64 CPU engine after the same steps.
+/// Displacement and increment of the float64 CPU engine after `steps` from the scene's start.
 std::pair<Matrix3Xd, Matrix3Xd> exact(const Scene& scene, int steps) {
     const auto cpu = make_cpu_engine(scene.rest, Scalar::Float64);
     cpu->set_conditions(scene.conditions);
@@ -95,6 +114,7 @@ void expect_follows(const Scene& scene, int steps) {
     engine.set_state(scene.start, scene.still);
     engine.run(steps, scene.coefficients);
     const auto [u, v] = exact(scene, steps);
+    EXPECT_GT(largest(u - exact(scene, 0).first), steps > 1 ? 0.1 : 1e-4) << "the test does not move";
     EXPECT_LT(largest(engine.displacement() - u), 5e-6 * largest(u));
     EXPECT_LT(largest(engine.increment() - v), 1e-4 * largest(v));
 }
@@ -113,7 +133,6 @@ TEST_P(RenderPasses, OneStepIsTheCpuEngines) {
 TEST_P(RenderPasses, TwoHundredStepsFollowTheCpuEngine) {
     const Scene scene(cube(5, Cells::T4, GetParam()));
     expect_follows(scene, 200);
-    EXPECT_GT(largest(exact(scene, 200).first - scene.start), 0.3) << "the test does not move";
 }
 
 // More elements than the longest side of a texture on many devices (16384): the lists lie in rows.
@@ -131,7 +150,8 @@ TEST(RenderPassEngine, FollowsTheCpuEngineOnAnIrregularMesh) {
     for (std::size_t a = 0; a + 1 < scene.rest.incidence.offset.size(); ++a)
         valences.insert(scene.rest.incidence.offset[a + 1] - scene.rest.incidence.offset[a]);
     ASSERT_GT(valences.size(), 10u);
-    ASSERT_TRUE(valences.contains(1));
+    ASSERT_EQ(*valences.begin(), 1);
+    ASSERT_EQ(*valences.rbegin(), 72);
     expect_follows(scene, 1);
     expect_follows(scene, 200);
 }
