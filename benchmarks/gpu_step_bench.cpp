@@ -2,17 +2,20 @@
 // Ourselin (2008): edge 100 mm, ends bonded, stretched by 20 %, mu = 1.007 kPa, lambda = 49.329 kPa, 1000 kg/m³.
 //     gpu_step_bench [--list] [--device N] [--cells 14,24,55,128] [--steps N] [--repeats N] [--compare-limit ELEMENTS]
 //                    [--element t4|averaged] [--law lnj|iso] [--mesh FILE.vtu] [--shapes TETS:FAN:WORKGROUP,…]
+//                    [--render-passes]
 // Without options: on hardware 14, 24, 55 and 128 cells an edge and 1000 steps, on a software rasteriser 14 and 24
 // cells and 50 steps; five repeats, the median is printed; both elements, both laws. The float64 engine runs the same
 // steps where the mesh has no more than --compare-limit elements (1 100 000). A mesh file of about that cube is
-// measured after those of --cells. Shapes are those of tled::GpuStepShape, 0:0:0 the two passes; without them the
-// suggested one.
+// measured after those of --cells. Shapes are those of tled::GpuStepShape, an m behind for many steps at once, 0:0:0
+// the two passes; without them the suggested one. --render-passes adds the fragment shaders of 2007 for T4.
 
 #include "core/errors.hpp"
 #include "meshing/mesh_io.hpp"
 #include "meshing/primitives.hpp"
 #include "shaders/device.hpp"
 #include "tled/engine.hpp"
+#include "tled/reference.hpp"
+#include "tled/render_pass_engine.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -42,6 +45,7 @@ struct Options {
     std::string element, law;  // empty: both
     std::string mesh;
     std::vector<tled::GpuStepShape> shapes;  // empty: the suggested one
+    bool render_passes = false;
 };
 
 double now() {
@@ -98,13 +102,19 @@ tled::StepCoefficients coefficients(const tled::RestState& rest, double density)
     return {(1 - 0.01) / (1 + 0.01), time_step * time_step / (1 + 0.01)};
 }
 
-void prepare(tled::Engine& engine, const Scene& scene) {
+void set_start(tled::Engine& engine, const Scene& scene) {
     engine.set_conditions(scene.conditions);
     engine.set_state(scene.start, Matrix3Xd::Zero(3, scene.start.cols()));
 }
 
+/// The render passes have their conditions from construction.
+void set_start(tled::RenderPassEngine& engine, const Scene& scene) {
+    engine.set_state(scene.start, Matrix3Xd::Zero(3, scene.start.cols()));
+}
+
 /// Seconds per step: the download that waits for the device is timed again alone and taken off.
-double timed_steps(tled::Engine& engine, int steps, const tled::StepCoefficients& step, Matrix3Xd& result) {
+template <class AnyEngine>
+double timed_steps(AnyEngine& engine, int steps, const tled::StepCoefficients& step, Matrix3Xd& result) {
     const double begin = now();
     engine.run(steps, step);
     result = engine.displacement();
@@ -113,39 +123,59 @@ double timed_steps(tled::Engine& engine, int steps, const tled::StepCoefficients
     return ((middle - begin) - (now() - middle)) / steps;
 }
 
-void report(const Scene& scene, const tled::RestState& rest, const std::string& name, const std::string& mesh,
-            const tled::GpuStepShape& shape, const Options& options) {
+/// A device at rest takes most of a second to reach its clock under load.
+constexpr double warm_up_seconds = 1;
+
+/// One row of the table: an engine that took `start_seconds` to make.
+template <class AnyEngine>
+void report(AnyEngine& engine, double start_seconds, const Scene& scene, const tled::RestState& rest,
+            const std::string& name, const std::string& mesh, const Options& options) {
     const tled::StepCoefficients step = coefficients(rest, 1e-6);
-    const double begin = now();
-    const auto gpu = tled::make_gpu_engine(rest, options.device, shape);
-    const double start_seconds = now() - begin;
     Matrix3Xd result;
-    prepare(*gpu, scene);
-    // A device at rest takes most of a second to reach its clock under load.
-    for (const double start = now(); now() - start < 1;) timed_steps(*gpu, std::min(options.steps, 1000), step, result);
+    set_start(engine, scene);
+    for (const double start = now(); now() - start < warm_up_seconds;) timed_steps(engine, options.steps, step, result);
     std::vector<double> seconds;
     for (int repeat = 0; repeat < options.repeats; ++repeat) {
-        prepare(*gpu, scene);
-        seconds.push_back(timed_steps(*gpu, options.steps, step, result));
+        set_start(engine, scene);
+        seconds.push_back(timed_steps(engine, options.steps, step, result));
     }
-    const tled::Observation seen = gpu->observe();
     const double per_step = median(seconds);
-    std::printf("| %-12s | %-8s | %9d | %4d:%d:%d%s | %9.2f | %9.1f | %6.2f | %6.3f ", name.c_str(), mesh.c_str(),
-                rest.element_count(), shape.patch_tets, shape.longest_fan, shape.workgroup,
-                shape.many_at_once ? "m" : "", per_step * 1e6, per_step / rest.element_count() * 1e12, start_seconds,
-                seen.min_jacobian);
-    if (!seen.finite) {
+    std::printf("| %-28s | %-8s | %9d | %9.2f | %9.1f | %6.2f | %6.3f ", name.c_str(), mesh.c_str(),
+                rest.element_count(), per_step * 1e6, per_step / rest.element_count() * 1e12, start_seconds,
+                tled::jacobians(rest, result).minCoeff());
+    if (!result.allFinite()) {
         std::printf("| not finite |\n");
     } else if (rest.element_count() > options.compare_limit) {
         std::printf("| – |\n");
     } else {
         const auto cpu = tled::make_cpu_engine(rest, tled::Scalar::Float64);
-        prepare(*cpu, scene);
+        set_start(*cpu, scene);
         cpu->run(options.steps, step);
         const Matrix3Xd exact = cpu->displacement();
         std::printf("| %.1e |\n", (result - exact).cwiseAbs().maxCoeff() / exact.cwiseAbs().maxCoeff());
     }
     std::fflush(stdout);
+}
+
+std::string name_of(const tled::GpuStepShape& shape) {
+    if (shape.patch_tets == 0) return "two passes";
+    return std::to_string(shape.patch_tets) + ":" + std::to_string(shape.longest_fan) + ":" +
+           std::to_string(shape.workgroup) + (shape.many_at_once ? "m" : "");
+}
+
+void report_engines(const Scene& scene, const tled::RestState& rest, const std::string& name, const std::string& mesh,
+                    const Options& options) {
+    std::vector<tled::GpuStepShape> shapes = options.shapes;
+    if (shapes.empty()) shapes = {tled::suggested_gpu_step_shape(rest.element_count())};
+    for (const tled::GpuStepShape& shape : shapes) {
+        const double begin = now();
+        const auto gpu = tled::make_gpu_engine(rest, options.device, shape);
+        report(*gpu, now() - begin, scene, rest, name + ", " + name_of(shape), mesh, options);
+    }
+    if (!options.render_passes || rest.pressure.count() > 0) return;
+    const double begin = now();
+    tled::RenderPassEngine passes(rest, scene.conditions, rest.lumped_mass.transpose().replicate(3, 1), options.device);
+    report(passes, now() - begin, scene, rest, name + ", 2007", mesh, options);
 }
 
 void measure(meshing::TetMesh mesh, const std::string& mesh_name, const Options& options) {
@@ -160,13 +190,10 @@ void measure(meshing::TetMesh mesh, const std::string& mesh_name, const Options&
         model.element = averaged ? tled::Element::AveragedPressureT4 : tled::Element::T4;
         tled::RestState rest = tled::rest_state(model);
         const std::string element = averaged ? "averaged " : "T4 ";
-        std::vector<tled::GpuStepShape> shapes = options.shapes;
-        if (shapes.empty()) shapes = {tled::suggested_gpu_step_shape(rest.element_count())};
-        for (const tled::GpuStepShape& shape : shapes)
-            if (options.law != "iso") report(scene, rest, element + "lnJ", mesh_name, shape, options);
+        if (options.law != "iso") report_engines(scene, rest, element + "lnJ", mesh_name, options);
         if (options.law == "lnj") continue;
         use_law(rest, iso);
-        for (const tled::GpuStepShape& shape : shapes) report(scene, rest, element + "iso", mesh_name, shape, options);
+        report_engines(scene, rest, element + "iso", mesh_name, options);
     }
 }
 
@@ -182,6 +209,10 @@ Options parsed(int argc, char** argv) {
     Options options;
     for (int i = 1; i < argc; ++i) {
         const std::string name = argv[i];
+        if (name == "--render-passes") {
+            options.render_passes = true;
+            continue;
+        }
         if (++i == argc) throw InvalidInput(name + " needs a value");
         const std::string value = argv[i];
         if (name == "--device")
@@ -236,9 +267,9 @@ int main(int argc, char** argv) try {
     if (options.steps <= 0) options.steps = hardware ? 1000 : 50;
     std::printf("%d steps, median of %d runs\n\n", options.steps, options.repeats);
     std::printf(
-        "| element, law | mesh | elements | shape | µs/step | ps/element-step | start s | min J | largest difference "
+        "| element, law, engine | mesh | elements | µs/step | ps/element-step | start s | min J | largest difference "
         "to "
-        "float64 / largest displacement |\n|---|---|---|---|---|---|---|---|---|\n");
+        "float64 / largest displacement |\n|---|---|---|---|---|---|---|---|\n");
     for (const int cells : options.cells)
         measure(meshing::box_mesh({edge, edge, edge}, {cells, cells, cells}), std::to_string(cells) + " cells",
                 options);

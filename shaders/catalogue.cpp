@@ -217,4 +217,31 @@ std::vector<ProgramSource> every_program() {
     return all;
 }
 
+ProgramSource full_screen_vertices() {
+    return {"full_screen", {}, {}, {}, ShaderStage::Vertex};
+}
+
+ProgramSource element_forces_pass(Law law) {
+    ProgramSource source{"element_forces",
+                         {"numbers", "texels", "deformation", "element.textures", "material.textures", "isochoric"},
+                         {{"USES_SHEAR", "1"}},
+                         {},
+                         ShaderStage::Fragment};
+    add_law(source, law);
+    source.chunks.emplace_back("pressure.element");
+    return source;
+}
+
+ProgramSource node_step_pass() {
+    return {"node_step", {"texels"}, {}, {}, ShaderStage::Fragment};
+}
+
+std::vector<ProgramSource> every_render_pass() {
+    std::vector<ProgramSource> all{full_screen_vertices(), node_step_pass()};
+    for (int law = 0; law < law_count; ++law)
+        if (static_cast<Law>(law) != Law::TransverselyIsotropic)
+            all.push_back(element_forces_pass(static_cast<Law>(law)));
+    return all;
+}
+
 }  // namespace tissuewarp::shaders

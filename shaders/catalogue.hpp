@@ -83,7 +83,15 @@ inline constexpr int observe_partials = 128;
 ProgramSource observe_nodes_program();
 ProgramSource observe_elements_program(Cell cell = Cell::Tetrahedron);
 
-/// Every program that the functions above can make, for checking them all.
+/// Every compute program that the functions above can make, for checking them all.
 std::vector<ProgramSource> every_program();
+
+/// The render passes of 2007 (shaders/render_pass/): the vertex stage of all of them, and their fragment stages. The
+/// law is one without fibres.
+ProgramSource full_screen_vertices();
+ProgramSource element_forces_pass(Law law);
+ProgramSource node_step_pass();
+/// Every stage that these three can make.
+std::vector<ProgramSource> every_render_pass();
 
 }  // namespace tissuewarp::shaders

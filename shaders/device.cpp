@@ -126,6 +126,7 @@ void Device::describe() {
     limits_.storage_blocks = gl_int(GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS);
     limits_.storage_bindings = gl_int(GL_MAX_SHADER_STORAGE_BUFFER_BINDINGS);
     limits_.workgroup_invocations = gl_int(GL_MAX_COMPUTE_WORK_GROUP_INVOCATIONS);
+    limits_.texture_size = gl_int(GL_MAX_TEXTURE_SIZE);
     for (unsigned axis = 0; axis < 3; ++axis)
         glGetIntegeri_v(GL_MAX_COMPUTE_WORK_GROUP_COUNT, axis, &limits_.workgroup_count[axis]);
     if (epoxy_has_gl_extension("GL_KHR_shader_subgroup")) limits_.subgroup_size = gl_int(GL_SUBGROUP_SIZE_KHR);

@@ -29,6 +29,7 @@ struct DeviceLimits {
     int storage_bindings = 0;              ///< of the context
     int workgroup_invocations = 0;
     std::array<int, 3> workgroup_count{};
+    int texture_size = 0;   ///< texels of a side
     int subgroup_size = 0;  ///< 0 without GL_KHR_shader_subgroup
 };
 

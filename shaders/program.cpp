@@ -1,6 +1,6 @@
 #include "shaders/program.hpp"
 
-#include "core/errors.hpp"
+#include "shaders/detail/compile.hpp"
 #include "shaders/detail/gl.hpp"
 
 #include <algorithm>
@@ -8,31 +8,6 @@
 
 namespace tissuewarp::shaders {
 namespace {
-
-template <class GetParameter, class GetLog>
-std::string log_of(GLuint object, GetParameter get_parameter, GetLog get_log) {
-    GLint length = 0;
-    get_parameter(object, GL_INFO_LOG_LENGTH, &length);
-    std::string log(static_cast<std::size_t>(std::max(length, 1)), '\0');
-    GLsizei written = 0;
-    get_log(object, length, &written, log.data());
-    log.resize(static_cast<std::size_t>(written));
-    return log;
-}
-
-/// Compiles one compute shader; the caller owns it.
-GLuint compile(const ComposedSource& source) {
-    const GLuint shader = glCreateShader(GL_COMPUTE_SHADER);
-    const char* text = source.text.c_str();
-    glShaderSource(shader, 1, &text, nullptr);
-    glCompileShader(shader);
-    GLint compiled = GL_FALSE;
-    glGetShaderiv(shader, GL_COMPILE_STATUS, &compiled);
-    if (compiled == GL_TRUE) return shader;
-    const std::string log = log_of(shader, glGetShaderiv, glGetShaderInfoLog);
-    glDeleteShader(shader);
-    throw GpuUnavailable("the driver refuses " + source.files.back() + ":\n" + readable_log(log, source.files));
-}
 
 std::vector<StorageBlock> storage_blocks_of(GLuint program) {
     GLint count = 0;
@@ -55,20 +30,7 @@ std::vector<StorageBlock> storage_blocks_of(GLuint program) {
 
 Program::Program(const Device& device, const ComposedSource& source) : device_(device) {
     const CurrentContext current = device.make_current();
-    const GLuint shader = compile(source);
-    id_ = glCreateProgram();
-    glAttachShader(id_, shader);
-    glLinkProgram(id_);
-    glDetachShader(id_, shader);
-    glDeleteShader(shader);
-    GLint linked = GL_FALSE;
-    glGetProgramiv(id_, GL_LINK_STATUS, &linked);
-    if (linked != GL_TRUE) {
-        const std::string log = log_of(id_, glGetProgramiv, glGetProgramInfoLog);
-        glDeleteProgram(id_);
-        throw GpuUnavailable("the driver does not link " + source.files.back() + ":\n" +
-                             readable_log(log, source.files));
-    }
+    id_ = detail::linked_program({{GL_COMPUTE_SHADER, &source}});
     std::array<GLint, 3> size{1, 1, 1};
     glGetProgramiv(id_, GL_COMPUTE_WORK_GROUP_SIZE, size.data());
     workgroup_size_ = size[0] * size[1] * size[2];

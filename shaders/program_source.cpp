@@ -19,6 +19,18 @@ const std::string& file(const SourceLibrary& library, const std::string& name) {
     return found->second;
 }
 
+std::string kernel_file(const ProgramSource& source) {
+    switch (source.stage) {
+        case ShaderStage::Vertex:
+            return "render_pass/" + source.kernel + ".vert";
+        case ShaderStage::Fragment:
+            return "render_pass/" + source.kernel + ".frag";
+        case ShaderStage::Compute:
+            break;
+    }
+    return "kernels/" + source.kernel + ".comp";
+}
+
 /// Names that a file declares by lines `//! define NAME`.
 void collect_declared_names(const std::string& text, std::set<std::string>& names) {
     constexpr std::string_view mark = "//! define ";
@@ -81,7 +93,7 @@ ComposedSource compose(const ProgramSource& source, const SourceLibrary& library
     ComposedSource composed;
     composed.files = {"prolog"};
     for (const std::string& chunk : source.chunks) composed.files.push_back("chunks/" + chunk + ".glsl");
-    composed.files.push_back("kernels/" + source.kernel + ".comp");
+    composed.files.push_back(kernel_file(source));
 
     std::set<std::string> declared;
     for (std::size_t k = 1; k < composed.files.size(); ++k)
@@ -101,7 +113,7 @@ ComposedSource compose(const ProgramSource& source, const SourceLibrary& library
 }
 
 std::string program_key(const ProgramSource& source) {
-    std::string key = source.kernel;
+    std::string key = kernel_file(source);
     for (const std::string& chunk : source.chunks) key += "+" + chunk;
     for (const auto& [name, value] : source.defines) key += ";" + name + "=" + value;
     for (const std::string& extension : source.extensions) key += ";" + extension;

@@ -8,18 +8,22 @@
 
 namespace tissuewarp::shaders {
 
-/// GLSL files by name: "kernels/<kernel>.comp", "chunks/<chunk>.glsl".
+/// GLSL files by name: "kernels/<kernel>.comp", "render_pass/<kernel>.vert" and ".frag", "chunks/<chunk>.glsl".
 using SourceLibrary = std::map<std::string, std::string>;
 
 /// The files of shaders/, embedded at build time.
 const SourceLibrary& embedded_sources();
 
-/// What a program is made of.
+/// Which files hold the main(): kernels/*.comp, render_pass/*.vert, render_pass/*.frag.
+enum class ShaderStage { Compute, Vertex, Fragment };
+
+/// What a program, or one stage of a render pass, is made of.
 struct ProgramSource {
     std::string kernel;                          ///< "element_force" for kernels/element_force.comp
     std::vector<std::string> chunks;             ///< in the order in which they precede the kernel
     std::map<std::string, std::string> defines;  ///< value of every name that a file declares by `//! define NAME`
     std::vector<std::string> extensions;         ///< GLSL extensions to require
+    ShaderStage stage = ShaderStage::Compute;
 };
 
 struct ComposedSource {

@@ -96,21 +96,24 @@ enum class Scalar { Float32, Float64 };
 /// SIMD over elements (Highway, widest set of the machine), threads by TBB. Same bits for any number of threads.
 std::unique_ptr<Engine> make_cpu_engine(const RestState& rest, Scalar scalar = Scalar::Float32);
 
-/// How a GPU takes its steps. Patches take one dispatch for a step where they know the scene (T4 of one law without
-/// fibres, viscosity and hexahedra); anything else, and every scene with `patch_tets` 0, takes a pass over elements and
-/// one over nodes.
+/// How a GPU takes its steps. Patches take one dispatch for a step (two with averaged pressure) where they know the
+/// scene: tetrahedra of one law without fibres, viscosity and hexahedra. Anything else, and every scene with
+/// `patch_tets` 0, takes a pass over elements and one over nodes.
 struct GpuStepShape {
-    int patch_tets = 1000;      ///< tetrahedra of a patch
-    int longest_fan = 5;        ///< tetrahedra that one invocation computes in turn, 1 … 5
-    int workgroup = 128;        ///< invocations for a patch
-    bool many_at_once = false;  ///< many steps in a dispatch, all patches at the same time
+    int patch_tets = 0;   ///< tetrahedra of a patch; fewer where its nodes do not fit into shared memory
+    int longest_fan = 5;  ///< tetrahedra that one invocation computes in turn, 1 … 5
+    int workgroup = 128;  ///< invocations for a patch
+    /// Many steps in a dispatch, all patches at the same time. Where the device does not run them so, the engine finds
+    /// out within a fraction of a second and goes on with one step in a dispatch.
+    bool many_at_once = false;
 };
 
-/// What measures best on an H100 for a mesh of so many elements.
+/// What measured best on an H100 for a mesh of so many tetrahedra (docs/performance.md).
 GpuStepShape suggested_gpu_step_shape(int element_count);
 
 /// OpenGL 4.5 compute through EGL, float32. `device` counts EGL devices; −1 takes the first hardware device, or the
-/// software rasteriser when there is none. Its forces on this mesh are compared with the scalar reference once. Throws
+/// software rasteriser when there is none. Without a shape, hardware takes the suggested one and a software rasteriser
+/// two passes. Its forces on this mesh are compared with the scalar reference once. Throws
 /// GpuUnavailable, also when they differ.
 std::unique_ptr<Engine> make_gpu_engine(const RestState& rest, int device = -1);
 std::unique_ptr<Engine> make_gpu_engine(const RestState& rest, int device, const GpuStepShape& shape);

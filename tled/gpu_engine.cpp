@@ -426,12 +426,16 @@ void require_right_forces(Engine& engine, const RestState& rest) {
 }  // namespace
 
 GpuStepShape suggested_gpu_step_shape(int element_count) {
-    static_cast<void>(element_count);
-    return {};
+    constexpr int multiprocessors = 132;  // each takes one patch of a small mesh
+    if (element_count < 20000) return {(element_count + multiprocessors - 1) / multiprocessors, 1, 128, true};
+    if (element_count < 120000) return {(element_count + multiprocessors - 1) / multiprocessors, 1, 640, true};
+    if (element_count < 650000) return {(element_count + multiprocessors - 1) / multiprocessors, 5, 640, true};
+    return {4450, 5, 768, false};
 }
 
 std::unique_ptr<Engine> make_gpu_engine(const RestState& rest, int device) {
-    return make_gpu_engine(rest, device, suggested_gpu_step_shape(rest.element_count()));
+    const bool hardware = shaders::Device(device).hardware();
+    return make_gpu_engine(rest, device, hardware ? suggested_gpu_step_shape(rest.element_count()) : GpuStepShape{});
 }
 
 std::unique_ptr<Engine> make_gpu_engine(const RestState& rest, int device, const GpuStepShape& shape) {

@@ -21,31 +21,26 @@ Ring next_of_ring(Ring ring) {
                 uvec2(ring.behind.x >> 16u | ring.behind.y << 16u, ring.behind.y >> 16u | 0xffff0000u));
 }
 
-/// Edges of a tetrahedron from the node a, at rest and moved: G = (u_b - u_a, u_c - u_a, u_d - u_a), and N whose columns
-/// are 6 V times the shape-function gradients of b, c and d.
+/// A tetrahedron (a, b, c, d) by its edges from a at rest and their displacements u_b - u_a …; normal_b is 6 V times the
+/// gradient of b's shape function. Columns of matrices that change in a loop have been seen to be lost: docs/decisions/
+/// gpu_arithmetic.md.
 struct Edges {
     vec3 rest_b, rest_c, rest_d;
-    mat3 G, N;
+    vec3 moved_b, moved_c, moved_d;
+    vec3 normal_b, normal_c, normal_d;
 };
 
+/// Before the first tetrahedron of a fan: its c stands in the place of d.
 Edges first_edges(Node a, Node b, Node c) {
-    Edges t;
-    t.rest_b = b.X - a.X;
-    t.rest_d = c.X - a.X;
-    t.G[0] = b.u - a.u;
-    t.G[2] = c.u - a.u;
-    t.N[1] = cross(t.rest_d, t.rest_b);
-    return t;
+    vec3 rest_b = b.X - a.X;
+    vec3 rest_c = c.X - a.X;
+    vec3 none = vec3(0.0);
+    return Edges(rest_b, none, rest_c, b.u - a.u, none, c.u - a.u, none, cross(rest_c, rest_b), none);
 }
 
 /// The next tetrahedron: its c is the last one's d, its d is new.
 Edges next_edges(Edges t, Node a, Node d) {
-    t.rest_c = t.rest_d;
-    t.G[1] = t.G[2];
-    t.N[2] = -t.N[1];
-    t.rest_d = d.X - a.X;
-    t.G[2] = d.u - a.u;
-    t.N[1] = cross(t.rest_d, t.rest_b);
-    t.N[0] = cross(t.rest_c, t.rest_d);
-    return t;
+    vec3 rest_d = d.X - a.X;
+    return Edges(t.rest_b, t.rest_d, rest_d, t.moved_b, t.moved_d, d.u - a.u, cross(t.rest_d, rest_d),
+                 cross(rest_d, t.rest_b), -t.normal_c);
 }

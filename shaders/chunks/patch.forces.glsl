@@ -36,7 +36,9 @@ void leave_force(uint i, vec3 f, inout Tally tally) {
 
 /// P of a tetrahedron.
 mat3 stress_of_tetrahedron(Edges t, Parameters parameters, Pressure pressure) {
-    Deformation d = deformation((t.G * transpose(t.N)) * reciprocal(dot(t.rest_b, t.N[0])));
+    mat3 G = mat3(t.moved_b, t.moved_c, t.moved_d);
+    mat3 N = mat3(t.normal_b, t.normal_c, t.normal_d);
+    Deformation d = deformation((G * transpose(N)) * reciprocal(dot(t.rest_b, t.normal_b)));
     return stress(0u, d, parameters, pressure_of(pressure, d.volume_change));
 }
 
@@ -53,9 +55,9 @@ void add_fan(uvec4 fan, Parameters parameters, Patch here, inout Tally tally) {
         t = next_edges(t, node_of_a, node(ring.next));
         take_next_node(pressure, ring.next);
         mat3 P = stress_of_tetrahedron(t, parameters, pressure);
-        force_b += P * t.N[0];
-        leave_force(c, force_c + P * t.N[1], tally);
-        force_c = P * t.N[2];
+        force_b += P * t.normal_b;
+        leave_force(c, force_c + P * t.normal_c, tally);
+        force_c = P * t.normal_d;
         c = ring.next;
     }
     leave_force(c, force_c, tally);

@@ -23,12 +23,13 @@ float pressure_of(Pressure pressure, float volume_change) {
     return 0.25 * (pressure.of_edge + (pressure.of_c + pressure.of_d));
 }
 
-/// 6 V (J - 1) = det(D + G) - det D with D = (rest_b, rest_c, rest_d).
+/// 6 V (J - 1) = det(D + G) - det D with D = (rest_b, rest_c, rest_d) and G = (moved_b, moved_c, moved_d).
 float six_volume_change(Edges t) {
-    vec3 bc = cross(t.G[0], t.G[1]);
-    float linear = dot(t.G[0], t.N[0]) + dot(t.G[1], t.N[1]) + dot(t.G[2], t.N[2]);
-    float quadratic = dot(t.rest_b, cross(t.G[1], t.G[2])) + dot(t.rest_c, cross(t.G[2], t.G[0])) + dot(t.rest_d, bc);
-    return linear + (quadratic + dot(t.G[2], bc));
+    vec3 bc = cross(t.moved_b, t.moved_c);
+    float linear = dot(t.moved_b, t.normal_b) + dot(t.moved_c, t.normal_c) + dot(t.moved_d, t.normal_d);
+    float quadratic = dot(t.rest_b, cross(t.moved_c, t.moved_d)) + dot(t.rest_c, cross(t.moved_d, t.moved_b)) +
+                      dot(t.rest_d, bc);
+    return linear + (quadratic + dot(t.moved_d, bc));
 }
 
 void leave_volume(uint i, float v, float scale, inout uint largest) {

@@ -19,6 +19,13 @@ const SourceLibrary library{
     {"chunks/b.glsl", "int b() { return 2; }\n"},
 };
 
+/// Compute programs and the stages of render passes.
+std::vector<ProgramSource> every_stage() {
+    std::vector<ProgramSource> all = every_program();
+    for (const ProgramSource& source : every_render_pass()) all.push_back(source);
+    return all;
+}
+
 TEST(Composition, PutsVersionDefinesChunksAndKernelInOrder) {
     const ComposedSource composed = compose({"k", {"a", "b"}, {{"WITH_A", "1"}, {"SIZE", "3"}}, {}}, library);
     EXPECT_EQ(composed.text,
@@ -61,12 +68,13 @@ TEST(Composition, RefusesAnUnknownFileByName) {
 TEST(Composition, KeyTellsProgramsApart) {
     std::set<std::string> keys;
     std::set<std::string> texts;
-    for (const ProgramSource& source : every_program()) {
+    const std::vector<ProgramSource> all = every_stage();
+    for (const ProgramSource& source : all) {
         keys.insert(program_key(source));
         texts.insert(compose(source).text);
     }
-    EXPECT_EQ(keys.size(), every_program().size());
-    EXPECT_EQ(texts.size(), every_program().size());
+    EXPECT_EQ(keys.size(), all.size());
+    EXPECT_EQ(texts.size(), all.size());
     EXPECT_EQ(program_key(impose_program()), program_key(impose_program()));
 }
 
@@ -85,7 +93,7 @@ TEST(Composition, LogsOfAllDriversAreMadeReadable) {
 
 TEST(Composition, EveryKernelAndChunkIsUsedByAProgram) {
     std::set<std::string> used;
-    for (const ProgramSource& source : every_program())
+    for (const ProgramSource& source : every_stage())
         for (const std::string& file : compose(source).files) used.insert(file);
     for (const auto& [name, text] : embedded_sources()) EXPECT_TRUE(used.contains(name)) << name;
 }

@@ -43,6 +43,15 @@ TEST(Glslang, AcceptsEveryProgram) {
     }
 }
 
+TEST(Glslang, AcceptsEveryRenderPass) {
+    for (const ProgramSource& source : every_render_pass()) {
+        const ComposedSource composed = compose(source);
+        const auto [output, status] =
+            glslang(composed.text, source.stage == ShaderStage::Vertex ? "-S vert" : "-S frag");
+        EXPECT_EQ(status, 0) << program_key(source) << "\n" << readable_log(output, composed.files);
+    }
+}
+
 TEST(Glslang, RefusesAWrongProgram) {
     const auto [output, status] = glslang(compose(impose_program()).text + "void f() { nonsense(); }\n", "-S comp");
     EXPECT_NE(status, 0);
