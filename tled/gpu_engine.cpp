@@ -426,11 +426,17 @@ void require_right_forces(Engine& engine, const RestState& rest) {
 }  // namespace
 
 GpuStepShape suggested_gpu_step_shape(int element_count) {
-    constexpr int multiprocessors = 132;  // each takes one patch of a small mesh
-    if (element_count < 20000) return {(element_count + multiprocessors - 1) / multiprocessors, 1, 128, true};
-    if (element_count < 120000) return {(element_count + multiprocessors - 1) / multiprocessors, 1, 640, true};
-    if (element_count < 650000) return {(element_count + multiprocessors - 1) / multiprocessors, 5, 640, true};
-    return {4450, 5, 768, false};
+    // Patches in multiples of the multiprocessors, so that none of these idles; larger ones lose less at their surfaces
+    // as long as their nodes fit into shared memory.
+    constexpr int multiprocessors = 132, largest_patch = 4450, least_patch = 64;
+    const auto shared_out = [&](int rounds) {
+        return std::max(least_patch, (element_count + multiprocessors * rounds - 1) / (multiprocessors * rounds));
+    };
+    if (element_count < 20000) return {shared_out(1), 1, 128, true};
+    if (element_count < 120000) return {shared_out(1), 1, 640, true};
+    if (element_count < 560000) return {shared_out(1), 5, 640, true};
+    const int rounds = (element_count + multiprocessors * largest_patch - 1) / (multiprocessors * largest_patch);
+    return {shared_out(rounds), 5, 768, false};
 }
 
 std::unique_ptr<Engine> make_gpu_engine(const RestState& rest, int device) {

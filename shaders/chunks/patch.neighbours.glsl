@@ -7,7 +7,7 @@ layout(std430, binding = BINDING_PATCH_NEIGHBOURS) readonly buffer PatchNeighbou
 /// How often each patch has left something, since ever; behind them one number that is not zero once a patch gave up waiting.
 layout(std430, binding = BINDING_PATCH_PROGRESS) coherent volatile buffer PatchProgress { uint patch_progress[]; };
 
-const uint most_polls = 1u << 16u;  // of the order of 50 ms, a thousand steps
+const uint most_polls = 1u << 15u;  // of the order of 20 ms; llvmpipe ends any loop after 65535 turns
 
 shared uint neighbours_missing;
 

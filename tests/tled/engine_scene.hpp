@@ -16,16 +16,21 @@ using Eigen::Matrix3d;
 using Eigen::Matrix3Xd;
 using Eigen::Vector3d;
 
-/// Every engine takes the same tests.
-enum class Kind { CpuFloat64, CpuFloat32, Gpu };
+/// Every engine takes the same tests: the GPU's as it comes, which on a software rasteriser takes two passes, and with
+/// its steps over patches, which is what hardware takes.
+enum class Kind { CpuFloat64, CpuFloat32, Gpu, GpuPatches };
+
+constexpr GpuStepShape small_patches{.patch_tets = 100, .longest_fan = 5, .workgroup = 64};
 
 inline std::unique_ptr<Engine> make_engine(Kind kind, const RestState& rest) {
     if (kind == Kind::Gpu) return make_gpu_engine(rest);
+    if (kind == Kind::GpuPatches) return make_gpu_engine(rest, -1, small_patches);
     return make_cpu_engine(rest, kind == Kind::CpuFloat64 ? Scalar::Float64 : Scalar::Float32);
 }
 
 inline const char* name_of(Kind kind) {
-    return kind == Kind::Gpu ? "Gpu" : kind == Kind::CpuFloat64 ? "CpuFloat64" : "CpuFloat32";
+    constexpr const char* names[] = {"CpuFloat64", "CpuFloat32", "Gpu", "GpuPatches"};
+    return names[static_cast<int>(kind)];
 }
 
 enum class Laws { Iso, LnJ, Stable, Polynomial, ArrudaBoyce, Ogden, Fibres, Mixed };

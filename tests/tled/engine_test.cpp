@@ -25,7 +25,7 @@ protected:
 
 INSTANTIATE_TEST_SUITE_P(
     All, Engines,
-    ::testing::Combine(::testing::Values(Kind::CpuFloat64, Kind::CpuFloat32, Kind::Gpu),
+    ::testing::Combine(::testing::Values(Kind::CpuFloat64, Kind::CpuFloat32, Kind::Gpu, Kind::GpuPatches),
                        ::testing::Values(Cells::T4, Cells::AveragedPressure, Cells::Hexahedra, Cells::Mixed),
                        ::testing::Values(Laws::Iso, Laws::LnJ, Laws::Stable, Laws::Polynomial, Laws::ArrudaBoyce,
                                          Laws::Ogden, Laws::Fibres, Laws::Mixed)),
