@@ -2,7 +2,7 @@
 // Ourselin (2008): edge 100 mm, ends bonded, stretched by 20 %, mu = 1.007 kPa, lambda = 49.329 kPa, 1000 kg/m³.
 //     gpu_step_bench [--list] [--device N] [--cells 14,24,55,128] [--steps N] [--repeats N] [--compare-limit ELEMENTS]
 //                    [--element t4|averaged] [--law lnj|iso] [--mesh FILE.vtu] [--shapes TETS:FAN:WORKGROUP,…]
-//                    [--render-passes]
+//                    [--render-passes] [--stretch 0.2]
 // Without options: on hardware 14, 24, 55 and 128 cells an edge and 1000 steps, on a software rasteriser 14 and 24
 // cells and 50 steps; five repeats, the median is printed; both elements, both laws. The float64 engine runs the same
 // steps where the mesh has no more than --compare-limit elements (1 100 000). A mesh file of about that cube is
@@ -34,7 +34,7 @@ namespace {
 constexpr double edge = 100;       // mm
 constexpr double shear = 1.007;    // kPa
 constexpr double lambda = 49.329;  // kPa
-constexpr double stretch = 0.2;
+constexpr double default_stretch = 0.2;
 
 struct Options {
     int device = -1;
@@ -44,6 +44,7 @@ struct Options {
     int compare_limit = 1100000;
     std::string element, law;  // empty: both
     std::string mesh;
+    double stretch = default_stretch;
     std::vector<tled::GpuStepShape> shapes;  // empty: the suggested one
     bool render_passes = false;
 };
@@ -65,7 +66,7 @@ struct Scene {
 };
 
 /// Nodes within a hundredth of the height from either end are held.
-Scene stretched_cube(meshing::TetMesh mesh) {
+Scene stretched_cube(meshing::TetMesh mesh, double stretch) {
     Scene scene;
     scene.mesh = std::move(mesh);
     const Eigen::RowVectorXd z = scene.mesh.nodes.row(2);
@@ -166,7 +167,8 @@ std::string name_of(const tled::GpuStepShape& shape) {
 void report_engines(const Scene& scene, const tled::RestState& rest, const std::string& name, const std::string& mesh,
                     const Options& options) {
     std::vector<tled::GpuStepShape> shapes = options.shapes;
-    if (shapes.empty()) shapes = {tled::suggested_gpu_step_shape(rest.element_count())};
+    const tled::Element element = rest.pressure.count() > 0 ? tled::Element::AveragedPressureT4 : tled::Element::T4;
+    if (shapes.empty()) shapes = {tled::suggested_gpu_step_shape(rest.element_count(), element)};
     for (const tled::GpuStepShape& shape : shapes) {
         const double begin = now();
         const auto gpu = tled::make_gpu_engine(rest, options.device, shape);
@@ -179,7 +181,7 @@ void report_engines(const Scene& scene, const tled::RestState& rest, const std::
 }
 
 void measure(meshing::TetMesh mesh, const std::string& mesh_name, const Options& options) {
-    const Scene scene = stretched_cube(std::move(mesh));
+    const Scene scene = stretched_cube(std::move(mesh), options.stretch);
     const tled::NeoHookeanLnJ lnj{shear, lambda};
     const tled::NeoHookeanIso iso{shear, lambda + 2 * shear / 3};
     for (const bool averaged : {false, true}) {
@@ -229,6 +231,8 @@ Options parsed(int argc, char** argv) {
             options.law = value;
         else if (name == "--mesh")
             options.mesh = value;
+        else if (name == "--stretch")
+            options.stretch = std::stod(value);
         else if (name == "--shapes") {
             std::istringstream list(value);
             tled::GpuStepShape shape;

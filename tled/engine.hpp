@@ -109,7 +109,7 @@ struct GpuStepShape {
 };
 
 /// What measured best on an H100 for a mesh of so many tetrahedra (docs/performance.md).
-GpuStepShape suggested_gpu_step_shape(int element_count);
+GpuStepShape suggested_gpu_step_shape(int element_count, Element element = Element::T4);
 
 /// OpenGL 4.5 compute through EGL, float32. `device` counts EGL devices; −1 takes the first hardware device, or the
 /// software rasteriser when there is none. Without a shape, hardware takes the suggested one and a software rasteriser

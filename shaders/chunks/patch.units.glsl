@@ -8,10 +8,11 @@ shared uint largest_of_patch;
 /// The unit is 1 / scale.
 float scale_for(uint largest) {
     uint exponent = floatBitsToUint(uintBitsToFloat(largest) * (2.0 * CONTRIBUTIONS)) >> 23u;  // biased
-    return uintBitsToFloat(clamp(283u - exponent, 1u, 230u) << 23u);  // 2²⁹ over the power of two below
+    // 2²⁹ over the power of two below; at most 2¹¹⁷, whose multiples and their reciprocals are still normal numbers.
+    return uintBitsToFloat(clamp(283u - exponent, 1u, 244u) << 23u);
 }
 
-bool fits(uint largest, float scale) { return uintBitsToFloat(largest) * (CONTRIBUTIONS * scale) < 2.1e9; }
+bool fits(uint largest, float scale) { return (uintBitsToFloat(largest) * CONTRIBUTIONS) * scale < 2.1e9; }
 
 /// Summands beyond are as good as infinite: their sums would not fit whatever the unit.
 bool countable(uint largest) { return largest < floatBitsToUint(1e30); }
