@@ -4,9 +4,12 @@
 #include "meshing/point_location.hpp"
 #include "registration/detail/continuation.hpp"
 #include "registration/detail/rasterisation.hpp"
+#include "registration/detail/uninitialised.hpp"
 
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
+#include <optional>
 #include <string>
 
 // Everything is computed in the moving frame, before the placement P: forward y = P (X + u(X)); backward, with
@@ -35,23 +38,29 @@ void require_usable(const Deformation& deformation, const FieldOptions& options)
 
 /// Relative displacements on a grid, and which voxels the mesh covers.
 struct Raster {
-    Volume values;                     // three channels float32, mm
+    Volume values;                     // three channels float32, mm; of any value outside the mesh
     std::vector<std::uint8_t> inside;  // one per voxel
     detail::RasterCount count;
+
+    /// A grid within the mesh needs no continuation.
+    [[nodiscard]] bool full() const { return std::find(inside.begin(), inside.end(), 0) == inside.end(); }
 };
 
 Raster rasterise_mesh(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tets, const Eigen::Matrix3Xd& values,
                       const Geometry& grid) {
-    Raster raster{Volume(grid, CV_32FC3), std::vector<std::uint8_t>(static_cast<std::size_t>(grid.voxel_count())), {}};
+    Raster raster{detail::uninitialised(grid, CV_32FC3),
+                  std::vector<std::uint8_t>(static_cast<std::size_t>(grid.voxel_count())),
+                  {}};
     const Eigen::Matrix3Xd index = grid.point_to_index() * (nodes.colwise() - grid.origin);
     auto* target = raster.values.data<cv::Vec3f>();
     raster.count = detail::rasterise(index, tets, grid.size, [&](const detail::TetRow& row) {
         const Eigen::Matrix<double, 3, 4> corners = values(Eigen::all, tets.col(row.tet));
+        const Eigen::Vector3d start = corners * row.at_first, step = corners * row.step;
         for (int i = row.first; i <= row.last; ++i) {
             const std::int64_t voxel = grid.size[0] * (row.j + std::int64_t{grid.size[1]} * row.k) + i;
             if (raster.inside[static_cast<std::size_t>(voxel)]) continue;
             raster.inside[static_cast<std::size_t>(voxel)] = 1;
-            const Eigen::Vector3d value = corners * (row.at_first + row.step * (i - row.first));
+            const Eigen::Vector3d value = start + step * (i - row.first);
             for (int c = 0; c < 3; ++c) target[voxel][c] = static_cast<float>(value[c]);
         }
     });
@@ -64,15 +73,17 @@ template <class Outside>
 void complete(Raster& raster, const Geometry& grid, const Eigen::Matrix3d& rotation, const Eigen::Matrix3d& linear,
               const Eigen::Vector3d& constant, const Outside& outside) {
     const Geometry moving = raster.values.geometry;
+    const Eigen::Vector3d step = linear * grid.index_to_point().col(0);
     auto* values = raster.values.data<cv::Vec3f>();
     tbb::parallel_for(0, grid.size[1] * grid.size[2], [&](int row) {
         const int j = row % grid.size[1], k = row / grid.size[1];
+        const Eigen::Vector3d start = linear * grid.point(Eigen::Vector3d(0, j, k)) + constant;
         for (int i = 0; i < grid.size[0]; ++i) {
             const std::int64_t voxel = raster.values.offset(i, j, k);
-            const Eigen::Vector3d index(i, j, k);
-            Eigen::Vector3d value(values[voxel][0], values[voxel][1], values[voxel][2]);
-            if (!raster.inside[static_cast<std::size_t>(voxel)]) value = outside(moving.point(index));
-            const Eigen::Vector3d total = rotation * value + (linear * grid.point(index) + constant);
+            const Eigen::Vector3d value = raster.inside[static_cast<std::size_t>(voxel)]
+                                              ? Eigen::Vector3d(values[voxel][0], values[voxel][1], values[voxel][2])
+                                              : outside(moving.point(Eigen::Vector3d(i, j, k)));
+            const Eigen::Vector3d total = rotation * value + (start + i * step);
             for (int c = 0; c < 3; ++c) values[voxel][c] = static_cast<float>(total[c]);
         }
     });
@@ -115,12 +126,14 @@ Volume displacement_moving_to_fixed(const Deformation& deformation, const Geomet
     observer.checkpoint(stage, 0.0);
     Raster raster = rasterise_mesh(mesh.nodes, mesh.tets, deformation.displacement, moving_grid);
     observer.checkpoint(stage, 0.2);
-    const detail::Continuation continuation(mesh.nodes, mesh.tets, meshing::boundary_surface(mesh),
-                                            deformation.displacement, options.fade_mm);
+    std::optional<detail::Continuation> continuation;
+    if (!raster.full())
+        continuation.emplace(mesh.nodes, mesh.tets, meshing::boundary_surface(mesh), deformation.displacement,
+                             options.fade_mm);
     observer.checkpoint(stage, 0.6);
     const Eigen::Matrix3d rotation = deformation.placement.linear();
     complete(raster, moving_grid, rotation, rotation - Eigen::Matrix3d::Identity(), deformation.placement.translation(),
-             continuation);
+             [&](const Eigen::Vector3d& X) { return (*continuation)(X); });
     observer.progress(stage, 1.0);
     return raster.values;
 }
@@ -143,13 +156,16 @@ Volume displacement_fixed_to_moving(const Deformation& deformation, const Geomet
         observer.note("field fixed to moving: " + std::to_string(raster.count.inverted) + " inverted and " +
                       std::to_string(raster.count.flat) + " flat tetrahedra; the field folds there");
     observer.checkpoint(stage, 0.15);
-    const meshing::BoundarySurface boundary = meshing::boundary_surface(mesh);
-    const detail::Continuation forward(mesh.nodes, mesh.tets, boundary, deformation.displacement, options.fade_mm);
-    observer.checkpoint(stage, 0.4);
-    const detail::Continuation backward(deformed, mesh.tets, boundary, inverse, options.fade_mm);
+    std::optional<detail::Continuation> forward, backward;
+    if (!raster.full()) {
+        const meshing::BoundarySurface boundary = meshing::boundary_surface(mesh);
+        forward.emplace(mesh.nodes, mesh.tets, boundary, deformation.displacement, options.fade_mm);
+        observer.checkpoint(stage, 0.4);
+        backward.emplace(deformed, mesh.tets, boundary, inverse, options.fade_mm);
+    }
     observer.checkpoint(stage, 0.6);
     complete(raster, fixed_grid, Eigen::Matrix3d::Identity(), to_moving.linear() - Eigen::Matrix3d::Identity(),
-             to_moving.translation(), [&](const Eigen::Vector3d& z) { return inverted(forward, z, backward(z)); });
+             to_moving.translation(), [&](const Eigen::Vector3d& z) { return inverted(*forward, z, (*backward)(z)); });
     observer.progress(stage, 1.0);
     return raster.values;
 }

@@ -1,6 +1,7 @@
 #include "registration/warp.hpp"
 
 #include "core/errors.hpp"
+#include "registration/detail/uninitialised.hpp"
 
 #include <tbb/parallel_for.h>
 
@@ -76,16 +77,17 @@ template <class T>
 void pull(const Volume& moving, const Volume& field, Kernel kernel, double outside, Volume& result) {
     const Geometry& grid = field.geometry;
     const Eigen::Matrix3d to_index = moving.geometry.point_to_index();
+    const Eigen::Vector3d step = to_index * grid.index_to_point().col(0);
     const Sampler<T> sampler{moving};
     const T outside_value = cv::saturate_cast<T>(outside);
     tbb::parallel_for(0, grid.size[1] * grid.size[2], [&](int row) {
         const int j = row % grid.size[1], k = row / grid.size[1];
         const cv::Vec3f* displacement = field.data<cv::Vec3f>() + field.offset(0, j, k);
         T* target = result.data<T>() + sampler.channels * result.offset(0, j, k);
+        const Eigen::Vector3d start = to_index * (grid.point(Eigen::Vector3d(0, j, k)) - moving.geometry.origin);
         for (int i = 0; i < grid.size[0]; ++i, target += sampler.channels) {
             const Eigen::Vector3d d(displacement[i][0], displacement[i][1], displacement[i][2]);
-            const Eigen::Vector3d index =
-                to_index * (grid.point(Eigen::Vector3d(i, j, k)) + d - moving.geometry.origin);
+            const Eigen::Vector3d index = start + i * step + to_index * d;
             if (!holds(moving.geometry, index))
                 std::fill_n(target, sampler.channels, outside_value);
             else if (kernel == Kernel::Linear)
@@ -97,7 +99,7 @@ void pull(const Volume& moving, const Volume& field, Kernel kernel, double outsi
 }
 
 Volume warp(const Volume& moving, const Volume& field, Kernel kernel, double outside) {
-    Volume result(field.geometry, moving.voxels.type());
+    Volume result = detail::uninitialised(field.geometry, moving.voxels.type());
     switch (moving.voxels.depth()) {
         case CV_8U:
             pull<std::uint8_t>(moving, field, kernel, outside, result);

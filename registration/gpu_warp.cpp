@@ -1,0 +1,382 @@
+// The passes of the warp on a device: clear the owners of the voxels, elements to affine inverse fields, rasterise,
+// read the moving image at every voxel. Kernels: shaders/kernels/warp_*.comp, blocks: shaders/chunks/warp*.glsl.
+
+#include "registration/gpu_warp.hpp"
+
+#include "core/errors.hpp"
+#include "registration/detail/uninitialised.hpp"
+#include "shaders/buffer.hpp"
+#include "shaders/catalogue.hpp"
+#include "shaders/program.hpp"
+#include "shaders/timer.hpp"
+
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <vector>
+
+namespace tissuewarp::registration {
+
+namespace {
+
+using imaging::Geometry;
+using imaging::Interpolation;
+using imaging::Volume;
+using shaders::Buffer;
+using shaders::CurrentContext;
+using shaders::Program;
+using shaders::WarpContinuation;
+using Float4 = std::array<float, 4>;
+using Uint4 = std::array<std::uint32_t, 4>;
+using Row4 = Eigen::Matrix<double, 3, 4>;
+
+/// Rows of voxels that a portion of an element has at most, so that one long element does not keep 32 lanes busy while
+/// the others rest.
+constexpr int rows_of_portion = 512;
+
+/// The storage block WarpGrid of shaders/chunks/warp.glsl.
+struct GridBlock {
+    Uint4 output_size, moving_size;
+    std::array<Float4, 3> rigid_offset, rigid_field, to_moving_index;
+};
+
+/// The storage block WarpCounts of shaders/kernels/warp_elements.comp.
+struct Counts {
+    std::uint32_t negative = 0, flat = 0;
+};
+
+Float4 packed(const Eigen::Vector3d& v, double w = 0.0) {
+    return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2]), static_cast<float>(w)};
+}
+
+std::array<Float4, 3> rows_of(const Row4& matrix) {
+    std::array<Float4, 3> rows;
+    for (int r = 0; r < 3; ++r)
+        rows[static_cast<std::size_t>(r)] = packed(matrix.row(r).head<3>().transpose(), matrix(r, 3));
+    return rows;
+}
+
+Uint4 size_of(const Geometry& grid) {
+    return {static_cast<std::uint32_t>(grid.size[0]), static_cast<std::uint32_t>(grid.size[1]),
+            static_cast<std::uint32_t>(grid.size[2]), 0};
+}
+
+/// The output grid seen from the moving frame.
+Geometry before_placement(const Geometry& output, const Eigen::Isometry3d& placement) {
+    const Eigen::Isometry3d to_moving = placement.inverse();
+    Geometry grid = output;
+    grid.origin = to_moving * output.origin;
+    grid.direction = to_moving.linear() * output.direction;
+    return grid;
+}
+
+/// X − y, mm, of tissue that the placement alone has moved, as an affine function of the output index.
+Row4 rigid_field(const Geometry& output, const Eigen::Isometry3d& placement) {
+    const Geometry grid = before_placement(output, placement);
+    Row4 rows;
+    rows << grid.index_to_point() - output.index_to_point(), grid.origin - output.origin;
+    return rows;
+}
+
+GridBlock grid_block(const Geometry& moving, const Geometry& output, const Eigen::Isometry3d& placement) {
+    const Geometry grid = before_placement(output, placement);
+    const Eigen::Matrix3d to_index = moving.point_to_index();
+    Row4 offset, matrix;
+    offset << to_index * grid.index_to_point() - Eigen::Matrix3d::Identity(), moving.index(grid.origin);
+    matrix << to_index, Eigen::Vector3d::Zero();
+    return {size_of(output), size_of(moving), rows_of(offset), rows_of(rigid_field(output, placement)),
+            rows_of(matrix)};
+}
+
+/// (element, portion, portions of that element), from the boxes around the elements at rest; a deformation that grows
+/// them costs balance, not voxels.
+std::vector<Uint4> portions_of(const meshing::TetMesh& mesh, const Geometry& output) {
+    const Eigen::Matrix3Xd index = output.point_to_index() * mesh.nodes;
+    std::vector<Uint4> portions;
+    for (int e = 0; e < mesh.tet_count(); ++e) {
+        const Eigen::Matrix<double, 3, 4> corners = index(Eigen::all, mesh.tets.col(e));
+        const Eigen::Array3d extent = corners.rowwise().maxCoeff() - corners.rowwise().minCoeff();
+        const double rows = std::min(extent[1] + 1.0, 1.0 * output.size[1]) *  //
+                            std::min(extent[2] + 1.0, 1.0 * output.size[2]);
+        const auto count = static_cast<std::uint32_t>(rows / rows_of_portion) + 1;
+        for (std::uint32_t part = 0; part < count; ++part)
+            portions.push_back({static_cast<std::uint32_t>(e), part, count, 0});
+    }
+    return portions;
+}
+
+std::vector<Uint4> corners_of(const meshing::TetMesh& mesh) {
+    std::vector<Uint4> corners;
+    for (const auto& tet : mesh.tets.colwise())
+        corners.push_back({static_cast<std::uint32_t>(tet[0]), static_cast<std::uint32_t>(tet[1]),
+                           static_cast<std::uint32_t>(tet[2]), static_cast<std::uint32_t>(tet[3])});
+    return corners;
+}
+
+void require_image(const Volume& moving, Interpolation interpolation) {
+    if (moving.empty()) throw InvalidInput("GPU warp: the moving image is empty; give one with voxels");
+    imaging::require_valid(moving.geometry, "moving image");
+    if (moving.channels() != 1)
+        throw InvalidInput("GPU warp: the moving image has " + std::to_string(moving.channels()) +
+                           " channels; give one of one channel, or take warp_image()");
+    const int depth = moving.voxels.depth();
+    if (interpolation == Interpolation::Nearest && depth > CV_32S)
+        throw InvalidInput("GPU warp: labels are floating-point; read them with read_labels");
+    if (interpolation == Interpolation::Linear && depth != CV_32F && depth > CV_16S)
+        throw InvalidInput(
+            "GPU warp: voxels of 32-bit integers or float64 do not fit into float32; convert them or take "
+            "warp_image()");
+}
+
+void require_space(const shaders::Device& device, const Geometry& grid, const char* what) {
+    const auto limit = static_cast<long long>(device.limits().storage_buffer_bytes / sizeof(float));
+    if (grid.voxel_count() > limit)
+        throw GpuUnavailable("GPU warp: the " + std::string(what) + " has " + std::to_string(grid.voxel_count()) +
+                             " voxels, " + device.renderer() + " holds " + std::to_string(limit) +
+                             " in a storage block; crop it, take a coarser grid or warp on the CPU");
+}
+
+/// Four bytes a voxel, as the device holds them.
+Volume in_words(const Volume& image, Interpolation interpolation) {
+    return image.as(interpolation == Interpolation::Nearest ? CV_32S : CV_32F);
+}
+
+std::span<std::uint32_t> words_of(Volume& volume) {
+    return {reinterpret_cast<std::uint32_t*>(volume.voxels.data), volume.voxels.total()};
+}
+
+}  // namespace
+
+struct GpuWarp::Impl {
+    Geometry moving_grid, output;
+    int type;  // of the moving image and the result
+    Interpolation interpolation;
+    std::uint32_t outside_bits = 0;
+    Eigen::Matrix3Xd nodes;  // rest positions, mm, moving frame
+    shaders::Device device;
+    shaders::ProgramCache programs;
+    std::uint32_t element_count, portion_count = 0;
+    std::optional<Buffer<GridBlock>> grid;
+    std::optional<Buffer<Float4>> node_state, element_field;
+    std::optional<Buffer<Uint4>> corners, portions;
+    std::optional<Buffer<std::uint32_t>> owner, moving, result;
+    std::optional<Buffer<Counts>> counts;
+    std::array<std::optional<Buffer<float>>, 3> continuation;
+    std::map<std::string, const shaders::StorageBuffer*> blocks;
+    std::optional<shaders::GpuTimer> rasterise_timer, resample_timer;
+    std::vector<Float4> node_words;
+    GpuWarpReport last;
+
+    Impl(const meshing::TetMesh& mesh, const Volume& image, const Geometry& grid_of_output,
+         const GpuWarpOptions& options)
+        : moving_grid(image.geometry),
+          output(grid_of_output),
+          type(image.voxels.type()),
+          interpolation(options.interpolation),
+          nodes(mesh.nodes),
+          device(options.gpu_index),
+          programs(device),
+          element_count(static_cast<std::uint32_t>(mesh.tet_count())) {
+        require_space(device, output, "output grid");
+        require_space(device, moving_grid, "moving image");
+        set_outside(options.outside);
+        allocate(mesh, image);
+        blocks = {{"WarpGrid", &*grid},     {"WarpNodes", &*node_state},  {"WarpTetrahedra", &*corners},
+                  {"WarpOwner", &*owner},   {"WarpPortions", &*portions}, {"WarpElementField", &*element_field},
+                  {"WarpMoving", &*moving}, {"WarpResult", &*result},     {"WarpCounts", &*counts}};
+    }
+
+    void set_outside(double outside) {
+        cv::Mat value(1, 1, CV_64F, cv::Scalar(outside));
+        value.convertTo(value, CV_MAT_DEPTH(type));
+        value.convertTo(value, interpolation == Interpolation::Nearest ? CV_32S : CV_32F);
+        outside_bits = *value.ptr<std::uint32_t>();
+    }
+
+    void allocate(const meshing::TetMesh& mesh, const Volume& image) {
+        const auto voxels = static_cast<std::size_t>(output.voxel_count());
+        const std::vector<Uint4> parts = portions_of(mesh, output);
+        Volume words = in_words(image, interpolation);
+        portion_count = static_cast<std::uint32_t>(parts.size());
+        grid.emplace(device, 1, "grids of the warp");
+        node_state.emplace(device, 2 * static_cast<std::size_t>(nodes.cols()), "displacements of the warp");
+        element_field.emplace(device, 4 * static_cast<std::size_t>(element_count), "inverse fields of elements");
+        corners.emplace(device, corners_of(mesh), "nodes of elements");
+        portions.emplace(device, parts, "portions of elements");
+        owner.emplace(device, voxels, "elements of voxels");
+        moving.emplace(device, words_of(words), "moving image");
+        result.emplace(device, voxels, "warped image");
+        counts.emplace(device, 1, "counts of elements");
+        rasterise_timer.emplace(device);
+        resample_timer.emplace(device);
+    }
+
+    [[nodiscard]] WarpContinuation continuation_kind() const {
+        return continuation[0] ? WarpContinuation::Given : WarpContinuation::None;
+    }
+
+    void bind(const Program& program) const {
+        for (const shaders::StorageBlock& block : program.storage_blocks()) blocks.at(block.name)->bind(block.binding);
+    }
+
+    void run(const Program& program, std::size_t invocations) const {
+        bind(program);
+        program.dispatch(invocations);
+        shaders::storage_barrier();
+    }
+
+    void require(const Eigen::Matrix3Xd& displacement, const Eigen::Isometry3d& placement) const {
+        if (displacement.cols() != nodes.cols())
+            throw InvalidInput("GPU warp: " + std::to_string(displacement.cols()) + " displacements for " +
+                               std::to_string(nodes.cols()) + " nodes; give one each");
+        for (Eigen::Index n = 0; n < displacement.cols(); ++n)
+            if (!displacement.col(n).allFinite())
+                throw InvalidInput("GPU warp: the displacement of node " + std::to_string(n) + " is not finite");
+        if (!placement.matrix().allFinite())
+            throw InvalidInput("GPU warp: the placement is not finite; give a rigid motion");
+    }
+
+    /// Node positions are reduced to output indices in double precision: every element that shares a node sees the same
+    /// rounded position, so rounding opens no gap.
+    void upload(const Eigen::Matrix3Xd& displacement, const Eigen::Isometry3d& placement) {
+        const Geometry seen = before_placement(output, placement);
+        const Eigen::Matrix3d to_index = seen.point_to_index();
+        node_words.resize(2 * static_cast<std::size_t>(nodes.cols()));
+        for (Eigen::Index n = 0; n < nodes.cols(); ++n) {
+            const Eigen::Vector3d u = displacement.col(n);
+            const Eigen::Vector3d index = to_index * (nodes.col(n) + u - seen.origin);
+            node_words[2 * static_cast<std::size_t>(n)] = packed(index);
+            node_words[2 * static_cast<std::size_t>(n) + 1] = packed(-u);
+        }
+        node_state->upload(node_words);
+        grid->upload(std::array{grid_block(moving_grid, output, placement)});
+        counts->upload(std::array{Counts{}});
+    }
+
+    void rasterise(const Eigen::Matrix3Xd& displacement, const Eigen::Isometry3d& placement) {
+        upload(displacement, placement);
+        last = {};
+        const Program& elements = programs.get(shaders::warp_elements_program());
+        const Program& rows = programs.get(shaders::warp_rasterise_program());
+        const Program& clear = programs.get(shaders::warp_clear_program());
+        elements.set(0, element_count);
+        rows.set(0, portion_count);
+        rasterise_timer->start();
+        run(clear, owner->size());
+        run(elements, element_count);
+        run(rows, std::size_t{portion_count} * shaders::warp_portion_lanes);
+        rasterise_timer->stop();
+    }
+
+    void resample(const Program& program, std::uint32_t uniform, Volume& target) {
+        program.set(0, uniform);
+        resample_timer->start();
+        run(program, result->size());
+        resample_timer->stop();
+        result->download(words_of(target));
+        last.resample_seconds += resample_timer->seconds();
+    }
+
+    void finish_report() {
+        last.rasterise_seconds = rasterise_timer->seconds();
+        const Counts found = counts->download().front();
+        last.flat = static_cast<int>(found.flat);
+        // An index triple of other handedness than the patient's turns the sign of every volume.
+        const bool mirrored = output.direction.determinant() < 0.0;
+        last.inverted = static_cast<int>(mirrored ? element_count - found.flat - found.negative : found.negative);
+    }
+};
+
+GpuWarp::GpuWarp(const meshing::TetMesh& mesh, const Volume& moving, const Geometry& output,
+                 const GpuWarpOptions& options) {
+    meshing::require_valid(mesh, "GPU warp");
+    if (mesh.tet_count() == 0) throw InvalidInput("GPU warp: the mesh has no elements; give one with tetrahedra");
+    imaging::require_valid(output, "output grid");
+    require_image(moving, options.interpolation);
+    impl_ = std::make_unique<Impl>(mesh, moving, output, options);
+}
+GpuWarp::~GpuWarp() = default;
+GpuWarp::GpuWarp(GpuWarp&&) noexcept = default;
+GpuWarp& GpuWarp::operator=(GpuWarp&&) noexcept = default;
+
+void GpuWarp::set_continuation(const Volume& fixed_to_moving, const Eigen::Isometry3d& placement) {
+    if (fixed_to_moving.empty() || fixed_to_moving.voxels.type() != CV_32FC3)
+        throw InvalidInput(
+            "GPU warp: the field must have three channels of float32; give displacement_fixed_to_moving");
+    if (!imaging::same_grid(fixed_to_moving.geometry, impl_->output))
+        throw InvalidInput("GPU warp: the field lies on another grid than the output, " +
+                           std::to_string(imaging::grid_distance(fixed_to_moving.geometry, impl_->output)) +
+                           " voxels off; compute it on the output grid");
+    if (!placement.matrix().allFinite() || !cv::checkRange(fixed_to_moving.voxels))
+        throw InvalidInput("GPU warp: the field or its placement is not finite; give displacement_fixed_to_moving");
+    const Row4 rigid = rigid_field(impl_->output, placement);
+    const auto& size = impl_->output.size;
+    std::vector<float> component(impl_->result->size());
+    const auto* field = fixed_to_moving.data<cv::Vec3f>();
+    const CurrentContext current = impl_->device.make_current();
+    for (int c = 0; c < 3; ++c) {
+        std::size_t voxel = 0;
+        for (int k = 0; k < size[2]; ++k)
+            for (int j = 0; j < size[1]; ++j)
+                for (int i = 0; i < size[0]; ++i, ++voxel)
+                    component[voxel] =
+                        static_cast<float>(field[voxel][c] - rigid.row(c).dot(Eigen::Vector4d(i, j, k, 1.0)));
+        auto& buffer = impl_->continuation[static_cast<std::size_t>(c)];
+        if (!buffer) buffer.emplace(impl_->device, component.size(), "continuation of the field");
+        buffer->upload(component);
+        impl_->blocks[std::string("WarpContinuation") + "XYZ"[c]] = &*buffer;
+    }
+}
+
+void GpuWarp::warp(const Eigen::Matrix3Xd& displacement, const Eigen::Isometry3d& placement, Volume& result) {
+    Impl& impl = *impl_;
+    impl.require(displacement, placement);
+    const CurrentContext current = impl.device.make_current();
+    const bool nearest = impl.interpolation == Interpolation::Nearest;
+    const int word_type = nearest ? CV_32SC1 : CV_32FC1;
+    const bool fits = !result.empty() && result.voxels.type() == word_type && result.geometry.size == impl.output.size;
+    Volume words = fits && impl.type == word_type ? result : detail::uninitialised(impl.output, word_type);
+    words.geometry = impl.output;
+    impl.rasterise(displacement, placement);
+    const Program& program = impl.programs.get(shaders::warp_image_program(
+        impl.continuation_kind(), nearest ? shaders::WarpTakes::Nearest : shaders::WarpTakes::Trilinear));
+    impl.resample(program, impl.outside_bits, words);
+    impl.finish_report();
+    result = words.as(CV_MAT_DEPTH(impl.type));
+}
+
+Volume GpuWarp::warp(const Eigen::Matrix3Xd& displacement, const Eigen::Isometry3d& placement) {
+    Volume result;
+    warp(displacement, placement, result);
+    return result;
+}
+
+Volume GpuWarp::field(const Eigen::Matrix3Xd& displacement, const Eigen::Isometry3d& placement) {
+    Impl& impl = *impl_;
+    impl.require(displacement, placement);
+    const CurrentContext current = impl.device.make_current();
+    impl.rasterise(displacement, placement);
+    const Program& program = impl.programs.get(shaders::warp_field_program(impl.continuation_kind()));
+    Volume component = detail::uninitialised(impl.output, CV_32FC1),
+           result = detail::uninitialised(impl.output, CV_32FC3);
+    const auto* from = component.data<float>();
+    auto* to = result.data<cv::Vec3f>();
+    for (int c = 0; c < 3; ++c) {
+        impl.resample(program, static_cast<std::uint32_t>(c), component);
+        for (std::size_t voxel = 0; voxel < component.voxels.total(); ++voxel) to[voxel][c] = from[voxel];
+    }
+    impl.finish_report();
+    return result;
+}
+
+const GpuWarpReport& GpuWarp::report() const {
+    return impl_->last;
+}
+const std::string& GpuWarp::device() const {
+    return impl_->device.renderer();
+}
+
+}  // namespace tissuewarp::registration
