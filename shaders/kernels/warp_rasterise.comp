@@ -26,10 +26,11 @@ void clip_row(float excess, float step, float start, inout float first, inout fl
 }
 
 void main() {
-    uint portion = invocation_index() / PORTION_LANES;
+    uint index = invocation_index() / PORTION_LANES;
     uint lane = invocation_index() % PORTION_LANES;
-    if (portion >= portion_count) return;
-    uint element = portions[portion].x;
+    if (index >= portion_count) return;
+    uvec4 portion = portions[index];
+    uint element = portion.x;
     uvec4 nodes = warp_tetrahedron[element];
     BarycentricMap map = barycentric_map(nodes);
     if (map.volume == 0.0) return;
@@ -47,7 +48,7 @@ void main() {
     float bound_3 = slack * length(map.gradient_3);
     uint rows_y = uint(upper.y - lower.y) + 1u;
     uint rows = rows_y * (uint(upper.z - lower.z) + 1u);
-    for (uint row = portions[portion].y * PORTION_LANES + lane; row < rows; row += portions[portion].z * PORTION_LANES) {
+    for (uint row = portion.y * PORTION_LANES + lane; row < rows; row += portion.z * PORTION_LANES) {
         vec3 start = lower + vec3(0.0, float(row % rows_y), float(row / rows_y));
         vec3 p = start - map.corner;
         float first = lower.x, last = upper.x;
