@@ -53,16 +53,19 @@ Raster rasterise_mesh(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tet
                   {}};
     const Eigen::Matrix3Xd index = grid.point_to_index() * (nodes.colwise() - grid.origin);
     auto* target = raster.values.data<cv::Vec3f>();
-    raster.count = detail::rasterise(index, tets, grid.size, [&](const detail::TetRow& row) {
-        const Eigen::Matrix<double, 3, 4> corners = values(Eigen::all, tets.col(row.tet));
-        const Eigen::Vector3d start = corners * row.at_first, step = corners * row.step;
-        for (int i = row.first; i <= row.last; ++i) {
-            const std::int64_t voxel = grid.size[0] * (row.j + std::int64_t{grid.size[1]} * row.k) + i;
-            if (raster.inside[static_cast<std::size_t>(voxel)]) continue;
-            raster.inside[static_cast<std::size_t>(voxel)] = 1;
-            const Eigen::Vector3d value = start + step * (i - row.first);
-            for (int c = 0; c < 3; ++c) target[voxel][c] = static_cast<float>(value[c]);
-        }
+    raster.count = detail::rasterise(index, tets, grid.size, [&](int tet, const Eigen::Vector4d& barycentric_step) {
+        const Eigen::Matrix<double, 3, 4> corners = values(Eigen::all, tets.col(tet));
+        const Eigen::Vector3d step = corners * barycentric_step;
+        return [&, corners, step](const detail::TetRow& row) {
+            const Eigen::Vector3d start = corners * row.at_first;
+            for (int i = row.first; i <= row.last; ++i) {
+                const std::int64_t voxel = grid.size[0] * (row.j + std::int64_t{grid.size[1]} * row.k) + i;
+                if (raster.inside[static_cast<std::size_t>(voxel)]) continue;
+                raster.inside[static_cast<std::size_t>(voxel)] = 1;
+                const Eigen::Vector3d value = start + step * (i - row.first);
+                for (int c = 0; c < 3; ++c) target[voxel][c] = static_cast<float>(value[c]);
+            }
+        };
     });
     return raster;
 }

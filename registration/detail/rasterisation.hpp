@@ -12,11 +12,10 @@
 
 namespace tissuewarp::registration::detail {
 
-/// Voxels first … last of row (j, k) lie in a tetrahedron; their barycentric coordinates are at_first + step (i −
-/// first).
+/// Voxels first … last of row (j, k) lie in a tetrahedron; `at_first` are the barycentric coordinates of the first.
 struct TetRow {
-    int tet, first, last, j, k;
-    Eigen::Vector4d at_first, step;
+    int first, last, j, k;
+    Eigen::Vector4d at_first;
 };
 
 struct RasterCount {
@@ -81,9 +80,10 @@ struct RowClip {
     }
 };
 
-/// Calls `visit(TetRow)` for every row of voxels that a tetrahedron holds. `nodes` are continuous voxel indices. Slabs
-/// of slices run in parallel; within a slab tetrahedra come in ascending order, so a visitor that keeps the first
-/// writer of a voxel gives the same result for any number of threads: the lowest element wins.
+/// Calls `visit(tet, step)` for tetrahedra, `step` being the change of the barycentric coordinates from a voxel of a
+/// row to the next, and what that returns with every TetRow that the tetrahedron holds. `nodes` are continuous voxel
+/// indices. Slabs of slices run in parallel; within a slab tetrahedra come in ascending order, so a visitor that keeps
+/// the first writer of a voxel gives the same result for any number of threads: the lowest element wins.
 template <class Visit>
 RasterCount rasterise(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tets, const std::array<int, 3>& size,
                       const Visit& visit) {
@@ -117,16 +117,19 @@ RasterCount rasterise(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tet
             BarycentricMap map;
             map.set(bounds(tet, lower, upper));
             const RowClip clip(map.matrix.col(0));
+            const Eigen::Vector4d at_lower = map.at(lower);
+            const auto draw = visit(tet, clip.step);
             const int k_first = std::max(static_cast<int>(lower[2]), slab * slab_slices);
             const int k_last = std::min(static_cast<int>(upper[2]), slab * slab_slices + slab_slices - 1);
             for (int k = k_first; k <= k_last; ++k) {
+                const Eigen::Vector4d in_slice = at_lower + map.matrix.col(2) * (k - lower[2]);
                 for (int j = static_cast<int>(lower[1]); j <= static_cast<int>(upper[1]); ++j) {
-                    Eigen::Vector4d lambda = map.at({lower[0], static_cast<double>(j), static_cast<double>(k)});
+                    const Eigen::Vector4d in_row = in_slice + map.matrix.col(1) * (j - lower[1]);
                     double first = lower[0], last = upper[0];
-                    clip(lambda, first, last);
+                    clip(in_row, first, last);
                     if (!(first <= last)) continue;
-                    lambda += clip.step * (first - lower[0]);
-                    visit(TetRow{tet, static_cast<int>(first), static_cast<int>(last), j, k, lambda, clip.step});
+                    draw(TetRow{static_cast<int>(first), static_cast<int>(last), j, k,
+                                in_row + clip.step * (first - lower[0])});
                 }
             }
         }
