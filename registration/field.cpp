@@ -71,21 +71,28 @@ Raster rasterise_mesh(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tet
 }
 
 /// Replaces v by `rotation` v + `linear` p + `constant` at every voxel centre p of `grid`, in double precision; voxels
-/// outside the mesh first take `outside(q)`, q being the voxel centre in the moving frame.
+/// outside the mesh first take outside_of_row()(i, q), with one such function for each row of voxels, called in
+/// ascending order, and q the voxel centre in the moving frame.
 template <class Outside>
 void complete(Raster& raster, const Geometry& grid, const Eigen::Matrix3d& rotation, const Eigen::Matrix3d& linear,
-              const Eigen::Vector3d& constant, const Outside& outside) {
+              const Eigen::Vector3d& constant, const Outside& outside_of_row) {
     const Geometry moving = raster.values.geometry;
-    const Eigen::Vector3d step = linear * grid.index_to_point().col(0);
+    const Eigen::Vector3d step = linear * grid.index_to_point().col(0), moving_step = moving.index_to_point().col(0);
     auto* values = raster.values.data<cv::Vec3f>();
     tbb::parallel_for(0, grid.size[1] * grid.size[2], [&](int row) {
         const int j = row % grid.size[1], k = row / grid.size[1];
         const Eigen::Vector3d start = linear * grid.point(Eigen::Vector3d(0, j, k)) + constant;
+        const Eigen::Vector3d moving_start = moving.point(Eigen::Vector3d(0, j, k));
+        std::optional<decltype(outside_of_row())> outside;  // a covered grid has nothing to make it from
         for (int i = 0; i < grid.size[0]; ++i) {
             const std::int64_t voxel = raster.values.offset(i, j, k);
-            const Eigen::Vector3d value = raster.inside[static_cast<std::size_t>(voxel)]
-                                              ? Eigen::Vector3d(values[voxel][0], values[voxel][1], values[voxel][2])
-                                              : outside(moving.point(Eigen::Vector3d(i, j, k)));
+            Eigen::Vector3d value;
+            if (raster.inside[static_cast<std::size_t>(voxel)]) {
+                value = Eigen::Vector3d(values[voxel][0], values[voxel][1], values[voxel][2]);
+            } else {
+                if (!outside) outside.emplace(outside_of_row());
+                value = (*outside)(i, moving_start + i * moving_step);
+            }
             const Eigen::Vector3d total = rotation * value + (start + i * step);
             for (int c = 0; c < 3; ++c) values[voxel][c] = static_cast<float>(total[c]);
         }
@@ -93,10 +100,15 @@ void complete(Raster& raster, const Geometry& grid, const Eigen::Matrix3d& rotat
     raster.values.geometry = grid;
 }
 
+struct Inverse {
+    Eigen::Vector3d w;
+    bool converged;
+};
+
 /// w = X − z with X + u(X) = z, u the continued forward field: Broyden steps (his first method, Math. Comp. 19, 1965)
-/// from the continued inverse, shortened until the residual falls, which it does where the field does not fold.
-/// The gradient just outside the mesh is close to a rank-one matrix, ∂u/∂n ⊗ n, which one update learns.
-Eigen::Vector3d inverted(const detail::Continuation& forward, const Eigen::Vector3d& z, Eigen::Vector3d w) {
+/// from the guess w, shortened until the residual falls, which it does where the field does not fold. The gradient just
+/// outside the mesh is close to a rank-one matrix, ∂u/∂n ⊗ n, which one update learns.
+Inverse inverted(const detail::Continuation& forward, const Eigen::Vector3d& z, Eigen::Vector3d w) {
     constexpr double negligible = 0.01;  // mm
     constexpr int most_steps = 6, most_halvings = 3;
     Eigen::Matrix3d inverse_gradient = Eigen::Matrix3d::Identity();
@@ -115,8 +127,34 @@ Eigen::Vector3d inverted(const detail::Continuation& forward, const Eigen::Vecto
         w += change;
         residual = next_residual;
     }
-    return w;
+    if (!(residual.squaredNorm() <= negligible * negligible)) return {w, false};
+    return {w - inverse_gradient * residual, true};  // the next step, not worth its evaluation
 }
+
+/// The inverse at consecutive voxels of a row: where two are known the next is guessed from their line, which needs one
+/// evaluation in most places; at first, and where that leads nowhere, from the continued inverse.
+class RowInverse {
+public:
+    RowInverse(const detail::Continuation& forward, const detail::Continuation& backward)
+        : forward_(forward), backward_(backward) {}
+
+    Eigen::Vector3d operator()(int i, const Eigen::Vector3d& z) {
+        known_ = i == last_ + 1 ? std::min(known_ + 1, 2) : 0;
+        Inverse found{Eigen::Vector3d::Zero(), false};
+        if (known_ == 2) found = inverted(forward_, z, 2.0 * before_ - two_before_);
+        if (!found.converged) found = inverted(forward_, z, backward_(z));
+        if (!found.converged) known_ = -1;
+        two_before_ = before_;
+        before_ = found.w;
+        last_ = i;
+        return found.w;
+    }
+
+private:
+    const detail::Continuation &forward_, &backward_;
+    Eigen::Vector3d before_ = Eigen::Vector3d::Zero(), two_before_ = Eigen::Vector3d::Zero();
+    int last_ = -2, known_ = 0;
+};
 
 }  // namespace
 
@@ -136,7 +174,7 @@ Volume displacement_moving_to_fixed(const Deformation& deformation, const Geomet
     observer.checkpoint(stage, 0.6);
     const Eigen::Matrix3d rotation = deformation.placement.linear();
     complete(raster, moving_grid, rotation, rotation - Eigen::Matrix3d::Identity(), deformation.placement.translation(),
-             [&](const Eigen::Vector3d& X) { return (*continuation)(X); });
+             [&] { return [&](int, const Eigen::Vector3d& X) { return (*continuation)(X); }; });
     observer.progress(stage, 1.0);
     return raster.values;
 }
@@ -168,7 +206,7 @@ Volume displacement_fixed_to_moving(const Deformation& deformation, const Geomet
     }
     observer.checkpoint(stage, 0.6);
     complete(raster, fixed_grid, Eigen::Matrix3d::Identity(), to_moving.linear() - Eigen::Matrix3d::Identity(),
-             to_moving.translation(), [&](const Eigen::Vector3d& z) { return inverted(*forward, z, (*backward)(z)); });
+             to_moving.translation(), [&] { return RowInverse(*forward, *backward); });
     observer.progress(stage, 1.0);
     return raster.values;
 }
