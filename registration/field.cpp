@@ -51,7 +51,8 @@ Raster rasterise_mesh(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tet
     Raster raster{detail::uninitialised(grid, CV_32FC3),
                   std::vector<std::uint8_t>(static_cast<std::size_t>(grid.voxel_count())),
                   {}};
-    const Eigen::Matrix3Xd index = grid.point_to_index() * (nodes.colwise() - grid.origin);
+    const Eigen::Matrix3d to_index = grid.point_to_index();
+    const Eigen::Matrix3Xd index = to_index * (nodes.colwise() - grid.origin);
     auto* target = raster.values.data<cv::Vec3f>();
     raster.count = detail::rasterise(index, tets, grid.size, [&](int tet, const Eigen::Vector4d& barycentric_step) {
         const Eigen::Matrix<double, 3, 4> corners = values(Eigen::all, tets.col(tet));
@@ -67,6 +68,9 @@ Raster rasterise_mesh(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tet
             }
         };
     });
+    // Seen by a left-handed grid every volume has the other sign.
+    if (to_index.determinant() < 0.0)
+        raster.count.inverted = static_cast<int>(tets.cols()) - raster.count.flat - raster.count.inverted;
     return raster;
 }
 

@@ -19,7 +19,7 @@ struct TetRow {
 };
 
 struct RasterCount {
-    int inverted = 0;  ///< elements of negative volume; they are drawn like the others
+    int inverted = 0;  ///< elements of negative volume in voxel indices; they are drawn like the others
     int flat = 0;      ///< elements without volume; they hold no voxel and are skipped
 };
 

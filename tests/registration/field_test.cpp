@@ -284,6 +284,17 @@ TEST(JacobianDeterminant, TakesOneSidedDifferencesAtTheBorderAndNoneAlongASingle
     for_each_voxel(jacobian, [&](const auto&, std::int64_t n) { EXPECT_FLOAT_EQ(jacobian.data<float>()[n], 1.5F); });
 }
 
+TEST(Field, SaysNothingOfInversionOnALeftHandedGrid) {
+    struct Notes : Observer {
+        std::string text;
+        void note(std::string_view message) override { text += message; }
+    } observer;
+    const Deformation deformation =
+        test::deformed_by(test::box_at({0, 0, 0}, {30, 30, 30}, {3, 3, 3}), affine_displacement);
+    displacement_fixed_to_moving(deformation, test::oblique_grid({15, 15, 15}, {31, 31, 31}, {1, 1, 1}), {}, observer);
+    EXPECT_EQ(observer.text, "");
+}
+
 TEST(Field, SaysHowManyTetrahedraAreInverted) {
     struct Notes : Observer {
         std::string text;
