@@ -4,6 +4,8 @@
 #include "registration/gpu_warp.hpp"
 
 #include "core/errors.hpp"
+#include "registration/detail/gpu_warp_check.hpp"
+#include "registration/detail/gpu_warp_layout.hpp"
 #include "registration/detail/uninitialised.hpp"
 #include "shaders/buffer.hpp"
 #include "shaders/catalogue.hpp"
@@ -14,7 +16,6 @@
 #include <tbb/parallel_for.h>
 
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <map>
@@ -25,6 +26,10 @@ namespace tissuewarp::registration {
 
 namespace {
 
+using detail::ElementCounts;
+using detail::Float4;
+using detail::GridBlock;
+using detail::Uint4;
 using imaging::Geometry;
 using imaging::Interpolation;
 using imaging::Volume;
@@ -32,92 +37,6 @@ using shaders::Buffer;
 using shaders::CurrentContext;
 using shaders::Program;
 using shaders::WarpContinuation;
-using Float4 = std::array<float, 4>;
-using Uint4 = std::array<std::uint32_t, 4>;
-using Row4 = Eigen::Matrix<double, 3, 4>;
-
-/// Rows of voxels that a portion of an element has at most, so that one long element does not keep 32 lanes busy while
-/// the others rest.
-constexpr int rows_of_portion = 512;
-
-/// The storage block WarpGrid of shaders/chunks/warp.glsl.
-struct GridBlock {
-    Uint4 output_size, moving_size;
-    std::array<Float4, 3> rigid_offset, rigid_field, to_moving_index;
-};
-
-/// The storage block WarpCounts of shaders/kernels/warp_elements.comp.
-struct Counts {
-    std::uint32_t negative = 0, flat = 0;
-};
-
-Float4 packed(const Eigen::Vector3d& v, double w = 0.0) {
-    return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2]), static_cast<float>(w)};
-}
-
-std::array<Float4, 3> rows_of(const Row4& matrix) {
-    std::array<Float4, 3> rows;
-    for (int r = 0; r < 3; ++r)
-        rows[static_cast<std::size_t>(r)] = packed(matrix.row(r).head<3>().transpose(), matrix(r, 3));
-    return rows;
-}
-
-Uint4 size_of(const Geometry& grid) {
-    return {static_cast<std::uint32_t>(grid.size[0]), static_cast<std::uint32_t>(grid.size[1]),
-            static_cast<std::uint32_t>(grid.size[2]), 0};
-}
-
-/// The output grid seen from the moving frame.
-Geometry before_placement(const Geometry& output, const Eigen::Isometry3d& placement) {
-    const Eigen::Isometry3d to_moving = placement.inverse();
-    Geometry grid = output;
-    grid.origin = to_moving * output.origin;
-    grid.direction = to_moving.linear() * output.direction;
-    return grid;
-}
-
-/// X − y, mm, of tissue that the placement alone has moved, as an affine function of the output index.
-Row4 rigid_field(const Geometry& output, const Eigen::Isometry3d& placement) {
-    const Geometry grid = before_placement(output, placement);
-    Row4 rows;
-    rows << grid.index_to_point() - output.index_to_point(), grid.origin - output.origin;
-    return rows;
-}
-
-GridBlock grid_block(const Geometry& moving, const Geometry& output, const Eigen::Isometry3d& placement) {
-    const Geometry grid = before_placement(output, placement);
-    const Eigen::Matrix3d to_index = moving.point_to_index();
-    Row4 offset, matrix;
-    offset << to_index * grid.index_to_point() - Eigen::Matrix3d::Identity(), moving.index(grid.origin);
-    matrix << to_index, Eigen::Vector3d::Zero();
-    return {size_of(output), size_of(moving), rows_of(offset), rows_of(rigid_field(output, placement)),
-            rows_of(matrix)};
-}
-
-/// (element, portion, portions of that element), from the boxes around the elements at rest; a deformation that grows
-/// them costs balance, not voxels.
-std::vector<Uint4> portions_of(const meshing::TetMesh& mesh, const Geometry& output) {
-    const Eigen::Matrix3Xd index = output.point_to_index() * mesh.nodes;
-    std::vector<Uint4> portions;
-    for (int e = 0; e < mesh.tet_count(); ++e) {
-        const Eigen::Matrix<double, 3, 4> corners = index(Eigen::all, mesh.tets.col(e));
-        const Eigen::Array3d extent = corners.rowwise().maxCoeff() - corners.rowwise().minCoeff();
-        const double rows = std::min(extent[1] + 1.0, 1.0 * output.size[1]) *  //
-                            std::min(extent[2] + 1.0, 1.0 * output.size[2]);
-        const auto count = static_cast<std::uint32_t>(rows / rows_of_portion) + 1;
-        for (std::uint32_t part = 0; part < count; ++part)
-            portions.push_back({static_cast<std::uint32_t>(e), part, count, 0});
-    }
-    return portions;
-}
-
-std::vector<Uint4> corners_of(const meshing::TetMesh& mesh) {
-    std::vector<Uint4> corners;
-    for (const auto& tet : mesh.tets.colwise())
-        corners.push_back({static_cast<std::uint32_t>(tet[0]), static_cast<std::uint32_t>(tet[1]),
-                           static_cast<std::uint32_t>(tet[2]), static_cast<std::uint32_t>(tet[3])});
-    return corners;
-}
 
 void require_image(const Volume& moving, Interpolation interpolation) {
     if (moving.empty()) throw InvalidInput("GPU warp: the moving image is empty; give one with voxels");
@@ -132,6 +51,8 @@ void require_image(const Volume& moving, Interpolation interpolation) {
         throw InvalidInput(
             "GPU warp: voxels of 32-bit integers or float64 do not fit into float32; convert them or take "
             "warp_image()");
+    if (!cv::checkRange(moving.voxels))
+        throw InvalidInput("GPU warp: the moving image has voxels that are not finite; replace them");
 }
 
 void require_space(const shaders::Device& device, const Geometry& grid, const char* what) {
@@ -175,7 +96,7 @@ struct GpuWarp::Impl {
     std::optional<Buffer<Float4>> node_state, element_field;
     std::optional<Buffer<Uint4>> corners, portions;
     std::optional<Buffer<std::uint32_t>> owner, moving, result;
-    std::optional<Buffer<Counts>> counts;
+    std::optional<Buffer<ElementCounts>> counts;
     std::optional<shaders::Readback> readback;
     std::array<std::optional<Buffer<float>>, 3> continuation;
     std::map<std::string, const shaders::StorageBuffer*> blocks;
@@ -211,13 +132,13 @@ struct GpuWarp::Impl {
 
     void allocate(const meshing::TetMesh& mesh, const Volume& image) {
         const auto voxels = static_cast<std::size_t>(output.voxel_count());
-        const std::vector<Uint4> parts = portions_of(mesh, output);
+        const std::vector<Uint4> parts = detail::portions_of(mesh, output);
         Volume words = in_words(image, interpolation);
         portion_count = static_cast<std::uint32_t>(parts.size());
         grid.emplace(device, 1, "grids of the warp");
         node_state.emplace(device, 2 * static_cast<std::size_t>(nodes.cols()), "displacements of the warp");
         element_field.emplace(device, 4 * static_cast<std::size_t>(element_count), "inverse fields of elements");
-        corners.emplace(device, corners_of(mesh), "nodes of elements");
+        corners.emplace(device, detail::corners_of(mesh), "nodes of elements");
         portions.emplace(device, parts, "portions of elements");
         owner.emplace(device, voxels, "elements of voxels");
         moving.emplace(device, words_of(words), "moving image");
@@ -253,21 +174,11 @@ struct GpuWarp::Impl {
             throw InvalidInput("GPU warp: the placement is not finite; give a rigid motion");
     }
 
-    /// Node positions are reduced to output indices in double precision: every element that shares a node sees the same
-    /// rounded position, so rounding opens no gap.
     void upload(const Eigen::Matrix3Xd& displacement, const Eigen::Isometry3d& placement) {
-        const Geometry seen = before_placement(output, placement);
-        const Eigen::Matrix3d to_index = seen.point_to_index();
-        node_words.resize(2 * static_cast<std::size_t>(nodes.cols()));
-        for (Eigen::Index n = 0; n < nodes.cols(); ++n) {
-            const Eigen::Vector3d u = displacement.col(n);
-            const Eigen::Vector3d index = to_index * (nodes.col(n) + u - seen.origin);
-            node_words[2 * static_cast<std::size_t>(n)] = packed(index);
-            node_words[2 * static_cast<std::size_t>(n) + 1] = packed(-u);
-        }
+        detail::set_node_words(nodes, displacement, output, placement, node_words);
         node_state->upload(node_words);
-        grid->upload(std::array{grid_block(moving_grid, output, placement)});
-        counts->upload(std::array{Counts{}});
+        grid->upload(std::array{detail::grid_block(moving_grid, output, placement)});
+        counts->upload(std::array{ElementCounts{}});
     }
 
     void rasterise(const Eigen::Matrix3Xd& displacement, const Eigen::Isometry3d& placement) {
@@ -298,7 +209,7 @@ struct GpuWarp::Impl {
 
     void finish_report() {
         last.rasterise_seconds = rasterise_timer->seconds();
-        const Counts found = counts->download().front();
+        const ElementCounts found = counts->download().front();
         last.flat = static_cast<int>(found.flat);
         // An index triple of other handedness than the patient's turns the sign of every volume.
         const bool mirrored = output.direction.determinant() < 0.0;
@@ -313,6 +224,8 @@ GpuWarp::GpuWarp(const meshing::TetMesh& mesh, const Volume& moving, const Geome
     imaging::require_valid(output, "output grid");
     require_image(moving, options.interpolation);
     impl_ = std::make_unique<Impl>(mesh, moving, output, options);
+    detail::require_right(*this, mesh, moving, output, options);
+    impl_->last = {};
 }
 GpuWarp::~GpuWarp() = default;
 GpuWarp::GpuWarp(GpuWarp&&) noexcept = default;
@@ -328,7 +241,7 @@ void GpuWarp::set_continuation(const Volume& fixed_to_moving, const Eigen::Isome
                            " voxels off; compute it on the output grid");
     if (!placement.matrix().allFinite() || !cv::checkRange(fixed_to_moving.voxels))
         throw InvalidInput("GPU warp: the field or its placement is not finite; give displacement_fixed_to_moving");
-    const Row4 rigid = rigid_field(impl_->output, placement);
+    const detail::Row4 rigid = detail::rigid_field(impl_->output, placement);
     const auto& size = impl_->output.size;
     std::vector<float> component(impl_->result->size());
     const auto* field = fixed_to_moving.data<cv::Vec3f>();

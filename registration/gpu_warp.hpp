@@ -45,8 +45,8 @@ class GpuWarp {
 public:
     /// `mesh`: rest positions, LPS mm, frame of the moving image. `moving`: one channel of 8 or 16 bits or float32;
     /// with Nearest integers of up to 32 bits. The result lies on `output`, a grid of the fixed frame, and has the type
-    /// of `moving`. Throws InvalidInput, and GpuUnavailable without a device or where a grid exceeds its storage
-    /// block (4 bytes a voxel; 128 MiB on Mesa's llvmpipe).
+    /// of `moving`. Throws InvalidInput, and GpuUnavailable without a device, where a grid exceeds its storage block (4
+    /// bytes a voxel; 128 MiB on Mesa's llvmpipe), and where a trial on the very mesh and image differs from the CPU.
     GpuWarp(const meshing::TetMesh& mesh, const imaging::Volume& moving, const imaging::Geometry& output,
             const GpuWarpOptions& options = {});
     ~GpuWarp();

@@ -4,6 +4,7 @@
 #include "core/errors.hpp"
 #include "imaging/image_io.hpp"
 #include "meshing/mesher.hpp"
+#include "registration/detail/gpu_warp_check.hpp"
 #include "registration/field.hpp"
 #include "registration/warp.hpp"
 #include "shapes.hpp"
@@ -305,6 +306,26 @@ TEST(GpuWarp, OfARealHeadIsThatOfTheCpu) {
         coarse.voxel_count() / 10000);
 }
 
+TEST(GpuWarpCheck, RefusesADeviceThatComputesSomethingElse) {
+    // A device that warps another mesh or another image than it was given stands for one that computes wrongly.
+    const Scene scene;
+    const Volume image = noise(scene.moving, CV_32FC1), other_image = noise(scene.moving, CV_8UC1).as(CV_32F);
+    meshing::TetMesh other_mesh = scene.deformation.mesh;
+    other_mesh.nodes.row(0) *= 1.02;
+    GpuWarp gpu = scene.gpu(image);
+    EXPECT_NO_THROW(detail::require_right(gpu, scene.deformation.mesh, image, scene.output, {}));
+    const auto refusal = [&](const meshing::TetMesh& mesh, const Volume& moving) -> std::string {
+        try {
+            detail::require_right(gpu, mesh, moving, scene.output, {});
+        } catch (const GpuUnavailable& error) {
+            return error.what();
+        }
+        return "";
+    };
+    EXPECT_THAT(refusal(other_mesh, image), HasSubstr("computes another field than the CPU"));
+    EXPECT_THAT(refusal(scene.deformation.mesh, other_image), HasSubstr("computes another image than the CPU"));
+}
+
 TEST(GpuWarp, RefusesMeshesAndImagesThatItCannotUse) {
     const Scene scene;
     const Volume image(scene.moving, CV_8UC1);
@@ -320,6 +341,9 @@ TEST(GpuWarp, RefusesMeshesAndImagesThatItCannotUse) {
     EXPECT_THROW(make(mesh, Volume(), scene.output), InvalidInput);
     EXPECT_THROW(make(mesh, image, Geometry{}), InvalidInput);
     EXPECT_THROW(make(mesh, Volume(scene.moving, CV_32FC3), scene.output), InvalidInput);
+    Volume broken(scene.moving, CV_32FC1);
+    broken.data<float>()[1000] = std::numeric_limits<float>::infinity();
+    EXPECT_THROW(make(mesh, broken, scene.output), InvalidInput);
     EXPECT_THROW(make(mesh, Volume(scene.moving, CV_64FC1), scene.output), InvalidInput);
     EXPECT_THROW(make(mesh, Volume(scene.moving, CV_32SC1), scene.output), InvalidInput);
     EXPECT_THROW(make(mesh, Volume(scene.moving, CV_32FC1), scene.output, Interpolation::Nearest), InvalidInput);
