@@ -55,6 +55,15 @@ void require_image(const Volume& moving, Interpolation interpolation) {
         throw InvalidInput("GPU warp: the moving image has voxels that are not finite; replace them");
 }
 
+void require_limits(const shaders::Device& device) {
+    // warp_image with a continuation declares eight blocks; shaders/chunks/warp.glsl counts to 11.
+    if (device.limits().storage_blocks < 8 || device.limits().storage_bindings < 12)
+        throw GpuUnavailable("GPU warp: " + device.renderer() + " offers " +
+                             std::to_string(device.limits().storage_blocks) + " storage blocks per shader and " +
+                             std::to_string(device.limits().storage_bindings) +
+                             " bindings; the warp needs 8 and 12; take another device or warp on the CPU");
+}
+
 void require_space(const shaders::Device& device, const Geometry& grid, const char* what) {
     const auto limit = static_cast<long long>(device.limits().storage_buffer_bytes / sizeof(float));
     if (grid.voxel_count() > limit)
@@ -114,6 +123,7 @@ struct GpuWarp::Impl {
           device(options.gpu_index),
           programs(device),
           element_count(static_cast<std::uint32_t>(mesh.tet_count())) {
+        require_limits(device);
         require_space(device, output, "output grid");
         require_space(device, moving_grid, "moving image");
         set_outside(options.outside);

@@ -100,8 +100,8 @@ TEST(BackwardField, IsNearlyInverseOutsideTheMesh) {
             error.push_back((forward(y + vector_at(field, n)).col(0) - y).norm());
         });
         const Summary summary = summarise(error);
-        EXPECT_LT(summary.percentile_95, 0.02) << height;
-        EXPECT_LT(summary.maximum, 0.3) << height;
+        EXPECT_LT(summary.percentile_95, 1e-3) << height;
+        EXPECT_LT(summary.maximum, 0.02) << height;
     }
 }
 
