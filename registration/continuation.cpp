@@ -209,14 +209,18 @@ struct Continuation::Impl {
 
     /// Grid nodes inside the mesh take the finite-element field.
     void fix_inside(const Eigen::Matrix3Xd& index, const Eigen::Matrix4Xi& tets, const Eigen::Matrix3Xd& values) {
-        rasterise(index, tets, grid.size, [&](const TetRow& row) {
-            const Eigen::Matrix<double, 3, 4> corners = values(Eigen::all, tets.col(row.tet));
-            for (int i = row.first; i <= row.last; ++i) {
-                const std::size_t n = grid.at(i, row.j, row.k);
-                if (grid.fixed[n]) continue;
-                grid.fixed[n] = in_mesh;
-                set(n, corners * (row.at_first + row.step * (i - row.first)));
-            }
+        rasterise(index, tets, grid.size, [&](int tet, const Eigen::Vector4d& barycentric_step) {
+            const Eigen::Matrix<double, 3, 4> corners = values(Eigen::all, tets.col(tet));
+            const Eigen::Vector3d step = corners * barycentric_step;
+            return [&, corners, step](const TetRow& row) {
+                const Eigen::Vector3d start = corners * row.at_first;
+                for (int i = row.first; i <= row.last; ++i) {
+                    const std::size_t n = grid.at(i, row.j, row.k);
+                    if (grid.fixed[n]) continue;
+                    grid.fixed[n] = in_mesh;
+                    set(n, start + step * (i - row.first));
+                }
+            };
         });
     }
 

@@ -4,9 +4,12 @@
 #include "meshing/point_location.hpp"
 #include "registration/detail/continuation.hpp"
 #include "registration/detail/rasterisation.hpp"
+#include "registration/detail/uninitialised.hpp"
 
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
+#include <optional>
 #include <string>
 
 // Everything is computed in the moving frame, before the placement P: forward y = P (X + u(X)); backward, with
@@ -35,54 +38,81 @@ void require_usable(const Deformation& deformation, const FieldOptions& options)
 
 /// Relative displacements on a grid, and which voxels the mesh covers.
 struct Raster {
-    Volume values;                     // three channels float32, mm
+    Volume values;                     // three channels float32, mm; of any value outside the mesh
     std::vector<std::uint8_t> inside;  // one per voxel
     detail::RasterCount count;
+
+    /// A grid within the mesh needs no continuation.
+    [[nodiscard]] bool full() const { return std::find(inside.begin(), inside.end(), 0) == inside.end(); }
 };
 
 Raster rasterise_mesh(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tets, const Eigen::Matrix3Xd& values,
                       const Geometry& grid) {
-    Raster raster{Volume(grid, CV_32FC3), std::vector<std::uint8_t>(static_cast<std::size_t>(grid.voxel_count())), {}};
-    const Eigen::Matrix3Xd index = grid.point_to_index() * (nodes.colwise() - grid.origin);
+    Raster raster{detail::uninitialised(grid, CV_32FC3),
+                  std::vector<std::uint8_t>(static_cast<std::size_t>(grid.voxel_count())),
+                  {}};
+    const Eigen::Matrix3d to_index = grid.point_to_index();
+    const Eigen::Matrix3Xd index = to_index * (nodes.colwise() - grid.origin);
     auto* target = raster.values.data<cv::Vec3f>();
-    raster.count = detail::rasterise(index, tets, grid.size, [&](const detail::TetRow& row) {
-        const Eigen::Matrix<double, 3, 4> corners = values(Eigen::all, tets.col(row.tet));
-        for (int i = row.first; i <= row.last; ++i) {
-            const std::int64_t voxel = grid.size[0] * (row.j + std::int64_t{grid.size[1]} * row.k) + i;
-            if (raster.inside[static_cast<std::size_t>(voxel)]) continue;
-            raster.inside[static_cast<std::size_t>(voxel)] = 1;
-            const Eigen::Vector3d value = corners * (row.at_first + row.step * (i - row.first));
-            for (int c = 0; c < 3; ++c) target[voxel][c] = static_cast<float>(value[c]);
-        }
+    raster.count = detail::rasterise(index, tets, grid.size, [&](int tet, const Eigen::Vector4d& barycentric_step) {
+        const Eigen::Matrix<double, 3, 4> corners = values(Eigen::all, tets.col(tet));
+        const Eigen::Vector3d step = corners * barycentric_step;
+        return [&, corners, step](const detail::TetRow& row) {
+            const Eigen::Vector3d start = corners * row.at_first;
+            for (int i = row.first; i <= row.last; ++i) {
+                const std::int64_t voxel = grid.size[0] * (row.j + std::int64_t{grid.size[1]} * row.k) + i;
+                if (raster.inside[static_cast<std::size_t>(voxel)]) continue;
+                raster.inside[static_cast<std::size_t>(voxel)] = 1;
+                const Eigen::Vector3d value = start + step * (i - row.first);
+                for (int c = 0; c < 3; ++c) target[voxel][c] = static_cast<float>(value[c]);
+            }
+        };
     });
+    // Seen by a left-handed grid every volume has the other sign.
+    if (to_index.determinant() < 0.0)
+        raster.count.inverted = static_cast<int>(tets.cols()) - raster.count.flat - raster.count.inverted;
     return raster;
 }
 
 /// Replaces v by `rotation` v + `linear` p + `constant` at every voxel centre p of `grid`, in double precision; voxels
-/// outside the mesh first take `outside(q)`, q being the voxel centre in the moving frame.
+/// outside the mesh first take outside_of_row()(i, q), with one such function for each row of voxels, called in
+/// ascending order, and q the voxel centre in the moving frame.
 template <class Outside>
 void complete(Raster& raster, const Geometry& grid, const Eigen::Matrix3d& rotation, const Eigen::Matrix3d& linear,
-              const Eigen::Vector3d& constant, const Outside& outside) {
+              const Eigen::Vector3d& constant, const Outside& outside_of_row) {
     const Geometry moving = raster.values.geometry;
+    const Eigen::Vector3d step = linear * grid.index_to_point().col(0), moving_step = moving.index_to_point().col(0);
     auto* values = raster.values.data<cv::Vec3f>();
     tbb::parallel_for(0, grid.size[1] * grid.size[2], [&](int row) {
         const int j = row % grid.size[1], k = row / grid.size[1];
+        const Eigen::Vector3d start = linear * grid.point(Eigen::Vector3d(0, j, k)) + constant;
+        const Eigen::Vector3d moving_start = moving.point(Eigen::Vector3d(0, j, k));
+        std::optional<decltype(outside_of_row())> outside;  // a covered grid has nothing to make it from
         for (int i = 0; i < grid.size[0]; ++i) {
             const std::int64_t voxel = raster.values.offset(i, j, k);
-            const Eigen::Vector3d index(i, j, k);
-            Eigen::Vector3d value(values[voxel][0], values[voxel][1], values[voxel][2]);
-            if (!raster.inside[static_cast<std::size_t>(voxel)]) value = outside(moving.point(index));
-            const Eigen::Vector3d total = rotation * value + (linear * grid.point(index) + constant);
+            Eigen::Vector3d value;
+            if (raster.inside[static_cast<std::size_t>(voxel)]) {
+                value = Eigen::Vector3d(values[voxel][0], values[voxel][1], values[voxel][2]);
+            } else {
+                if (!outside) outside.emplace(outside_of_row());
+                value = (*outside)(i, moving_start + i * moving_step);
+            }
+            const Eigen::Vector3d total = rotation * value + (start + i * step);
             for (int c = 0; c < 3; ++c) values[voxel][c] = static_cast<float>(total[c]);
         }
     });
     raster.values.geometry = grid;
 }
 
+struct Inverse {
+    Eigen::Vector3d w;
+    bool converged;
+};
+
 /// w = X − z with X + u(X) = z, u the continued forward field: Broyden steps (his first method, Math. Comp. 19, 1965)
-/// from the continued inverse, shortened until the residual falls, which it does where the field does not fold.
-/// The gradient just outside the mesh is close to a rank-one matrix, ∂u/∂n ⊗ n, which one update learns.
-Eigen::Vector3d inverted(const detail::Continuation& forward, const Eigen::Vector3d& z, Eigen::Vector3d w) {
+/// from the guess w, shortened until the residual falls, which it does where the field does not fold. The gradient just
+/// outside the mesh is close to a rank-one matrix, ∂u/∂n ⊗ n, which one update learns.
+Inverse inverted(const detail::Continuation& forward, const Eigen::Vector3d& z, Eigen::Vector3d w) {
     constexpr double negligible = 0.01;  // mm
     constexpr int most_steps = 6, most_halvings = 3;
     Eigen::Matrix3d inverse_gradient = Eigen::Matrix3d::Identity();
@@ -101,8 +131,34 @@ Eigen::Vector3d inverted(const detail::Continuation& forward, const Eigen::Vecto
         w += change;
         residual = next_residual;
     }
-    return w;
+    if (!(residual.squaredNorm() <= negligible * negligible)) return {w, false};
+    return {w - inverse_gradient * residual, true};  // the next step, not worth its evaluation
 }
+
+/// The inverse at consecutive voxels of a row: where two are known the next is guessed from their line, which needs one
+/// evaluation in most places; at first, and where that leads nowhere, from the continued inverse.
+class RowInverse {
+public:
+    RowInverse(const detail::Continuation& forward, const detail::Continuation& backward)
+        : forward_(forward), backward_(backward) {}
+
+    Eigen::Vector3d operator()(int i, const Eigen::Vector3d& z) {
+        known_ = i == last_ + 1 ? std::min(known_ + 1, 2) : 0;
+        Inverse found{Eigen::Vector3d::Zero(), false};
+        if (known_ == 2) found = inverted(forward_, z, 2.0 * before_ - two_before_);
+        if (!found.converged) found = inverted(forward_, z, backward_(z));
+        if (!found.converged) known_ = -1;
+        two_before_ = before_;
+        before_ = found.w;
+        last_ = i;
+        return found.w;
+    }
+
+private:
+    const detail::Continuation &forward_, &backward_;
+    Eigen::Vector3d before_ = Eigen::Vector3d::Zero(), two_before_ = Eigen::Vector3d::Zero();
+    int last_ = -2, known_ = 0;
+};
 
 }  // namespace
 
@@ -115,12 +171,14 @@ Volume displacement_moving_to_fixed(const Deformation& deformation, const Geomet
     observer.checkpoint(stage, 0.0);
     Raster raster = rasterise_mesh(mesh.nodes, mesh.tets, deformation.displacement, moving_grid);
     observer.checkpoint(stage, 0.2);
-    const detail::Continuation continuation(mesh.nodes, mesh.tets, meshing::boundary_surface(mesh),
-                                            deformation.displacement, options.fade_mm);
+    std::optional<detail::Continuation> continuation;
+    if (!raster.full())
+        continuation.emplace(mesh.nodes, mesh.tets, meshing::boundary_surface(mesh), deformation.displacement,
+                             options.fade_mm);
     observer.checkpoint(stage, 0.6);
     const Eigen::Matrix3d rotation = deformation.placement.linear();
     complete(raster, moving_grid, rotation, rotation - Eigen::Matrix3d::Identity(), deformation.placement.translation(),
-             continuation);
+             [&] { return [&](int, const Eigen::Vector3d& X) { return (*continuation)(X); }; });
     observer.progress(stage, 1.0);
     return raster.values;
 }
@@ -143,13 +201,16 @@ Volume displacement_fixed_to_moving(const Deformation& deformation, const Geomet
         observer.note("field fixed to moving: " + std::to_string(raster.count.inverted) + " inverted and " +
                       std::to_string(raster.count.flat) + " flat tetrahedra; the field folds there");
     observer.checkpoint(stage, 0.15);
-    const meshing::BoundarySurface boundary = meshing::boundary_surface(mesh);
-    const detail::Continuation forward(mesh.nodes, mesh.tets, boundary, deformation.displacement, options.fade_mm);
-    observer.checkpoint(stage, 0.4);
-    const detail::Continuation backward(deformed, mesh.tets, boundary, inverse, options.fade_mm);
+    std::optional<detail::Continuation> forward, backward;
+    if (!raster.full()) {
+        const meshing::BoundarySurface boundary = meshing::boundary_surface(mesh);
+        forward.emplace(mesh.nodes, mesh.tets, boundary, deformation.displacement, options.fade_mm);
+        observer.checkpoint(stage, 0.4);
+        backward.emplace(deformed, mesh.tets, boundary, inverse, options.fade_mm);
+    }
     observer.checkpoint(stage, 0.6);
     complete(raster, fixed_grid, Eigen::Matrix3d::Identity(), to_moving.linear() - Eigen::Matrix3d::Identity(),
-             to_moving.translation(), [&](const Eigen::Vector3d& z) { return inverted(forward, z, backward(z)); });
+             to_moving.translation(), [&] { return RowInverse(*forward, *backward); });
     observer.progress(stage, 1.0);
     return raster.values;
 }

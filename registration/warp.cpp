@@ -1,6 +1,7 @@
 #include "registration/warp.hpp"
 
 #include "core/errors.hpp"
+#include "registration/detail/uninitialised.hpp"
 
 #include <tbb/parallel_for.h>
 
@@ -36,36 +37,42 @@ template <class T>
 struct Sampler {
     const Volume& image;
     int channels = image.channels();
+    std::array<std::int64_t, 3> stride{channels, channels* std::int64_t{image.geometry.size[0]},
+                                       channels* std::int64_t{image.geometry.size[0]} * image.geometry.size[1]};
 
     void nearest(const Eigen::Vector3d& index, T* target) const {
-        std::array<int, 3> voxel;
-        for (int axis = 0; axis < 3; ++axis)
-            voxel[axis] = std::clamp(static_cast<int>(std::floor(index[axis] + 0.5)), 0, image.geometry.size[axis] - 1);
-        std::copy_n(image.data<T>() + channels * image.offset(voxel[0], voxel[1], voxel[2]), channels, target);
+        const T* voxel = image.data<T>();
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            const int rounded = static_cast<int>(std::floor(index[static_cast<Eigen::Index>(axis)] + 0.5));
+            voxel += stride[axis] * std::clamp(rounded, 0, image.geometry.size[axis] - 1);
+        }
+        std::copy_n(voxel, channels, target);
     }
 
     void linear(const Eigen::Vector3d& index, T* target) const {
-        std::array<int, 3> lower, upper;
-        Eigen::Vector3d f;
-        for (int axis = 0; axis < 3; ++axis) {
+        const T* corner = image.data<T>();
+        std::array<std::int64_t, 3> next;  // to the neighbour along each axis, 0 where there is none
+        std::array<double, 3> f;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
             const int last = image.geometry.size[axis] - 1;
-            const double clamped = std::clamp(index[axis], 0.0, static_cast<double>(last));
-            lower[axis] = static_cast<int>(clamped);
-            upper[axis] = std::min(lower[axis] + 1, last);
-            f[axis] = clamped - lower[axis];
+            const double clamped =
+                std::min(std::max(index[static_cast<Eigen::Index>(axis)], 0.0), static_cast<double>(last));
+            const int lower = static_cast<int>(clamped);
+            f[axis] = clamped - lower;
+            corner += stride[axis] * lower;
+            next[axis] = lower < last ? stride[axis] : 0;
         }
-        const auto row = [&](int j, int k, int c) {
-            const T* start = image.data<T>() + channels * image.offset(0, j, k) + c;
-            const double left = start[channels * lower[0]];
-            return left + f[0] * (start[channels * upper[0]] - left);
+        const auto row = [&](const T* p) {
+            const double left = p[0];
+            return left + f[0] * (p[next[0]] - left);
         };
-        const auto slice = [&](int k, int c) {
-            const double near = row(lower[1], k, c);
-            return near + f[1] * (row(upper[1], k, c) - near);
+        const auto slice = [&](const T* p) {
+            const double near = row(p);
+            return near + f[1] * (row(p + next[1]) - near);
         };
         for (int c = 0; c < channels; ++c) {
-            const double near = slice(lower[2], c);
-            target[c] = cv::saturate_cast<T>(near + f[2] * (slice(upper[2], c) - near));
+            const double near = slice(corner + c);
+            target[c] = cv::saturate_cast<T>(near + f[2] * (slice(corner + c + next[2]) - near));
         }
     }
 };
@@ -76,16 +83,17 @@ template <class T>
 void pull(const Volume& moving, const Volume& field, Kernel kernel, double outside, Volume& result) {
     const Geometry& grid = field.geometry;
     const Eigen::Matrix3d to_index = moving.geometry.point_to_index();
+    const Eigen::Vector3d step = to_index * grid.index_to_point().col(0);
     const Sampler<T> sampler{moving};
     const T outside_value = cv::saturate_cast<T>(outside);
     tbb::parallel_for(0, grid.size[1] * grid.size[2], [&](int row) {
         const int j = row % grid.size[1], k = row / grid.size[1];
         const cv::Vec3f* displacement = field.data<cv::Vec3f>() + field.offset(0, j, k);
         T* target = result.data<T>() + sampler.channels * result.offset(0, j, k);
+        const Eigen::Vector3d start = to_index * (grid.point(Eigen::Vector3d(0, j, k)) - moving.geometry.origin);
         for (int i = 0; i < grid.size[0]; ++i, target += sampler.channels) {
             const Eigen::Vector3d d(displacement[i][0], displacement[i][1], displacement[i][2]);
-            const Eigen::Vector3d index =
-                to_index * (grid.point(Eigen::Vector3d(i, j, k)) + d - moving.geometry.origin);
+            const Eigen::Vector3d index = start + i * step + to_index * d;
             if (!holds(moving.geometry, index))
                 std::fill_n(target, sampler.channels, outside_value);
             else if (kernel == Kernel::Linear)
@@ -97,7 +105,7 @@ void pull(const Volume& moving, const Volume& field, Kernel kernel, double outsi
 }
 
 Volume warp(const Volume& moving, const Volume& field, Kernel kernel, double outside) {
-    Volume result(field.geometry, moving.voxels.type());
+    Volume result = detail::uninitialised(field.geometry, moving.voxels.type());
     switch (moving.voxels.depth()) {
         case CV_8U:
             pull<std::uint8_t>(moving, field, kernel, outside, result);

@@ -37,6 +37,7 @@ public:
     [[nodiscard]] const std::string& what() const { return what_; }
 
 private:
+    friend class Readback;
     void require_range(std::size_t offset, std::size_t bytes) const;
 
     const Device* device_;

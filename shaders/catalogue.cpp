@@ -71,6 +71,20 @@ constexpr std::array<PatchStages, 7> every_patch_stages{{
     {.advances = true, .volumes = true, .forces = true, .averages = true, .persists = true},
 }};
 
+ProgramSource warp_program(std::string kernel) {
+    return {std::move(kernel), {"index", "warp"}, {{"WORKGROUP_SIZE", workgroup_size}}, {}};
+}
+
+/// A pass over the voxels of the output.
+ProgramSource warp_program(std::string kernel, WarpContinuation continuation) {
+    ProgramSource source = warp_program(std::move(kernel));
+    const bool continued = continuation == WarpContinuation::Given;
+    if (continued) source.chunks.emplace_back("warp.continuation");
+    source.chunks.emplace_back("warp.inverse");
+    source.defines["HAS_CONTINUATION"] = flag(continued);
+    return source;
+}
+
 }  // namespace
 
 ProgramSource element_force_program(const ElementForces& forces) {
@@ -186,6 +200,33 @@ ProgramSource observe_elements_program(Cell cell) {
     return source;
 }
 
+ProgramSource warp_clear_program() {
+    return warp_program("warp_clear");
+}
+
+ProgramSource warp_elements_program() {
+    ProgramSource source = warp_program("warp_elements");
+    source.chunks.emplace_back("warp.element");
+    return source;
+}
+
+ProgramSource warp_rasterise_program() {
+    ProgramSource source = warp_elements_program();
+    source.kernel = "warp_rasterise";
+    source.defines["PORTION_LANES"] = std::to_string(warp_portion_lanes) + "u";
+    return source;
+}
+
+ProgramSource warp_image_program(WarpContinuation continuation, WarpTakes takes) {
+    ProgramSource source = warp_program("warp_image", continuation);
+    source.defines["TAKES_NEAREST"] = flag(takes == WarpTakes::Nearest);
+    return source;
+}
+
+ProgramSource warp_field_program(WarpContinuation continuation) {
+    return warp_program("warp_field", continuation);
+}
+
 std::vector<ProgramSource> every_program() {
     std::vector<ProgramSource> all{element_volume_program(),        impose_program(),
                                    previous_displacement_program(), observe_nodes_program(),
@@ -214,6 +255,14 @@ std::vector<ProgramSource> every_program() {
         }
     all.push_back(patch_load_program());
     all.push_back(patch_store_program());
+    all.push_back(warp_clear_program());
+    all.push_back(warp_elements_program());
+    all.push_back(warp_rasterise_program());
+    for (const WarpContinuation continuation : {WarpContinuation::None, WarpContinuation::Given}) {
+        all.push_back(warp_field_program(continuation));
+        for (const WarpTakes takes : {WarpTakes::Trilinear, WarpTakes::Nearest})
+            all.push_back(warp_image_program(continuation, takes));
+    }
     return all;
 }
 

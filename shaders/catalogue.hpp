@@ -83,6 +83,18 @@ inline constexpr int observe_partials = 128;
 ProgramSource observe_nodes_program();
 ProgramSource observe_elements_program(Cell cell = Cell::Tetrahedron);
 
+/// The warp of an image (registration/gpu_warp.hpp), in the order of its passes. Outside the mesh the tissue follows a
+/// field that the host left, or the placement alone.
+enum class WarpContinuation { None, Given };
+enum class WarpTakes { Trilinear, Nearest };
+/// Invocations for each portion of a tetrahedron.
+inline constexpr int warp_portion_lanes = 32;
+ProgramSource warp_clear_program();
+ProgramSource warp_elements_program();
+ProgramSource warp_rasterise_program();
+ProgramSource warp_image_program(WarpContinuation continuation, WarpTakes takes);
+ProgramSource warp_field_program(WarpContinuation continuation);
+
 /// Every compute program that the functions above can make, for checking them all.
 std::vector<ProgramSource> every_program();
 

@@ -12,15 +12,14 @@
 
 namespace tissuewarp::registration::detail {
 
-/// Voxels first … last of row (j, k) lie in a tetrahedron; their barycentric coordinates are at_first + step (i −
-/// first).
+/// Voxels first … last of row (j, k) lie in a tetrahedron; `at_first` are the barycentric coordinates of the first.
 struct TetRow {
-    int tet, first, last, j, k;
-    Eigen::Vector4d at_first, step;
+    int first, last, j, k;
+    Eigen::Vector4d at_first;
 };
 
 struct RasterCount {
-    int inverted = 0;  ///< elements of negative volume; they are drawn like the others
+    int inverted = 0;  ///< elements of negative volume in voxel indices; they are drawn like the others
     int flat = 0;      ///< elements without volume; they hold no voxel and are skipped
 };
 
@@ -52,23 +51,39 @@ struct BarycentricMap {
     }
 };
 
-/// The part of [first, last] where all four coordinates stay above −slack; empty when first > last.
-inline void clip_row(const Eigen::Vector4d& at_first, const Eigen::Vector4d& step, double& first, double& last) {
-    const double start = first;
-    for (int corner = 0; corner < 4; ++corner) {
-        const double excess = at_first[corner] + barycentric_slack;
-        if (step[corner] > 0.0)
-            first = std::max(first, start + std::ceil(-excess / step[corner]));
-        else if (step[corner] < 0.0)
-            last = std::min(last, start + std::floor(-excess / step[corner]));
-        else if (excess < 0.0)
-            last = start - 1.0;
-    }
-}
+/// Where a row of voxels may enter and leave a tetrahedron: coordinate c is at_first + step t, and `inverse_step` = 1 /
+/// step, which all rows of an element share.
+struct RowClip {
+    Eigen::Vector4d step, inverse_step;
 
-/// Calls `visit(TetRow)` for every row of voxels that a tetrahedron holds. `nodes` are continuous voxel indices. Slabs
-/// of slices run in parallel; within a slab tetrahedra come in ascending order, so a visitor that keeps the first
-/// writer of a voxel gives the same result for any number of threads: the lowest element wins.
+    explicit RowClip(const Eigen::Vector4d& of_step) : step(of_step), inverse_step(of_step.cwiseInverse()) {}
+
+    /// The part of the voxels [first, last] where all four coordinates stay above −slack; empty when first > last.
+    void operator()(const Eigen::Vector4d& at_first, double& first, double& last) const {
+        double from = 0.0, to = last - first;
+        for (int corner = 0; corner < 4; ++corner) {
+            const double excess = at_first[corner] + barycentric_slack;
+            const double zero = -excess * inverse_step[corner];
+            if (step[corner] > 0.0)
+                from = std::max(from, zero);
+            else if (step[corner] < 0.0)
+                to = std::min(to, zero);
+            else if (excess < 0.0)
+                to = -1.0;
+        }
+        if (from > to) {
+            last = first - 1.0;
+            return;
+        }
+        last = first + std::floor(to);
+        first += std::ceil(from);
+    }
+};
+
+/// Calls `visit(tet, step)` for tetrahedra, `step` being the change of the barycentric coordinates from a voxel of a
+/// row to the next, and what that returns with every TetRow that the tetrahedron holds. `nodes` are continuous voxel
+/// indices. Slabs of slices run in parallel; within a slab tetrahedra come in ascending order, so a visitor that keeps
+/// the first writer of a voxel gives the same result for any number of threads: the lowest element wins.
 template <class Visit>
 RasterCount rasterise(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tets, const std::array<int, 3>& size,
                       const Visit& visit) {
@@ -101,17 +116,20 @@ RasterCount rasterise(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tet
             Eigen::Array3d lower, upper;
             BarycentricMap map;
             map.set(bounds(tet, lower, upper));
-            const Eigen::Vector4d step = map.matrix.col(0);
+            const RowClip clip(map.matrix.col(0));
+            const Eigen::Vector4d at_lower = map.at(lower);
+            const auto draw = visit(tet, clip.step);
             const int k_first = std::max(static_cast<int>(lower[2]), slab * slab_slices);
             const int k_last = std::min(static_cast<int>(upper[2]), slab * slab_slices + slab_slices - 1);
             for (int k = k_first; k <= k_last; ++k) {
+                const Eigen::Vector4d in_slice = at_lower + map.matrix.col(2) * (k - lower[2]);
                 for (int j = static_cast<int>(lower[1]); j <= static_cast<int>(upper[1]); ++j) {
-                    Eigen::Vector4d lambda = map.at({lower[0], static_cast<double>(j), static_cast<double>(k)});
+                    const Eigen::Vector4d in_row = in_slice + map.matrix.col(1) * (j - lower[1]);
                     double first = lower[0], last = upper[0];
-                    clip_row(lambda, step, first, last);
+                    clip(in_row, first, last);
                     if (!(first <= last)) continue;
-                    lambda += step * (first - lower[0]);
-                    visit(TetRow{tet, static_cast<int>(first), static_cast<int>(last), j, k, lambda, step});
+                    draw(TetRow{static_cast<int>(first), static_cast<int>(last), j, k,
+                                in_row + clip.step * (first - lower[0])});
                 }
             }
         }

@@ -1,5 +1,6 @@
 #include "shaders/buffer.hpp"
 #include "core/errors.hpp"
+#include "shaders/readback.hpp"
 
 #include <gmock/gmock.h>
 
@@ -51,6 +52,31 @@ TEST_F(BufferTest, RefusesARangeOutsideItself) {
     EXPECT_THROW(buffer.download(two, 2), InvalidInput);
     Buffer<int> larger(device, 4, "larger");
     EXPECT_THROW(buffer.copy_from(larger, larger.bytes()), InvalidInput);
+}
+
+TEST_F(BufferTest, ComesDownThroughMappedMemory) {
+    std::vector<int> values(100000);
+    std::iota(values.begin(), values.end(), 7);
+    Buffer<int> buffer(device, values, "values");
+    Readback readback(device, buffer.bytes(), "mapped values");
+    const auto fetched = [&](std::size_t count) {
+        const std::span<const std::byte> bytes = readback.fetch(buffer, count * sizeof(int));
+        const auto* first = reinterpret_cast<const int*>(bytes.data());
+        return std::vector<int>(first, first + bytes.size() / sizeof(int));
+    };
+    EXPECT_EQ(fetched(values.size()), values);
+    values[99999] = -1;
+    buffer.upload(values);
+    EXPECT_EQ(fetched(values.size()), values);
+    EXPECT_EQ(fetched(2), (std::vector<int>{7, 8}));
+    EXPECT_TRUE(fetched(0).empty());
+}
+
+TEST_F(BufferTest, RefusesToComeDownIntoLess) {
+    const Buffer<int> small(device, 3, "small"), large(device, 5, "large");
+    Readback readback(device, 4 * sizeof(int), "mapped values");
+    EXPECT_THROW((void)readback.fetch(small, 4 * sizeof(int)), InvalidInput);
+    EXPECT_THROW((void)readback.fetch(large, 5 * sizeof(int)), InvalidInput);
 }
 
 TEST_F(BufferTest, MayBeEmpty) {

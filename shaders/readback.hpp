@@ -1,0 +1,30 @@
+#pragma once
+/// The fast way down for large results: memory of the host that stays mapped, which the device writes itself.
+
+#include "shaders/buffer.hpp"
+
+namespace tissuewarp::shaders {
+
+/// Bytes of the host that a device copies its buffers into. fetch() needs the device's context current; construction
+/// and destruction make it so.
+class Readback {
+public:
+    /// Throws GpuUnavailable when the driver does not map that much; `what` names the contents in that message.
+    Readback(const Device& device, std::size_t bytes, std::string what);
+    ~Readback();
+    Readback(const Readback&) = delete;
+    Readback& operator=(const Readback&) = delete;
+
+    /// The first `bytes` of `source`, once all that was recorded before is done. The next call overwrites them. Throws
+    /// InvalidInput when either side is smaller.
+    [[nodiscard]] std::span<const std::byte> fetch(const StorageBuffer& source, std::size_t bytes);
+
+private:
+    const Device& device_;
+    std::size_t bytes_;
+    std::string what_;
+    unsigned id_ = 0;
+    const std::byte* mapped_ = nullptr;
+};
+
+}  // namespace tissuewarp::shaders
