@@ -84,6 +84,8 @@ void main() {
 #if PERSISTS
         tell_neighbours(here, 2u * step + 2u);
     }
+    // A driver may end loops early: llvmpipe after 65535 turns of all loops of an invocation together.
+    if (lane == 0u && step != first_step + steps) give_up();
 #endif
     if (lane == 0u) patch_largest[here.index] = largest;
 #if ADVANCES

@@ -83,7 +83,9 @@ TEST_P(Engines, TwoHundredStepsFollowThePlainLoop) {
     engine->set_state(wavy(X, 0.3), zero);
     engine->run(200, coefficients);
     const PlainState plain = plain_steps(rest, conditions, lumped(rest), wavy(X, 0.3), zero, 200, coefficients);
-    EXPECT_GT(largest(plain.u - wavy(X, 0.3)), 0.3) << "the test does not move";
+    // From the state after no step, which holds the imposed displacements already: the free nodes must travel.
+    const PlainState start = plain_steps(rest, conditions, lumped(rest), wavy(X, 0.3), zero, 0, coefficients);
+    EXPECT_GT(largest(plain.u - start.u), 1.0) << "the test does not move";
     EXPECT_LT(largest(engine->displacement() - plain.u), 5e-6 * largest(plain.u));
     EXPECT_LT(largest(engine->increment() - plain.v), 1e-4 * largest(plain.v));
 }

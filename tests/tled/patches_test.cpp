@@ -175,5 +175,26 @@ TEST_P(GpuSteps, AnOrganFarFromTheOriginMovesTheSame) {
     EXPECT_LT(largest(after(small_patches, {60}, start, zero) - near), 1e-5 * largest(near));
 }
 
+// A patch has one material, and a node room for 16 patches. A failure looks like: patches that grow until their size
+// overflows.
+TEST(GpuStepsOfManyMaterials, AreThoseOfTwoPassesWhereMoreMeetThanANodeHasRoomFor) {
+    Model model = cube(3, Cells::T4, Laws::Iso);
+    model.materials.clear();
+    for (int t = 0; t < model.mesh.tet_count(); ++t) {
+        const int label = 1 + t % 29;
+        model.mesh.labels[t] = label;
+        model.materials[label] = NeoHookeanIso{1.0 + 0.1 * label, 50.0};
+    }
+    const RestState rest = rest_state(model);
+    const auto engine = make_gpu_engine(rest, -1, small_patches);
+    const NodalConditions conditions = nodal_conditions(mixed_conditions(model.mesh), rest.node_count);
+    const StepCoefficients coefficients = stable_coefficients(model, rest);
+    engine->set_conditions(conditions);
+    engine->run(20, coefficients);
+    const Matrix3Xd zero = Matrix3Xd::Zero(3, rest.node_count);
+    const PlainState plain = plain_steps(rest, conditions, lumped(rest), zero, zero, 20, coefficients);
+    EXPECT_LT(largest(engine->displacement() - plain.u), 5e-6 * largest(plain.u));
+}
+
 }  // namespace
 }  // namespace tissuewarp::tled

@@ -24,6 +24,21 @@ bool every_node_has_tetrahedra(const RestState& rest) {
     return std::adjacent_find(offset.begin(), offset.end()) == offset.end();
 }
 
+/// Patches are of one material: these meet at a node whatever their size.
+bool too_many_materials_meet(const RestState& rest) {
+    const std::vector<int> material = material_of_elements(rest);
+    std::vector<int> here;
+    for (std::size_t a = 0; a + 1 < rest.incidence.offset.size(); ++a) {
+        here.clear();
+        for (int i = rest.incidence.offset[a]; i < rest.incidence.offset[a + 1]; ++i)
+            here.push_back(material[static_cast<std::size_t>(rest.incidence.entry[static_cast<std::size_t>(i)] / 4)]);
+        std::sort(here.begin(), here.end());
+        const auto kinds = std::unique(here.begin(), here.end()) - here.begin();
+        if (static_cast<std::size_t>(kinds) > most_sharing_patches) return true;
+    }
+    return false;
+}
+
 /// Whether elements keep a part of an averaged pressure.
 bool keeps_a_part(const RestState& rest) {
     return rest.pressure.count() > 0 && rest.volumetric_modulus.cwiseAbs().maxCoeff() > 0;
@@ -36,7 +51,7 @@ std::size_t shared_bytes(int slots, bool averages) {
 
 /// Patches that are so tiny that too many meet at a node grow; those that do not fit into shared memory shrink.
 PatchLayout fitting_layout(const RestState& rest, const GpuStepShape& shape, std::size_t shared_memory) {
-    PatchShape cut{shape.patch_tets, shape.longest_fan};
+    PatchShape cut{std::min(shape.patch_tets, rest.element_count()), shape.longest_fan};
     std::vector<Patch> patches = cut_into_patches(rest, cut);
     const auto fits = [&] {
         const auto larger = std::max_element(patches.begin(), patches.end(), [](const Patch& a, const Patch& b) {
@@ -75,7 +90,8 @@ bool GpuPatches::suit(const RestState& rest, const shaders::Device& device) {
         return rest.materials[static_cast<std::size_t>(block.material)].index() ==
                static_cast<std::size_t>(law_of(rest));
     };
-    return std::all_of(rest.blocks.begin(), rest.blocks.end(), follows_the_law) && every_node_has_tetrahedra(rest);
+    return std::all_of(rest.blocks.begin(), rest.blocks.end(), follows_the_law) && every_node_has_tetrahedra(rest) &&
+           !too_many_materials_meet(rest);
 }
 
 GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& programs, const RestState& rest,

@@ -12,8 +12,8 @@ namespace tissuewarp::tled::detail {
 
 class GpuPatches {
 public:
-    /// Whether patches can compute the scene on the device: T4 of one law without fibres and viscosity, no hexahedra,
-    /// no node outside of all tetrahedra.
+    /// Whether patches can compute the scene on the device: tetrahedra of one law without fibres and viscosity, no
+    /// hexahedra, no node outside of all tetrahedra or of more than most_sharing_patches materials.
     static bool suit(const RestState& rest, const shaders::Device& device);
 
     GpuPatches(const shaders::Device& device, shaders::ProgramCache& programs, const RestState& rest,
