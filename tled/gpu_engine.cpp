@@ -427,15 +427,16 @@ void require_right_forces(Engine& engine, const RestState& rest) {
 
 GpuStepShape suggested_gpu_step_shape(int element_count, Element element) {
     // Patches in multiples of the multiprocessors, so that none of these idles; larger ones lose less at their surfaces
-    // as long as their nodes, of which a regular mesh has more than others, fit into shared memory.
-    constexpr int multiprocessors = 132, least_patch = 64;
-    const int largest_patch = element == Element::T4 ? 4450 : 3600;
+    // as long as their nodes fit into shared memory, of which a regular mesh has more than others; patches that do not
+    // are made smaller.
+    constexpr int multiprocessors = 132, least_patch = 64, largest_patch = 4450;
+    const int largest_at_once = element == Element::T4 ? largest_patch : 3600;
     const auto shared_out = [&](int rounds) {
         return std::max(least_patch, (element_count + multiprocessors * rounds - 1) / (multiprocessors * rounds));
     };
     if (element_count < 20000) return {shared_out(1), 1, 128, true};
     if (element_count < 120000) return {shared_out(1), 1, 640, true};
-    if (element_count < multiprocessors * largest_patch) return {shared_out(1), 5, 640, true};
+    if (element_count < multiprocessors * largest_at_once) return {shared_out(1), 5, 640, true};
     const int rounds = (element_count + multiprocessors * largest_patch - 1) / (multiprocessors * largest_patch);
     return {shared_out(rounds), 5, 768, false};
 }

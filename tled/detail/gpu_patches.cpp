@@ -45,28 +45,26 @@ bool keeps_a_part(const RestState& rest) {
 }
 
 /// Bytes of shared memory that the patches' programs take.
-std::size_t shared_bytes(int slots, bool averages) {
-    return static_cast<std::size_t>(slots) * (averages ? 44 : 36) + 16;
+std::size_t shared_bytes(std::size_t slots, bool averages) {
+    return slots * (averages ? 44 : 36) + 16;
 }
 
-/// Patches that are so tiny that too many meet at a node grow; those that do not fit into shared memory shrink.
+std::size_t most_nodes(const std::vector<Patch>& patches) {
+    std::size_t most = 0;
+    for (const Patch& patch : patches) most = std::max(most, patch.node.size());
+    return most;
+}
+
+/// Patches that do not fit into shared memory shrink, such that their number grows by halves: what was shared out
+/// evenly among multiprocessors stays so. Patches that are so tiny that too many meet at a node grow.
 PatchLayout fitting_layout(const RestState& rest, const GpuStepShape& shape, std::size_t shared_memory) {
-    PatchShape cut{std::min(shape.patch_tets, rest.element_count()), shape.longest_fan};
-    std::vector<Patch> patches = cut_into_patches(rest, cut);
-    const auto fits = [&] {
-        const auto larger = std::max_element(patches.begin(), patches.end(), [](const Patch& a, const Patch& b) {
-            return a.node.size() < b.node.size();
-        });
-        return shared_bytes(static_cast<int>(larger->node.size()), rest.pressure.count() > 0) <= shared_memory;
-    };
-    while (!fits()) {
-        cut.tets = cut.tets * 7 / 8;
-        patches = cut_into_patches(rest, cut);
-    }
-    while (most_sharing(rest.node_count, patches) > most_sharing_patches) {
-        cut.tets *= 2;
-        patches = cut_into_patches(rest, cut);
-    }
+    const int elements = rest.element_count(), asked = std::min(shape.patch_tets, elements);
+    const int count = (elements + asked - 1) / asked;
+    std::vector<Patch> patches = cut_into_patches(rest, {asked, shape.longest_fan});
+    for (int halves = 3; shared_bytes(most_nodes(patches), rest.pressure.count() > 0) > shared_memory; ++halves)
+        patches = cut_into_patches(rest, {(2 * elements + halves * count - 1) / (halves * count), shape.longest_fan});
+    for (int tets = 2 * asked; most_sharing(rest.node_count, patches) > most_sharing_patches; tets *= 2)
+        patches = cut_into_patches(rest, {tets, shape.longest_fan});
     return patch_layout(rest, patches);
 }
 
