@@ -138,6 +138,7 @@ struct Parser {
     WarpOptions warp;
     EvaluateOptions evaluate;
     InfoOptions info;
+    BenchOptions bench;
     std::filesystem::path config;
     std::vector<std::string> register_lengths, mesh_lengths, info_files;
     std::deque<Verb> verbs;
@@ -150,6 +151,7 @@ struct Parser {
         declare_warp(verbs.emplace_back(app, "warp", "Carry an image, labels, points or a surface along"));
         declare_evaluate(verbs.emplace_back(app, "evaluate", "Score label maps, landmarks and fields"));
         declare_info(verbs.emplace_back(app, "info", "Print what a file holds, or the devices of this machine"));
+        declare_bench(verbs.emplace_back(app, "bench", "Time the solver's engines on this machine"));
     }
 
     void declare_register(Verb& verb) {
@@ -258,6 +260,36 @@ struct Parser {
         verb.common(o.common);
     }
 
+    void declare_bench(Verb& verb) {
+        BenchOptions& o = bench;
+        verb.text("--study", o.study, "cube (stretched, 100 mm), brain (indented by 10 mm), scaling (cubes) or all")
+            ->check(CLI::IsMember({"cube", "brain", "scaling", "all"}).description(""));
+        verb.path("--labels", o.labels,
+                  "Label map of the brain; default: data/brainshift/preop_labels.nii.gz if there");
+        verb.app()
+            .add_option("--label", o.only, "Labels that are brain; default: all but 0")
+            ->type_name("LABEL")
+            ->delimiter(',');
+        verb.app()
+            .add_option("--engines", o.engines,
+                        "Of scalar, simd, render-passes, two-pass, fused; default: all that can run")
+            ->type_name("NAME")
+            ->delimiter(',');
+        verb.app()
+            .add_option("--elements", o.elements, "Sizes of the meshes, tetrahedra, of one study")
+            ->type_name("COUNT")
+            ->delimiter(',')
+            ->check(CLI::Range(6, 40000000).description(""));
+        verb.number("--steps", o.steps, "COUNT", 1, 1000000,
+                    "Steps of a run, and after how many results are compared with float64");
+        verb.number("--repeats", o.repeats, "COUNT", 2, 1000, "Runs of each engine on each mesh");
+        verb.text("--device", o.device.name, "auto, cpu, gpu or gpu:<index>")
+            ->check(CLI::Validator(check_device, "", "device"));
+        verb.path("-o,--output", o.output, "Folder for bench.json, bench.csv and figures")->type_name("FOLDER");
+        verb.flag("--quick", o.quick, "Small meshes, few steps: whether everything runs, not how fast");
+        verb.common(o.common);
+    }
+
     Command result() {
         const std::string verb = app.get_subcommands().front()->get_name();
         if (verb == "register") {
@@ -271,6 +303,7 @@ struct Parser {
         }
         if (verb == "warp") return warp;
         if (verb == "evaluate") return evaluate;
+        if (verb == "bench") return bench;
         info.files.assign(info_files.begin(), info_files.end());
         return info;
     }
@@ -299,7 +332,7 @@ struct Parser {
         throw InvalidInput(message + (nearest.empty() ? "; see --help" : "; did you mean '" + nearest + "'?"));
     }
 
-    static std::vector<std::string> verb_names() { return {"register", "mesh", "warp", "evaluate", "info"}; }
+    static std::vector<std::string> verb_names() { return {"register", "mesh", "warp", "evaluate", "info", "bench"}; }
 };
 
 /// Puts the file that --config names in front of the other arguments, so that those win.
@@ -334,7 +367,7 @@ Command parse_command_line(std::vector<std::string> arguments) {
         throw HelpRequest{parser.app.version() + "\n"};
     } catch (const CLI::ParseError& error) {
         const bool no_verb = parser.app.get_subcommands().empty();
-        throw InvalidInput(no_verb ? "give a verb: register, mesh, warp, evaluate or info; see --help"
+        throw InvalidInput(no_verb ? "give a verb: register, mesh, warp, evaluate, info or bench; see --help"
                                    : std::string(error.what()) + "; see --help");
     }
     return parser.result();

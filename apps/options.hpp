@@ -83,7 +83,20 @@ struct InfoOptions {
     bool labels = false, devices = false;
 };
 
-using Command = std::variant<RegisterOptions, MeshOptions, WarpOptions, EvaluateOptions, InfoOptions>;
+struct BenchOptions {
+    CommonOptions common;
+    std::string study = "all";             ///< "cube", "brain", "scaling" or "all"
+    std::filesystem::path labels, output;  ///< label map of the brain; folder for JSON, CSV and figures, or empty
+    std::vector<int> only;                 ///< labels that are brain; empty: all but 0
+    std::vector<std::string> engines;      ///< empty: all
+    std::vector<int> elements;             ///< sizes of the meshes of one study; empty: those of the study
+    int steps = 1000;
+    int repeats = 5;
+    bool quick = false;
+    DeviceChoice device;
+};
+
+using Command = std::variant<RegisterOptions, MeshOptions, WarpOptions, EvaluateOptions, InfoOptions, BenchOptions>;
 
 /// The text that --help or --version asked for; not an error.
 struct HelpRequest {

@@ -10,5 +10,6 @@ void run_mesh(const MeshOptions& options);
 void run_warp(const WarpOptions& options);
 void run_evaluate(const EvaluateOptions& options);
 void run_info(const InfoOptions& options);
+void run_bench(const BenchOptions& options);
 
 }  // namespace tissuewarp::apps

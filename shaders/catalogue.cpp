@@ -227,6 +227,17 @@ ProgramSource warp_field_program(WarpContinuation continuation) {
     return warp_program("warp_field", continuation);
 }
 
+ProgramSource copy_bandwidth_program() {
+    return {"copy_bandwidth", {"index", "bindings"}, {{"WORKGROUP_SIZE", workgroup_size}}, {}};
+}
+
+ProgramSource fma_rate_program() {
+    return {"fma_rate",
+            {"index", "bindings"},
+            {{"WORKGROUP_SIZE", workgroup_size}, {"FMA_PER_ROUND", std::to_string(fma_per_round)}},
+            {}};
+}
+
 std::vector<ProgramSource> every_program() {
     std::vector<ProgramSource> all{element_volume_program(),        impose_program(),
                                    previous_displacement_program(), observe_nodes_program(),
@@ -263,6 +274,8 @@ std::vector<ProgramSource> every_program() {
         for (const WarpTakes takes : {WarpTakes::Trilinear, WarpTakes::Nearest})
             all.push_back(warp_image_program(continuation, takes));
     }
+    all.push_back(copy_bandwidth_program());
+    all.push_back(fma_rate_program());
     return all;
 }
 

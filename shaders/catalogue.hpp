@@ -95,6 +95,11 @@ ProgramSource warp_rasterise_program();
 ProgramSource warp_image_program(WarpContinuation continuation, WarpTakes takes);
 ProgramSource warp_field_program(WarpContinuation continuation);
 
+/// What measures a device's ceilings (ceilings.hpp).
+ProgramSource copy_bandwidth_program();
+inline constexpr int fma_per_round = 64;
+ProgramSource fma_rate_program();
+
 /// Every compute program that the functions above can make, for checking them all.
 std::vector<ProgramSource> every_program();
 

@@ -44,3 +44,7 @@
 #define BINDING_PREVIOUS_RESIDUAL 7
 #define BINDING_PREVIOUS_DISPLACEMENT 8
 #define BINDING_IMPOSED 9
+
+// Measuring the device's ceilings.
+#define BINDING_COPY_SOURCE 0
+#define BINDING_COPY_TARGET 1

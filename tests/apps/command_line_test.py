@@ -15,7 +15,7 @@ from phantom import CENTRE_LPS, MOVING_AFFINE, PROGRAM, PhantomTest, lps_of_voxe
 
 class CommandLine(PhantomTest):
     def test_help_of_each_verb_names_units(self):
-        for verb in ("register", "mesh", "warp", "evaluate", "info"):
+        for verb in ("register", "mesh", "warp", "evaluate", "info", "bench"):
             result = run(verb, "--help")
             self.assertEqual(result.returncode, 0)
             self.assertIn("mm", result.stdout, verb)

@@ -67,8 +67,9 @@ class Phantom:
         return run(*arguments, *more)
 
 
-def run(*arguments):
-    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=110)
+def run(*arguments, folder=None):
+    """The program with these arguments, in that folder."""
+    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=110, cwd=folder)
 
 
 class PhantomTest(unittest.TestCase):

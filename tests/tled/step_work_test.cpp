@@ -1,0 +1,47 @@
+/// The counted model of a step's cost.
+#include "tled/step_work.hpp"
+#include "meshing/primitives.hpp"
+
+#include <gmock/gmock.h>
+
+namespace tissuewarp::tled {
+namespace {
+
+RestState cube(int cells) {
+    Model model;
+    model.mesh = meshing::box_mesh({100, 100, 100}, {cells, cells, cells});
+    model.materials = {{1, NeoHookeanLnJ{1.007, 49.329}}};
+    model.element = Element::T4;
+    return rest_state(model);
+}
+
+// By hand: 216 nodes and 750 tetrahedra.
+TEST(StepWork, OfTwoPassesIsThatOfTheirArrays) {
+    const StepWork work = gpu_step_work(cube(5), {});
+    EXPECT_NEAR(work.bytes, 208 + 104 * 216.0 / 750, 1e-9);
+    EXPECT_NEAR(work.flops, 241 + 12 * 216.0 / 750, 1e-9);
+}
+
+// One patch shares no node: 216 slots, no force leaves it but to itself. Fans of one tetrahedron each.
+TEST(StepWork, OfOnePatchIsThatOfItsSlotsAndFans) {
+    const RestState rest = cube(5);
+    const StepWork work = gpu_step_work(rest, {.patch_tets = 750, .longest_fan = 1});
+    EXPECT_NEAR(work.bytes, (216 * (72 + 32) + 750 * 16) / 750.0, 1e-9);
+    const StepWork persisting = gpu_step_work(rest, {.patch_tets = 750, .longest_fan = 1, .many_at_once = true});
+    EXPECT_NEAR(persisting.bytes, (216 * 36 + 750 * 16) / 750.0, 1e-9);
+}
+
+// Shared nodes cost: a model that forgets them would give small patches for free.
+TEST(StepWork, OfPatchesGrowsAsTheyShrink) {
+    const RestState rest = cube(10);
+    double before = 0;
+    for (const int tets : {6000, 1000, 200}) {
+        const StepWork work = gpu_step_work(rest, {.patch_tets = tets, .longest_fan = 5});
+        EXPECT_GT(work.bytes, before);
+        before = work.bytes;
+    }
+    EXPECT_LT(before, gpu_step_work(rest, {}).bytes) << "patches exist to move less than two passes";
+}
+
+}  // namespace
+}  // namespace tissuewarp::tled
