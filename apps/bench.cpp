@@ -151,9 +151,10 @@ private:
         results_.studies.push_back(std::move(measured));
     }
 
-    /// Takes engines that are too slow from the list.
+    /// Takes engines that are too slow for the mesh, or whose device is too small, from the list.
     MeshTimings run(const BenchScene& scene, TimingPlan plan, std::vector<BenchEngine>& engines,
                     const std::string& name, double from, double to) {
+        constexpr int least_refused = 1'000'000;  // elements: smaller meshes fit into the memory of every device
         constexpr int most_compared = 1'100'000;  // elements: float64 and the scalar loops take minutes beyond
         if (scene.rest.element_count() > most_compared) plan.compared_steps = 0;
         const SceneReference reference = scene_reference(scene, plan, progress_);
@@ -164,13 +165,19 @@ private:
         std::erase_if(engines, [&](BenchEngine engine) {
             progress_.begin(name + " " + name_of(engine), from, from + share);
             from += share;
-            std::optional<EngineTiming> timing = timed(engine, scene, reference, device, plan, progress_);
-            if (timing) {
-                mesh.engines.push_back(std::move(*timing));
-                return false;
+            try {
+                std::optional<EngineTiming> timing = timed(engine, scene, reference, device, plan, progress_);
+                if (timing) {
+                    mesh.engines.push_back(std::move(*timing));
+                    return false;
+                }
+                results_.notes.push_back(fmt::format("{} stops before {} elements: a step takes more than {} s",
+                                                     name_of(engine), mesh.elements, plan.longest_step));
+            } catch (const GpuUnavailable& reason) {
+                if (plan.longest_step == 0 || mesh.elements < least_refused) throw;
+                results_.notes.push_back(
+                    fmt::format("{} stops before {} elements: {}", name_of(engine), mesh.elements, reason.what()));
             }
-            results_.notes.push_back(fmt::format("{} stops before {} elements: a step takes more than {} s",
-                                                 name_of(engine), mesh.elements, plan.longest_step));
             return true;
         });
         return mesh;

@@ -157,15 +157,15 @@ Curve real_time(const StudyResults& study) {
 
 std::string legend(const StudyResults& study) {
     std::string svg;
-    double x = 90;
+    double x = 40;
     const auto entry = [&](const char* colour, const std::string& label, const char* more) {
         svg += line({x, 26}, {x + 22, 26}, colour, more) + text(x + 28, 30, label, "start");
-        x += 50 + 6.6 * double(label.size());
+        x += 50 + 6.2 * double(label.size());
     };
     for (const BenchEngine engine : every_bench_engine)
         if (std::any_of(study.meshes.begin(), study.meshes.end(), [&](const auto& mesh) { return mesh.of(engine); }))
             entry(colour_of(engine), label_of(engine), " stroke-width=\"2\"");
-    entry("#111827", "the step simulated", " stroke-width=\"2\" stroke-dasharray=\"6 4\"");
+    entry("#111827", "step simulated", " stroke-width=\"2\" stroke-dasharray=\"6 4\"");
     return svg;
 }
 

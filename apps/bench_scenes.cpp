@@ -18,11 +18,12 @@ namespace {
 using Eigen::Matrix3Xd;
 using Eigen::Vector3d;
 
-constexpr double edge = 100;        // mm
-constexpr double stretch = 0.2;     // of the edge
-constexpr double indentation = 10;  // mm
-constexpr double pressed = 15;      // mm, radius of what is pressed in
-constexpr double fade = 40;         // mm, standard deviation of the dent around it
+constexpr double edge = 100;          // mm
+constexpr double stretch = 0.2;       // of the edge
+constexpr double least_height = 100;  // mm, of what is pressed in by 10 mm; all lengths shrink with a smaller one
+constexpr double indentation = 10;    // mm
+constexpr double pressed = 15;        // mm, radius of what is pressed in
+constexpr double fade = 40;           // mm, standard deviation of the dent around it
 
 BenchScene scene_of(const meshing::TetMesh& mesh, Matrix3Xd start, const tled::Conditions& conditions) {
     tled::Model model;
@@ -99,18 +100,20 @@ BenchScene indented_brain(const meshing::TetMesh& mesh) {
     const double low = mesh.nodes.row(2).minCoeff(), height = mesh.nodes.row(2).maxCoeff() - low;
 
     const double anchored = low + 0.1 * height;
+    const double scale = std::min(1.0, height / least_height);
     Matrix3Xd start(3, mesh.node_count());
     for (int node = 0; node < mesh.node_count(); ++node) {
-        const double beyond = std::max(0.0, (mesh.nodes.col(node) - mesh.nodes.col(centre)).norm() - pressed);
+        const double beyond = std::max(0.0, (mesh.nodes.col(node) - mesh.nodes.col(centre)).norm() - scale * pressed);
         const double above = std::clamp((mesh.nodes(2, node) - anchored) / (0.4 * height), 0.0, 1.0);
-        start.col(node) = -indentation * above * std::exp(-0.5 * std::pow(beyond / fade, 2)) * outward;
+        start.col(node) =
+            -indentation * scale * above * std::exp(-0.5 * std::pow(beyond / (scale * fade), 2)) * outward;
     }
     tled::Conditions conditions;
     for (int node = 0; node < mesh.node_count(); ++node)
         if (mesh.nodes(2, node) < anchored)
             conditions.prescribed.push_back({node, {true, true, true}, Vector3d::Zero()});
     for (const int node : boundary.node_of)
-        if ((mesh.nodes.col(node) - mesh.nodes.col(centre)).norm() < pressed && mesh.nodes(2, node) >= anchored)
+        if ((mesh.nodes.col(node) - mesh.nodes.col(centre)).norm() < scale * pressed && mesh.nodes(2, node) >= anchored)
             conditions.prescribed.push_back({node, {true, true, true}, start.col(node)});
     BenchScene scene = scene_of(mesh, std::move(start), conditions);
     settle(scene);

@@ -84,8 +84,8 @@ std::optional<EngineTiming> timed(BenchEngine engine, const BenchScene& scene, c
     timing.engine = engine;
     timing.description = stepper.description;
     timing.work = stepper.work;
-    timing.steps =
-        std::clamp(static_cast<int>(plan.run_seconds / first), std::min(least_steps, plan.steps), plan.steps);
+    const double fitting = std::min(plan.run_seconds / first, double(plan.steps));
+    timing.steps = std::max(static_cast<int>(fitting), std::min(least_steps, plan.steps));
     if (hardware)
         for (const double begin = now(); now() - begin < plan.warm_up_seconds;)
             timed_run(stepper, timing.steps, reference.coefficients);

@@ -4,10 +4,12 @@ import csv
 import json
 import math
 import re
+import signal
+import subprocess
 import unittest
 import xml.etree.ElementTree as xml
 
-from phantom import Phantom, PhantomTest, run
+from phantom import PROGRAM, Phantom, PhantomTest, run
 
 INPUT, IO, GPU = 2, 3, 5
 ENGINES = ["scalar", "simd", "render-passes", "two-pass", "fused"]
@@ -156,6 +158,20 @@ class BenchmarkOptions(PhantomTest):
 
     def test_gpu_that_is_not_there(self):
         self.assert_refused(run("bench", "--device", "gpu:99"), GPU)
+
+    # The folder appears before the first run and must go again; a run of an hour must stop within seconds.
+    def test_interrupt_leaves_nothing(self):
+        process = subprocess.Popen(
+            [PROGRAM, "bench", "--study", "cube", "--elements", "6000", "--repeats", "1000", "--device", "cpu",
+             "--output", str(self.phantom.output)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        while not self.phantom.output.exists() and process.poll() is None:
+            pass
+        process.send_signal(signal.SIGINT)
+        printed, message = process.communicate(timeout=100)
+        self.assertEqual(process.returncode, 130, message)
+        self.assertEqual(message.count("\n"), 1, message)
+        self.assertEqual(printed, "")
+        self.assertFalse(self.phantom.output.exists())
 
     def test_output_is_a_file(self):
         path = self.phantom.folder / "taken"
