@@ -29,7 +29,7 @@ void print_ceilings(const BenchResults& results) {
 }
 
 void print_row(const BenchResults& results, const MeshTimings& mesh, const EngineTiming& engine) {
-    fmt::print("{:>9}  {:<14}{:>11.2f}{:>11.2f}{:>8}{:>10.3f}{:>7.0f}{:>7.0f}{:>8.1f}{:>8.1f}{:>12.2f}{:>10.2f}  {}\n",
+    fmt::print("{:>9}  {:<14}{:>11.2f}{:>11.2f}{:>8}{:>10.3f}{:>7.0f}{:>7.0f}{:>8.1f}{:>8.1f}{:>12.2f}{:>10.3g}  {}\n",
                mesh.elements, name_of(engine.engine), engine.mean() * 1e6, engine.median() * 1e6,
                ratio_text(mesh.ratio_to_scalar(engine)), engine.median() / mesh.elements * 1e9, engine.work.bytes,
                engine.work.flops, 100 * results.bandwidth_share(mesh, engine), 100 * results.fma_share(mesh, engine),
