@@ -50,6 +50,22 @@ class Benchmark(unittest.TestCase):
         self.assertEqual([mesh["elements"] for mesh in self.report["studies"][0]["meshes"]], [750, 3072])
         self.assertAlmostEqual(self.report["studies"][1]["meshes"][0]["elements"], 1500, delta=150)
 
+    # An interpolation between the wrong meshes, or of the brain, whose elements are not those of a cube.
+    def test_largest_cube_in_real_time_lies_between_its_neighbours(self):
+        for name in ENGINES:
+            factors = sorted((mesh["elements"], engine["real_time_factor"]) for study, mesh, engine in self.timings()
+                             if engine["engine"] == name and study != "brain")
+            limit = self.report["largest_real_time_cube"][name]
+            slow = [elements for elements, factor in factors if factor < 1]
+            if not slow:
+                self.assertEqual((limit["kind"], limit["elements"]), ("above", factors[-1][0]))
+            elif slow[0] == factors[0][0]:
+                self.assertEqual((limit["kind"], limit["elements"]), ("below", factors[0][0]))
+            else:
+                self.assertEqual(limit["kind"], "interpolated")
+                before = max(elements for elements, _ in factors if elements < slow[0])
+                self.assertTrue(before <= limit["elements"] <= slow[0])
+
     # A wrong median, a share per node in place of per element, a ratio upside down.
     def test_numbers_follow_from_each_other(self):
         for _, mesh, engine in self.timings():
