@@ -9,18 +9,31 @@ float trace_excess(Deformation d) {
     return 2.0 * d.trace_H + dot(d.H[0], d.H[0]) + dot(d.H[1], d.H[1]) + dot(d.H[2], d.H[2]);
 }
 
-/// c (F - F⁻ᵀ) + q cof F with F - F⁻ᵀ = (J H + (J I - cof F)) / J. The quotient is one factor of the whole: the rounding
-/// error of 1 / J on one of the terms alone would be a stress whose moments do not balance, which turns a rotating body
-/// faster or slower.
-StressFactors stretch_difference(Deformation d, float c, float q) {
-    float J = 1.0 + d.volume_change;
-    float factor = c * reciprocal(J);
-    return StressFactors(factor * J, factor, q);
+/// E = C - I = H + Hᵀ + Hᵀ H: xx yy zz and xy yz zx.
+struct StrainExcess {
+    vec3 diagonal, others;
+};
+
+StrainExcess symmetric_strain(Deformation d) {
+    vec3 x = d.H[0], y = d.H[1], z = d.H[2];
+    return StrainExcess(2.0 * vec3(x.x, y.y, z.z) + vec3(dot(x, x), dot(y, y), dot(z, z)),
+                        vec3(y.x, z.y, x.z) + vec3(x.y, y.z, z.x) + vec3(dot(x, y), dot(y, z), dot(z, x)));
+}
+
+/// c (F - F⁻ᵀ) + q cof F = cof F (c/J E + q I), since F - F⁻ᵀ = F⁻ᵀ (FᵀF - I). In a turned body the terms of F - F⁻ᵀ are of
+/// the order of 1 and cancel; what rounding left of them had moments, which turned the body (docs/decisions/
+/// gpu_arithmetic.md). E is small and symmetric from the start.
+mat3 stretch_difference(Deformation d, float c, float q) {
+    StrainExcess E = symmetric_strain(d);
+    float factor = c * reciprocal(1.0 + d.volume_change);
+    vec3 a = factor * E.diagonal + vec3(q);
+    vec3 b = factor * E.others;
+    return cofactor_F(d) * mat3(a.x, b.x, b.z, b.x, a.y, b.y, b.z, b.y, a.z);
 }
 
 /// psi_1 times the derivative of J^(-2/3) tr C, and pressure cof F: 2 psi_1 j (F - (tr C)/3 F⁻ᵀ); with tr C = 3 + x the
 /// bracket is F - F⁻ᵀ - x/3 cof F / J.
-StressFactors first_invariant_stress(Deformation d, float psi_1, float j, float pressure) {
+mat3 first_invariant_stress(Deformation d, float psi_1, float j, float pressure) {
     float c = 2.0 * psi_1 * j;
     float third = trace_excess(d) * (1.0 / 3.0) / (1.0 + d.volume_change);
     return stretch_difference(d, c, pressure - c * third);

@@ -11,7 +11,7 @@ mat3 stress(uint e, Deformation d, Parameters p, float pressure) {
     float j = isochoric_factor(d);
     float I1 = j * (3.0 + trace_excess(d));
     float psi_1 = p.a.x + I1 * (p.a.y + I1 * (p.a.z + I1 * (p.a.w + I1 * p.b.x)));
-    return stress_of(first_invariant_stress(d, psi_1, j, pressure), d);
+    return first_invariant_stress(d, psi_1, j, pressure);
 }
 #endif
 

@@ -7,7 +7,7 @@
 #if USES_SHEAR
 /// P = mu (F - F⁻ᵀ) + pressure cof F.
 mat3 stress(uint e, Deformation d, Parameters p, float pressure) {
-    return stress_of(stretch_difference(d, p.a.x, d.volume_change > -1.0 ? pressure : not_a_number()), d);
+    return stretch_difference(d, p.a.x, d.volume_change > -1.0 ? pressure : not_a_number());
 }
 #endif
 

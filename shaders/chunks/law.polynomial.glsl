@@ -17,7 +17,7 @@ mat3 stress(uint e, Deformation d, Parameters p, float pressure) {
     float psi_1 = p.a.x + 2.0 * p.a.z * x + p.a.w * y + 3.0 * p.b.y * x * x;
     float psi_2 = p.a.y + p.a.w * x + 2.0 * p.b.x * y;
     float q = (4.0 / 3.0 * t + minors * (1.0 / 3.0)) / (1.0 + d.volume_change);
-    mat3 second = stress_of(stretch_difference(d, 2.0, -q), d) + (mat3(1.0) + d.H) * (mat3(t) - E);
-    return stress_of(first_invariant_stress(d, psi_1, j, pressure), d) + (2.0 * psi_2 * j * j) * second;
+    mat3 second = stretch_difference(d, 2.0, -q) + (mat3(1.0) + d.H) * (mat3(t) - E);
+    return first_invariant_stress(d, psi_1, j, pressure) + (2.0 * psi_2 * j * j) * second;
 }
 #endif

@@ -18,6 +18,6 @@ mat3 stress(uint e, Deformation d, Parameters p, float pressure) {
     float third = (1.0 + excess) * (1.0 / 3.0) / (1.0 + d.volume_change);
     mat3 bracket = outerProduct(a + stretch, a) - third * cofactor_F(d);
     float j = 1.0 + j_minus_1;
-    return stress_of(first_invariant_stress(d, 0.5 * p.a.x, j, pressure), d) + (2.0 * p.a.y * strength * j) * bracket;
+    return first_invariant_stress(d, 0.5 * p.a.x, j, pressure) + (2.0 * p.a.y * strength * j) * bracket;
 }
 #endif
