@@ -23,17 +23,3 @@ Deformation deformation(mat3 H) {
 
 /// J F⁻ᵀ = (1 + tr H) I - Hᵀ + cof H.
 mat3 cofactor_F(Deformation d) { return mat3(1.0 + d.trace_H) - d.Q; }
-
-/// J (I - F⁻ᵀ), without the cancellation of its two terms.
-mat3 J_I_minus_cofactor_F(Deformation d) { return mat3(d.higher) + d.Q; }
-
-/// First Piola-Kirchhoff stress of a law of tr C and J, as most are.
-struct StressFactors {
-    float of_H, of_J_I_minus_cofactor_F, of_cofactor_F;
-};
-
-/// The sum of the three matrices, of which only H and Q are made.
-mat3 stress_of(StressFactors f, Deformation d) {
-    float of_I = f.of_J_I_minus_cofactor_F * d.higher + f.of_cofactor_F * (1.0 + d.trace_H);
-    return mat3(of_I) + f.of_H * d.H + (f.of_J_I_minus_cofactor_F - f.of_cofactor_F) * d.Q;
-}

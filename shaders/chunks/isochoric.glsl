@@ -20,6 +20,13 @@ StrainExcess symmetric_strain(Deformation d) {
                         vec3(y.x, z.y, x.z) + vec3(x.y, y.z, z.x) + vec3(dot(x, y), dot(y, z), dot(z, x)));
 }
 
+mat3 strain_excess(Deformation d) {
+    StrainExcess E = symmetric_strain(d);
+    vec3 a = E.diagonal;
+    vec3 b = E.others;
+    return mat3(a.x, b.x, b.z, b.x, a.y, b.y, b.z, b.y, a.z);
+}
+
 /// c (F - F⁻ᵀ) + q cof F = cof F (c/J E + q I), since F - F⁻ᵀ = F⁻ᵀ (FᵀF - I). In a turned body the terms of F - F⁻ᵀ are of
 /// the order of 1 and cancel; what rounding left of them had moments, which turned the body (docs/decisions/
 /// gpu_arithmetic.md). E is small and symmetric from the start.
@@ -37,10 +44,4 @@ mat3 first_invariant_stress(Deformation d, float psi_1, float j, float pressure)
     float c = 2.0 * psi_1 * j;
     float third = trace_excess(d) * (1.0 / 3.0) / (1.0 + d.volume_change);
     return stretch_difference(d, c, pressure - c * third);
-}
-
-/// C - I = H + Hᵀ + Hᵀ H.
-mat3 strain_excess(Deformation d) {
-    mat3 H_transposed = transpose(d.H);
-    return d.H + H_transposed + H_transposed * d.H;
 }
