@@ -1,5 +1,5 @@
-// Time of a step on the GPU, and how far its float32 strays from the float64 CPU engine. The cube of Taylor, Cheng and
-// Ourselin (2008): edge 100 mm, ends bonded, stretched by 20 %, mu = 1.007 kPa, lambda = 49.329 kPa, 1000 kg/m³.
+// Time of a step on the GPU, and how far its float32 strays from the float64 CPU engine. The cube of
+// benchmarks/stretched_cube.hpp.
 //     gpu_step_bench [--list] [--device N] [--cells 14,24,55,128] [--steps N] [--repeats N] [--compare-limit ELEMENTS]
 //                    [--element t4|averaged] [--law lnj|iso] [--mesh FILE.vtu] [--shapes TETS:FAN:WORKGROUP,…]
 //                    [--render-passes] [--stretch 0.2]
@@ -9,17 +9,15 @@
 // measured after those of --cells. Shapes are those of tled::GpuStepShape, an m behind for many steps at once, 0:0:0
 // the two passes; without them the suggested one. --render-passes adds the fragment shaders of 2007 for T4.
 
+#include "benchmarks/stretched_cube.hpp"
 #include "core/errors.hpp"
 #include "meshing/mesh_io.hpp"
 #include "meshing/primitives.hpp"
 #include "shaders/device.hpp"
-#include "tled/engine.hpp"
 #include "tled/reference.hpp"
 #include "tled/render_pass_engine.hpp"
 
 #include <algorithm>
-#include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <sstream>
@@ -27,14 +25,10 @@
 #include <vector>
 
 using namespace tissuewarp;
+using namespace tissuewarp::stretched_cube;
 using Eigen::Matrix3Xd;
 
 namespace {
-
-constexpr double edge = 100;       // mm
-constexpr double shear = 1.007;    // kPa
-constexpr double lambda = 49.329;  // kPa
-constexpr double default_stretch = 0.2;
 
 struct Options {
     int device = -1;
@@ -48,60 +42,6 @@ struct Options {
     std::vector<tled::GpuStepShape> shapes;  // empty: the suggested one
     bool render_passes = false;
 };
-
-double now() {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-double median(std::vector<double> values) {
-    std::sort(values.begin(), values.end());
-    return values[values.size() / 2];
-}
-
-/// The stretched cube with its ends held: the state in which the run begins, and what holds it.
-struct Scene {
-    meshing::TetMesh mesh;
-    tled::NodalConditions conditions;
-    Matrix3Xd start;
-};
-
-/// Nodes within a hundredth of the height from either end are held.
-Scene stretched_cube(meshing::TetMesh mesh, double stretch) {
-    Scene scene;
-    scene.mesh = std::move(mesh);
-    const Eigen::RowVectorXd z = scene.mesh.nodes.row(2);
-    const double bottom = z.minCoeff(), height = z.maxCoeff() - bottom;
-    const int count = scene.mesh.node_count();
-    scene.start = Matrix3Xd::Zero(3, count);
-    tled::Conditions conditions;
-    for (int node = 0; node < count; ++node) {
-        const double part = (z[node] - bottom) / height;
-        scene.start(2, node) = stretch * height * part;
-        if (part < 0.01 || part > 0.99)
-            conditions.prescribed.push_back({node, {true, true, true}, scene.start.col(node)});
-    }
-    scene.conditions = tled::nodal_conditions(conditions, count);
-    return scene;
-}
-
-/// The same rest state, of one material, under another law of the same moduli at rest.
-void use_law(tled::RestState& rest, const tled::Material& material) {
-    rest.materials = {material};
-    const double modulus = tled::volumetric_modulus(material);
-    if (rest.pressure.count() == 0) rest.volumetric_modulus.setConstant(modulus);
-    rest.pressure.modulus.setConstant(modulus);
-}
-
-/// 0.9 of the step that the element bound allows, ω² ≤ 4 (λ + 2μ)/ρ Σ |grad N|², damped by α with α Δt/2 = 0.01.
-tled::StepCoefficients coefficients(const tled::RestState& rest, double density) {
-    double sum = 0;
-    for (int e = 0; e < rest.element_count(); ++e) {
-        const auto gradient = rest.gradient.col(e).reshaped(3, 3);
-        sum = std::max(sum, gradient.squaredNorm() + gradient.rowwise().sum().squaredNorm());
-    }
-    const double time_step = 0.9 * 2 / std::sqrt(4 * (lambda + 2 * shear) / density * sum);  // s
-    return {(1 - 0.01) / (1 + 0.01), time_step * time_step / (1 + 0.01)};
-}
 
 void set_start(tled::Engine& engine, const Scene& scene) {
     engine.set_conditions(scene.conditions);
@@ -131,7 +71,7 @@ constexpr double warm_up_seconds = 1;
 template <class AnyEngine>
 void report(AnyEngine& engine, double start_seconds, const Scene& scene, const tled::RestState& rest,
             const std::string& name, const std::string& mesh, const Options& options) {
-    const tled::StepCoefficients step = coefficients(rest, 1e-6);
+    const tled::StepCoefficients step = coefficients(rest);
     Matrix3Xd result;
     set_start(engine, scene);
     for (const double start = now(); now() - start < warm_up_seconds;) timed_steps(engine, options.steps, step, result);
@@ -181,22 +121,9 @@ void report_engines(const Scene& scene, const tled::RestState& rest, const std::
 }
 
 void measure(meshing::TetMesh mesh, const std::string& mesh_name, const Options& options) {
-    const Scene scene = stretched_cube(std::move(mesh), options.stretch);
-    const tled::NeoHookeanLnJ lnj{shear, lambda};
-    const tled::NeoHookeanIso iso{shear, lambda + 2 * shear / 3};
-    for (const bool averaged : {false, true}) {
-        if (!options.element.empty() && (options.element == "averaged") != averaged) continue;
-        tled::Model model;
-        model.mesh = scene.mesh;
-        model.materials[1] = lnj;
-        model.element = averaged ? tled::Element::AveragedPressureT4 : tled::Element::T4;
-        tled::RestState rest = tled::rest_state(model);
-        const std::string element = averaged ? "averaged " : "T4 ";
-        if (options.law != "iso") report_engines(scene, rest, element + "lnJ", mesh_name, options);
-        if (options.law == "lnj") continue;
-        use_law(rest, iso);
-        report_engines(scene, rest, element + "iso", mesh_name, options);
-    }
+    const Scene scene = stretched(std::move(mesh), options.stretch);
+    for (const Variant& variant : variants(scene, options.element, options.law))
+        report_engines(scene, variant.rest, variant.name, mesh_name, options);
 }
 
 void list_devices() {

@@ -1,14 +1,17 @@
 // The step of total Lagrangian explicit dynamics on the CPU, in the order of Miller et al. (2007), table 1:
-// element forces, gather by node, central-difference update. All sums run in a fixed order.
+// element forces, gather by node, central-difference update. A patch of tetrahedra does all three for the nodes that it
+// owns while they are in the cache; nodes that several patches or hexahedra move follow. All sums run in a fixed order.
 
 #include "core/errors.hpp"
 #include "tled/detail/cpu_batches.hpp"
 #include "tled/detail/cpu_kernels.hpp"
+#include "tled/detail/fan_layout.hpp"
 #include "tled/detail/kernel_parameters.hpp"
 #include "tled/detail/parallel.hpp"
 #include "tled/detail/prony_coefficients.hpp"
 #include "tled/engine.hpp"
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -23,6 +26,7 @@ using detail::Advance;
 using detail::batch_width;
 using detail::BatchBlock;
 using detail::ElementBatches;
+using detail::FanPatch;
 using detail::Kinematics;
 using detail::record;
 
@@ -48,24 +52,28 @@ template <class T>
 class CpuEngine final : public Engine {
 public:
     explicit CpuEngine(const RestState& rest)
-        : layout_(detail::batch_layout(rest.blocks)),
-          elements_(detail::element_batches<T>(rest, layout_)),
+        : CpuEngine(rest, detail::fan_layout(rest, detail::suggested_patch_tets(rest.element_count()))) {}
+
+    CpuEngine(const RestState& rest, const detail::FanLayout& fans)
+        : layout_(fans.batches),
+          elements_(detail::element_batches<T>(rest, fans)),
           hex_layout_(detail::batch_layout(rest.hexahedra.blocks)),
-          hexahedra_(detail::hex_batches<T>(rest.hexahedra, hex_layout_)),
+          hexahedra_(detail::hex_batches<T>(rest.hexahedra, hex_layout_, fans.internal)),
           materials_(kernel_materials<T>(rest)),
           kinematics_(rest.pressure.count() > 0 ? Kinematics::AveragedPressure : Kinematics::T4),
           node_count_(static_cast<std::size_t>(rest.node_count)),
           tet_(rest.tet),
           hex_(rest.hexahedra.hex),
           admits_inversion_(tled::admits_inversion(rest)),
-          forces_(detail::force_lists(rest, layout_, hex_layout_)) {
+          internal_(fans.internal),
+          own_nodes_(fans.own_nodes),
+          sources_(detail::force_sources(rest, fans, hex_layout_)) {
         const std::size_t vector_size = node_count_ * record;
         displacement_.assign(vector_size, T(0));
-        increment_ = scratch_ = force_load_ = displacement_;
+        increment_ = scratch_ = force_load_ = force_ = displacement_;
         inverse_mass_.assign(vector_size, T(0));
-        spring_of_node_.assign(node_count_, -1);
-        corner_force_.assign(first_hex_force() + hexahedra_.count() * 8 * batch_width * record, T(0));
-        if (kinematics_ == Kinematics::AveragedPressure) prepare_pressure(rest.pressure);
+        contribution_.assign(first_hex_force() + hexahedra_.count() * 8 * batch_width * record, T(0));
+        if (kinematics_ == Kinematics::AveragedPressure) prepare_pressure(rest.pressure, fans);
         prepare_viscosity(rest);
         free_.assign(vector_size, T(1));
         for (std::size_t node = 0; node < node_count_; ++node) free_[node * record + 3] = T(0);
@@ -77,20 +85,21 @@ public:
 
     void set_conditions(const NodalConditions& conditions) override {
         require_columns(conditions.constrained.cols(), node_count_, "the set of conditions");
-        spring_of_node_.assign(node_count_, -1);
         springs_.clear();
         for (std::size_t s = 0; s < conditions.spring_node.size(); ++s) {
-            spring_of_node_[static_cast<std::size_t>(conditions.spring_node[s])] = static_cast<std::int32_t>(s);
             const auto column = static_cast<Eigen::Index>(s);
-            std::array<T, 9> spring;
-            for (int k = 0; k < 6; ++k) spring[static_cast<std::size_t>(k)] = T(conditions.spring_stiffness(k, column));
-            for (int k = 0; k < 3; ++k) spring[static_cast<std::size_t>(6 + k)] = T(conditions.spring_force(k, column));
+            Spring spring{internal_[static_cast<std::size_t>(conditions.spring_node[s])], {}};
+            for (int k = 0; k < 6; ++k)
+                spring.k[static_cast<std::size_t>(k)] = T(conditions.spring_stiffness(k, column));
+            for (int k = 0; k < 3; ++k)
+                spring.k[static_cast<std::size_t>(6 + k)] = T(conditions.spring_force(k, column));
             springs_.push_back(spring);
         }
+        std::sort(springs_.begin(), springs_.end(), [](const Spring& x, const Spring& y) { return x.node < y.node; });
         for (std::size_t node = 0; node < node_count_; ++node)
             for (std::size_t c = 0; c < 3; ++c) {
                 const auto row = static_cast<Eigen::Index>(c), column = static_cast<Eigen::Index>(node);
-                const std::size_t at = node * record + c;
+                const std::size_t at = place(node, c);
                 force_load_[at] = T(conditions.external_force(row, column));
                 free_[at] = conditions.constrained(row, column) ? T(0) : T(1);
                 if (free_[at] != T(0)) continue;
@@ -107,7 +116,7 @@ public:
                 if (!(m > 0) || !std::isfinite(m))
                     throw InvalidInput("the mass of node " + std::to_string(node) + " is " + std::to_string(m) +
                                        "; it must be positive");
-                inverse_mass_[node * record + c] = T(1 / m);
+                inverse_mass_[place(node, c)] = T(1 / m);
             }
     }
 
@@ -116,7 +125,7 @@ public:
         require_columns(increment.cols(), node_count_, "the increment");
         for (std::size_t node = 0; node < node_count_; ++node)
             for (std::size_t c = 0; c < 3; ++c) {
-                const std::size_t at = node * record + c;
+                const std::size_t at = place(node, c);
                 if (free_[at] == T(0)) continue;
                 displacement_[at] = T(displacement(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(node)));
                 increment_[at] = T(increment(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(node)));
@@ -129,7 +138,7 @@ public:
         require_columns(increment.cols(), node_count_, "the increment");
         for (std::size_t node = 0; node < node_count_; ++node)
             for (std::size_t c = 0; c < 3; ++c) {
-                const std::size_t at = node * record + c;
+                const std::size_t at = place(node, c);
                 increment_[at] =
                     free_[at] * T(increment(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(node)));
             }
@@ -146,39 +155,24 @@ public:
     void run(int steps, const StepCoefficients& coefficients) override {
         const T momentum = T(coefficients.momentum), gain = T(coefficients.gain);
         set_time_step(coefficients.time_step);
-        for (int step = 0; step < steps; ++step) {
-            corner_forces(displacement_.data(), Advance::Yes);
-            for_nodes([&](std::size_t node) {
-                T residual[3];
-                node_residual(node, displacement_.data(), residual);
-                for (std::size_t c = 0; c < 3; ++c) {
-                    const std::size_t at = node * record + c;
-                    // Selected, not multiplied by zero: a blown-up state would leave NaN on constrained nodes for good.
-                    increment_[at] =
-                        free_[at] != T(0) ? momentum * increment_[at] + gain * inverse_mass_[at] * residual[c] : T(0);
-                    displacement_[at] += increment_[at];
-                }
+        T* u = displacement_.data();
+        for (int step = 0; step < steps; ++step)
+            sum_forces(u, Advance::Yes, [&](std::size_t begin, std::size_t end) {
+                add_springs(u, begin, end);
+                const std::size_t at = begin * record;
+                detail::advance_nodes(momentum, gain, &inverse_mass_[at], &force_load_[at], &force_[at], &free_[at],
+                                      &increment_[at], u + at, end - begin);
             });
-        }
     }
 
     [[nodiscard]] Eigen::Matrix3Xd displacement() const override { return to_matrix(displacement_); }
     [[nodiscard]] Eigen::Matrix3Xd increment() const override { return to_matrix(increment_); }
 
-    [[nodiscard]] Eigen::Matrix3Xd residual() override {
-        corner_forces(displacement_.data());
-        return residual_at(displacement_.data());
-    }
+    [[nodiscard]] Eigen::Matrix3Xd residual() override { return residual_at(displacement_.data()); }
 
     [[nodiscard]] Eigen::Matrix3Xd internal_force() override {
-        corner_forces(displacement_.data());
-        Eigen::Matrix3Xd force(3, static_cast<Eigen::Index>(node_count_));
-        for_nodes([&](std::size_t node) {
-            T sum[3];
-            gathered_force(node, sum);
-            for (Eigen::Index c = 0; c < 3; ++c) force(c, static_cast<Eigen::Index>(node)) = double(sum[c]);
-        });
-        return force;
+        sum_forces(displacement_.data(), Advance::No, [](std::size_t, std::size_t) {});
+        return to_matrix(force_);
     }
 
     [[nodiscard]] Observation observe() override {
@@ -197,7 +191,7 @@ public:
         for (Eigen::Index node = 0; node < step.cols(); ++node)
             for (Eigen::Index c = 0; c < 3; ++c) {
                 const double v = step(c, node);
-                const std::size_t at = static_cast<std::size_t>(node) * record + static_cast<std::size_t>(c);
+                const std::size_t at = place(static_cast<std::size_t>(node), static_cast<std::size_t>(c));
                 seen.increment_mass += v * v / double(inverse_mass_[at]);
                 seen.increment_stiffness += v * (before(c, node) - now(c, node));
             }
@@ -243,13 +237,15 @@ private:
     std::vector<int> tet_, hex_;
     bool admits_inversion_;
 
-    detail::ForceLists forces_;
-    std::vector<T> corner_force_;  // of tetrahedra, then of hexahedra
+    std::vector<std::uint32_t> internal_;  // node of the mesh → internal number
+    std::size_t own_nodes_;                // internal numbers below belong to one patch
+    detail::SourceLists sources_;          // of the other nodes: of `contribution_`
+    std::vector<T> contribution_;          // records by patch × local node, then corner forces of hexahedra
+    tbb::enumerable_thread_specific<detail::PatchScratch<T>> patch_scratch_;
 
     // averaged pressure
-    std::vector<int> pressure_offset_;
-    std::vector<std::uint32_t> pressure_entry_;
-    std::vector<T> inverse_pressure_volume_, pressure_modulus_, nodal_change_, nodal_pressure_, change_;
+    detail::SourceLists pressure_sources_;  // of `patch_change_`
+    std::vector<T> patch_change_, inverse_pressure_volume_, pressure_modulus_, nodal_change_, nodal_pressure_;
     std::vector<BatchBlock> pressure_runs_;  // runs of pressure nodes that share a material
 
     // by material, for tetrahedra and then again for hexahedra; empty where none is viscous
@@ -262,20 +258,29 @@ private:
     };
     KeptState kept_;
 
-    // records of four per node
-    std::vector<T> displacement_, increment_, inverse_mass_, force_load_, free_, scratch_;
-    std::vector<std::int32_t> spring_of_node_;
-    std::vector<std::array<T, 9>> springs_;  // xx yy zz xy yz zx, K·target
+    std::vector<T> change_;  // J − 1 of elements in batches
 
-    void prepare_pressure(const PressureNodes& pressure) {
+    // records of four per internal node
+    std::vector<T> displacement_, increment_, inverse_mass_, force_load_, free_, force_, scratch_;
+
+    struct Spring {
+        std::uint32_t node;  // internal
+        std::array<T, 9> k;  // xx yy zz xy yz zx, K·target
+    };
+    std::vector<Spring> springs_;  // ascending
+
+    [[nodiscard]] std::size_t place(std::size_t node, std::size_t component) const {
+        return internal_[node] * std::size_t{record} + component;
+    }
+
+    void prepare_pressure(const PressureNodes& pressure, const detail::FanLayout& fans) {
         const auto count = static_cast<std::size_t>(pressure.count());
-        pressure_offset_ = pressure.incidence.offset;
-        pressure_entry_ = detail::pressure_slots(pressure, layout_);
+        pressure_sources_ = detail::pressure_sources(pressure, fans);
+        patch_change_.assign(fans.nodes.node.size(), T(0));
         inverse_pressure_volume_.resize(count);
         pressure_modulus_.resize(count);
         nodal_change_.assign(count, T(0));
         nodal_pressure_.assign(count, T(0));
-        change_.assign(elements_.count() * batch_width, T(0));
         for (std::size_t a = 0; a < count; ++a) {
             inverse_pressure_volume_[a] = T(1 / pressure.volume[static_cast<Eigen::Index>(a)]);
             pressure_modulus_[a] = T(pressure.modulus[static_cast<Eigen::Index>(a)]);
@@ -286,32 +291,47 @@ private:
     }
 
     template <class Body>
-    void for_nodes(const Body& body) const {
-        parallel_ranges(0, node_count_, 1024, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t node = begin; node != end; ++node) body(node);
-        });
-    }
-
-    template <class Body>
     static void for_batches(std::size_t begin, std::size_t end, const Body& body) {
         parallel_ranges(begin, end, 32, body);
     }
 
-    /// Element pass: corner forces at displacement `u`, nodal pressures first where the element needs them.
-    void corner_forces(const T* u, Advance advance = Advance::No) {
+    /// body(patch, scratch) for all patches.
+    template <class Body>
+    void for_patches(const Body& body) {
+        parallel_ranges(0, elements_.patches.size(), 1, [&](std::size_t begin, std::size_t end) {
+            detail::PatchScratch<T>& scratch = patch_scratch_.local();
+            for (std::size_t p = begin; p != end; ++p) body(elements_.patches[p], scratch);
+        });
+    }
+
+    /// Internal forces at displacement `u` to `force_`; after(begin, end) as soon as those of nodes [begin, end) are
+    /// there. It may move these nodes: no element that is still to come has one of them.
+    template <class After>
+    void sum_forces(T* u, Advance advance, const After& after) {
         if (kinematics_ == Kinematics::AveragedPressure) average_pressure(u);
-        for (const BatchBlock& block : layout_.blocks) {
-            const auto m = static_cast<std::size_t>(block.material);
-            for_batches(block.begin, block.end, [&](std::size_t begin, std::size_t end) {
-                if (viscous_.empty() || viscous_[m].coefficient.empty())
-                    detail::element_forces(materials_[m], kinematics_, elements_, begin, end, u, nodal_pressure_.data(),
-                                           corner_force_.data());
-                else
-                    detail::viscous_element_forces(materials_[m], viscous_[m], advance, kinematics_, elements_, begin,
-                                                   end, u, nodal_pressure_.data(), corner_force_.data());
-            });
-        }
-        T* hex_force = corner_force_.data() + first_hex_force();
+        for_patches([&](const FanPatch& patch, detail::PatchScratch<T>& scratch) {
+            patch_forces(patch, u, advance, scratch);
+            after(patch.first_own, patch.first_own + patch.own_count);
+        });
+        hex_forces(u, advance);
+        parallel_ranges(own_nodes_, node_count_, 512, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t node = begin; node != end; ++node) sum_contributions(node);
+            after(begin, end);
+        });
+    }
+
+    void patch_forces(const FanPatch& patch, const T* u, Advance advance, detail::PatchScratch<T>& scratch) {
+        const std::size_t m = patch.material;
+        if (viscous_.empty() || viscous_[m].coefficient.empty())
+            detail::patch_forces(materials_[m], kinematics_, elements_, patch, u, nodal_pressure_.data(), scratch,
+                                 force_.data(), contribution_.data());
+        else
+            detail::viscous_patch_forces(materials_[m], viscous_[m], advance, kinematics_, elements_, patch, u,
+                                         nodal_pressure_.data(), scratch, force_.data(), contribution_.data());
+    }
+
+    void hex_forces(const T* u, Advance advance) {
+        T* hex_force = contribution_.data() + first_hex_force();
         for (const BatchBlock& block : hex_layout_.blocks) {
             const auto m = static_cast<std::size_t>(block.material), v = viscosity_.size() + m;
             for_batches(block.begin, block.end, [&](std::size_t begin, std::size_t end) {
@@ -324,7 +344,31 @@ private:
         }
     }
 
-    [[nodiscard]] std::size_t first_hex_force() const { return elements_.count() * 4 * batch_width * record; }
+    [[nodiscard]] std::size_t first_hex_force() const { return elements_.nodes.node.size() * record; }
+
+    void sum_contributions(std::size_t node) {
+        std::array<T, record> sum{};
+        const std::size_t list = node - own_nodes_;
+        for (std::uint32_t k = sources_.offset[list]; k < sources_.offset[list + 1]; ++k) {
+            const T* f = &contribution_[std::size_t{sources_.entry[k]} * record];
+            for (std::size_t c = 0; c < record; ++c) sum[c] += f[c];
+        }
+        std::copy(sum.begin(), sum.end(), &force_[node * record]);
+    }
+
+    /// Takes the forces of springs on internal nodes [begin, end) off `force_`.
+    void add_springs(const T* u, std::size_t begin, std::size_t end) {
+        auto spring = std::lower_bound(springs_.begin(), springs_.end(), begin,
+                                       [](const Spring& each, std::size_t node) { return each.node < node; });
+        for (; spring != springs_.end() && spring->node < end; ++spring) {
+            const std::array<T, 9>& k = spring->k;
+            const T *at = u + spring->node * std::size_t{record}, x = at[0], y = at[1], z = at[2];
+            T* force = &force_[spring->node * std::size_t{record}];
+            force[0] -= k[6] - (k[0] * x + k[3] * y + k[5] * z);
+            force[1] -= k[7] - (k[3] * x + k[1] * y + k[4] * z);
+            force[2] -= k[8] - (k[5] * x + k[4] * y + k[2] * z);
+        }
+    }
 
     void prepare_viscosity(const RestState& rest) {
         viscosity_ = rest.viscosity;
@@ -354,57 +398,31 @@ private:
 
     /// q_a = M_a U'(J_a) with J_a − 1 = Σ ¼ V_e (J_e − 1) / V_a.
     void average_pressure(const T* u) {
-        for_batches(0, elements_.count(), [&](std::size_t begin, std::size_t end) {
-            detail::volume_changes(elements_, begin, end, u, change_.data());
-        });
-        parallel_ranges(0, nodal_change_.size(), 1024, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t a = begin; a != end; ++a) {
-                T sum = 0;
-                for (int k = pressure_offset_[a]; k < pressure_offset_[a + 1]; ++k) {
-                    const std::uint32_t slot = pressure_entry_[static_cast<std::size_t>(k)];
-                    sum += elements_.volume[slot] * change_[slot];
-                }
-                nodal_change_[a] = T(0.25) * sum * inverse_pressure_volume_[a];
-            }
+        for_patches([&](const FanPatch& patch, detail::PatchScratch<T>& scratch) {
+            detail::patch_volume_changes(elements_, patch, u, scratch, patch_change_.data());
         });
         for (const BatchBlock& run : pressure_runs_)
-            detail::nodal_pressures(materials_[static_cast<std::size_t>(run.material)].law,
-                                    &pressure_modulus_[run.begin], &nodal_change_[run.begin],
-                                    &nodal_pressure_[run.begin], run.end - run.begin);
-    }
-
-    void gathered_force(std::size_t node, T (&sum)[3]) const {
-        sum[0] = sum[1] = sum[2] = 0;
-        for (int k = forces_.offset[node]; k < forces_.offset[node + 1]; ++k) {
-            const T* f = &corner_force_[static_cast<std::size_t>(forces_.entry[static_cast<std::size_t>(k)]) * record];
-            for (int c = 0; c < 3; ++c) sum[c] += f[c];
-        }
+            parallel_ranges(run.begin, run.end, 1024, [&](std::size_t begin, std::size_t end) {
+                for (std::size_t a = begin; a != end; ++a) {
+                    T sum = 0;
+                    for (std::uint32_t k = pressure_sources_.offset[a]; k < pressure_sources_.offset[a + 1]; ++k)
+                        sum += patch_change_[pressure_sources_.entry[k]];
+                    nodal_change_[a] = T(0.25) * sum * inverse_pressure_volume_[a];
+                }
+                detail::nodal_pressures(materials_[static_cast<std::size_t>(run.material)].law,
+                                        &pressure_modulus_[begin], &nodal_change_[begin], &nodal_pressure_[begin],
+                                        end - begin);
+            });
     }
 
     /// f_ext + f_spring − f_int, masked by the constraints.
-    void node_residual(std::size_t node, const T* u, T (&residual)[3]) const {
-        T internal[3];
-        gathered_force(node, internal);
-        const std::size_t at = node * record;
-        for (std::size_t c = 0; c < 3; ++c) residual[c] = force_load_[at + c] - internal[c];
-        if (spring_of_node_[node] >= 0) {
-            const std::array<T, 9>& k = springs_[static_cast<std::size_t>(spring_of_node_[node])];
-            const T x = u[at], y = u[at + 1], z = u[at + 2];
-            residual[0] += k[6] - (k[0] * x + k[3] * y + k[5] * z);
-            residual[1] += k[7] - (k[3] * x + k[1] * y + k[4] * z);
-            residual[2] += k[8] - (k[5] * x + k[4] * y + k[2] * z);
-        }
-        for (std::size_t c = 0; c < 3; ++c) residual[c] *= free_[at + c];
-    }
-
-    [[nodiscard]] Eigen::Matrix3Xd residual_at(const T* u) const {
-        Eigen::Matrix3Xd result(3, static_cast<Eigen::Index>(node_count_));
-        for_nodes([&](std::size_t node) {
-            T residual[3];
-            node_residual(node, u, residual);
-            for (Eigen::Index c = 0; c < 3; ++c) result(c, static_cast<Eigen::Index>(node)) = double(residual[c]);
+    [[nodiscard]] Eigen::Matrix3Xd residual_at(T* u) {
+        sum_forces(u, Advance::No, [&](std::size_t begin, std::size_t end) {
+            add_springs(u, begin, end);
+            for (std::size_t at = begin * record; at < end * record; ++at)
+                force_[at] = free_[at] * (force_load_[at] - force_[at]);
         });
-        return result;
+        return to_matrix(force_);
     }
 
     /// Takes the smallest of `change_` where it is below what is known; place(e) is its tetrahedron and hexahedron.
@@ -423,7 +441,6 @@ private:
     /// At u − (u − u⁻).
     [[nodiscard]] Eigen::Matrix3Xd residual_before() {
         for (std::size_t i = 0; i < scratch_.size(); ++i) scratch_[i] = displacement_[i] - increment_[i];
-        corner_forces(scratch_.data());
         return residual_at(scratch_.data());
     }
 
@@ -431,8 +448,7 @@ private:
         Eigen::Matrix3Xd matrix(3, static_cast<Eigen::Index>(node_count_));
         for (std::size_t node = 0; node < node_count_; ++node)
             for (std::size_t c = 0; c < 3; ++c)
-                matrix(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(node)) =
-                    double(records[node * record + c]);
+                matrix(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(node)) = double(records[place(node, c)]);
         return matrix;
     }
 };

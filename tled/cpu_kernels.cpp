@@ -1,4 +1,5 @@
-// The kernels of detail/cpu_elements-inl.hpp for every instruction set, law and scalar, chosen at run time.
+// The kernels of detail/cpu_fans-inl.hpp and detail/cpu_elements-inl.hpp for every instruction set, law and scalar,
+// chosen at run time.
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tled/cpu_kernels.cpp"
@@ -10,30 +11,31 @@
 
 #include "tled/detail/cpu_kernels.hpp"
 #include "tled/detail/cpu_elements-inl.hpp"
+#include "tled/detail/cpu_fans-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace tissuewarp::tled::detail {
 namespace HWY_NAMESPACE {
 
 template <class T>
-void element_forces_any(const KernelMaterial<T>& material, Kinematics kinematics, const ElementBatches<T>& elements,
-                        std::size_t begin, std::size_t end, const T* u, const T* pressure, T* force) {
+void patch_forces_any(const KernelMaterial<T>& material, Kinematics kinematics, const ElementBatches<T>& elements,
+                      const FanPatch& patch, const T* u, const T* pressure, PatchScratch<T>& scratch, T* force,
+                      T* shared) {
     with_law(material.law, [&]<class Law>() {
         const T* parameter = material.parameter.data();
         if (kinematics == Kinematics::T4)
-            element_forces_of<Law, Kinematics::T4>(parameter, elements, begin, end, u, pressure, force);
+            patch_forces_of<Law, Kinematics::T4>(parameter, elements, patch, u, pressure, scratch, force, shared);
         else
-            element_forces_of<Law, Kinematics::AveragedPressure>(parameter, elements, begin, end, u, pressure, force);
+            patch_forces_of<Law, Kinematics::AveragedPressure>(parameter, elements, patch, u, pressure, scratch, force,
+                                                               shared);
     });
 }
 
 template <class T>
 void hex_forces_any(const KernelMaterial<T>& material, const HexBatches<T>& hexahedra, std::size_t begin,
                     std::size_t end, const T* u, T* force) {
-    with_law(material.law, [&]<class Law>() {
-        element_forces_of<Law, Kinematics::T4>(material.parameter.data(), hexahedra, begin, end, u,
-                                               static_cast<const T*>(nullptr), force);
-    });
+    with_law(material.law,
+             [&]<class Law>() { hex_forces_of<Law>(material.parameter.data(), hexahedra, begin, end, u, force); });
 }
 
 template <class T>
@@ -42,15 +44,31 @@ void nodal_pressures_any(std::size_t law, const T* modulus, const T* change, T* 
 }
 
 // Highway dispatches plain functions: one name for each scalar type.
-void element_forces_f32(const KernelMaterial<float>& material, Kinematics kinematics,
-                        const ElementBatches<float>& elements, std::size_t begin, std::size_t end, const float* u,
-                        const float* pressure, float* force) {
-    element_forces_any(material, kinematics, elements, begin, end, u, pressure, force);
+void patch_forces_f32(const KernelMaterial<float>& material, Kinematics kinematics,
+                      const ElementBatches<float>& elements, const FanPatch& patch, const float* u,
+                      const float* pressure, PatchScratch<float>& scratch, float* force, float* shared) {
+    patch_forces_any(material, kinematics, elements, patch, u, pressure, scratch, force, shared);
 }
-void element_forces_f64(const KernelMaterial<double>& material, Kinematics kinematics,
-                        const ElementBatches<double>& elements, std::size_t begin, std::size_t end, const double* u,
-                        const double* pressure, double* force) {
-    element_forces_any(material, kinematics, elements, begin, end, u, pressure, force);
+void patch_volume_changes_f32(const ElementBatches<float>& elements, const FanPatch& patch, const float* u,
+                              PatchScratch<float>& scratch, float* change) {
+    patch_volume_changes_of(elements, patch, u, scratch, change);
+}
+void advance_nodes_f32(float momentum, float gain, const float* inverse_mass, const float* load, const float* force,
+                       const float* free, float* v, float* u, std::size_t count) {
+    advance_nodes_of(momentum, gain, inverse_mass, load, force, free, v, u, count);
+}
+void patch_forces_f64(const KernelMaterial<double>& material, Kinematics kinematics,
+                      const ElementBatches<double>& elements, const FanPatch& patch, const double* u,
+                      const double* pressure, PatchScratch<double>& scratch, double* force, double* shared) {
+    patch_forces_any(material, kinematics, elements, patch, u, pressure, scratch, force, shared);
+}
+void patch_volume_changes_f64(const ElementBatches<double>& elements, const FanPatch& patch, const double* u,
+                              PatchScratch<double>& scratch, double* change) {
+    patch_volume_changes_of(elements, patch, u, scratch, change);
+}
+void advance_nodes_f64(double momentum, double gain, const double* inverse_mass, const double* load,
+                       const double* force, const double* free, double* v, double* u, std::size_t count) {
+    advance_nodes_of(momentum, gain, inverse_mass, load, force, free, v, u, count);
 }
 void volume_changes_f32(const ElementBatches<float>& elements, std::size_t begin, std::size_t end, const float* u,
                         float* change) {
@@ -93,8 +111,12 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace tissuewarp::tled::detail {
 
-HWY_EXPORT(element_forces_f32);
-HWY_EXPORT(element_forces_f64);
+HWY_EXPORT(patch_forces_f32);
+HWY_EXPORT(patch_forces_f64);
+HWY_EXPORT(patch_volume_changes_f32);
+HWY_EXPORT(patch_volume_changes_f64);
+HWY_EXPORT(advance_nodes_f32);
+HWY_EXPORT(advance_nodes_f64);
 HWY_EXPORT(volume_changes_f32);
 HWY_EXPORT(volume_changes_f64);
 HWY_EXPORT(hex_forces_f32);
@@ -106,15 +128,36 @@ HWY_EXPORT(nodal_pressures_f64);
 HWY_EXPORT(target_name);
 
 template <>
-void element_forces(const KernelMaterial<float>& material, Kinematics kinematics, const ElementBatches<float>& elements,
-                    std::size_t begin, std::size_t end, const float* u, const float* pressure, float* force) {
-    HWY_DYNAMIC_DISPATCH(element_forces_f32)(material, kinematics, elements, begin, end, u, pressure, force);
+void patch_forces(const KernelMaterial<float>& material, Kinematics kinematics, const ElementBatches<float>& elements,
+                  const FanPatch& patch, const float* u, const float* pressure, PatchScratch<float>& scratch,
+                  float* force, float* shared) {
+    HWY_DYNAMIC_DISPATCH(patch_forces_f32)(material, kinematics, elements, patch, u, pressure, scratch, force, shared);
 }
 template <>
-void element_forces(const KernelMaterial<double>& material, Kinematics kinematics,
-                    const ElementBatches<double>& elements, std::size_t begin, std::size_t end, const double* u,
-                    const double* pressure, double* force) {
-    HWY_DYNAMIC_DISPATCH(element_forces_f64)(material, kinematics, elements, begin, end, u, pressure, force);
+void patch_volume_changes(const ElementBatches<float>& elements, const FanPatch& patch, const float* u,
+                          PatchScratch<float>& scratch, float* change) {
+    HWY_DYNAMIC_DISPATCH(patch_volume_changes_f32)(elements, patch, u, scratch, change);
+}
+template <>
+void advance_nodes(float momentum, float gain, const float* inverse_mass, const float* load, const float* force,
+                   const float* free, float* v, float* u, std::size_t count) {
+    HWY_DYNAMIC_DISPATCH(advance_nodes_f32)(momentum, gain, inverse_mass, load, force, free, v, u, count);
+}
+template <>
+void patch_forces(const KernelMaterial<double>& material, Kinematics kinematics, const ElementBatches<double>& elements,
+                  const FanPatch& patch, const double* u, const double* pressure, PatchScratch<double>& scratch,
+                  double* force, double* shared) {
+    HWY_DYNAMIC_DISPATCH(patch_forces_f64)(material, kinematics, elements, patch, u, pressure, scratch, force, shared);
+}
+template <>
+void patch_volume_changes(const ElementBatches<double>& elements, const FanPatch& patch, const double* u,
+                          PatchScratch<double>& scratch, double* change) {
+    HWY_DYNAMIC_DISPATCH(patch_volume_changes_f64)(elements, patch, u, scratch, change);
+}
+template <>
+void advance_nodes(double momentum, double gain, const double* inverse_mass, const double* load, const double* force,
+                   const double* free, double* v, double* u, std::size_t count) {
+    HWY_DYNAMIC_DISPATCH(advance_nodes_f64)(momentum, gain, inverse_mass, load, force, free, v, u, count);
 }
 template <>
 void volume_changes(const ElementBatches<float>& elements, std::size_t begin, std::size_t end, const float* u,

@@ -9,6 +9,7 @@
 // clang-format on
 
 #include "tled/detail/cpu_elements-inl.hpp"
+#include "tled/detail/cpu_fans-inl.hpp"
 #include "tled/detail/cpu_kernels.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -48,17 +49,18 @@ struct PronyRelaxation {
 };
 
 template <class T>
-void viscous_element_forces_any(const KernelMaterial<T>& material, ViscousBatches<T>& viscous, Advance advance,
-                                Kinematics kinematics, const ElementBatches<T>& elements, std::size_t begin,
-                                std::size_t end, const T* u, const T* pressure, T* force) {
+void viscous_patch_forces_any(const KernelMaterial<T>& material, ViscousBatches<T>& viscous, Advance advance,
+                              Kinematics kinematics, const ElementBatches<T>& elements, const FanPatch& patch,
+                              const T* u, const T* pressure, PatchScratch<T>& scratch, T* force, T* shared) {
     with_law(material.law, [&]<class Law>() {
         const T* parameter = material.parameter.data();
         const PronyRelaxation<T> relaxation{&viscous, advance};
         if (kinematics == Kinematics::T4)
-            element_forces_of<Law, Kinematics::T4>(parameter, elements, begin, end, u, pressure, force, relaxation);
+            patch_forces_of<Law, Kinematics::T4>(parameter, elements, patch, u, pressure, scratch, force, shared,
+                                                 relaxation);
         else
-            element_forces_of<Law, Kinematics::AveragedPressure>(parameter, elements, begin, end, u, pressure, force,
-                                                                 relaxation);
+            patch_forces_of<Law, Kinematics::AveragedPressure>(parameter, elements, patch, u, pressure, scratch, force,
+                                                               shared, relaxation);
     });
 }
 
@@ -66,23 +68,25 @@ template <class T>
 void viscous_hex_forces_any(const KernelMaterial<T>& material, ViscousBatches<T>& viscous, Advance advance,
                             const HexBatches<T>& hexahedra, std::size_t begin, std::size_t end, const T* u, T* force) {
     with_law(material.law, [&]<class Law>() {
-        element_forces_of<Law, Kinematics::T4>(material.parameter.data(), hexahedra, begin, end, u,
-                                               static_cast<const T*>(nullptr), force,
-                                               PronyRelaxation<T>{&viscous, advance});
+        hex_forces_of<Law>(material.parameter.data(), hexahedra, begin, end, u, force,
+                           PronyRelaxation<T>{&viscous, advance});
     });
 }
 
 // Highway dispatches plain functions: one name for each scalar type.
-void viscous_element_forces_f32(const KernelMaterial<float>& material, ViscousBatches<float>& viscous, Advance advance,
-                                Kinematics kinematics, const ElementBatches<float>& elements, std::size_t begin,
-                                std::size_t end, const float* u, const float* pressure, float* force) {
-    viscous_element_forces_any(material, viscous, advance, kinematics, elements, begin, end, u, pressure, force);
+void viscous_patch_forces_f32(const KernelMaterial<float>& material, ViscousBatches<float>& viscous, Advance advance,
+                              Kinematics kinematics, const ElementBatches<float>& elements, const FanPatch& patch,
+                              const float* u, const float* pressure, PatchScratch<float>& scratch, float* force,
+                              float* shared) {
+    viscous_patch_forces_any(material, viscous, advance, kinematics, elements, patch, u, pressure, scratch, force,
+                             shared);
 }
-void viscous_element_forces_f64(const KernelMaterial<double>& material, ViscousBatches<double>& viscous,
-                                Advance advance, Kinematics kinematics, const ElementBatches<double>& elements,
-                                std::size_t begin, std::size_t end, const double* u, const double* pressure,
-                                double* force) {
-    viscous_element_forces_any(material, viscous, advance, kinematics, elements, begin, end, u, pressure, force);
+void viscous_patch_forces_f64(const KernelMaterial<double>& material, ViscousBatches<double>& viscous, Advance advance,
+                              Kinematics kinematics, const ElementBatches<double>& elements, const FanPatch& patch,
+                              const double* u, const double* pressure, PatchScratch<double>& scratch, double* force,
+                              double* shared) {
+    viscous_patch_forces_any(material, viscous, advance, kinematics, elements, patch, u, pressure, scratch, force,
+                             shared);
 }
 void viscous_hex_forces_f32(const KernelMaterial<float>& material, ViscousBatches<float>& viscous, Advance advance,
                             const HexBatches<float>& hexahedra, std::size_t begin, std::size_t end, const float* u,
@@ -102,24 +106,26 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace tissuewarp::tled::detail {
 
-HWY_EXPORT(viscous_element_forces_f32);
-HWY_EXPORT(viscous_element_forces_f64);
+HWY_EXPORT(viscous_patch_forces_f32);
+HWY_EXPORT(viscous_patch_forces_f64);
 HWY_EXPORT(viscous_hex_forces_f32);
 HWY_EXPORT(viscous_hex_forces_f64);
 
 template <>
-void viscous_element_forces(const KernelMaterial<float>& material, ViscousBatches<float>& viscous, Advance advance,
-                            Kinematics kinematics, const ElementBatches<float>& elements, std::size_t begin,
-                            std::size_t end, const float* u, const float* pressure, float* force) {
-    HWY_DYNAMIC_DISPATCH(viscous_element_forces_f32)
-    (material, viscous, advance, kinematics, elements, begin, end, u, pressure, force);
+void viscous_patch_forces(const KernelMaterial<float>& material, ViscousBatches<float>& viscous, Advance advance,
+                          Kinematics kinematics, const ElementBatches<float>& elements, const FanPatch& patch,
+                          const float* u, const float* pressure, PatchScratch<float>& scratch, float* force,
+                          float* shared) {
+    HWY_DYNAMIC_DISPATCH(viscous_patch_forces_f32)
+    (material, viscous, advance, kinematics, elements, patch, u, pressure, scratch, force, shared);
 }
 template <>
-void viscous_element_forces(const KernelMaterial<double>& material, ViscousBatches<double>& viscous, Advance advance,
-                            Kinematics kinematics, const ElementBatches<double>& elements, std::size_t begin,
-                            std::size_t end, const double* u, const double* pressure, double* force) {
-    HWY_DYNAMIC_DISPATCH(viscous_element_forces_f64)
-    (material, viscous, advance, kinematics, elements, begin, end, u, pressure, force);
+void viscous_patch_forces(const KernelMaterial<double>& material, ViscousBatches<double>& viscous, Advance advance,
+                          Kinematics kinematics, const ElementBatches<double>& elements, const FanPatch& patch,
+                          const double* u, const double* pressure, PatchScratch<double>& scratch, double* force,
+                          double* shared) {
+    HWY_DYNAMIC_DISPATCH(viscous_patch_forces_f64)
+    (material, viscous, advance, kinematics, elements, patch, u, pressure, scratch, force, shared);
 }
 template <>
 void viscous_hex_forces(const KernelMaterial<float>& material, ViscousBatches<float>& viscous, Advance advance,

@@ -22,19 +22,25 @@ struct BatchLayout {
 };
 BatchLayout batch_layout(const std::vector<MaterialBlock>& blocks);
 
-template <class T>
-ElementBatches<T> element_batches(const RestState& rest, const BatchLayout& layout);
-template <class T>
-HexBatches<T> hex_batches(const HexState& hexahedra, const BatchLayout& layout);
+struct FanLayout;
 
-/// Slots of the tetrahedra of each pressure node.
-std::vector<std::uint32_t> pressure_slots(const PressureNodes& pressure, const BatchLayout& layout);
+template <class T>
+ElementBatches<T> element_batches(const RestState& rest, const FanLayout& layout);
+/// `internal` numbers the nodes of the mesh.
+template <class T>
+HexBatches<T> hex_batches(const HexState& hexahedra, const BatchLayout& layout,
+                          const std::vector<std::uint32_t>& internal);
 
-/// Corner-force records that the nodes gather: of their tetrahedra, then of their hexahedra, whose records follow.
-struct ForceLists {
-    std::vector<int> offset;
-    std::vector<std::uint32_t> entry;
+/// What is summed for each of a row of nodes: `entry` from offset[i] to offset[i + 1].
+struct SourceLists {
+    std::vector<std::uint32_t> offset, entry;
 };
-ForceLists force_lists(const RestState& rest, const BatchLayout& tetrahedra, const BatchLayout& hexahedra);
+
+/// Patch × local node, for each pressure node.
+SourceLists pressure_sources(const PressureNodes& pressure, const FanLayout& layout);
+
+/// For each internal node that is no patch's own: patch × local node, then the records of its hexahedra, which follow
+/// those of all patches.
+SourceLists force_sources(const RestState& rest, const FanLayout& layout, const BatchLayout& hexahedra);
 
 }  // namespace tissuewarp::tled::detail

@@ -16,6 +16,8 @@
 
 #include <hwy/highway.h>
 
+#include <type_traits>
+
 #include "tled/detail/cpu_kernels.hpp"
 #include "tled/detail/cpu_laws-inl.hpp"
 #include "tled/hex_state.hpp"
@@ -26,7 +28,7 @@ namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 template <class D, class T>
-Vec<D> gather(D d, const T* base, const std::int32_t* index) {
+HWY_INLINE Vec<D> gather(D d, const T* base, const std::int32_t* index) {
     const hn::RebindToSigned<D> di;
     if constexpr (sizeof(T) == 4)
         return hn::GatherIndex(d, base, hn::LoadU(di, index));
@@ -54,7 +56,7 @@ void displacement_gradient(D d, const ElementBatches<T>& elements, std::size_t b
 }
 
 template <class D>
-void cofactor(const Vec<D> (&A)[3][3], Vec<D> (&cof)[3][3]) {
+HWY_INLINE void cofactor(const Vec<D> (&A)[3][3], Vec<D> (&cof)[3][3]) {
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) {
             const int a = (i + 1) % 3, b = (i + 2) % 3, c = (j + 1) % 3, e = (j + 2) % 3;
@@ -62,26 +64,25 @@ void cofactor(const Vec<D> (&A)[3][3], Vec<D> (&cof)[3][3]) {
         }
 }
 
-/// Fills `cof_excess` with cof F − I = tr H I − Hᵀ + cof H, and `change` with J − 1 = tr H + tr cof H + det H.
+/// Fills all that follows from H; J − 1 = tr H + tr cof H + det H.
 template <class D>
-void finish_strain(Strain<D>& strain) {
-    auto& cof = strain.cof_excess;
-    cofactor<D>(strain.H, cof);  // cof H for now
-    const auto trace = strain.H[0][0] + strain.H[1][1] + strain.H[2][2];
-    const auto second = cof[0][0] + cof[1][1] + cof[2][2];
+HWY_INLINE void finish_strain(Strain<D>& strain) {
+    auto& Q = strain.Q;
+    cofactor<D>(strain.H, Q);  // cof H for now
+    strain.trace = strain.H[0][0] + strain.H[1][1] + strain.H[2][2];
+    const auto second = Q[0][0] + Q[1][1] + Q[2][2];
     const auto determinant =
-        hn::MulAdd(strain.H[0][0], cof[0][0], hn::MulAdd(strain.H[0][1], cof[0][1], strain.H[0][2] * cof[0][2]));
-    strain.change = trace + second + determinant;
-    for (int i = 0; i < 3; ++i) {
-        for (int j = 0; j < 3; ++j) cof[i][j] = cof[i][j] - strain.H[j][i];
-        cof[i][i] = cof[i][i] + trace;
-    }
+        hn::MulAdd(strain.H[0][0], Q[0][0], hn::MulAdd(strain.H[0][1], Q[0][1], strain.H[0][2] * Q[0][2]));
+    strain.higher = second + determinant;
+    strain.change = strain.trace + second + determinant;
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) Q[i][j] = strain.H[j][i] - Q[i][j];
 }
 
 /// J − 1 where J > 0, NaN elsewhere for laws that know no inverted state: Highway's logarithm gives a finite number for
 /// one, which would pass as a force.
 template <class Law, class D>
-Vec<D> admissible(D d, Vec<D> change) {
+HWY_INLINE Vec<D> admissible(D d, Vec<D> change) {
     if constexpr (Response<Law>::admits_inversion)
         return change;
     else
@@ -132,52 +133,6 @@ HexStrain<D> strain_of(D d, const HexBatches<T>& hexahedra, std::size_t batch, i
     return strain;
 }
 
-/// V p, kPa mm³, of hexahedra.
-template <class Law, Kinematics kinematics, class D, class T>
-Vec<D> scaled_pressure(D d, const HexBatches<T>& hexahedra, std::size_t batch, int lane, Vec<D> volume, Vec<D> change,
-                       const T* /*pressure*/) {
-    const auto modulus = hn::LoadU(d, &hexahedra.volumetric_modulus[batch * batch_width + lane]);
-    return volume * (modulus * Response<Law>::pressure_factor(d, change));
-}
-
-/// V p, kPa mm³.
-template <class Law, Kinematics kinematics, class D, class T>
-Vec<D> scaled_pressure(D d, const ElementBatches<T>& elements, std::size_t batch, int lane, Vec<D> volume,
-                       Vec<D> change, const T* pressure) {
-    if constexpr (kinematics == Kinematics::AveragedPressure) {
-        const std::int32_t* node = &elements.pressure[batch * 4 * batch_width + static_cast<std::size_t>(lane)];
-        const auto sum = gather(d, pressure, node) + gather(d, pressure, node + batch_width) +
-                         gather(d, pressure, node + 2 * batch_width) + gather(d, pressure, node + 3 * batch_width);
-        return volume * (sum * hn::Set(d, T(0.25)));
-    } else {
-        const auto modulus =
-            hn::LoadU(d, &elements.volumetric_modulus[batch * batch_width + static_cast<std::size_t>(lane)]);
-        return volume * (modulus * Response<Law>::pressure_factor(d, change));
-    }
-}
-
-/// f_a = V P ∂N_a/∂X for the scaled stress V P; the first corner takes minus the sum of the others.
-template <class D, class T>
-void store_corner_forces(D d, const ElementBatches<T>& elements, std::size_t batch, int lane,
-                         const Strain<D>& /*strain*/, const Vec<D> (&P)[3][3], T* force) {
-    const T* gradient = &elements.gradient[batch * 9 * batch_width + static_cast<std::size_t>(lane)];
-    T* out = force + (batch * 4 * batch_width + static_cast<std::size_t>(lane)) * record;
-    const auto zero = hn::Zero(d);
-    Vec<D> f0[3] = {zero, zero, zero};
-    for (int k = 0; k < 3; ++k) {
-        const auto b0 = hn::LoadU(d, gradient + 3 * k * batch_width);
-        const auto b1 = hn::LoadU(d, gradient + (3 * k + 1) * batch_width);
-        const auto b2 = hn::LoadU(d, gradient + (3 * k + 2) * batch_width);
-        Vec<D> f[3];
-        for (int i = 0; i < 3; ++i) {
-            f[i] = hn::MulAdd(P[i][0], b0, hn::MulAdd(P[i][1], b1, P[i][2] * b2));
-            f0[i] = f0[i] - f[i];
-        }
-        hn::StoreInterleaved4(f[0], f[1], f[2], zero, d, out + (k + 1) * batch_width * record);
-    }
-    hn::StoreInterleaved4(f0[0], f0[1], f0[2], zero, d, out);
-}
-
 /// f_I = (V P − k Σ_α q_α ⊗ X^Γ_α) ∂N_I/∂X + k Σ_α Γ_αI q_α; the first corner takes minus the sum of the others.
 template <class D, class T>
 void store_corner_forces(D d, const HexBatches<T>& hexahedra, std::size_t batch, int lane, const HexStrain<D>& strain,
@@ -214,37 +169,53 @@ void store_corner_forces(D d, const HexBatches<T>& hexahedra, std::size_t batch,
 }
 
 /// Elastic tissue: nothing happens to the stress of a batch.
-struct Elastic {
-    template <class D>
-    void operator()(D /*d*/, std::size_t /*batch*/, int /*lane*/, const Strain<D>& /*strain*/,
-                    Vec<D> (&/*P*/)[3][3]) const {}
-};
+struct Elastic {};
 
-/// `after_shear(d, batch, lane, strain, P)` may change the shear stress P (times volume) of each batch. Hexahedra have
-/// no averaged pressure: their `kinematics` is T4.
-template <class Law, Kinematics kinematics, class T, class Batches, class AfterShear = Elastic>
-void element_forces_of(const T* parameter, const Batches& elements, std::size_t begin, std::size_t end, const T* u,
-                       const T* pressure, T* force, const AfterShear& after_shear = {}) {
+/// P times `volume`: of the law's shear part, what `after_shear(d, batch, lane, strain, P)` makes of it, and
+/// `scaled_pressure` (V p) times cof F.
+template <class Law, class D, class AfterShear>
+HWY_INLINE void stress(D d, std::size_t batch, int lane, const Strain<D>& strain, const Tissue<D>& tissue,
+                       Vec<D> volume, Vec<D> scaled_pressure, const AfterShear& after_shear, Vec<D> (&P)[3][3]) {
+    if constexpr (has_factors<Law, D> && std::is_same_v<AfterShear, Elastic>) {
+        auto factors = Response<Law>::shear_factors(d, strain, tissue, volume);
+        factors.of_cof_F = factors.of_cof_F + scaled_pressure;
+        stress_of<D>(factors, strain, hn::Set(d, 1) + strain.change, P);
+    } else {
+        shear_stress<Law>(d, strain, tissue, volume, P);
+        if constexpr (!std::is_same_v<AfterShear, Elastic>) after_shear(d, batch, lane, strain, P);
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j) P[i][j] = hn::MulAdd(scaled_pressure, cof(d, strain, i, j), P[i][j]);
+    }
+}
+
+/// What the law knows of a batch.
+template <class Law, class D, class T, class Batches>
+HWY_INLINE Tissue<D> tissue_of(D d, const T* parameter, const Batches& elements, std::size_t batch, int lane) {
+    Tissue<D> tissue;
+    tissue.parameter = parameter;
+    if constexpr (Response<Law>::has_fibre)
+        for (int c = 0; c < 3; ++c)
+            tissue.fibre[c] = hn::LoadU(d, &elements.fibre[(batch * 3 + c) * batch_width + lane]);
+    return tissue;
+}
+
+template <class Law, class T, class AfterShear = Elastic>
+void hex_forces_of(const T* parameter, const HexBatches<T>& hexahedra, std::size_t begin, std::size_t end, const T* u,
+                   T* force, const AfterShear& after_shear = {}) {
     const hn::CappedTag<T, batch_width> d;
     using D = hn::CappedTag<T, batch_width>;
     const int lanes = static_cast<int>(hn::Lanes(d));
     for (std::size_t batch = begin; batch < end; ++batch)
         for (int lane = 0; lane < batch_width; lane += lanes) {
-            auto strain = strain_of(d, elements, batch, lane, u);
+            auto strain = strain_of(d, hexahedra, batch, lane, u);
             strain.change = admissible<Law>(d, strain.change);
-            Tissue<D> tissue;
-            tissue.parameter = parameter;
-            if constexpr (Response<Law>::has_fibre)
-                for (int c = 0; c < 3; ++c)
-                    tissue.fibre[c] = hn::LoadU(d, &elements.fibre[(batch * 3 + c) * batch_width + lane]);
-            const auto volume = hn::LoadU(d, &elements.volume[batch * batch_width + static_cast<std::size_t>(lane)]);
+            const auto volume = hn::LoadU(d, &hexahedra.volume[batch * batch_width + lane]);
+            const auto modulus = hn::LoadU(d, &hexahedra.volumetric_modulus[batch * batch_width + lane]);
+            const auto pressure = volume * (modulus * Response<Law>::pressure_factor(d, strain.change));
             Vec<D> P[3][3];
-            Response<Law>::shear_stress(d, strain, tissue, volume, P);
-            after_shear(d, batch, lane, strain, P);
-            const auto p = scaled_pressure<Law, kinematics>(d, elements, batch, lane, volume, strain.change, pressure);
-            for (int i = 0; i < 3; ++i)
-                for (int j = 0; j < 3; ++j) P[i][j] = hn::MulAdd(p, cof(d, strain, i, j), P[i][j]);
-            store_corner_forces(d, elements, batch, lane, strain, P, force);
+            stress<Law>(d, batch, lane, strain, tissue_of<Law, D>(d, parameter, hexahedra, batch, lane), volume,
+                        pressure, after_shear, P);
+            store_corner_forces(d, hexahedra, batch, lane, strain, P, force);
         }
 }
 

@@ -1,5 +1,5 @@
-// The shear stress of every law for a batch of elements, in terms of H = F − I, cof F and J − 1, so that float32 keeps
-// small strains. Included once for each instruction set (Highway's convention for -inl files).
+// The shear stress of every law for a batch of elements, in terms of H = F − I, Hᵀ − cof H and J − 1, so that float32
+// keeps small strains. Included once for each instruction set (Highway's convention for -inl files).
 
 // clang-format off
 #if defined(TISSUEWARP_CPU_LAWS_INL) == defined(HWY_TARGET_TOGGLE)
@@ -25,17 +25,20 @@ using Vec = hn::Vec<D>;
 template <class D>
 using Scalar = hn::TFromD<D>;
 
-/// Kinematics of a batch of elements: H, cof F − I and J − 1.
+/// Kinematics of a batch of elements, without the units whose place their small numbers would fall below.
 template <class D>
 struct Strain {
-    Vec<D> H[3][3];
-    Vec<D> cof_excess[3][3];  // cof F − I, whose small numbers the 1 of cof F would round away
-    Vec<D> change;            // J − 1
+    Vec<D> H[3][3];  // F − I
+    Vec<D> Q[3][3];  // Hᵀ − cof H
+    Vec<D> trace;    // tr H
+    Vec<D> higher;   // J − 1 − tr H
+    Vec<D> change;   // J − 1
 };
 
+/// cof F = (1 + tr H) I − Hᵀ + cof H.
 template <class D>
-Vec<D> cof(D d, const Strain<D>& strain, int i, int j) {
-    return i == j ? strain.cof_excess[i][i] + hn::Set(d, 1) : strain.cof_excess[i][j];
+HWY_INLINE Vec<D> cof(D d, const Strain<D>& strain, int i, int j) {
+    return i == j ? hn::Set(d, 1) + strain.trace - strain.Q[i][i] : hn::Neg(strain.Q[i][j]);
 }
 
 /// What a law knows beside the strain: its parameters (detail/kernel_parameters.hpp), and the fibre where it has one.
@@ -47,22 +50,21 @@ struct Tissue {
 
 /// a·b of three components.
 template <class D>
-Vec<D> dot(const Vec<D> (&a)[3], const Vec<D> (&b)[3]) {
+HWY_INLINE Vec<D> dot(const Vec<D> (&a)[3], const Vec<D> (&b)[3]) {
     return hn::MulAdd(a[0], b[0], hn::MulAdd(a[1], b[1], a[2] * b[2]));
 }
 
-/// J F − cof F = J H + (J I − cof F), without the cancelling unit parts: J I − cof F = (J − 1) I − (cof F − I).
+/// J F − cof F = J H + (J I − cof F), without the cancelling unit parts: J I − cof F = (J − 1 − tr H) I + Hᵀ − cof H.
 template <class D>
-Vec<D> stretch_difference(const Strain<D>& strain, Vec<D> J, int i, int j) {
-    const auto difference = hn::MulSub(J, strain.H[i][j], strain.cof_excess[i][j]);
-    return i == j ? difference + strain.change : difference;
+HWY_INLINE Vec<D> stretch_difference(const Strain<D>& strain, Vec<D> J, int i, int j) {
+    const auto difference = hn::MulAdd(J, strain.H[i][j], strain.Q[i][j]);
+    return i == j ? difference + strain.higher : difference;
 }
 
 /// tr C − 3 = 2 tr H + H : H.
 template <class D>
-Vec<D> trace_excess(const Strain<D>& strain) {
-    const auto trace = strain.H[0][0] + strain.H[1][1] + strain.H[2][2];
-    auto excess = trace + trace;
+HWY_INLINE Vec<D> trace_excess(const Strain<D>& strain) {
+    auto excess = strain.trace + strain.trace;
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) excess = hn::MulAdd(strain.H[i][j], strain.H[i][j], excess);
     return excess;
@@ -70,7 +72,7 @@ Vec<D> trace_excess(const Strain<D>& strain) {
 
 /// C − I = H + Hᵀ + Hᵀ H.
 template <class D>
-void strain_excess(const Strain<D>& strain, Vec<D> (&E)[3][3]) {
+HWY_INLINE void strain_excess(const Strain<D>& strain, Vec<D> (&E)[3][3]) {
     for (int i = 0; i < 3; ++i)
         for (int j = i; j < 3; ++j) {
             auto sum = strain.H[i][j] + strain.H[j][i];
@@ -79,17 +81,81 @@ void strain_excess(const Strain<D>& strain, Vec<D> (&E)[3][3]) {
         }
 }
 
-/// P of the law's shear part times `volume`, and U'(J).
+/// First Piola–Kirchhoff stress of a law of tr C and J, as most are: scale (J F − cof F) + of_cof_F cof F.
+template <class D>
+struct StressFactors {
+    Vec<D> scale, of_cof_F;
+};
+
+/// The difference is scaled as a whole: a rounding error of one of its terms alone would be a stress whose moments do
+/// not balance, which turns a rotating body faster or slower and drains the energy of a swinging one.
+template <class D>
+HWY_INLINE void stress_of(const StressFactors<D>& f, const Strain<D>& strain, Vec<D> J, Vec<D> (&P)[3][3]) {
+    const auto pressure = hn::MulAdd(f.of_cof_F, strain.trace, f.of_cof_F);
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            const auto difference = f.scale * stretch_difference(strain, J, i, j);
+            P[i][j] = hn::NegMulAdd(f.of_cof_F, strain.Q[i][j], i == j ? difference + pressure : difference);
+        }
+}
+
+/// ln(1 + x) for x > −1, to two units in the last place. For float32 by the polynomial of Moshier's Cephes (logf) for
+/// ln(1 + f) on √½ ≤ 1 + f < √2, which divides by nothing.
+template <class D>
+HWY_INLINE Vec<D> log_1p(D d, Vec<D> x) {
+    if constexpr (sizeof(Scalar<D>) == 8) {
+        return hn::Log1p(d, x);
+    } else {
+        constexpr float factors[] = {-1.1514610310e-1F, 1.1676998740e-1F, -1.2420140846e-1F, 1.4249322787e-1F,
+                                     -1.6668057665e-1F, 2.0000714765e-1F, -2.4999993993e-1F, 3.3333331174e-1F};
+        const hn::RebindToSigned<D> di;
+        const auto one = hn::Set(d, 1), y = one + x;
+        // y = 2^k (1 + f): the bits above those of √½ count powers of two.
+        const auto above = hn::BitCast(di, y) - hn::Set(di, 0x3f3504f3);
+        const auto k = hn::ShiftRight<23>(above);
+        const auto scaled = hn::BitCast(d, hn::BitCast(di, y) - hn::ShiftLeft<23>(k)) - one;
+        const auto power = hn::ConvertTo(d, k);
+        const auto f = hn::IfThenElse(power == hn::Zero(d), x, scaled);
+        auto series = hn::Set(d, 7.0376836292e-2F);
+        for (const float factor : factors) series = hn::MulAdd(series, f, hn::Set(d, factor));
+        const auto square = f * f;
+        const auto log = hn::MulAdd(square, hn::MulSub(f, series, hn::Set(d, 0.5F)), f);
+        return hn::MulAdd(power, hn::Set(d, 0.693147181F), log);
+    }
+}
+
+/// P of the law's shear part times `volume`, and U'(J). A law of tr C and J says its P as `shear_factors`.
 template <class Law>
 struct Response;
+
+template <class Law, class D>
+concept has_factors = requires(D d, const Strain<D>& strain, const Tissue<D>& tissue, Vec<D> volume) {
+    Response<Law>::shear_factors(d, strain, tissue, volume);
+};
+
+template <class Law, class D>
+HWY_INLINE void shear_stress(D d, const Strain<D>& strain, const Tissue<D>& tissue, Vec<D> volume, Vec<D> (&P)[3][3]) {
+    if constexpr (has_factors<Law, D>) {
+        const auto factors = Response<Law>::shear_factors(d, strain, tissue, volume);
+        stress_of<D>(factors, strain, hn::Set(d, 1) + strain.change, P);
+    } else {
+        Response<Law>::shear_stress(d, strain, tissue, volume, P);
+    }
+}
 
 /// U = (J − 1)²/2.
 struct QuadraticVolume {
     template <class D>
-    static Vec<D> pressure_factor(D, Vec<D> change) {
+    static HWY_INLINE Vec<D> pressure_factor(D, Vec<D> change) {
         return change;
     }
 };
+
+template <class D>
+HWY_INLINE Vec<D> reciprocal_J(D d, Vec<D> change) {
+    const auto one = hn::Set(d, 1);
+    return one / (one + change);
+}
 
 template <>
 struct Response<NeoHookeanLnJ> {
@@ -97,16 +163,14 @@ struct Response<NeoHookeanLnJ> {
 
     /// P = μ (F − F^−T) = μ/J (J F − cof F)
     template <class D>
-    static void shear_stress(D d, const Strain<D>& strain, const Tissue<D>& tissue, Vec<D> volume, Vec<D> (&P)[3][3]) {
-        const auto J = hn::Set(d, 1) + strain.change;
-        const auto scale = volume * hn::Set(d, tissue.parameter[0]) / J;
-        for (int i = 0; i < 3; ++i)
-            for (int j = 0; j < 3; ++j) P[i][j] = scale * stretch_difference(strain, J, i, j);
+    static HWY_INLINE StressFactors<D> shear_factors(D d, const Strain<D>& strain, const Tissue<D>& tissue,
+                                                     Vec<D> volume) {
+        return {volume * hn::Set(d, tissue.parameter[0]) * reciprocal_J(d, strain.change), hn::Zero(d)};
     }
     /// U' = ln J / J
     template <class D>
-    static Vec<D> pressure_factor(D d, Vec<D> change) {
-        return hn::Log1p(d, change) / (hn::Set(d, 1) + change);
+    static HWY_INLINE Vec<D> pressure_factor(D d, Vec<D> change) {
+        return log_1p(d, change) * reciprocal_J(d, change);
     }
 };
 
@@ -115,9 +179,10 @@ struct Response<NeoHookeanStable> : QuadraticVolume {
     static constexpr bool admits_inversion = true, has_fibre = false;
 
     /// P = μ' (1 − 1/(tr C + 1)) F − ¾ μ' cof F; with tr C + 1 = 4 + x the bracket of F is ¾ + x/(4 (4 + x)), so
-    /// P = μ' [¾ (F − cof F) + x/(4 (4 + x)) F].
+    /// P = μ' [¾ (F − cof F) + x/(4 (4 + x)) F] with F − cof F = H + Hᵀ − cof H − tr H I.
     template <class D>
-    static void shear_stress(D d, const Strain<D>& strain, const Tissue<D>& tissue, Vec<D> volume, Vec<D> (&P)[3][3]) {
+    static HWY_INLINE void shear_stress(D d, const Strain<D>& strain, const Tissue<D>& tissue, Vec<D> volume,
+                                        Vec<D> (&P)[3][3]) {
         const auto one = hn::Set(d, 1), excess = trace_excess(strain);
         const auto mu = volume * hn::Set(d, tissue.parameter[0]);
         const auto three_quarters = mu * hn::Set(d, Scalar<D>(0.75));
@@ -125,26 +190,26 @@ struct Response<NeoHookeanStable> : QuadraticVolume {
         const auto growth = mu * excess / (four * (four + excess));
         for (int i = 0; i < 3; ++i)
             for (int j = 0; j < 3; ++j) {
-                const auto F = i == j ? strain.H[i][j] + one : strain.H[i][j];
-                P[i][j] = hn::MulAdd(three_quarters, strain.H[i][j] - strain.cof_excess[i][j], growth * F);
+                auto F = strain.H[i][j], difference = strain.H[i][j] + strain.Q[i][j];
+                if (i == j) {
+                    F = F + one;
+                    difference = difference - strain.trace;
+                }
+                P[i][j] = hn::MulAdd(three_quarters, difference, growth * F);
             }
     }
 };
 
 /// ln J^(−1/3) and the powers that isochoric laws take of it.
 template <class D>
-Vec<D> isochoric_exponent(D d, const Strain<D>& strain) {
-    return hn::Log1p(d, strain.change) * hn::Set(d, Scalar<D>(-1.0 / 3));
+HWY_INLINE Vec<D> isochoric_exponent(D d, const Strain<D>& strain) {
+    return log_1p(d, strain.change) * hn::Set(d, Scalar<D>(-1.0 / 3));
 }
 
-/// Adds 2 ψ₁ J^(−2/3) (F − I₁/3 F^−T) = 2 ψ₁ J^(−5/3) (J F − cof F − (I₁/3 − 1) cof F).
+/// 2 ψ₁ J^(−2/3) (F − I₁/3 F^−T) = 2 ψ₁ J^(−5/3) (J F − cof F − (I₁/3 − 1) cof F).
 template <class D>
-void set_first_invariant_stress(D d, const Strain<D>& strain, Vec<D> excess, Vec<D> scale, Vec<D> (&P)[3][3]) {
-    const auto J = hn::Set(d, 1) + strain.change;
-    const auto third = excess * hn::Set(d, Scalar<D>(1.0 / 3));
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j)
-            P[i][j] = scale * hn::NegMulAdd(third, cof(d, strain, i, j), stretch_difference(strain, J, i, j));
+HWY_INLINE StressFactors<D> first_invariant_factors(D d, Vec<D> excess, Vec<D> scale) {
+    return {scale, scale * excess * hn::Set(d, Scalar<D>(-1.0 / 3))};
 }
 
 template <>
@@ -153,10 +218,11 @@ struct Response<NeoHookeanIso> : QuadraticVolume {
 
     /// ψ₁ = μ/2
     template <class D>
-    static void shear_stress(D d, const Strain<D>& strain, const Tissue<D>& tissue, Vec<D> volume, Vec<D> (&P)[3][3]) {
+    static HWY_INLINE StressFactors<D> shear_factors(D d, const Strain<D>& strain, const Tissue<D>& tissue,
+                                                     Vec<D> volume) {
         const auto scale =
             volume * hn::Set(d, tissue.parameter[0]) * hn::Exp(d, isochoric_exponent(d, strain) * hn::Set(d, 5));
-        set_first_invariant_stress(d, strain, trace_excess(strain), scale, P);
+        return first_invariant_factors(d, trace_excess(strain), scale);
     }
 };
 
@@ -166,19 +232,20 @@ struct Response<ArrudaBoyce> {
 
     /// ψ₁ = Σ k_i Ī₁^(i−1)
     template <class D>
-    static void shear_stress(D d, const Strain<D>& strain, const Tissue<D>& tissue, Vec<D> volume, Vec<D> (&P)[3][3]) {
+    static HWY_INLINE StressFactors<D> shear_factors(D d, const Strain<D>& strain, const Tissue<D>& tissue,
+                                                     Vec<D> volume) {
         const auto excess = trace_excess(strain);
         const auto exponent = isochoric_exponent(d, strain);
         const auto j = hn::Exp(d, exponent + exponent);
         const auto invariant = j * (excess + hn::Set(d, 3));
         auto psi = hn::Set(d, tissue.parameter[4]);
         for (int i = 3; i >= 0; --i) psi = hn::MulAdd(psi, invariant, hn::Set(d, tissue.parameter[i]));
-        const auto scale = volume * (psi + psi) * j / (hn::Set(d, 1) + strain.change);
-        set_first_invariant_stress(d, strain, excess, scale, P);
+        const auto scale = volume * (psi + psi) * j * reciprocal_J(d, strain.change);
+        return first_invariant_factors(d, excess, scale);
     }
     /// U' = (J − 1/J)/2 = x (2 + x)/(2 (1 + x)) with x = J − 1
     template <class D>
-    static Vec<D> pressure_factor(D d, Vec<D> change) {
+    static HWY_INLINE Vec<D> pressure_factor(D d, Vec<D> change) {
         const auto one = hn::Set(d, 1), J = one + change;
         return change * (one + J) / (J + J);
     }
@@ -209,7 +276,7 @@ struct Response<Polynomial> : QuadraticVolume {
 
         const auto J = set(1) + strain.change, inverse_J = set(1) / J;
         const auto two_volume = volume + volume;
-        set_first_invariant_stress(d, strain, t, two_volume * psi_1 * j * inverse_J, P);
+        stress_of<D>(first_invariant_factors(d, t, two_volume * psi_1 * j * inverse_J), strain, J, P);
         const auto scale = two_volume * psi_2 * j * j;
         const auto q = hn::MulAdd(set(4.0 / 3), t, set(1.0 / 3) * minors) * inverse_J;
         const auto two_over_J = inverse_J + inverse_J;
@@ -231,7 +298,7 @@ struct Response<TransverselyIsotropic> : QuadraticVolume {
     /// P of the isochoric neo-Hookean law and 2 η (Ī₄ − 1) J^(−2/3) (f aᵀ − I₄/3 G) with f = F a.
     template <class D>
     static void shear_stress(D d, const Strain<D>& strain, const Tissue<D>& tissue, Vec<D> volume, Vec<D> (&P)[3][3]) {
-        Response<NeoHookeanIso>::shear_stress(d, strain, tissue, volume, P);
+        detail::HWY_NAMESPACE::shear_stress<NeoHookeanIso>(d, strain, tissue, volume, P);
         Vec<D> stretch[3], f[3];  // H a, F a
         for (int i = 0; i < 3; ++i) {
             stretch[i] = dot<D>(strain.H[i], tissue.fibre);
@@ -297,7 +364,7 @@ struct Response<Ogden> : QuadraticVolume {
         const auto exponent = isochoric_exponent(d, strain);
         const auto half = hn::Set(d, Scalar<D>(0.5)), third = hn::Set(d, Scalar<D>(1.0 / 3)), one = hn::Set(d, 1);
         Vec<D> log_stretch[3], T[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};  // ln λ̄_i
-        for (int i = 0; i < 3; ++i) log_stretch[i] = hn::MulAdd(half, hn::Log1p(d, E[i][i]), exponent);
+        for (int i = 0; i < 3; ++i) log_stretch[i] = hn::MulAdd(half, log_1p(d, E[i][i]), exponent);
         for (int term = 0; term < 3; ++term) {
             if (tissue.parameter[2 * term] == Scalar<D>(0)) continue;
             const auto modulus = hn::Set(d, tissue.parameter[2 * term]);

@@ -1,0 +1,78 @@
+#include "benchmarks/stretched_cube.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace tissuewarp::stretched_cube {
+
+namespace {
+
+/// The same rest state, of one material, under another law of the same moduli at rest.
+void use_law(tled::RestState& rest, const tled::Material& material) {
+    rest.materials = {material};
+    const double modulus = tled::volumetric_modulus(material);
+    if (rest.pressure.count() == 0) rest.volumetric_modulus.setConstant(modulus);
+    rest.pressure.modulus.setConstant(modulus);
+}
+
+}  // namespace
+
+Scene stretched(meshing::TetMesh mesh, double stretch) {
+    Scene scene;
+    scene.mesh = std::move(mesh);
+    const Eigen::RowVectorXd z = scene.mesh.nodes.row(2);
+    const double bottom = z.minCoeff(), height = z.maxCoeff() - bottom;
+    const int count = scene.mesh.node_count();
+    scene.start = Eigen::Matrix3Xd::Zero(3, count);
+    tled::Conditions conditions;
+    for (int node = 0; node < count; ++node) {
+        const double part = (z[node] - bottom) / height;
+        scene.start(2, node) = stretch * height * part;
+        if (part < 0.01 || part > 0.99)
+            conditions.prescribed.push_back({node, {true, true, true}, scene.start.col(node)});
+    }
+    scene.conditions = tled::nodal_conditions(conditions, count);
+    return scene;
+}
+
+std::vector<Variant> variants(const Scene& scene, const std::string& element, const std::string& law) {
+    const tled::NeoHookeanLnJ lnj{shear, lambda};
+    const tled::NeoHookeanIso iso{shear, lambda + 2 * shear / 3};
+    std::vector<Variant> result;
+    for (const bool averaged : {false, true}) {
+        if (!element.empty() && (element == "averaged") != averaged) continue;
+        tled::Model model;
+        model.mesh = scene.mesh;
+        model.materials[1] = lnj;
+        model.element = averaged ? tled::Element::AveragedPressureT4 : tled::Element::T4;
+        tled::RestState rest = tled::rest_state(model);
+        const std::string name = averaged ? "averaged " : "T4 ";
+        if (law != "iso") result.push_back({name + "lnJ", rest});
+        if (law == "lnj") continue;
+        use_law(rest, iso);
+        result.push_back({name + "iso", std::move(rest)});
+    }
+    return result;
+}
+
+tled::StepCoefficients coefficients(const tled::RestState& rest) {
+    double sum = 0;
+    for (int e = 0; e < rest.element_count(); ++e) {
+        const auto gradient = rest.gradient.col(e).reshaped(3, 3);
+        sum = std::max(sum, gradient.squaredNorm() + gradient.rowwise().sum().squaredNorm());
+    }
+    const double time_step = 0.9 * 2 / std::sqrt(4 * (lambda + 2 * shear) / density * sum);  // s
+    return {(1 - 0.01) / (1 + 0.01), time_step * time_step / (1 + 0.01)};
+}
+
+double now() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+double median(std::vector<double> values) {
+    std::sort(values.begin(), values.end());
+    return values[values.size() / 2];
+}
+
+}  // namespace tissuewarp::stretched_cube
