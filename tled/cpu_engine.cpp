@@ -5,8 +5,9 @@
 #include "core/errors.hpp"
 #include "tled/detail/cpu_batches.hpp"
 #include "tled/detail/cpu_kernels.hpp"
+#include "tled/detail/cpu_pressures.hpp"
+#include "tled/detail/cpu_springs.hpp"
 #include "tled/detail/fan_layout.hpp"
-#include "tled/detail/kernel_parameters.hpp"
 #include "tled/detail/parallel.hpp"
 #include "tled/detail/prony_coefficients.hpp"
 #include "tled/engine.hpp"
@@ -30,18 +31,6 @@ using detail::FanPatch;
 using detail::Kinematics;
 using detail::record;
 
-template <class T>
-std::vector<detail::KernelMaterial<T>> kernel_materials(const RestState& rest) {
-    std::vector<detail::KernelMaterial<T>> result;
-    for (const Material& material : rest.materials) {
-        detail::KernelMaterial<T> entry{material.index(), {}};
-        const detail::KernelParameters parameters = detail::kernel_parameters(material);
-        std::transform(parameters.begin(), parameters.end(), entry.parameter.begin(), [](double p) { return T(p); });
-        result.push_back(entry);
-    }
-    return result;
-}
-
 void require_columns(Eigen::Index columns, std::size_t nodes, const char* what) {
     if (static_cast<std::size_t>(columns) != nodes)
         throw InvalidInput(std::string(what) + " has " + std::to_string(columns) + " columns; the model has " +
@@ -59,7 +48,7 @@ public:
           elements_(detail::element_batches<T>(rest, fans)),
           hex_layout_(detail::batch_layout(rest.hexahedra.blocks)),
           hexahedra_(detail::hex_batches<T>(rest.hexahedra, hex_layout_, fans.internal)),
-          materials_(kernel_materials<T>(rest)),
+          materials_(detail::kernel_materials<T>(rest)),
           kinematics_(rest.pressure.count() > 0 ? Kinematics::AveragedPressure : Kinematics::T4),
           node_count_(static_cast<std::size_t>(rest.node_count)),
           tet_(rest.tet),
@@ -67,13 +56,13 @@ public:
           admits_inversion_(tled::admits_inversion(rest)),
           internal_(fans.internal),
           own_nodes_(fans.own_nodes),
-          sources_(detail::force_sources(rest, fans, hex_layout_)) {
+          sources_(detail::force_sources(rest, fans, hex_layout_)),
+          pressures_(rest.pressure, fans) {
         const std::size_t vector_size = node_count_ * record;
         displacement_.assign(vector_size, T(0));
         increment_ = scratch_ = force_load_ = force_ = displacement_;
         inverse_mass_.assign(vector_size, T(0));
         contribution_.assign(first_hex_force() + hexahedra_.count() * 8 * batch_width * record, T(0));
-        if (kinematics_ == Kinematics::AveragedPressure) prepare_pressure(rest.pressure, fans);
         prepare_viscosity(rest);
         free_.assign(vector_size, T(1));
         for (std::size_t node = 0; node < node_count_; ++node) free_[node * record + 3] = T(0);
@@ -85,17 +74,7 @@ public:
 
     void set_conditions(const NodalConditions& conditions) override {
         require_columns(conditions.constrained.cols(), node_count_, "the set of conditions");
-        springs_.clear();
-        for (std::size_t s = 0; s < conditions.spring_node.size(); ++s) {
-            const auto column = static_cast<Eigen::Index>(s);
-            Spring spring{internal_[static_cast<std::size_t>(conditions.spring_node[s])], {}};
-            for (int k = 0; k < 6; ++k)
-                spring.k[static_cast<std::size_t>(k)] = T(conditions.spring_stiffness(k, column));
-            for (int k = 0; k < 3; ++k)
-                spring.k[static_cast<std::size_t>(6 + k)] = T(conditions.spring_force(k, column));
-            springs_.push_back(spring);
-        }
-        std::sort(springs_.begin(), springs_.end(), [](const Spring& x, const Spring& y) { return x.node < y.node; });
+        springs_ = detail::CpuSprings<T>(conditions, internal_);
         for (std::size_t node = 0; node < node_count_; ++node)
             for (std::size_t c = 0; c < 3; ++c) {
                 const auto row = static_cast<Eigen::Index>(c), column = static_cast<Eigen::Index>(node);
@@ -158,7 +137,7 @@ public:
         T* u = displacement_.data();
         for (int step = 0; step < steps; ++step)
             sum_forces(u, Advance::Yes, [&](std::size_t begin, std::size_t end) {
-                add_springs(u, begin, end);
+                springs_.take_off(u, begin, end, force_.data());
                 const std::size_t at = begin * record;
                 detail::advance_nodes(momentum, gain, &inverse_mass_[at], &force_load_[at], &force_[at], &free_[at],
                                       &increment_[at], u + at, end - begin);
@@ -243,10 +222,8 @@ private:
     std::vector<T> contribution_;          // records by patch × local node, then corner forces of hexahedra
     tbb::enumerable_thread_specific<detail::PatchScratch<T>> patch_scratch_;
 
-    // averaged pressure
-    detail::SourceLists pressure_sources_;  // of `patch_change_`
-    std::vector<T> patch_change_, inverse_pressure_volume_, pressure_modulus_, nodal_change_, nodal_pressure_;
-    std::vector<BatchBlock> pressure_runs_;  // runs of pressure nodes that share a material
+    detail::CpuPressures<T> pressures_;
+    detail::CpuSprings<T> springs_;
 
     // by material, for tetrahedra and then again for hexahedra; empty where none is viscous
     std::vector<PronySeries> viscosity_;
@@ -263,31 +240,8 @@ private:
     // records of four per internal node
     std::vector<T> displacement_, increment_, inverse_mass_, force_load_, free_, force_, scratch_;
 
-    struct Spring {
-        std::uint32_t node;  // internal
-        std::array<T, 9> k;  // xx yy zz xy yz zx, K·target
-    };
-    std::vector<Spring> springs_;  // ascending
-
     [[nodiscard]] std::size_t place(std::size_t node, std::size_t component) const {
         return internal_[node] * std::size_t{record} + component;
-    }
-
-    void prepare_pressure(const PressureNodes& pressure, const detail::FanLayout& fans) {
-        const auto count = static_cast<std::size_t>(pressure.count());
-        pressure_sources_ = detail::pressure_sources(pressure, fans);
-        patch_change_.assign(fans.nodes.node.size(), T(0));
-        inverse_pressure_volume_.resize(count);
-        pressure_modulus_.resize(count);
-        nodal_change_.assign(count, T(0));
-        nodal_pressure_.assign(count, T(0));
-        for (std::size_t a = 0; a < count; ++a) {
-            inverse_pressure_volume_[a] = T(1 / pressure.volume[static_cast<Eigen::Index>(a)]);
-            pressure_modulus_[a] = T(pressure.modulus[static_cast<Eigen::Index>(a)]);
-            if (pressure_runs_.empty() || pressure_runs_.back().material != pressure.material[a])
-                pressure_runs_.push_back({pressure.material[a], a, a});
-            pressure_runs_.back().end = a + 1;
-        }
     }
 
     template <class Body>
@@ -308,7 +262,12 @@ private:
     /// there. It may move these nodes: no element that is still to come has one of them.
     template <class After>
     void sum_forces(T* u, Advance advance, const After& after) {
-        if (kinematics_ == Kinematics::AveragedPressure) average_pressure(u);
+        if (kinematics_ == Kinematics::AveragedPressure) {
+            for_patches([&](const FanPatch& patch, detail::PatchScratch<T>& scratch) {
+                detail::patch_volume_changes(elements_, patch, u, scratch, pressures_.patch_changes());
+            });
+            pressures_.average(materials_);
+        }
         for_patches([&](const FanPatch& patch, detail::PatchScratch<T>& scratch) {
             patch_forces(patch, u, advance, scratch);
             after(patch.first_own, patch.first_own + patch.own_count);
@@ -323,11 +282,11 @@ private:
     void patch_forces(const FanPatch& patch, const T* u, Advance advance, detail::PatchScratch<T>& scratch) {
         const std::size_t m = patch.material;
         if (viscous_.empty() || viscous_[m].coefficient.empty())
-            detail::patch_forces(materials_[m], kinematics_, elements_, patch, u, nodal_pressure_.data(), scratch,
+            detail::patch_forces(materials_[m], kinematics_, elements_, patch, u, pressures_.pressure(), scratch,
                                  force_.data(), contribution_.data());
         else
             detail::viscous_patch_forces(materials_[m], viscous_[m], advance, kinematics_, elements_, patch, u,
-                                         nodal_pressure_.data(), scratch, force_.data(), contribution_.data());
+                                         pressures_.pressure(), scratch, force_.data(), contribution_.data());
     }
 
     void hex_forces(const T* u, Advance advance) {
@@ -356,20 +315,6 @@ private:
         std::copy(sum.begin(), sum.end(), &force_[node * record]);
     }
 
-    /// Takes the forces of springs on internal nodes [begin, end) off `force_`.
-    void add_springs(const T* u, std::size_t begin, std::size_t end) {
-        auto spring = std::lower_bound(springs_.begin(), springs_.end(), begin,
-                                       [](const Spring& each, std::size_t node) { return each.node < node; });
-        for (; spring != springs_.end() && spring->node < end; ++spring) {
-            const std::array<T, 9>& k = spring->k;
-            const T *at = u + spring->node * std::size_t{record}, x = at[0], y = at[1], z = at[2];
-            T* force = &force_[spring->node * std::size_t{record}];
-            force[0] -= k[6] - (k[0] * x + k[3] * y + k[5] * z);
-            force[1] -= k[7] - (k[3] * x + k[1] * y + k[4] * z);
-            force[2] -= k[8] - (k[5] * x + k[4] * y + k[2] * z);
-        }
-    }
-
     void prepare_viscosity(const RestState& rest) {
         viscosity_ = rest.viscosity;
         viscous_.resize(2 * viscosity_.size());
@@ -396,29 +341,10 @@ private:
         }
     }
 
-    /// q_a = M_a U'(J_a) with J_a − 1 = Σ ¼ V_e (J_e − 1) / V_a.
-    void average_pressure(const T* u) {
-        for_patches([&](const FanPatch& patch, detail::PatchScratch<T>& scratch) {
-            detail::patch_volume_changes(elements_, patch, u, scratch, patch_change_.data());
-        });
-        for (const BatchBlock& run : pressure_runs_)
-            parallel_ranges(run.begin, run.end, 1024, [&](std::size_t begin, std::size_t end) {
-                for (std::size_t a = begin; a != end; ++a) {
-                    T sum = 0;
-                    for (std::uint32_t k = pressure_sources_.offset[a]; k < pressure_sources_.offset[a + 1]; ++k)
-                        sum += patch_change_[pressure_sources_.entry[k]];
-                    nodal_change_[a] = T(0.25) * sum * inverse_pressure_volume_[a];
-                }
-                detail::nodal_pressures(materials_[static_cast<std::size_t>(run.material)].law,
-                                        &pressure_modulus_[begin], &nodal_change_[begin], &nodal_pressure_[begin],
-                                        end - begin);
-            });
-    }
-
     /// f_ext + f_spring − f_int, masked by the constraints.
     [[nodiscard]] Eigen::Matrix3Xd residual_at(T* u) {
         sum_forces(u, Advance::No, [&](std::size_t begin, std::size_t end) {
-            add_springs(u, begin, end);
+            springs_.take_off(u, begin, end, force_.data());
             for (std::size_t at = begin * record; at < end * record; ++at)
                 force_[at] = free_[at] * (force_load_[at] - force_[at]);
         });

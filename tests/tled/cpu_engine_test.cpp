@@ -94,5 +94,27 @@ TEST(CpuEngine, PressureOfAUniformExpansionIsTheReferences) {
     }
 }
 
+// The power of J that the isochoric law takes from the bits of a float32. Poisson's ratio 0: at the default of soft
+// tissue the pressure would hide an error of the shear stress. A failure looks like: stiffness that jumps with the
+// volume.
+TEST(CpuEngine, ShearStressOfExpandedTissueIsTheReferences) {
+    Model model = cube(2, Cells::T4, Laws::Iso);
+    model.materials = {{1, neo_hookean_iso(3.0, 0.0)}, {2, neo_hookean_iso(6.0, 0.0)}};
+    const RestState rest = rest_state(model);
+    Matrix3d stretch = Eigen::Vector3d(1.3, 1.0, 1 / 1.3).asDiagonal();
+    stretch(0, 1) = 0.2;
+    for (const std::int64_t target : targets()) {
+        const WidestTarget widest(target);
+        const auto engine = make_cpu_engine(rest);
+        for (double J = 0.05; J < 20; J *= 1.07) {
+            const Matrix3d H = std::cbrt(J) * stretch - Matrix3d::Identity();
+            const Matrix3Xd u = (H * model.mesh.nodes).cast<float>().cast<double>();
+            engine->set_state(u, Matrix3Xd::Zero(3, rest.node_count));
+            const Matrix3Xd expected = internal_force(rest, u);
+            EXPECT_LT(largest(engine->internal_force() - expected), 2e-5 * largest(expected)) << J;
+        }
+    }
+}
+
 }  // namespace
 }  // namespace tissuewarp::tled

@@ -1,6 +1,7 @@
 #include "tled/detail/cpu_batches.hpp"
 
 #include "tled/detail/fan_layout.hpp"
+#include "tled/detail/kernel_parameters.hpp"
 
 #include <algorithm>
 
@@ -140,6 +141,21 @@ template ElementBatches<float> element_batches(const RestState&, const FanLayout
 template ElementBatches<double> element_batches(const RestState&, const FanLayout&);
 template HexBatches<float> hex_batches(const HexState&, const BatchLayout&, const std::vector<std::uint32_t>&);
 template HexBatches<double> hex_batches(const HexState&, const BatchLayout&, const std::vector<std::uint32_t>&);
+
+template <class T>
+std::vector<KernelMaterial<T>> kernel_materials(const RestState& rest) {
+    std::vector<KernelMaterial<T>> result;
+    for (const Material& material : rest.materials) {
+        KernelMaterial<T> entry{material.index(), {}};
+        const KernelParameters parameters = kernel_parameters(material);
+        std::transform(parameters.begin(), parameters.end(), entry.parameter.begin(), [](double p) { return T(p); });
+        result.push_back(entry);
+    }
+    return result;
+}
+
+template std::vector<KernelMaterial<float>> kernel_materials(const RestState&);
+template std::vector<KernelMaterial<double>> kernel_materials(const RestState&);
 
 SourceLists pressure_sources(const PressureNodes& pressure, const FanLayout& layout) {
     std::vector<std::vector<std::uint32_t>> sources(static_cast<std::size_t>(pressure.count()));

@@ -31,6 +31,10 @@ template <class T>
 HexBatches<T> hex_batches(const HexState& hexahedra, const BatchLayout& layout,
                           const std::vector<std::uint32_t>& internal);
 
+/// What the kernels know of each of RestState::materials.
+template <class T>
+std::vector<KernelMaterial<T>> kernel_materials(const RestState& rest);
+
 /// What is summed for each of a row of nodes: `entry` from offset[i] to offset[i + 1].
 struct SourceLists {
     std::vector<std::uint32_t> offset, entry;

@@ -3,7 +3,7 @@
 // displacement gradient from precomputed derivatives, first Piola–Kirchhoff stress, corner forces f_a = V P ∂N_a/∂X.
 // Included once for each instruction set (Highway's convention for -inl files).
 //
-// Stresses are written in H = F − I and J − 1 = tr H + ½(tr²H − tr H²) + det H, so that float32 keeps small strains.
+// Stresses are written in H = F − I, cof F − I, C − I and J − 1, so that float32 keeps small strains.
 
 // clang-format off
 #if defined(TISSUEWARP_CPU_ELEMENTS_INL) == defined(HWY_TARGET_TOGGLE)
@@ -55,30 +55,6 @@ void displacement_gradient(D d, const ElementBatches<T>& elements, std::size_t b
     }
 }
 
-template <class D>
-HWY_INLINE void cofactor(const Vec<D> (&A)[3][3], Vec<D> (&cof)[3][3]) {
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            const int a = (i + 1) % 3, b = (i + 2) % 3, c = (j + 1) % 3, e = (j + 2) % 3;
-            cof[i][j] = hn::MulSub(A[a][c], A[b][e], A[a][e] * A[b][c]);
-        }
-}
-
-/// Fills all that follows from H; J − 1 = tr H + tr cof H + det H.
-template <class D>
-HWY_INLINE void finish_strain(Strain<D>& strain) {
-    auto& Q = strain.Q;
-    cofactor<D>(strain.H, Q);  // cof H for now
-    strain.trace = strain.H[0][0] + strain.H[1][1] + strain.H[2][2];
-    const auto second = Q[0][0] + Q[1][1] + Q[2][2];
-    const auto determinant =
-        hn::MulAdd(strain.H[0][0], Q[0][0], hn::MulAdd(strain.H[0][1], Q[0][1], strain.H[0][2] * Q[0][2]));
-    strain.higher = second + determinant;
-    strain.change = strain.trace + second + determinant;
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) Q[i][j] = strain.H[j][i] - Q[i][j];
-}
-
 /// J − 1 where J > 0, NaN elsewhere for laws that know no inverted state: Highway's logarithm gives a finite number for
 /// one, which would pass as a force.
 template <class Law, class D>
@@ -93,7 +69,7 @@ template <class D, class T>
 Strain<D> strain_of(D d, const ElementBatches<T>& elements, std::size_t batch, int lane, const T* u) {
     Strain<D> strain;
     displacement_gradient(d, elements, batch, lane, u, strain.H);
-    finish_strain(strain);
+    finish_strain(d, strain);
     return strain;
 }
 
@@ -129,7 +105,7 @@ HexStrain<D> strain_of(D d, const HexBatches<T>& hexahedra, std::size_t batch, i
                     hn::NegMulAdd(strain.H[i][j], hn::LoadU(d, rest_hourglass + (3 * alpha + j) * batch_width),
                                   strain.hourglass[alpha][i]);
     }
-    finish_strain(static_cast<Strain<D>&>(strain));
+    finish_strain<D>(d, strain);
     return strain;
 }
 
@@ -178,8 +154,8 @@ HWY_INLINE void stress(D d, std::size_t batch, int lane, const Strain<D>& strain
                        Vec<D> volume, Vec<D> scaled_pressure, const AfterShear& after_shear, Vec<D> (&P)[3][3]) {
     if constexpr (has_factors<Law, D> && std::is_same_v<AfterShear, Elastic>) {
         auto factors = Response<Law>::shear_factors(d, strain, tissue, volume);
-        factors.of_cof_F = factors.of_cof_F + scaled_pressure;
-        stress_of<D>(factors, strain, hn::Set(d, 1) + strain.change, P);
+        factors.of_I = factors.of_I + scaled_pressure;
+        stress_of<D>(factors, strain, P);
     } else {
         shear_stress<Law>(d, strain, tissue, volume, P);
         if constexpr (!std::is_same_v<AfterShear, Elastic>) after_shear(d, batch, lane, strain, P);

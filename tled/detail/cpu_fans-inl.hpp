@@ -111,7 +111,7 @@ HWY_INLINE Strain<D> strain_of(D d, const FanNodes<D>& fan, const T* gradient) {
         for (int i = 0; i < 3; ++i)
             strain.H[i][j] = hn::MulAdd(fan.b[i], b0, hn::MulAdd(fan.from[i], b1, fan.to[i] * b2));
     }
-    finish_strain(strain);
+    finish_strain(d, strain);
     return strain;
 }
 

@@ -1,5 +1,5 @@
-// The shear stress of every law for a batch of elements, in terms of H = F − I, Hᵀ − cof H and J − 1, so that float32
-// keeps small strains. Included once for each instruction set (Highway's convention for -inl files).
+// The shear stress of every law for a batch of elements, in terms of H = F − I, cof F − I, C − I and J − 1, so that
+// float32 keeps small strains. Included once for each instruction set (Highway's convention for -inl files).
 
 // clang-format off
 #if defined(TISSUEWARP_CPU_LAWS_INL) == defined(HWY_TARGET_TOGGLE)
@@ -13,33 +13,13 @@
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
+#include "tled/detail/cpu_strain-inl.hpp"
 #include "tled/material.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace tissuewarp::tled::detail {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
-
-template <class D>
-using Vec = hn::Vec<D>;
-template <class D>
-using Scalar = hn::TFromD<D>;
-
-/// Kinematics of a batch of elements, without the units whose place their small numbers would fall below.
-template <class D>
-struct Strain {
-    Vec<D> H[3][3];  // F − I
-    Vec<D> Q[3][3];  // Hᵀ − cof H
-    Vec<D> trace;    // tr H
-    Vec<D> higher;   // J − 1 − tr H
-    Vec<D> change;   // J − 1
-};
-
-/// cof F = (1 + tr H) I − Hᵀ + cof H.
-template <class D>
-HWY_INLINE Vec<D> cof(D d, const Strain<D>& strain, int i, int j) {
-    return i == j ? hn::Set(d, 1) + strain.trace - strain.Q[i][i] : hn::Neg(strain.Q[i][j]);
-}
 
 /// What a law knows beside the strain: its parameters (detail/kernel_parameters.hpp), and the fibre where it has one.
 template <class D>
@@ -52,51 +32,6 @@ struct Tissue {
 template <class D>
 HWY_INLINE Vec<D> dot(const Vec<D> (&a)[3], const Vec<D> (&b)[3]) {
     return hn::MulAdd(a[0], b[0], hn::MulAdd(a[1], b[1], a[2] * b[2]));
-}
-
-/// J F − cof F = J H + (J I − cof F), without the cancelling unit parts: J I − cof F = (J − 1 − tr H) I + Hᵀ − cof H.
-template <class D>
-HWY_INLINE Vec<D> stretch_difference(const Strain<D>& strain, Vec<D> J, int i, int j) {
-    const auto difference = hn::MulAdd(J, strain.H[i][j], strain.Q[i][j]);
-    return i == j ? difference + strain.higher : difference;
-}
-
-/// tr C − 3 = 2 tr H + H : H.
-template <class D>
-HWY_INLINE Vec<D> trace_excess(const Strain<D>& strain) {
-    auto excess = strain.trace + strain.trace;
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) excess = hn::MulAdd(strain.H[i][j], strain.H[i][j], excess);
-    return excess;
-}
-
-/// C − I = H + Hᵀ + Hᵀ H.
-template <class D>
-HWY_INLINE void strain_excess(const Strain<D>& strain, Vec<D> (&E)[3][3]) {
-    for (int i = 0; i < 3; ++i)
-        for (int j = i; j < 3; ++j) {
-            auto sum = strain.H[i][j] + strain.H[j][i];
-            for (int k = 0; k < 3; ++k) sum = hn::MulAdd(strain.H[k][i], strain.H[k][j], sum);
-            E[i][j] = E[j][i] = sum;
-        }
-}
-
-/// First Piola–Kirchhoff stress of a law of tr C and J, as most are: scale (J F − cof F) + of_cof_F cof F.
-template <class D>
-struct StressFactors {
-    Vec<D> scale, of_cof_F;
-};
-
-/// The difference is scaled as a whole: a rounding error of one of its terms alone would be a stress whose moments do
-/// not balance, which turns a rotating body faster or slower and drains the energy of a swinging one.
-template <class D>
-HWY_INLINE void stress_of(const StressFactors<D>& f, const Strain<D>& strain, Vec<D> J, Vec<D> (&P)[3][3]) {
-    const auto pressure = hn::MulAdd(f.of_cof_F, strain.trace, f.of_cof_F);
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            const auto difference = f.scale * stretch_difference(strain, J, i, j);
-            P[i][j] = hn::NegMulAdd(f.of_cof_F, strain.Q[i][j], i == j ? difference + pressure : difference);
-        }
 }
 
 /// ln(1 + x) for x > −1, to two units in the last place. For float32 by the polynomial of Moshier's Cephes (logf) for
@@ -137,7 +72,7 @@ template <class Law, class D>
 HWY_INLINE void shear_stress(D d, const Strain<D>& strain, const Tissue<D>& tissue, Vec<D> volume, Vec<D> (&P)[3][3]) {
     if constexpr (has_factors<Law, D>) {
         const auto factors = Response<Law>::shear_factors(d, strain, tissue, volume);
-        stress_of<D>(factors, strain, hn::Set(d, 1) + strain.change, P);
+        stress_of<D>(factors, strain, P);
     } else {
         Response<Law>::shear_stress(d, strain, tissue, volume, P);
     }
@@ -161,7 +96,7 @@ template <>
 struct Response<NeoHookeanLnJ> {
     static constexpr bool admits_inversion = false, has_fibre = false;
 
-    /// P = μ (F − F^−T) = μ/J (J F − cof F)
+    /// P = μ (F − F^−T) = μ/J cof F E
     template <class D>
     static HWY_INLINE StressFactors<D> shear_factors(D d, const Strain<D>& strain, const Tissue<D>& tissue,
                                                      Vec<D> volume) {
@@ -179,7 +114,7 @@ struct Response<NeoHookeanStable> : QuadraticVolume {
     static constexpr bool admits_inversion = true, has_fibre = false;
 
     /// P = μ' (1 − 1/(tr C + 1)) F − ¾ μ' cof F; with tr C + 1 = 4 + x the bracket of F is ¾ + x/(4 (4 + x)), so
-    /// P = μ' [¾ (F − cof F) + x/(4 (4 + x)) F] with F − cof F = H + Hᵀ − cof H − tr H I.
+    /// P = μ' [¾ (F − cof F) + x/(4 (4 + x)) F]. As a product with E it would divide by J, which may be 0 here.
     template <class D>
     static HWY_INLINE void shear_stress(D d, const Strain<D>& strain, const Tissue<D>& tissue, Vec<D> volume,
                                         Vec<D> (&P)[3][3]) {
@@ -190,15 +125,33 @@ struct Response<NeoHookeanStable> : QuadraticVolume {
         const auto growth = mu * excess / (four * (four + excess));
         for (int i = 0; i < 3; ++i)
             for (int j = 0; j < 3; ++j) {
-                auto F = strain.H[i][j], difference = strain.H[i][j] + strain.Q[i][j];
-                if (i == j) {
-                    F = F + one;
-                    difference = difference - strain.trace;
-                }
-                P[i][j] = hn::MulAdd(three_quarters, difference, growth * F);
+                const auto F = i == j ? strain.H[i][j] + one : strain.H[i][j];
+                P[i][j] = hn::MulAdd(three_quarters, strain.H[i][j] - strain.K[i][j], growth * F);
             }
     }
 };
+
+/// J^(−5/3). float32: the bits of a number grow as its logarithm does, so that M − bits/3 are those of an r near
+/// J^(−1/3), with h = 1 − J r³ between −0.108 and 0.099; then r⁵ (1 − h)^(−5/3) by a polynomial that interpolates at
+/// the Chebyshev points of that range, relative error 1e-8 before rounding.
+template <class D>
+HWY_INLINE Vec<D> power_of_minus_five_thirds(D d, Vec<D> J) {
+    if constexpr (sizeof(Scalar<D>) == 8) {
+        // Divided, so that NaN stays NaN; Highway's logarithm makes a number of it.
+        return hn::Exp(d, hn::Log(d, J) * hn::Set(d, -2.0 / 3)) / J;
+    } else {
+        constexpr float factors[] = {3.671276404F, 3.170046715F, 2.715631885F, 2.222217177F, 1.666667213F, 1.0F};
+        const hn::RebindToSigned<D> di;
+        const auto bits = hn::ConvertTo(d, hn::BitCast(di, J));
+        const auto r =
+            hn::BitCast(d, hn::ConvertTo(di, hn::NegMulAdd(bits, hn::Set(d, 1.0F / 3), hn::Set(d, 1419920000.0F))));
+        const auto square = r * r;
+        const auto h = hn::NegMulAdd(J * r, square, hn::Set(d, 1));
+        auto series = hn::Set(d, 3.942550970F);
+        for (const float factor : factors) series = hn::MulAdd(series, h, hn::Set(d, factor));
+        return square * square * (r * series);
+    }
+}
 
 /// ln J^(−1/3) and the powers that isochoric laws take of it.
 template <class D>
@@ -206,7 +159,7 @@ HWY_INLINE Vec<D> isochoric_exponent(D d, const Strain<D>& strain) {
     return log_1p(d, strain.change) * hn::Set(d, Scalar<D>(-1.0 / 3));
 }
 
-/// 2 ψ₁ J^(−2/3) (F − I₁/3 F^−T) = 2 ψ₁ J^(−5/3) (J F − cof F − (I₁/3 − 1) cof F).
+/// 2 ψ₁ J^(−2/3) (F − I₁/3 F^−T) = 2 ψ₁ J^(−5/3) cof F (E − (tr E)/3 I).
 template <class D>
 HWY_INLINE StressFactors<D> first_invariant_factors(D d, Vec<D> excess, Vec<D> scale) {
     return {scale, scale * excess * hn::Set(d, Scalar<D>(-1.0 / 3))};
@@ -221,7 +174,7 @@ struct Response<NeoHookeanIso> : QuadraticVolume {
     static HWY_INLINE StressFactors<D> shear_factors(D d, const Strain<D>& strain, const Tissue<D>& tissue,
                                                      Vec<D> volume) {
         const auto scale =
-            volume * hn::Set(d, tissue.parameter[0]) * hn::Exp(d, isochoric_exponent(d, strain) * hn::Set(d, 5));
+            volume * hn::Set(d, tissue.parameter[0]) * power_of_minus_five_thirds(d, hn::Set(d, 1) + strain.change);
         return first_invariant_factors(d, trace_excess(strain), scale);
     }
 };
@@ -256,13 +209,12 @@ struct Response<Polynomial> : QuadraticVolume {
     static constexpr bool admits_inversion = false, has_fibre = false;
 
     /// P = 2 ψ₁ J^(−2/3) (F − I₁/3 G) + 2 ψ₂ J^(−4/3) (I₁ F − F C − 2/3 I₂ G), G = F^−T. With C = I + E, t = tr E and
-    /// q = 4/3 t + (t² − E:E)/3 the second bracket is 2 (F − G) + F (t I − E) − q G.
+    /// q = 4/3 t + (t² − E:E)/3 the second bracket is 2 (F − G) + F (t I − E) − q G = G (2 E − q I) + F (t I − E).
     template <class D>
     static void shear_stress(D d, const Strain<D>& strain, const Tissue<D>& tissue, Vec<D> volume, Vec<D> (&P)[3][3]) {
         const auto set = [&](double value) { return hn::Set(d, Scalar<D>(value)); };
-        Vec<D> E[3][3];
-        strain_excess(strain, E);
-        const auto t = E[0][0] + E[1][1] + E[2][2];
+        const auto& E = strain.E;
+        const auto t = trace_excess(strain);
         auto E_E = E[0][0] * E[0][0];
         for (int k = 1; k < 9; ++k) E_E = hn::MulAdd(E[k / 3][k % 3], E[k / 3][k % 3], E_E);
         const auto minors = t * t - E_E;
@@ -274,19 +226,19 @@ struct Response<Polynomial> : QuadraticVolume {
         const auto psi_1 = c(0) + hn::MulAdd(c(3), y, x * hn::MulAdd(three * c(5), x, c(2) + c(2)));
         const auto psi_2 = c(1) + hn::MulAdd(c(3), x, (c(4) + c(4)) * y);
 
-        const auto J = set(1) + strain.change, inverse_J = set(1) / J;
-        const auto two_volume = volume + volume;
-        stress_of<D>(first_invariant_factors(d, t, two_volume * psi_1 * j * inverse_J), strain, J, P);
-        const auto scale = two_volume * psi_2 * j * j;
-        const auto q = hn::MulAdd(set(4.0 / 3), t, set(1.0 / 3) * minors) * inverse_J;
-        const auto two_over_J = inverse_J + inverse_J;
+        const auto inverse_J = reciprocal_J(d, strain.change), two_volume = volume + volume;
+        const auto scale = two_volume * psi_2 * j * j, over_J = scale * inverse_J;
+        const auto q = hn::MulAdd(set(4.0 / 3), t, set(1.0 / 3) * minors);
+        auto factors = first_invariant_factors(d, t, two_volume * psi_1 * j * inverse_J);
+        factors.of_E = factors.of_E + over_J + over_J;
+        factors.of_I = hn::NegMulAdd(over_J, q, factors.of_I);
+        stress_of<D>(factors, strain, P);
         for (int i = 0; i < 3; ++i)
             for (int k = 0; k < 3; ++k) {
-                auto F_E = E[i][k];  // F E = E + H E
-                for (int m = 0; m < 3; ++m) F_E = hn::MulAdd(strain.H[i][m], E[m][k], F_E);
-                auto bracket = hn::MulSub(t, strain.H[i][k], F_E) + two_over_J * stretch_difference(strain, J, i, k);
+                auto bracket = hn::MulSub(t, strain.H[i][k], E[i][k]);  // F (t I − E)
+                for (int m = 0; m < 3; ++m) bracket = hn::NegMulAdd(strain.H[i][m], E[m][k], bracket);
                 if (i == k) bracket = bracket + t;
-                P[i][k] = hn::MulAdd(scale, hn::NegMulAdd(q, cof(d, strain, i, k), bracket), P[i][k]);
+                P[i][k] = hn::MulAdd(scale, bracket, P[i][k]);
             }
     }
 };
@@ -359,7 +311,7 @@ struct Response<Ogden> : QuadraticVolume {
     template <class D>
     static void shear_stress(D d, const Strain<D>& strain, const Tissue<D>& tissue, Vec<D> volume, Vec<D> (&P)[3][3]) {
         Vec<D> E[3][3], n[3][3];
-        strain_excess(strain, E);
+        for (int i = 0; i < 9; ++i) E[i / 3][i % 3] = strain.E[i / 3][i % 3];
         symmetric_eigenvectors(d, E, n);
         const auto exponent = isochoric_exponent(d, strain);
         const auto half = hn::Set(d, Scalar<D>(0.5)), third = hn::Set(d, Scalar<D>(1.0 / 3)), one = hn::Set(d, 1);
