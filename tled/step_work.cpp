@@ -1,5 +1,6 @@
 #include "tled/step_work.hpp"
 
+#include "tled/detail/fan_layout.hpp"
 #include "tled/detail/patches.hpp"
 
 #include <algorithm>
@@ -73,11 +74,21 @@ StepWork scalar_step_work(const RestState& rest) {
     return per_element(rest, {60, 12 + 24 + 24 + 24 + 24 + 12, 63 + 45 + 41 + 35 + 18 + 45 + 54 + 18, 15});
 }
 
-// A record of 60 B; corner forces of 64 B written and read, their list of 16 B. Nodes: u read by the elements, then u
-// and increment read and written, masses, masks, loads of 16 B, two indices.
+// A patch's copy of its nodes and what its fans leave stay in a core's cache and count as no bytes; shared slots are
+// patches' nodes that another patch has too. Bytes of a lane, padding included: derivatives, volume, modulus 44; of a
+// fan's node 2, of its place in the list of its node 2; of a slot number, first place and u 24, of a shared one its
+// force written and read and its entry 36; of a node force 16, increment and u read and written 64, mass, load and
+// mask 48. Operations of a tetrahedron: relative displacements 3, H 45, cof F − I, E and J − 1 72, factors of the
+// stress 26, P 63, three forces 54 and their sum 3; of a fan its first nodes and last force 15; of a node 18.
 StepWork cpu_step_work(const RestState& rest) {
-    return per_element(rest,
-                       {60 + 64 + 64 + 16, 16 + 32 + 32 + 3 * 16 + 8, flops_of_gathering_element, flops_of_node_step});
+    const detail::FanLayout layout = detail::fan_layout(rest, detail::suggested_patch_tets(rest.element_count()));
+    const double elements = std::max(1, rest.element_count()), lanes = double(layout.batches.element.size());
+    const double nodes = rest.node_count, slots = double(layout.nodes.node.size());
+    const double places = double(layout.nodes.scalar_place.size()), fans = (places - elements) / 3;
+    const double bytes = 44 * lanes + 2 * double(layout.nodes.fan_node.size()) + 2 * places + 24 * slots +
+                         36 * (slots - double(layout.own_nodes)) + (16 + 64 + 48) * nodes;
+    const double flops = elements * (3 + 45 + 72 + 26 + 63 + 54 + 3) + 15 * fans + 3 * places + 18 * nodes;
+    return {bytes / elements, flops / elements};
 }
 
 // Indices 16, rest data 48, corner forces 64 written and read, their list 16. Nodes: u read by the elements, first

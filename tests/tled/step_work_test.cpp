@@ -22,6 +22,21 @@ TEST(StepWork, OfTwoPassesIsThatOfTheirArrays) {
     EXPECT_NEAR(work.flops, 241 + 12 * 216.0 / 750, 1e-9);
 }
 
+// By hand: 8 nodes and 6 tetrahedra, fans of one each in a group of 16 lanes with 4 nodes.
+TEST(StepWork, OfTheCpuIsThatOfItsFans) {
+    const StepWork work = cpu_step_work(cube(1));
+    EXPECT_NEAR(work.bytes, (16 * 44 + 64 * 2 + 24 * 2 + 8 * 24 + 8 * 128) / 6.0, 1e-9);
+    EXPECT_NEAR(work.flops, 266 + 15 + 4 * 3 + 8 * 18 / 6.0, 1e-9);
+}
+
+// What fans are for: most tetrahedra share nodes with the next. Below, a plain list of tetrahedra with a force of 16 B
+// for each corner, written and read.
+TEST(StepWork, OfTheCpuMovesLessThanCornerForcesDo) {
+    const RestState rest = cube(20);
+    EXPECT_LT(cpu_step_work(rest).bytes, 60 + 64 + 64 + 16);
+    EXPECT_GT(cpu_step_work(rest).bytes, 44 + 128.0 * rest.node_count / rest.element_count());
+}
+
 // One patch shares no node: 216 slots, no force leaves it but to itself. Fans of one tetrahedron each.
 TEST(StepWork, OfOnePatchIsThatOfItsSlotsAndFans) {
     const RestState rest = cube(5);
