@@ -1,12 +1,12 @@
 // Time of a step on the GPU, and how far its float32 strays from the float64 CPU engine. The cube of
 // benchmarks/stretched_cube.hpp.
 //     gpu_step_bench [--list] [--device N] [--cells 14,24,55,128] [--steps N] [--repeats N] [--compare-limit ELEMENTS]
-//                    [--element t4|averaged] [--law lnj|iso] [--mesh FILE.vtu] [--shapes TETS:FAN:WORKGROUP,…]
+//                    [--element t4|averaged] [--law lnj|iso] [--mesh FILE.vtu] [--shapes TETS:FAN:WORKGROUP[:AT_ONCE],…]
 //                    [--render-passes] [--stretch 0.2]
 // Without options: on hardware 14, 24, 55 and 128 cells an edge and 1000 steps, on a software rasteriser 14 and 24
 // cells and 50 steps; five repeats, the median is printed; both elements, both laws. The float64 engine runs the same
 // steps where the mesh has no more than --compare-limit elements (1 100 000). A mesh file of about that cube is
-// measured after those of --cells. Shapes are those of tled::GpuStepShape, an m behind for many steps at once, 0:0:0
+// measured after those of --cells. Shapes are those of tled::GpuStepShape, 0:0:0
 // the two passes; without them the suggested one. --render-passes adds the fragment shaders of 2007 for T4.
 
 #include "benchmarks/stretched_cube.hpp"
@@ -100,8 +100,10 @@ void report(AnyEngine& engine, double start_seconds, const Scene& scene, const t
 
 std::string name_of(const tled::GpuStepShape& shape) {
     if (shape.patch_tets == 0) return "two passes";
-    return std::to_string(shape.patch_tets) + ":" + std::to_string(shape.longest_fan) + ":" +
-           std::to_string(shape.workgroup) + (shape.many_at_once ? "m" : "");
+    std::ostringstream name;
+    name << shape.patch_tets << ':' << shape.longest_fan << ':' << shape.workgroup;
+    if (shape.at_once > 0) name << ':' << shape.at_once;
+    return name.str();
 }
 
 void report_engines(const Scene& scene, const tled::RestState& rest, const std::string& name, const std::string& mesh,
@@ -165,8 +167,9 @@ Options parsed(int argc, char** argv) {
             tled::GpuStepShape shape;
             char colon = 0;
             for (std::string one; std::getline(list, one, ',');) {
-                std::istringstream(one) >> shape.patch_tets >> colon >> shape.longest_fan >> colon >> shape.workgroup;
-                shape.many_at_once = one.back() == 'm';
+                shape.at_once = 0;
+                std::istringstream(one) >> shape.patch_tets >> colon >> shape.longest_fan >> colon >>
+                    shape.workgroup >> colon >> shape.at_once;
                 options.shapes.push_back(shape);
             }
         } else if (name == "--cells") {

@@ -158,11 +158,13 @@ ProgramSource patch_step_program(Law law, const NodeEffects& effects, const Patc
     define("FORCES", flag(stages.forces));
     define("AVERAGES", flag(stages.averages));
     define("PERSISTS", flag(stages.persists));
+    define("STAYS", flag(stages.persists && sizes.workgroups == sizes.patches));
     define("HAS_SPRINGS", flag(effects.springs));
     define("HAS_EXTERNAL_FORCE", flag(effects.external_force));
     define("COHERENT", stages.persists ? "coherent" : "");
     define("CONTRIBUTIONS", std::to_string(sizes.contributions) + ".0");
     define_count("PATCHES", sizes.patches);
+    define_count("WORKGROUPS", stages.persists ? sizes.workgroups : sizes.patches);
     define_count("SLOTS", sizes.slots);
     define_count("FANS", sizes.fans);
     define_count("SOURCES", sizes.sources);

@@ -62,6 +62,7 @@ ProgramSource node_residual_program(const NodeEffects& effects, MaskConstrained 
 struct PatchSizes {
     int patches = 1, slots = 1, fans = 1, sources = 1, neighbours = 1, contributions = 1;
     int workgroup = 128;
+    int workgroups = 1;  ///< that share out the patches where a dispatch persists; elsewhere each patch has one
 };
 /// What one dispatch over patches does (kernels/patch_step.comp).
 struct PatchStages {

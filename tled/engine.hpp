@@ -103,9 +103,10 @@ struct GpuStepShape {
     int patch_tets = 0;   ///< tetrahedra of a patch; fewer where its nodes do not fit into shared memory
     int longest_fan = 5;  ///< tetrahedra that one invocation computes in turn, 1 … 5
     int workgroup = 128;  ///< invocations for a patch
-    /// Many steps in a dispatch, all patches at the same time. Where the device does not run them so, the engine finds
-    /// out within a fraction of a second and goes on with one step in a dispatch.
-    bool many_at_once = false;
+    /// Workgroups that run at the same time, share out the patches and take many steps in a dispatch; 0: a workgroup for
+    /// each patch and one step in a dispatch. Where the device does not run so many, the engine finds out within a
+    /// fraction of a second and goes on as with 0.
+    int at_once = 0;
 };
 
 /// What measured best on an H100 for a mesh of so many tetrahedra (docs/performance.md).

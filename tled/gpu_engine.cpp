@@ -434,11 +434,11 @@ GpuStepShape suggested_gpu_step_shape(int element_count, Element element) {
     const auto shared_out = [&](int rounds) {
         return std::max(least_patch, (element_count + multiprocessors * rounds - 1) / (multiprocessors * rounds));
     };
-    if (element_count < 20000) return {shared_out(1), 1, 128, true};
-    if (element_count < 120000) return {shared_out(1), 1, 640, true};
-    if (element_count < multiprocessors * largest_at_once) return {shared_out(1), 5, 640, true};
+    if (element_count < 20000) return {shared_out(1), 1, 128, 4 * multiprocessors};
+    if (element_count < 120000) return {shared_out(1), 1, 640, multiprocessors};
+    if (element_count < multiprocessors * largest_at_once) return {shared_out(1), 5, 640, multiprocessors};
     const int rounds = (element_count + multiprocessors * largest_patch - 1) / (multiprocessors * largest_patch);
-    return {shared_out(rounds), 5, 768, false};
+    return {shared_out(rounds), 5, 640, element == Element::T4 ? multiprocessors : 0};
 }
 
 std::unique_ptr<Engine> make_gpu_engine(const RestState& rest, int device) {

@@ -56,7 +56,7 @@ StepWork patch_step_work(const RestState& rest, const GpuStepShape& shape) {
         counted(detail::cut_into_patches(rest, {shape.patch_tets, shape.longest_fan}), rest.node_count);
     const double elements = std::max(1, rest.element_count());
     double bytes = 36 * c.slots + 20 * c.sharers + 16 * c.fans;
-    if (shape.many_at_once)
+    if (shape.at_once > 0)
         bytes += 16 * c.shared_slots;
     else
         bytes += 36 * c.slots + 16 * c.slots + 16 * (c.slots - c.shared_slots);

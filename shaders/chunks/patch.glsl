@@ -5,6 +5,7 @@
 //! define SLOTS
 //! define FANS
 //! define SOURCES
+//! define WORKGROUPS
 
 const uint slots_of_all = PATCHES * SLOTS;
 
@@ -22,9 +23,11 @@ struct Patch {
     uvec4 planes_0_to_7, planes_8_to_15;
 };
 
-Patch patch_of_workgroup() {
-    uint p = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-    uint at = 3u * min(p, PATCHES - 1u);
+/// A workgroup has every WORKGROUPS-th patch from this one on.
+uint first_patch_of_workgroup() { return gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x; }
+
+Patch patch_of(uint p) {
+    uint at = 3u * p;
     uvec4 head = patch_head[at];
     return Patch(p, head.x & 0xffffu, head.x >> 16u, head.y & 0xffffu, uintBitsToFloat(head.z),
                  head.y >> 16u, head.w & 0xffffu, head.w >> 16u, patch_head[at + 1u], patch_head[at + 2u]);

@@ -1,10 +1,11 @@
 // Needs: bindings, patch; node.springs and node.external_force where their flags are 1.
 // Gives: the nodes of a patch in shared memory: load_node, node, advance_node, store_displacement.
+//! define STAYS
 //! define HAS_SPRINGS
 //! define HAS_EXTERNAL_FORCE
 
-/// Planes of all slots: X.x, X.y, X.z (mm, from a point of the patch), inverse mass x, y, z, and 1 / V_a (1/mm³) of the averaged
-/// pressure.
+/// Planes of all slots: X.x, X.y, X.z (mm, from a point of the patch), inverse mass or, where its components differ, a
+/// negative number, its components, and 1 / V_a (1/mm³) of the averaged pressure.
 layout(std430, binding = BINDING_PATCH_REST) readonly buffer PatchRest { float patch_rest[]; };
 /// Planes of all slots: u.x, u.y, u.z, v.x, v.y, v.z, mm.
 layout(std430, binding = BINDING_PATCH_STATE) buffer PatchState { float patch_state[]; };
@@ -39,6 +40,12 @@ void store_state(uint s, uint plane, vec3 value) {
     patch_state[(plane + 2u) * slots_of_all + s] = value.z;
 }
 
+/// Most nodes move freely: one number instead of three.
+vec3 inverse_mass(uint s) {
+    float all = patch_rest[3u * slots_of_all + s];
+    return all < 0.0 ? rest_plane(s, 4u) : vec3(all);
+}
+
 /// Slot i of the patch, s of all.
 void load_node(uint s, uint i) {
     vec3 X = rest_plane(s, 0u);
@@ -50,7 +57,8 @@ void load_node(uint s, uint i) {
 
 void store_displacement(uint s, uint i) { store_state(s, 0u, vec3(node_b[i].y, node_c[i])); }
 
-/// The time step in increment form under the internal force f, mN: v⁺ = momentum v + gain r / m, u⁺ = u + v⁺.
+/// The time step in increment form under the internal force f, mN: v⁺ = momentum v + gain r / m, u⁺ = u + v⁺. Where a dispatch
+/// is one step, u⁺ goes to memory too.
 void advance_node(uint s, uint i, vec3 f, float momentum, float gain) {
     vec3 u = vec3(node_b[i].y, node_c[i]);
     vec3 residual = -f;
@@ -60,9 +68,12 @@ void advance_node(uint s, uint i, vec3 f, float momentum, float gain) {
 #if HAS_EXTERNAL_FORCE
     residual += external_force(node_of_slot[s]);
 #endif
-    vec3 v = momentum * state_plane(s, 3u) + gain * (residual * rest_plane(s, 3u));
+    vec3 v = momentum * state_plane(s, 3u) + gain * (residual * inverse_mass(s));
     u += v;
     store_state(s, 3u, v);
     node_b[i].y = u.x;
     node_c[i] = u.yz;
+#if !STAYS
+    store_state(s, 0u, u);
+#endif
 }

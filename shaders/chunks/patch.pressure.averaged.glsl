@@ -113,6 +113,6 @@ float received_volume(Patch here, uint i) {
 
 /// q_a = M U'(J_a) with J_a - 1 = Σ ¼ V_e (J_e - 1) / V_a.
 void find_pressure(Patch here, uint i) {
-    float inverse_volume = patch_rest[6u * slots_of_all + here.index * SLOTS + i];
+    float inverse_volume = patch_rest[7u * slots_of_all + here.index * SLOTS + i];
     nodal_pressure[i] = here.volumetric_modulus * volumetric_derivative(received_volume(here, i) * inverse_volume);
 }

@@ -14,8 +14,10 @@ void main() {
     if (s >= count) return;
     uint a = node_of_slot[s];
     if (a == 0xffffffffu) return;
+    vec3 m = inverse_mass[a].xyz;
+    patch_rest[3u * count + s] = m.x == m.y && m.y == m.z ? m.x : -1.0;
     for (uint c = 0u; c < 3u; ++c) {
-        patch_rest[(3u + c) * count + s] = inverse_mass[a][c];
+        patch_rest[(4u + c) * count + s] = m[c];
         patch_state[c * count + s] = displacement[a][c];
         patch_state[(3u + c) * count + s] = increment[a][c];
     }

@@ -132,7 +132,7 @@ TEST_P(GpuSteps, RepeatBitByBit) {
 TEST_P(GpuSteps, ManyInADispatchAreThoseOneByOne) {
     const GpuStepShape one{.patch_tets = 100000, .longest_fan = 5, .workgroup = 128};
     GpuStepShape many = one;
-    many.many_at_once = true;
+    many.at_once = 1;
     const Matrix3Xd start = wavy(X, 0.3);
     for (const int steps : {1, 2, 43})
         EXPECT_TRUE(after(many, {steps}, start, zero) == after(one, {steps}, start, zero)) << steps;
@@ -144,7 +144,7 @@ TEST_P(GpuSteps, ManyInADispatchAreThoseOneByOne) {
 TEST_P(GpuSteps, GoOnOneByOneWherePatchesDoNotRunAtTheSameTime) {
     GpuStepShape shape = small_patches;
     const Matrix3Xd expected = after(shape, {40}, wavy(X, 0.3), zero);
-    shape.many_at_once = true;
+    shape.at_once = 1000;
     EXPECT_LT(largest(after(shape, {40}, wavy(X, 0.3), zero) - expected), 1e-5 * largest(expected));
 }
 

@@ -97,11 +97,13 @@ GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& pro
     : programs_(programs),
       law_(law_of(rest)),
       averages_(rest.pressure.count() > 0),
-      many_at_once_(shape.many_at_once),
       node_count_(static_cast<std::size_t>(rest.node_count)) {
     const PatchLayout layout = fitting_layout(rest, shape, device.limits().shared_memory_bytes);
     const PatchCapacity& c = layout.capacity;
-    sizes_ = {c.patches, c.slots, c.fans, c.sources, c.neighbours, c.contributions, shape.workgroup};
+    const int workgroups = shape.at_once > 0 ? std::min(shape.at_once, c.patches) : c.patches;
+    many_steps_ = shape.at_once > 0;
+    sizes_ = {c.patches,       c.slots,         c.fans,    c.sources, c.neighbours,
+              c.contributions, shape.workgroup, workgroups};
     slot_count_ = layout.node_of_slot.size();
     head_.emplace(device, layout.head, "heads of patches");
     fans_.emplace(device, layout.fans, "fans of patches");
@@ -132,41 +134,49 @@ GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& pro
 void GpuPatches::run(int steps, const StepCoefficients& coefficients, const shaders::NodeEffects& effects,
                      const BlockBuffers& blocks) {
     if (!loaded_) load(effects, blocks);
-    if (many_at_once_) {
-        step_many(steps, coefficients, effects, blocks);
+    if (many_steps_) {
+        step_many(next_steps(steps, coefficients), effects, blocks);
         // The nodes still hold the state that the run began with.
         if (gave_up()) {
-            many_at_once_ = false;
+            many_steps_ = false;
             load(effects, blocks);
         }
     }
-    if (!many_at_once_)
-        dispatch(averages_ ? Stages(averaged_one_step) : one_step, steps, 1, coefficients, effects, blocks);
+    if (!many_steps_)
+        dispatch(averages_ ? Stages(averaged_one_step) : one_step, steps, 1, next_steps(steps, coefficients), effects,
+                 blocks);
     store(blocks);
     shaders::check_errors("time steps over patches");
 }
 
-void GpuPatches::step_many(int steps, const StepCoefficients& coefficients, const shaders::NodeEffects& effects,
-                           const BlockBuffers& blocks) {
-    const Stages stages = averages_ ? averaged_many_steps : many_steps;
-    dispatch(stages, steps / steps_per_dispatch, steps_per_dispatch, coefficients, effects, blocks);
-    if (const int left = steps % steps_per_dispatch; left > 0) dispatch(stages, 1, left, coefficients, effects, blocks);
+GpuPatches::Run GpuPatches::next_steps(int steps, const StepCoefficients& coefficients) const {
+    return {step_, step_ + static_cast<std::uint32_t>(steps), coefficients};
 }
 
-void GpuPatches::dispatch(Stages stages, int repeats, int steps, const StepCoefficients& coefficients,
-                          const shaders::NodeEffects& effects, const BlockBuffers& blocks) {
+void GpuPatches::step_many(const Run& run, const shaders::NodeEffects& effects, const BlockBuffers& blocks) {
+    const int steps = static_cast<int>(run.end - run.begin);
+    const Stages stages = averages_ ? averaged_many_steps : many_steps;
+    dispatch(stages, steps / steps_per_dispatch, steps_per_dispatch, run, effects, blocks);
+    if (const int left = steps % steps_per_dispatch; left > 0) dispatch(stages, 1, left, run, effects, blocks);
+}
+
+void GpuPatches::dispatch(Stages stages, int repeats, int steps, const Run& run, const shaders::NodeEffects& effects,
+                          const BlockBuffers& blocks) {
     std::vector<const Program*> programs;
     for (const PatchStages& each : stages) {
         programs.push_back(&programs_.get(shaders::patch_step_program(law_, effects, sizes_, each)));
         blocks.bind(*programs.back());
-        programs.back()->set(1, static_cast<float>(coefficients.momentum));
-        programs.back()->set(2, static_cast<float>(coefficients.gain));
+        programs.back()->set(1, static_cast<float>(run.coefficients.momentum));
+        programs.back()->set(2, static_cast<float>(run.coefficients.gain));
         programs.back()->set(3, static_cast<std::uint32_t>(steps));
+        programs.back()->set(4, run.begin);
+        programs.back()->set(5, run.end);
     }
+    const int workgroups = stages.front().persists ? sizes_.workgroups : sizes_.patches;
     for (int i = 1; i <= repeats; ++i) {
         for (const Program* program : programs) {
             program->set(0, step_);
-            program->dispatch(static_cast<std::size_t>(sizes_.patches) * static_cast<std::size_t>(sizes_.workgroup));
+            program->dispatch(static_cast<std::size_t>(workgroups) * static_cast<std::size_t>(sizes_.workgroup));
             shaders::storage_barrier();
         }
         step_ += static_cast<std::uint32_t>(steps);
@@ -181,7 +191,7 @@ void GpuPatches::load(const shaders::NodeEffects& effects, const BlockBuffers& b
     blocks.bind(load);
     load.dispatch(slot_count_);
     shaders::storage_barrier();
-    dispatch(averages_ ? Stages(averaged_first_forces) : first_forces, 1, 1, {}, effects, blocks);
+    dispatch(averages_ ? Stages(averaged_first_forces) : first_forces, 1, 1, next_steps(1, {}), effects, blocks);
     loaded_ = true;
 }
 

@@ -27,11 +27,16 @@ public:
 
 private:
     using Stages = std::span<const shaders::PatchStages>;
-    /// Dispatches of the stages, `repeats` times, each of which counts `steps`.
-    void dispatch(Stages stages, int repeats, int steps, const StepCoefficients& coefficients,
-                  const shaders::NodeEffects& effects, const BlockBuffers& blocks);
-    void step_many(int steps, const StepCoefficients& coefficients, const shaders::NodeEffects& effects,
-                   const BlockBuffers& blocks);
+    /// Steps [begin, end) as counted by step_; between them some nodes are ahead of others, after them none.
+    struct Run {
+        std::uint32_t begin, end;
+        StepCoefficients coefficients;
+    };
+    /// Dispatches of the stages, `repeats` times, each of which counts `steps` of the run.
+    void dispatch(Stages stages, int repeats, int steps, const Run& run, const shaders::NodeEffects& effects,
+                  const BlockBuffers& blocks);
+    void step_many(const Run& run, const shaders::NodeEffects& effects, const BlockBuffers& blocks);
+    [[nodiscard]] Run next_steps(int steps, const StepCoefficients& coefficients) const;
     void load(const shaders::NodeEffects& effects, const BlockBuffers& blocks);
     void store(const BlockBuffers& blocks);
     /// Whether a patch waited too long for its neighbours: the state is then not that of any step.
@@ -39,7 +44,7 @@ private:
 
     shaders::ProgramCache& programs_;
     shaders::Law law_;
-    bool averages_, many_at_once_;
+    bool averages_, many_steps_;
     std::size_t node_count_, slot_count_;
     shaders::PatchSizes sizes_;
     std::optional<shaders::Buffer<Uint4>> head_, fans_;

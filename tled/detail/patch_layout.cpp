@@ -108,7 +108,7 @@ PatchCapacity capacity_of(const std::vector<Patch>& patches, const std::vector<s
     if (c.fans >= static_cast<int>(no_local_node) || c.slots >= static_cast<int>(no_local_node))
         throw InvalidInput("a patch has " + std::to_string(c.slots) + " nodes and " + std::to_string(c.fans) +
                            " fans; 16 bits count to 65534: take smaller patches");
-    const double total = 7.0 * c.patches * std::max(c.sources, c.slots);
+    const double total = 8.0 * c.patches * std::max(c.sources, c.slots);
     if (total > std::numeric_limits<std::int32_t>::max())
         throw InvalidInput("the patches hold " + std::to_string(total) + " numbers; 31 bits count to 2147483647");
     return c;
@@ -131,7 +131,7 @@ public:
         const auto room = [&](int each) { return index(c.patches) * index(each); };
         layout_.head.resize(room(3));
         layout_.fans.resize(room(c.fans));
-        layout_.rest.resize(7 * room(c.slots));
+        layout_.rest.resize(8 * room(c.slots));
         layout_.sources.resize(room(c.sources));
         layout_.neighbours.resize(room(c.neighbours));
         layout_.node_of_slot.resize(room(c.slots), none);
@@ -187,7 +187,7 @@ private:
     /// 1 / V_a of the averaged pressure, of this patch's material.
     void write_inverse_volumes(std::size_t p) {
         if (rest_.pressure.count() == 0) return;
-        const std::size_t first = 6 * layout_.node_of_slot.size() + p * index(layout_.capacity.slots);
+        const std::size_t first = 7 * layout_.node_of_slot.size() + p * index(layout_.capacity.slots);
         for (const int e : patches_[p].tet)
             for (int k = 0; k < 4; ++k) {
                 const std::vector<Slot>& shared = slots_[index(rest_.nodes(k, e))];

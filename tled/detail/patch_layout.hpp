@@ -26,7 +26,7 @@ struct PatchCapacity {
 struct PatchLayout {
     PatchCapacity capacity;
     std::vector<Uint4> head, fans;
-    std::vector<float> rest;  ///< seven planes of all slots; inverse masses are left zero
+    std::vector<float> rest;  ///< eight planes of all slots; inverse masses are left zero
     std::vector<std::uint32_t> sources, neighbours;
     std::vector<std::uint32_t> node_of_slot;  ///< 0xffffffff where a patch has fewer nodes
     std::vector<std::uint32_t> slot_of_node;  ///< of one of its patches; 0xffffffff of a node without tetrahedra

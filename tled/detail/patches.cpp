@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <map>
 #include <numeric>
 #include <string>
 #include <unordered_map>
@@ -137,30 +136,28 @@ Matrix3Xd centroids(const RestState& rest) {
     return result;
 }
 
-/// Number of patches that hold each node.
-std::vector<int> share_counts(const RestState& rest, const std::vector<Patch>& patches) {
-    std::vector<int> count(static_cast<std::size_t>(rest.node_count)), last(count.size(), -1);
+/// The patches that hold each node, ascending.
+std::vector<std::vector<int>> sharers_of_nodes(const RestState& rest, const std::vector<Patch>& patches) {
+    std::vector<std::vector<int>> sharers(static_cast<std::size_t>(rest.node_count));
     for (std::size_t p = 0; p < patches.size(); ++p)
         for (const int e : patches[p].tet)
             for (const int a : rest.nodes.col(e)) {
-                const auto at = static_cast<std::size_t>(a);
-                if (last[at] == static_cast<int>(p)) continue;
-                last[at] = static_cast<int>(p);
-                ++count[at];
+                std::vector<int>& of_node = sharers[static_cast<std::size_t>(a)];
+                if (of_node.empty() || of_node.back() != static_cast<int>(p)) of_node.push_back(static_cast<int>(p));
             }
-    return count;
+    return sharers;
 }
 
-/// Local numbers in the order of sharing, then of how many tetrahedra of the patch meet at the node, then of the mesh:
-/// neighbouring invocations then have equally long lists.
-void number_nodes(const RestState& rest, const std::vector<int>& shares, Patch& patch) {
-    std::map<int, int> valence;
+/// Local numbers in the order of how many patches share the node, then of which, then of the mesh: what one patch takes
+/// from another then lies together in both.
+void number_nodes(const RestState& rest, const std::vector<std::vector<int>>& sharers, Patch& patch) {
     for (const int e : patch.tet)
-        for (const int a : rest.nodes.col(e)) ++valence[a];
-    for (const auto& [a, tets] : valence) patch.node.push_back(a);
+        for (const int a : rest.nodes.col(e)) patch.node.push_back(a);
+    std::sort(patch.node.begin(), patch.node.end());
+    patch.node.erase(std::unique(patch.node.begin(), patch.node.end()), patch.node.end());
     std::stable_sort(patch.node.begin(), patch.node.end(), [&](int x, int y) {
-        return std::pair(-shares[static_cast<std::size_t>(x)], -valence[x]) <
-               std::pair(-shares[static_cast<std::size_t>(y)], -valence[y]);
+        const std::vector<int>&p = sharers[static_cast<std::size_t>(x)], &q = sharers[static_cast<std::size_t>(y)];
+        return p.size() != q.size() ? p.size() > q.size() : p < q;
     });
 }
 
@@ -251,10 +248,10 @@ std::vector<Patch> cut_into_patches(const RestState& rest, const PatchShape& sha
         const auto most = static_cast<std::size_t>(shape.tets);
         Bisection(centroid, block.material, patches).split(elements, (elements.size() + most - 1) / most);
     }
-    const std::vector<int> shares = share_counts(rest, patches);
+    const std::vector<std::vector<int>> sharers = sharers_of_nodes(rest, patches);
     parallel_for(0, static_cast<int>(patches.size()), [&](int p) {
         Patch& patch = patches[static_cast<std::size_t>(p)];
-        number_nodes(rest, shares, patch);
+        number_nodes(rest, sharers, patch);
         find_fans(rest, shape.longest_fan, patch);
     });
     return patches;
