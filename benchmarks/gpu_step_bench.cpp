@@ -1,13 +1,14 @@
 // Time of a step on the GPU, and how far its float32 strays from the float64 CPU engine. The cube of
 // benchmarks/stretched_cube.hpp.
 //     gpu_step_bench [--list] [--device N] [--cells 14,24,55,128] [--steps N] [--repeats N] [--compare-limit ELEMENTS]
-//                    [--element t4|averaged] [--law lnj|iso] [--mesh FILE.vtu] [--shapes TETS:FAN:WORKGROUP[:AT_ONCE],…]
+//                    [--element t4|averaged] [--law lnj|iso] [--mesh FILE.vtu] [--shapes
+//                    TETS:FAN:WORKGROUP[:AT_ONCE],…]
 //                    [--render-passes] [--stretch 0.2]
 // Without options: on hardware 14, 24, 55 and 128 cells an edge and 1000 steps, on a software rasteriser 14 and 24
 // cells and 50 steps; five repeats, the median is printed; both elements, both laws. The float64 engine runs the same
 // steps where the mesh has no more than --compare-limit elements (1 100 000). A mesh file of about that cube is
-// measured after those of --cells. Shapes are those of tled::GpuStepShape, 0:0:0
-// the two passes; without them the suggested one. --render-passes adds the fragment shaders of 2007 for T4.
+// measured after those of --cells. Shapes are those of tled::GpuStepShape, 0:0:0 the two passes; without them the
+// suggested one. --render-passes adds the fragment shaders of 2007 for T4.
 
 #include "benchmarks/stretched_cube.hpp"
 #include "core/errors.hpp"
@@ -168,8 +169,8 @@ Options parsed(int argc, char** argv) {
             char colon = 0;
             for (std::string one; std::getline(list, one, ',');) {
                 shape.at_once = 0;
-                std::istringstream(one) >> shape.patch_tets >> colon >> shape.longest_fan >> colon >>
-                    shape.workgroup >> colon >> shape.at_once;
+                std::istringstream(one) >> shape.patch_tets >> colon >> shape.longest_fan >> colon >> shape.workgroup >>
+                    colon >> shape.at_once;
                 options.shapes.push_back(shape);
             }
         } else if (name == "--cells") {

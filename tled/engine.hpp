@@ -103,8 +103,8 @@ struct GpuStepShape {
     int patch_tets = 0;   ///< tetrahedra of a patch; fewer where its nodes do not fit into shared memory
     int longest_fan = 5;  ///< tetrahedra that one invocation computes in turn, 1 … 5
     int workgroup = 128;  ///< invocations for a patch
-    /// Workgroups that run at the same time, share out the patches and take many steps in a dispatch; 0: a workgroup for
-    /// each patch and one step in a dispatch. Where the device does not run so many, the engine finds out within a
+    /// Workgroups that run at the same time, share out the patches and take many steps in a dispatch; 0: a workgroup
+    /// for each patch and one step in a dispatch. Where the device does not run so many, the engine finds out within a
     /// fraction of a second and goes on as with 0.
     int at_once = 0;
 };

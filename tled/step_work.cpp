@@ -46,20 +46,16 @@ PatchCounts counted(const std::vector<detail::Patch>& patches, int node_count) {
     return counts;
 }
 
-// Bytes of a slot: inverse mass 12, increment read and written 24; one step in a dispatch also reads X and reads and
-// writes u, 36, which otherwise stay in shared memory. A force that is left or taken is 16, with its address 20; a fan
-// is
-// 16. Operations of a tetrahedron: edges and normals 27, H with 1/(6 V) 70, cof H and J − 1 45, factors 30, P 40, three
-// forces 51, their rounding 10; of a fan its first edges and last two nodes 40.
+// Bytes of a slot: inverse mass 4, increment read and written 24; unless a workgroup keeps its one patch in shared
+// memory, X is read and u read and written, 36. A force that is left for others or taken is 16, with its address 20; a
+// fan is 16. Operations of a tetrahedron: edges and normals 27, H with 1/(6 V) 70, cof H and J − 1 45, factors 30, P
+// 40, three forces 51, their rounding 10; of a fan its first edges and last two nodes 40.
 StepWork patch_step_work(const RestState& rest, const GpuStepShape& shape) {
-    const PatchCounts c =
-        counted(detail::cut_into_patches(rest, {shape.patch_tets, shape.longest_fan}), rest.node_count);
+    const std::vector<detail::Patch> patches = detail::cut_into_patches(rest, {shape.patch_tets, shape.longest_fan});
+    const PatchCounts c = counted(patches, rest.node_count);
     const double elements = std::max(1, rest.element_count());
-    double bytes = 36 * c.slots + 20 * c.sharers + 16 * c.fans;
-    if (shape.at_once > 0)
-        bytes += 16 * c.shared_slots;
-    else
-        bytes += 36 * c.slots + 16 * c.slots + 16 * (c.slots - c.shared_slots);
+    double bytes = 28 * c.slots + 16 * c.shared_slots + 20 * c.sharers + 16 * c.fans;
+    if (static_cast<std::size_t>(shape.at_once) < patches.size()) bytes += 36 * c.slots;
     const double flops =
         elements * (27 + 70 + 45 + 30 + 40 + 51 + 10) + 40 * c.fans + 3 * c.sharers + flops_of_node_step * c.slots;
     return {bytes / elements, flops / elements};

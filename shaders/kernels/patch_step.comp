@@ -127,9 +127,8 @@ void end_patch(Patch here) {
     barrier();  // before the next patch takes the shared memory
 #endif
 }
-#endif
 
-#if PERSISTS
+/// False where it came to no end.
 bool run_steps(uint first) {
     uvec4 fan;
     uvec2 largest;

@@ -41,9 +41,9 @@ TEST(StepWork, OfTheCpuMovesLessThanCornerForcesDo) {
 TEST(StepWork, OfOnePatchIsThatOfItsSlotsAndFans) {
     const RestState rest = cube(5);
     const StepWork work = gpu_step_work(rest, {.patch_tets = 750, .longest_fan = 1});
-    EXPECT_NEAR(work.bytes, (216 * (72 + 32) + 750 * 16) / 750.0, 1e-9);
+    EXPECT_NEAR(work.bytes, (216 * (28 + 36) + 750 * 16) / 750.0, 1e-9);
     const StepWork persisting = gpu_step_work(rest, {.patch_tets = 750, .longest_fan = 1, .at_once = 1});
-    EXPECT_NEAR(persisting.bytes, (216 * 36 + 750 * 16) / 750.0, 1e-9);
+    EXPECT_NEAR(persisting.bytes, (216 * 28 + 750 * 16) / 750.0, 1e-9);
 }
 
 // Shared nodes cost: a model that forgets them would give small patches for free.

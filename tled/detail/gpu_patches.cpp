@@ -102,8 +102,7 @@ GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& pro
     const PatchCapacity& c = layout.capacity;
     const int workgroups = shape.at_once > 0 ? std::min(shape.at_once, c.patches) : c.patches;
     many_steps_ = shape.at_once > 0;
-    sizes_ = {c.patches,       c.slots,         c.fans,    c.sources, c.neighbours,
-              c.contributions, shape.workgroup, workgroups};
+    sizes_ = {c.patches, c.slots, c.fans, c.sources, c.neighbours, c.contributions, shape.workgroup, workgroups};
     slot_count_ = layout.node_of_slot.size();
     head_.emplace(device, layout.head, "heads of patches");
     fans_.emplace(device, layout.fans, "fans of patches");
@@ -112,6 +111,7 @@ GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& pro
     sources_.emplace(device, layout.sources, "sources of forces");
     neighbours_.emplace(device, layout.neighbours, "neighbours of patches");
     progress_.emplace(device, static_cast<std::size_t>(c.patches) + 1, "progress of patches");
+    progress_copy_.emplace(device, progress_->size(), "progress of patches");
     largest_.emplace(device, static_cast<std::size_t>(c.patches), "largest forces of patches");
     volumes_.emplace(device, averages_ ? slot_count_ + 1 : 1, "volume changes of patches");
     node_of_slot_.emplace(device, layout.node_of_slot, "nodes of slots");
@@ -204,9 +204,10 @@ void GpuPatches::store(const BlockBuffers& blocks) {
     shaders::storage_barrier();
 }
 
-bool GpuPatches::gave_up() const {
+bool GpuPatches::gave_up() {
     std::array<std::uint32_t, 1> flag{};
-    progress_->download(flag, progress_->size() - 1);
+    progress_copy_->copy_from(*progress_, progress_->size() * sizeof(std::uint32_t));
+    progress_copy_->download(flag, progress_->size() - 1);
     return flag[0] != 0;
 }
 
