@@ -2,7 +2,7 @@
 // meshes and extrapolated; then every engine against Newton's method on one mesh.
 //     verification_table [--csv FILE] [--problem PART]... [--element NAME] [--no-studies] [--no-engines] [--gpu]
 // FILE takes one line per quantity and mesh, for scripts/plot_verification.py. PART selects problems whose name holds
-// it.
+// it; a $ behind it stands for the end of the name.
 
 #include "benchmarks/verification_engines.hpp"
 #include "core/errors.hpp"
@@ -54,7 +54,7 @@ Arguments parse(int argc, char** argv) {
 
 bool selected(const Problem& problem, const std::vector<std::string>& parts) {
     for (const std::string& part : parts) {
-        if (problem.name.find(part) != std::string::npos) return true;
+        if ((problem.name + "$").find(part) != std::string::npos) return true;
     }
     return parts.empty();
 }
