@@ -133,7 +133,6 @@ ProgramSource patch_step_program(Law law, const NodeEffects& effects, const Patc
     ProgramSource source{"patch_step", {"index", "bindings", "numbers"}, {}, {}};
     const auto add = [&](const char* chunk) { source.chunks.emplace_back(chunk); };
     const auto define = [&](const char* name, const std::string& value) { source.defines[name] = value; };
-    const auto define_count = [&](const char* name, int count) { define(name, std::to_string(count) + "u"); };
     if (stages.forces)
         for (const char* chunk : {"deformation", "material", "isochoric"}) add(chunk);
     if (stages.forces || stages.averages) {
@@ -148,26 +147,18 @@ ProgramSource patch_step_program(Law law, const NodeEffects& effects, const Patc
         if (!stages.averages) add("patch.pressure.element");
         add("patch.forces");
     }
-    if (stages.persists) {
-        add("patch.neighbours");
-        define_count("NEIGHBOURS", sizes.neighbours);
-    }
+    if (stages.persists) add("patch.neighbours");
     define("WORKGROUP_SIZE", std::to_string(sizes.workgroup));
     define("ADVANCES", flag(stages.advances));
     define("VOLUMES", flag(stages.volumes));
     define("FORCES", flag(stages.forces));
     define("AVERAGES", flag(stages.averages));
     define("PERSISTS", flag(stages.persists));
-    define("STAYS", flag(stages.persists && sizes.workgroups == sizes.patches));
+    define("STAYS", flag(stages.persists && sizes.each_has_one));
     define("HAS_SPRINGS", flag(effects.springs));
     define("HAS_EXTERNAL_FORCE", flag(effects.external_force));
     define("COHERENT", stages.persists ? "coherent" : "");
-    define("CONTRIBUTIONS", std::to_string(sizes.contributions) + ".0");
-    define_count("PATCHES", sizes.patches);
-    define_count("WORKGROUPS", stages.persists ? sizes.workgroups : sizes.patches);
-    define_count("SLOTS", sizes.slots);
-    define_count("FANS", sizes.fans);
-    define_count("SOURCES", sizes.sources);
+    define("SLOTS", std::to_string(sizes.slots) + "u");
     return source;
 }
 

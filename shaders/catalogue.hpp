@@ -58,11 +58,11 @@ ProgramSource nodal_pressure_program(Law law);
 ProgramSource node_step_program(const NodeEffects& effects, StoreResidual store);
 ProgramSource node_residual_program(const NodeEffects& effects, MaskConstrained mask);
 
-/// Sizes that are constants of the programs over patches: members of tled's PatchCapacity, and the workgroup.
+/// Sizes that are constants of the programs over patches; those of the mesh are uniforms (chunks/patch.glsl).
 struct PatchSizes {
-    int patches = 1, slots = 1, fans = 1, sources = 1, neighbours = 1, contributions = 1;
-    int workgroup = 128;
-    int workgroups = 1;  ///< that share out the patches where a dispatch persists; elsewhere each patch has one
+    int slots = 64;            ///< for each patch, in shared memory
+    int workgroup = 128;       ///< invocations
+    bool each_has_one = true;  ///< where a dispatch persists: whether each workgroup has one patch
 };
 /// What one dispatch over patches does (kernels/patch_step.comp).
 struct PatchStages {

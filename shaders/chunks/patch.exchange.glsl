@@ -5,7 +5,6 @@
 /// Forces on slots, mN, of all slots twice; then one zero.
 layout(std430, binding = BINDING_PATCH_FORCES) COHERENT buffer PatchForces { vec4 patch_forces[]; };
 
-const uint zero_force = 2u * slots_of_all;
 const uint other_material = 0x80000000u;  // flag of a source
 
 void send_force(uint slot, uint parity, vec3 f) { patch_forces[parity * slots_of_all + slot] = vec4(f, 0.0); }
@@ -22,7 +21,7 @@ Planes planes_from(uint first, uvec4 counts) {
     return Planes(counts, uvec4(first, b, c, c + counts.z));
 }
 
-Planes first_planes(Patch here) { return planes_from(here.index * SOURCES, low_counts(here.planes_0_to_7)); }
+Planes first_planes(Patch here) { return planes_from(here.index * source_room, low_counts(here.planes_0_to_7)); }
 
 /// The planes from 4 quad on, behind those before.
 Planes next_planes(Patch here, Planes before, uint quad) {
@@ -40,13 +39,13 @@ uvec4 sources_of_planes(uint i, Planes planes) {
 
 /// The other slot of a node that two patches share.
 uint source_of_pair(Patch here, uint i) {
-    return patch_sources[here.index * SOURCES + here.first_pair + i - (here.planes_0_to_7.x & 0xffffu)];
+    return patch_sources[here.index * source_room + here.first_pair + i - (here.planes_0_to_7.x & 0xffffu)];
 }
 
 /// Always four loads, none of which waits for another.
 vec3 forces_of_planes(uint i, Planes planes, uint parity) {
     uvec4 source = sources_of_planes(i, planes) & ~other_material;
-    uvec4 at = mix(uvec4(zero_force), source + parity * slots_of_all, lessThan(uvec4(i), planes.counts));
+    uvec4 at = mix(uvec4(2u * slots_of_all), source + parity * slots_of_all, lessThan(uvec4(i), planes.counts));
     vec3 a = patch_forces[at.x].xyz;
     vec3 b = patch_forces[at.y].xyz;
     vec3 c = patch_forces[at.z].xyz;

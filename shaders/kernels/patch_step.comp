@@ -15,7 +15,6 @@
 //! define AVERAGES
 //! define PERSISTS
 //! define STAYS
-//! define WORKGROUPS
 
 layout(location = 0) uniform uint first_step;  // of this dispatch; its parity tells which forces the first step reads
 layout(location = 1) uniform float momentum;
@@ -143,7 +142,7 @@ bool run_steps(uint first) {
     end_patch(here);
 #else
     for (; step != first_step + steps && good; ++step) {
-        for (uint p = first; p < PATCHES && good; p += WORKGROUPS) {
+        for (uint p = first; p < patch_count && good; p += workgroup_count) {
             Patch here = begin_patch(p, fan, largest);
             good = begin_step(here, fan, largest, step);
 #if !AVERAGES
@@ -153,7 +152,7 @@ bool run_steps(uint first) {
         }
 #if AVERAGES
         // Not before all patches of the workgroup have left what the others, and each other, need for the second part.
-        for (uint p = first; p < PATCHES && good; p += WORKGROUPS) {
+        for (uint p = first; p < patch_count && good; p += workgroup_count) {
             Patch here = begin_patch(p, fan, largest);
             good = end_step(here, fan, largest, step);
             end_patch(here);
@@ -167,7 +166,7 @@ bool run_steps(uint first) {
 
 void main() {
     uint first = first_patch_of_workgroup();
-    if (first >= WORKGROUPS) return;
+    if (first >= workgroup_count) return;
 #if PERSISTS
     // A driver may end loops early: llvmpipe after 65535 turns of all loops of an invocation together.
     if (!run_steps(first) && gl_LocalInvocationID.x == 0u) give_up();

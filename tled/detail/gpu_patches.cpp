@@ -49,10 +49,10 @@ std::size_t shared_bytes(std::size_t slots, bool averages) {
     return slots * (averages ? 44 : 36) + 16;
 }
 
-std::size_t most_nodes(const std::vector<Patch>& patches) {
+std::size_t most_slots(const std::vector<Patch>& patches) {
     std::size_t most = 0;
     for (const Patch& patch : patches) most = std::max(most, patch.node.size());
-    return most;
+    return (most + slot_step - 1) / slot_step * slot_step;
 }
 
 /// Patches that do not fit into shared memory shrink, such that their number grows by halves: what was shared out
@@ -61,7 +61,7 @@ PatchLayout fitting_layout(const RestState& rest, const GpuStepShape& shape, std
     const int elements = rest.element_count(), asked = std::min(shape.patch_tets, elements);
     const int count = (elements + asked - 1) / asked;
     std::vector<Patch> patches = cut_into_patches(rest, {asked, shape.longest_fan});
-    for (int halves = 3; shared_bytes(most_nodes(patches), rest.pressure.count() > 0) > shared_memory; ++halves)
+    for (int halves = 3; shared_bytes(most_slots(patches), rest.pressure.count() > 0) > shared_memory; ++halves)
         patches = cut_into_patches(rest, {(2 * elements + halves * count - 1) / (halves * count), shape.longest_fan});
     for (int tets = 2 * asked; most_sharing(rest.node_count, patches) > most_sharing_patches; tets *= 2)
         patches = cut_into_patches(rest, {tets, shape.longest_fan});
@@ -100,9 +100,10 @@ GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& pro
       node_count_(static_cast<std::size_t>(rest.node_count)) {
     const PatchLayout layout = fitting_layout(rest, shape, device.limits().shared_memory_bytes);
     const PatchCapacity& c = layout.capacity;
-    const int workgroups = shape.at_once > 0 ? std::min(shape.at_once, c.patches) : c.patches;
+    workgroups_ = shape.at_once > 0 ? std::min(shape.at_once, c.patches) : c.patches;
     many_steps_ = shape.at_once > 0;
-    sizes_ = {c.patches, c.slots, c.fans, c.sources, c.neighbours, c.contributions, shape.workgroup, workgroups};
+    capacity_ = c;
+    sizes_ = {c.slots, shape.workgroup, workgroups_ == c.patches};
     slot_count_ = layout.node_of_slot.size();
     head_.emplace(device, layout.head, "heads of patches");
     fans_.emplace(device, layout.fans, "fans of patches");
@@ -160,6 +161,22 @@ void GpuPatches::step_many(const Run& run, const shaders::NodeEffects& effects, 
     if (const int left = steps % steps_per_dispatch; left > 0) dispatch(stages, 1, left, run, effects, blocks);
 }
 
+int GpuPatches::workgroups_of(const PatchStages& stages) const {
+    return stages.persists ? workgroups_ : capacity_.patches;
+}
+
+/// The uniforms of shaders/chunks/patch.glsl.
+void GpuPatches::set_sizes(const Program& program, int workgroups) const {
+    const auto set = [&](int location, auto value) { program.set(location, static_cast<std::uint32_t>(value)); };
+    set(6, capacity_.patches);
+    set(7, slot_count_);
+    set(8, capacity_.fans);
+    set(9, capacity_.sources);
+    set(10, capacity_.neighbours);
+    set(11, workgroups);
+    program.set(12, static_cast<float>(capacity_.contributions));
+}
+
 void GpuPatches::dispatch(Stages stages, int repeats, int steps, const Run& run, const shaders::NodeEffects& effects,
                           const BlockBuffers& blocks) {
     std::vector<const Program*> programs;
@@ -171,8 +188,9 @@ void GpuPatches::dispatch(Stages stages, int repeats, int steps, const Run& run,
         programs.back()->set(3, static_cast<std::uint32_t>(steps));
         programs.back()->set(4, run.begin);
         programs.back()->set(5, run.end);
+        set_sizes(*programs.back(), workgroups_of(each));
     }
-    const int workgroups = stages.front().persists ? sizes_.workgroups : sizes_.patches;
+    const int workgroups = workgroups_of(stages.front());
     for (int i = 1; i <= repeats; ++i) {
         for (const Program* program : programs) {
             program->set(0, step_);

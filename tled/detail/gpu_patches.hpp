@@ -36,6 +36,8 @@ private:
     void dispatch(Stages stages, int repeats, int steps, const Run& run, const shaders::NodeEffects& effects,
                   const BlockBuffers& blocks);
     void step_many(const Run& run, const shaders::NodeEffects& effects, const BlockBuffers& blocks);
+    [[nodiscard]] int workgroups_of(const shaders::PatchStages& stages) const;
+    void set_sizes(const shaders::Program& program, int workgroups) const;
     [[nodiscard]] Run next_steps(int steps, const StepCoefficients& coefficients) const;
     void load(const shaders::NodeEffects& effects, const BlockBuffers& blocks);
     void store(const BlockBuffers& blocks);
@@ -46,6 +48,8 @@ private:
     shaders::Law law_;
     bool averages_, many_steps_;
     std::size_t node_count_, slot_count_;
+    PatchCapacity capacity_;
+    int workgroups_;  ///< of a dispatch that persists
     shaders::PatchSizes sizes_;
     std::optional<shaders::Buffer<Uint4>> head_, fans_;
     std::optional<shaders::Buffer<float>> rest_, state_, volumes_;

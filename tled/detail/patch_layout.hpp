@@ -13,10 +13,13 @@ namespace tissuewarp::tled::detail {
 /// More patches than this never meet at a node, unless patches are tiny.
 inline constexpr std::size_t most_sharing_patches = 16;
 
+/// Programs hold the number of slots of a patch as a constant: few different ones, or every mesh is compiled anew.
+inline constexpr std::size_t slot_step = 64;
+
 /// Every patch has as much room as the largest, so that addresses follow from the patch's number alone.
 struct PatchCapacity {
     int patches = 0;
-    int slots = 0;  ///< local nodes
+    int slots = 0;  ///< local nodes, in steps of slot_step
     int fans = 0;
     int sources = 0;        ///< slots that share a node with one of a patch, itself counted, over its shared nodes
     int neighbours = 0;     ///< patches that share a node with one
