@@ -1,6 +1,7 @@
 // Prints the tables of docs/verification.md: the problems of data/reference by Newton's method, every element, on three
 // meshes and extrapolated; then every engine against Newton's method on one mesh.
 //     verification_table [--csv FILE] [--problem PART]... [--element NAME] [--no-studies] [--no-engines] [--gpu]
+//     verification_table --list
 // FILE takes one line per quantity and mesh, for scripts/plot_verification.py. PART selects problems whose name holds
 // it; a $ behind it stands for the end of the name.
 
@@ -13,6 +14,7 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -25,7 +27,7 @@ struct Arguments {
     std::string csv;
     std::vector<std::string> parts;
     std::string element;
-    bool studies = true, engines = true, gpu = false;
+    bool studies = true, engines = true, gpu = false, list = false;
 };
 
 Arguments parse(int argc, char** argv) {
@@ -43,6 +45,8 @@ Arguments parse(int argc, char** argv) {
             result.studies = false;
         } else if (given[i] == "--no-engines") {
             result.engines = false;
+        } else if (given[i] == "--list") {
+            result.list = true;
         } else if (given[i] == "--gpu") {
             result.gpu = true;
         } else {
@@ -152,11 +156,22 @@ void run_studies(const Arguments& arguments) {
     }
 }
 
+/// Names in the order of the tables; problems of several laws share one.
+void list_problems() {
+    std::set<std::string> names;
+    for (const Problem& problem : all_problems()) names.insert(problem.name);
+    for (const std::string& name : names) std::printf("%s\n", name.c_str());
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
     try {
         const Arguments arguments = parse(argc, argv);
+        if (arguments.list) {
+            list_problems();
+            return 0;
+        }
         if (arguments.studies) run_studies(arguments);
         if (arguments.engines) print_engines(arguments.gpu ? GpuRows::Print : GpuRows::Omit);
     } catch (const std::exception& error) {
