@@ -21,7 +21,10 @@ Matrix3Xd still(const BenchScene& scene) {
 /// What all engines have in common, though they share no class.
 template <class AnyEngine>
 Stepper stepper_of(std::shared_ptr<AnyEngine> engine, const BenchScene& scene, const tled::StepWork& work) {
-    return {engine->description(), work, [engine, &scene] { engine->set_state(scene.start, still(scene)); },
+    return {engine->description(),
+            work,
+            std::nullopt,
+            [engine, &scene] { engine->set_state(scene.start, still(scene)); },
             [engine](int steps, const tled::StepCoefficients& coefficients) { engine->run(steps, coefficients); },
             [engine] { return engine->displacement(); }};
 }
@@ -32,15 +35,22 @@ Stepper stepper_with_conditions(std::unique_ptr<tled::Engine> engine, const Benc
     return stepper_of(std::shared_ptr<tled::Engine>(std::move(engine)), scene, work);
 }
 
-/// A software rasteriser need not run all patches at the same time, and pays for every invocation and barrier.
-tled::GpuStepShape fused_shape(const BenchScene& scene, const BenchDevice& device) {
-    if (!device.hardware) return {.patch_tets = 2000, .longest_fan = 5, .workgroup = 32};
-    return tled::suggested_gpu_step_shape(scene.rest.element_count());
+/// What was measured, if that was patches. A software rasteriser need not run all patches at the same time, and pays
+/// for every invocation and barrier.
+tled::KnownStepShape fused_shape(const BenchScene& scene, const BenchDevice& device) {
+    const int elements = scene.rest.element_count();
+    const tled::KnownStepShape known =
+        tled::best_known_gpu_step_shape(elements, tled::element_of(scene.rest), device.steps, device.measured);
+    if (known.measured && known.shape.patch_tets > 0) return known;
+    if (!device.hardware) return {{.patch_tets = 2000, .longest_fan = 5, .workgroup = 32}};
+    return {tled::suggested_gpu_step_shape(elements, tled::element_of(scene.rest), device.steps.multiprocessors)};
 }
 
-Stepper compute_stepper(const BenchScene& scene, const BenchDevice& device, const tled::GpuStepShape& shape) {
-    return stepper_with_conditions(tled::make_gpu_engine(scene.rest, device.index, shape), scene,
-                                   tled::gpu_step_work(scene.rest, shape));
+Stepper compute_stepper(const BenchScene& scene, const BenchDevice& device, const tled::KnownStepShape& known) {
+    Stepper stepper = stepper_with_conditions(tled::make_gpu_engine(scene.rest, device.index, known.shape), scene,
+                                              tled::gpu_step_work(scene.rest, known.shape));
+    stepper.shape = known;
+    return stepper;
 }
 
 }  // namespace
@@ -64,8 +74,10 @@ std::optional<BenchDevice> bench_device(const std::string& name) {
     if (name == "cpu") return std::nullopt;
     const int index = name.starts_with("gpu:") ? std::stoi(name.substr(4)) : -1;
     try {
-        const shaders::Device device(index);
-        return BenchDevice{device.index(), device.hardware(), device.renderer()};
+        const int found = shaders::Device(index).index();
+        const tled::StepDevice steps = tled::step_device(found);
+        return BenchDevice{found, steps.hardware, steps.name, steps,
+                           tled::read_step_shape_cache(tled::step_shape_cache_path())};
     } catch (const GpuUnavailable&) {
         if (name != "auto") throw;
         return std::nullopt;

@@ -3,6 +3,7 @@
 
 #include "apps/bench_scenes.hpp"
 #include "tled/engine.hpp"
+#include "tled/step_shape_cache.hpp"
 #include "tled/step_work.hpp"
 
 #include <functional>
@@ -29,6 +30,8 @@ struct BenchDevice {
     int index = -1;  ///< of EGL's devices
     bool hardware = false;
     std::string name;
+    tled::StepDevice steps;
+    tled::StepShapeCache measured;  ///< shapes of its steps, and of others
 };
 /// The device that --device names: "auto" (nothing where there is none), "gpu", "gpu:<n>" or "cpu" (nothing). Throws
 /// GpuUnavailable.
@@ -38,6 +41,7 @@ std::optional<BenchDevice> bench_device(const std::string& name);
 struct Stepper {
     std::string description;
     tled::StepWork work;
+    std::optional<tled::KnownStepShape> shape;  ///< of compute passes and patches
     std::function<void()> restart;
     std::function<void(int steps, const tled::StepCoefficients&)> run;
     std::function<Eigen::Matrix3Xd()> displacement;

@@ -21,6 +21,26 @@ std::string difference_text(const EngineTiming& engine) {
     return difference + (engine.repeats_equal ? "" : " NOT REPEATED");
 }
 
+const char* source_of(const tled::KnownStepShape& shape) {
+    return shape.measured ? "measured" : "suggested";
+}
+
+/// Of patches: two passes have but one shape.
+std::string shape_text(const EngineTiming& engine) {
+    if (engine.engine != BenchEngine::Fused || !engine.shape) return "";
+    return fmt::format("  {} {}", source_of(*engine.shape), name_of(engine.shape->shape));
+}
+
+nlohmann::json shape_json(const EngineTiming& engine) {
+    if (engine.engine != BenchEngine::Fused || !engine.shape) return {};
+    const tled::GpuStepShape& shape = engine.shape->shape;
+    return {{"patch_tets", shape.patch_tets},
+            {"longest_fan", shape.longest_fan},
+            {"workgroup", shape.workgroup},
+            {"at_once", shape.at_once},
+            {"source", source_of(*engine.shape)}};
+}
+
 void print_ceilings(const BenchResults& results) {
     for (const auto& [processor, c] : results.ceilings)
         fmt::print("{}: copy {:.1f} GB/s, multiply-adds {:.1f} Gflop/s\n",
@@ -29,11 +49,12 @@ void print_ceilings(const BenchResults& results) {
 }
 
 void print_row(const BenchResults& results, const MeshTimings& mesh, const EngineTiming& engine) {
-    fmt::print("{:>9}  {:<14}{:>11.2f}{:>11.2f}{:>8}{:>10.3f}{:>7.0f}{:>7.0f}{:>8.1f}{:>8.1f}{:>12.2f}{:>10.3g}  {}\n",
-               mesh.elements, name_of(engine.engine), engine.mean() * 1e6, engine.median() * 1e6,
-               ratio_text(mesh.ratio_to_scalar(engine)), engine.median() / mesh.elements * 1e9, engine.work.bytes,
-               engine.work.flops, 100 * results.bandwidth_share(mesh, engine), 100 * results.fma_share(mesh, engine),
-               mesh.critical_step * 1e6, mesh.real_time_factor(engine), difference_text(engine));
+    fmt::print(
+        "{:>9}  {:<14}{:>11.2f}{:>11.2f}{:>8}{:>10.3f}{:>7.0f}{:>7.0f}{:>8.1f}{:>8.1f}{:>12.2f}{:>10.3g}  {}{}\n",
+        mesh.elements, name_of(engine.engine), engine.mean() * 1e6, engine.median() * 1e6,
+        ratio_text(mesh.ratio_to_scalar(engine)), engine.median() / mesh.elements * 1e9, engine.work.bytes,
+        engine.work.flops, 100 * results.bandwidth_share(mesh, engine), 100 * results.fma_share(mesh, engine),
+        mesh.critical_step * 1e6, mesh.real_time_factor(engine), difference_text(engine), shape_text(engine));
 }
 
 void print_study(const BenchResults& results, const StudyResults& study) {
@@ -59,6 +80,7 @@ nlohmann::json to_json(const BenchResults& results, const MeshTimings& mesh, con
     const std::optional<double> ratio = mesh.ratio_to_scalar(engine);
     return {{"engine", name_of(engine.engine)},
             {"description", engine.description},
+            {"step_shape", shape_json(engine)},
             {"steps", engine.steps},
             {"seconds_per_step", engine.seconds_per_step},
             {"mean_seconds_per_step", engine.mean()},

@@ -25,11 +25,12 @@ constexpr double indentation = 10;    // mm
 constexpr double pressed = 15;        // mm, radius of what is pressed in
 constexpr double fade = 40;           // mm, standard deviation of the dent around it
 
-BenchScene scene_of(const meshing::TetMesh& mesh, Matrix3Xd start, const tled::Conditions& conditions) {
+BenchScene scene_of(const meshing::TetMesh& mesh, Matrix3Xd start, const tled::Conditions& conditions,
+                    tled::Element element = tled::Element::T4) {
     tled::Model model;
     model.mesh = mesh;
     model.materials[1] = tled::NeoHookeanLnJ{1.007, 49.329};
-    model.element = tled::Element::T4;
+    model.element = element;
     model.density = 1e-6;
     return {tled::rest_state(model), tled::nodal_conditions(conditions, mesh.node_count()), std::move(start)};
 }
@@ -76,7 +77,7 @@ int cells_for(int elements) {
     return std::max(1, static_cast<int>(std::lround(std::cbrt(elements / 6.0))));
 }
 
-BenchScene stretched_cube(int cells) {
+BenchScene stretched_cube(int cells, tled::Element element) {
     const meshing::TetMesh mesh = meshing::box_mesh({edge, edge, edge}, {cells, cells, cells});
     Matrix3Xd start(3, mesh.node_count());
     tled::Conditions conditions;
@@ -88,7 +89,7 @@ BenchScene stretched_cube(int cells) {
             stretch * (X.z() - edge / (2 * std::numbers::pi) * std::sin(turn));
         if (z < 1e-6 || z > 1 - 1e-6) conditions.prescribed.push_back({node, {true, true, true}, start.col(node)});
     }
-    return scene_of(mesh, std::move(start), conditions);
+    return scene_of(mesh, std::move(start), conditions, element);
 }
 
 BenchScene indented_brain(const meshing::TetMesh& mesh) {

@@ -11,7 +11,7 @@
 
 namespace tissuewarp::apps {
 
-/// Linear tetrahedra of neo-Hookean tissue (lnJ, λ = 49.329 kPa, μ = 1.007 kPa, 1000 kg/m³), what holds and moves it,
+/// Tetrahedra of neo-Hookean tissue (lnJ, λ = 49.329 kPa, μ = 1.007 kPa, 1000 kg/m³), what holds and moves it,
 /// and the displacement (3 × N, mm) that the steps start from.
 struct BenchScene {
     tled::RestState rest;
@@ -23,7 +23,7 @@ struct BenchScene {
 /// Edge 100 mm, `cells`³ cells of six tetrahedra, both ends held, 20 % further apart than at rest. It starts as a waist
 /// of unchanged volume: an even stretch would release its pressure as waves that no step near the critical one
 /// survives.
-BenchScene stretched_cube(int cells);
+BenchScene stretched_cube(int cells, tled::Element element = tled::Element::T4);
 
 /// The nodes around the surface point that lies furthest to the front and above are pressed in by 10 mm, those of the
 /// lowest tenth are held; starts with the dent half settled.

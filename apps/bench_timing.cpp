@@ -84,6 +84,7 @@ std::optional<EngineTiming> timed(BenchEngine engine, const BenchScene& scene, c
     timing.engine = engine;
     timing.description = stepper.description;
     timing.work = stepper.work;
+    timing.shape = stepper.shape;
     const double fitting = std::min(plan.run_seconds / first, double(plan.steps));
     timing.steps = std::max(static_cast<int>(fitting), std::min(least_steps, plan.steps));
     if (hardware)

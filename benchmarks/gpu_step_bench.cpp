@@ -17,6 +17,7 @@
 #include "shaders/device.hpp"
 #include "tled/reference.hpp"
 #include "tled/render_pass_engine.hpp"
+#include "tled/step_shape_cache.hpp"
 
 #include <algorithm>
 #include <cstdio>
@@ -99,19 +100,13 @@ void report(AnyEngine& engine, double start_seconds, const Scene& scene, const t
     std::fflush(stdout);
 }
 
-std::string name_of(const tled::GpuStepShape& shape) {
-    if (shape.patch_tets == 0) return "two passes";
-    std::ostringstream name;
-    name << shape.patch_tets << ':' << shape.longest_fan << ':' << shape.workgroup;
-    if (shape.at_once > 0) name << ':' << shape.at_once;
-    return name.str();
-}
-
 void report_engines(const Scene& scene, const tled::RestState& rest, const std::string& name, const std::string& mesh,
                     const Options& options) {
     std::vector<tled::GpuStepShape> shapes = options.shapes;
-    const tled::Element element = rest.pressure.count() > 0 ? tled::Element::AveragedPressureT4 : tled::Element::T4;
-    if (shapes.empty()) shapes = {tled::suggested_gpu_step_shape(rest.element_count(), element)};
+    if (shapes.empty()) {
+        const int multiprocessors = tled::step_device(options.device).multiprocessors;
+        shapes = {tled::suggested_gpu_step_shape(rest.element_count(), tled::element_of(rest), multiprocessors)};
+    }
     for (const tled::GpuStepShape& shape : shapes) {
         const double begin = now();
         const auto gpu = tled::make_gpu_engine(rest, options.device, shape);

@@ -130,6 +130,7 @@ void Device::describe() {
     for (unsigned axis = 0; axis < 3; ++axis)
         glGetIntegeri_v(GL_MAX_COMPUTE_WORK_GROUP_COUNT, axis, &limits_.workgroup_count[axis]);
     if (epoxy_has_gl_extension("GL_KHR_shader_subgroup")) limits_.subgroup_size = gl_int(GL_SUBGROUP_SIZE_KHR);
+    if (epoxy_has_gl_extension("GL_NV_shader_thread_group")) limits_.multiprocessors = gl_int(GL_SM_COUNT_NV);
 }
 
 std::vector<DeviceInfo> list_devices() {

@@ -29,8 +29,9 @@ struct DeviceLimits {
     int storage_bindings = 0;              ///< of the context
     int workgroup_invocations = 0;
     std::array<int, 3> workgroup_count{};
-    int texture_size = 0;   ///< texels of a side
-    int subgroup_size = 0;  ///< 0 without GL_KHR_shader_subgroup
+    int texture_size = 0;     ///< texels of a side
+    int subgroup_size = 0;    ///< 0 without GL_KHR_shader_subgroup
+    int multiprocessors = 0;  ///< 0 where unknown, that is without GL_NV_shader_thread_group
 };
 
 enum class Debugging { Off, On };  ///< On: a debug context; errors carry the driver's words
@@ -70,6 +71,8 @@ public:
     [[nodiscard]] bool hardware() const { return hardware_; }
     [[nodiscard]] const std::string& renderer() const { return renderer_; }
     [[nodiscard]] const std::string& vendor() const { return vendor_; }
+    /// OpenGL's version string, which ends with that of the driver: "4.6.0 NVIDIA 580.65", "4.5 (Core Profile) Mesa
+    /// 22.3.6".
     [[nodiscard]] const std::string& version() const { return version_; }
     [[nodiscard]] const DeviceLimits& limits() const { return limits_; }
 

@@ -107,14 +107,16 @@ struct GpuStepShape {
     /// for each patch and one step in a dispatch. Where the device does not run so many, the engine finds out within a
     /// fraction of a second and goes on as with 0.
     int at_once = 0;
+    friend bool operator==(const GpuStepShape&, const GpuStepShape&) = default;
 };
 
-/// What measured best on an H100 for a mesh of so many tetrahedra (docs/performance.md).
-GpuStepShape suggested_gpu_step_shape(int element_count, Element element = Element::T4);
+/// What measured best on an H100 for a mesh of so many tetrahedra (docs/performance.md), carried over to a device of
+/// so many multiprocessors; where these are unknown (0), to one of as many as an H100 has.
+GpuStepShape suggested_gpu_step_shape(int element_count, Element element = Element::T4, int multiprocessors = 0);
 
 /// OpenGL 4.5 compute through EGL, float32. `device` counts EGL devices; −1 takes the first hardware device, or the
-/// software rasteriser when there is none. Without a shape, hardware takes the suggested one and a software rasteriser
-/// two passes. Its forces on this mesh are compared with the scalar reference once. Throws
+/// software rasteriser when there is none. Without a shape, hardware takes the best known one (step_shape_cache.hpp)
+/// and a software rasteriser two passes. Its forces on this mesh are compared with the scalar reference once. Throws
 /// GpuUnavailable, also when they differ.
 std::unique_ptr<Engine> make_gpu_engine(const RestState& rest, int device = -1);
 std::unique_ptr<Engine> make_gpu_engine(const RestState& rest, int device, const GpuStepShape& shape);

@@ -10,6 +10,7 @@
 #include "tled/detail/kinematics.hpp"
 #include "tled/engine.hpp"
 #include "tled/reference.hpp"
+#include "tled/step_shape_cache.hpp"
 
 #include <cmath>
 #include <limits>
@@ -425,29 +426,12 @@ void require_right_forces(Engine& engine, const RestState& rest) {
 
 }  // namespace
 
-GpuStepShape suggested_gpu_step_shape(int element_count, Element element) {
-    // Patches in multiples of the multiprocessors, so that none of these idles; larger ones lose less at their surfaces
-    // as long as their nodes fit into shared memory, of which a regular mesh has more than others; patches that do not
-    // are made smaller. Two workgroups on a multiprocessor overlap where one would wait. What no cache holds gains
-    // nothing from going round and round in one dispatch.
-    constexpr int multiprocessors = 132, least_patch = 64, largest_patch = 4450, cached = 2000000;
-    const auto shared_out = [&](int patches) { return std::max(least_patch, (element_count + patches - 1) / patches); };
-    const auto multiple = [&](int patches, int tets) { return patches * ((element_count - 1) / (patches * tets) + 1); };
-    if (element_count < 20000) return {shared_out(multiprocessors), 1, 128, 4 * multiprocessors};
-    if (element_count < 120000) return {shared_out(multiprocessors), 2, 512, multiprocessors};
-    const int largest_at_once = element == Element::T4 ? largest_patch : 3600;
-    if (element_count < multiprocessors * largest_at_once)
-        return {shared_out(multiprocessors), 5, 640, multiprocessors};
-    if (element_count < cached)
-        return {shared_out(multiple(2 * multiprocessors, largest_patch / 2)), 5, 320, 2 * multiprocessors};
-    return {shared_out(multiple(multiprocessors, largest_patch)), 5, 768, 0};
-}
-
 std::unique_ptr<Engine> make_gpu_engine(const RestState& rest, int device) {
-    const Element element = rest.pressure.count() > 0 ? Element::AveragedPressureT4 : Element::T4;
-    const bool hardware = shaders::Device(device).hardware();
+    const StepDevice on = step_device(device);
+    if (!on.hardware) return make_gpu_engine(rest, device, GpuStepShape{});
+    const StepShapeCache cache = read_step_shape_cache(step_shape_cache_path());
     return make_gpu_engine(rest, device,
-                           hardware ? suggested_gpu_step_shape(rest.element_count(), element) : GpuStepShape{});
+                           best_known_gpu_step_shape(rest.element_count(), element_of(rest), on, cache).shape);
 }
 
 std::unique_ptr<Engine> make_gpu_engine(const RestState& rest, int device, const GpuStepShape& shape) {

@@ -195,5 +195,76 @@ class BenchmarkOptions(PhantomTest):
         self.assert_refused(run("bench", "--quick", "--output", path), IO, "taken")
 
 
+class Tuning(PhantomTest):
+    """One tuning of a tiny cube, and what later runs make of it."""
+
+    def tune(self, *more):
+        self.cache = self.phantom.folder / "cache"
+        return run("bench", "--tune", "--quick", "--elements", 384, "--repeats", 2, *more,
+                   TISSUEWARP_CACHE=str(self.cache))
+
+    def lines(self):
+        text = (self.cache / "gpu_step_shapes.tsv").read_text()
+        return [line.split("\t") for line in text.splitlines() if not line.startswith("#")]
+
+    def fused_shape(self):
+        output = self.phantom.folder / "bench"
+        result = run("bench", "--quick", "--study", "cube", "--elements", 384, "--engines", "fused", "--output", output,
+                     TISSUEWARP_CACHE=str(self.cache))
+        self.assertEqual(result.returncode, 0, result.stderr)
+        report = json.loads((output / "bench.json").read_text())
+        return report["studies"][0]["meshes"][0]["engines"][0]["step_shape"], result.stdout
+
+    # A table that is not sorted, a cache that holds another shape than the fastest, one element alone.
+    def test_keeps_the_fastest_of_each_table(self):
+        result = self.tune()
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn(str(self.cache / "gpu_step_shapes.tsv"), result.stdout)
+        tables = re.findall(r"(?m)^384 (linear tetrahedra|averaged pressure)\nshape.*\n((?:.+\n)+)", result.stdout)
+        self.assertEqual([kind for kind, _ in tables], ["linear tetrahedra", "averaged pressure"])
+        self.assertEqual([line[2:4] for line in self.lines()], [["t4", "384"], ["averaged", "384"]])
+        for (_, table), line in zip(tables, self.lines()):
+            rows = table.splitlines()
+            self.assertEqual(sum(row.endswith("suggested") for row in rows), 1, table)
+            names = [re.split(r"  +", row)[0] for row in rows]
+            self.assertIn("two passes", names)
+            ratios = [float(re.split(r"  +", row)[3]) for row in rows if "out:" not in row]
+            self.assertEqual(ratios, sorted(ratios))
+            self.assertEqual(ratios[0], 1)
+            fastest = ["0", "5", "128", "0"] if names[0] == "two passes" else (names[0].split(":") + ["0"])[:4]
+            self.assertEqual(line[4:8], fastest)
+
+    # A measured shape that no run takes; one of which nobody hears; a damaged line that ends a run.
+    def test_later_runs_take_what_was_measured_and_say_so(self):
+        self.assertEqual(self.tune("--quiet").returncode, 0)
+        line = self.lines()[0]
+        line[4:8] = ["100", "2", "64", "0"]
+        file = self.cache / "gpu_step_shapes.tsv"
+        file.write_text("\t".join(line) + "\nnonsense\n")
+        shape, printed = self.fused_shape()
+        self.assertEqual(shape, {"patch_tets": 100, "longest_fan": 2, "workgroup": 64, "at_once": 0,
+                                 "source": "measured"})
+        self.assertIn("measured 100:2:64", printed)
+        self.assertIn(f"1 lines of {file} could not be used", printed)
+        line[1] = "another driver"
+        file.write_text("\t".join(line) + "\n")
+        shape, printed = self.fused_shape()
+        self.assertEqual(shape["source"], "suggested")
+        self.assertIn("  suggested ", printed)
+
+    def test_options_of_the_studies_are_refused(self):
+        for option in (["--study", "cube"], ["--engines", "fused"], ["--output", self.phantom.output]):
+            self.assert_refused(self.tune(*option), INPUT, option[0], "--tune")
+
+    def test_needs_a_device(self):
+        self.assert_refused(self.tune("--device", "cpu"), INPUT, "--tune", "--device cpu")
+
+    # Found before an hour of measuring, not after it.
+    def test_place_that_cannot_be_written(self):
+        taken = self.phantom.folder / "taken"
+        taken.write_text("")
+        self.assert_refused(run("bench", "--tune", TISSUEWARP_CACHE=str(taken)), IO, "taken", "TISSUEWARP_CACHE")
+
+
 if __name__ == "__main__":
     unittest.main()

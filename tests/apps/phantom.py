@@ -67,9 +67,10 @@ class Phantom:
         return run(*arguments, *more)
 
 
-def run(*arguments, folder=None):
-    """The program with these arguments, in that folder."""
-    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=110, cwd=folder)
+def run(*arguments, folder=None, **environment):
+    """The program with these arguments, in that folder, with these variables besides those of the test."""
+    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=110, cwd=folder,
+                          env={**os.environ, **environment})
 
 
 class PhantomTest(unittest.TestCase):

@@ -41,6 +41,9 @@ TEST(Devices, OffersWhatOpenGL45Guarantees) {
     EXPECT_GE(limits.storage_blocks, 8);
     EXPECT_GE(limits.workgroup_invocations, 1024);
     EXPECT_GE(limits.workgroup_count[0], 65535);
+    // Unknown, or what some device has; llvmpipe has none.
+    EXPECT_GE(limits.multiprocessors, 0);
+    EXPECT_LT(limits.multiprocessors, 10000);
 }
 
 TEST(Devices, RefusesAnIndexThatDoesNotExistAndSaysHowManyThereAre) {
