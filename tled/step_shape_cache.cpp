@@ -86,12 +86,13 @@ std::optional<std::string> next_line(std::istream& file) {
     std::string line(longest_line, '\0');
     file.getline(line.data(), static_cast<std::streamsize>(line.size()));
     if (file.gcount() == 0 && !file) return std::nullopt;
-    line.resize(line.find('\0') == std::string::npos ? line.size() : line.find('\0'));
     if (file.fail() && !file.eof()) {
         file.clear();
         file.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
         return "too long";
     }
+    // The end of the line was counted too, unless the file ends without one.
+    line.resize(static_cast<std::size_t>(file.gcount()) - (file.eof() ? 0 : 1));
     return line;
 }
 
