@@ -40,10 +40,10 @@ Stepper stepper_with_conditions(std::unique_ptr<tled::Engine> engine, const Benc
 tled::KnownStepShape fused_shape(const BenchScene& scene, const BenchDevice& device) {
     const int elements = scene.rest.element_count();
     const tled::KnownStepShape known =
-        tled::best_known_gpu_step_shape(elements, tled::element_of(scene.rest), device.steps, device.measured);
+        tled::best_known_gpu_step_shape(elements, tled::element_of(scene.rest), device.gpu, device.measured);
     if (known.measured && known.shape.patch_tets > 0) return known;
-    if (!device.hardware) return {{.patch_tets = 2000, .longest_fan = 5, .workgroup = 32}};
-    return {tled::suggested_gpu_step_shape(elements, tled::element_of(scene.rest), device.steps.multiprocessors)};
+    if (!device.gpu.hardware) return {{.patch_tets = 2000, .longest_fan = 5, .workgroup = 32}};
+    return {tled::suggested_gpu_step_shape(elements, tled::element_of(scene.rest), device.gpu.multiprocessors)};
 }
 
 Stepper compute_stepper(const BenchScene& scene, const BenchDevice& device, const tled::KnownStepShape& known) {
@@ -75,9 +75,7 @@ std::optional<BenchDevice> bench_device(const std::string& name) {
     const int index = name.starts_with("gpu:") ? std::stoi(name.substr(4)) : -1;
     try {
         const int found = shaders::Device(index).index();
-        const tled::StepDevice steps = tled::step_device(found);
-        return BenchDevice{found, steps.hardware, steps.name, steps,
-                           tled::read_step_shape_cache(tled::step_shape_cache_path())};
+        return BenchDevice{found, tled::step_device(found), tled::read_step_shape_cache(tled::step_shape_cache_path())};
     } catch (const GpuUnavailable&) {
         if (name != "auto") throw;
         return std::nullopt;

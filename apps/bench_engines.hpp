@@ -28,10 +28,8 @@ tled::Processor processor_of(BenchEngine engine);
 /// An OpenGL device as the benchmark knows it.
 struct BenchDevice {
     int index = -1;  ///< of EGL's devices
-    bool hardware = false;
-    std::string name;
-    tled::StepDevice steps;
-    tled::StepShapeCache measured;  ///< shapes of its steps, and of others
+    tled::StepDevice gpu;
+    tled::StepShapeCache measured;  ///< shapes of steps, on this device and on others
 };
 /// The device that --device names: "auto" (nothing where there is none), "gpu", "gpu:<n>" or "cpu" (nothing). Throws
 /// GpuUnavailable.

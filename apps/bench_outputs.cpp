@@ -44,7 +44,7 @@ nlohmann::json shape_json(const EngineTiming& engine) {
 void print_ceilings(const BenchResults& results) {
     for (const auto& [processor, c] : results.ceilings)
         fmt::print("{}: copy {:.1f} GB/s, multiply-adds {:.1f} Gflop/s\n",
-                   processor == tled::Processor::Cpu ? results.cpu : results.device->name,
+                   processor == tled::Processor::Cpu ? results.cpu : results.device->gpu.name,
                    c.copy_bytes_per_second * 1e-9, c.fma_flops_per_second * 1e-9);
 }
 
@@ -139,7 +139,7 @@ nlohmann::json bench_json(const BenchResults& results) {
             limits[name_of(engine)] = {{"kind", kinds[static_cast<int>(limit->kind)]}, {"elements", limit->elements}};
         }
     nlohmann::json gpu;
-    if (results.device) gpu = {{"name", results.device->name}, {"hardware", results.device->hardware}};
+    if (results.device) gpu = {{"name", results.device->gpu.name}, {"hardware", results.device->gpu.hardware}};
     return {{"schema", "tissuewarp.bench"},
             {"schema_version", 1},
             {"cpu", results.cpu},

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 
 namespace tissuewarp::apps {
 
@@ -41,7 +42,7 @@ BenchDevice tuned_device(const BenchOptions& options) {
 std::vector<int> sizes(const BenchOptions& options, const BenchDevice& device) {
     if (!options.elements.empty()) return options.elements;
     if (options.quick) return {750};
-    if (!device.hardware) return {6000, 16464};
+    if (!device.gpu.hardware) return {6000, 16464};
     return {6000, 16464, 82944, 384000, 998250, 3072000};
 }
 
@@ -74,13 +75,16 @@ void print_table(tled::Element element, int elements, const std::vector<tled::St
 
 void run_tuning(const BenchOptions& options, ProgressLine& progress) {
     refuse_options_of_studies(options);
+    // With its own cache of shaders NVIDIA's driver may run what it sees for the first time at half the speed
+    // (docs/performance.md), and each shape is a first time.
+    ::setenv("__GL_SHADER_DISK_CACHE", "0", 0);
     const BenchDevice device = tuned_device(options);
     const std::filesystem::path path = tled::step_shape_cache_path();
     tled::StepShapeCache cache = device.measured;
     tled::write_step_shape_cache(cache, path);  // an unwritable place is found before an hour of measuring
     if (!options.common.quiet) {
-        fmt::print("{}, {}, {} multiprocessors\n", device.name, device.steps.driver,
-                   device.steps.multiprocessors > 0 ? std::to_string(device.steps.multiprocessors) : "unknown");
+        fmt::print("{}, {}, {} multiprocessors\n", device.gpu.name, device.gpu.driver,
+                   device.gpu.multiprocessors > 0 ? std::to_string(device.gpu.multiprocessors) : "unknown");
         fmt::print("shape: tetrahedra of a patch : of a fan : invocations of a workgroup : workgroups at once\n");
         if (cache.skipped > 0) fmt::print("note: {}\n", skipped_lines(cache));
     }
@@ -95,13 +99,13 @@ void run_tuning(const BenchOptions& options, ProgressLine& progress) {
             const int count = rest.element_count();
             const std::vector<tled::StepShapeTiming> timings =
                 tled::tuned_gpu_step_shape(rest, device.index, progress, effort_of(options));
-            keep(cache, {device.steps.name, device.steps.driver, element, count, timings.front().shape,
+            keep(cache, {device.gpu.name, device.gpu.driver, element, count, timings.front().shape,
                          timings.front().seconds_per_step});
             tled::write_step_shape_cache(cache, path);
             progress.clear();
             if (options.common.quiet) continue;
             print_table(element, count, timings,
-                        tled::suggested_gpu_step_shape(count, element, device.steps.multiprocessors));
+                        tled::suggested_gpu_step_shape(count, element, device.gpu.multiprocessors));
         }
     if (!options.common.quiet) fmt::print("\nthe fastest are kept in {}\n", path.string());
 }

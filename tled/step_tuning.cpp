@@ -18,8 +18,22 @@ namespace {
 
 using Eigen::Matrix3Xd;
 
-void add(std::vector<GpuStepShape>& shapes, const GpuStepShape& shape) {
-    if (std::find(shapes.begin(), shapes.end(), shape) == shapes.end()) shapes.push_back(shape);
+constexpr int workgroups[] = {128, 320, 512, 640, 768};
+
+/// The largest up to `most` that a patch can occupy: about one invocation for each tetrahedron and node.
+int useful_workgroup(int most, int patch_tets) {
+    int useful = workgroups[0];
+    for (const int workgroup : workgroups)
+        if (workgroup <= most && workgroup <= 1.3 * patch_tets) useful = workgroup;
+    return useful;
+}
+
+/// Workgroups beyond the number of patches are not started.
+bool steps_alike(GpuStepShape a, GpuStepShape b, int element_count) {
+    for (GpuStepShape* shape : {&a, &b})
+        if (shape->patch_tets > 0)
+            shape->at_once = std::min(shape->at_once, (element_count - 1) / shape->patch_tets + 1);
+    return a == b;
 }
 
 /// The next smaller and the next larger of rising values.
@@ -155,29 +169,36 @@ GpuStepShape suggested_gpu_step_shape(int element_count, Element element, int mu
 }
 
 std::vector<GpuStepShape> candidate_gpu_step_shapes(int element_count, Element element, int multiprocessors) {
-    constexpr int fans[] = {1, 2, 5}, workgroups[] = {128, 320, 512, 640, 768};
+    constexpr int fans[] = {1, 2, 5};
+    constexpr int small = 300;  // tetrahedra of a patch: twice as many may lose less at its surface than they cost
     // Patches on a multiprocessor at the same time and the invocations for which it then has registers
     // (docs/decisions/gpu_patches.md).
     constexpr struct { int patches, workgroup; } sides[] = {{1, 640}, {2, 320}, {4, 128}};
     const GpuStepShape suggested = suggested_gpu_step_shape(element_count, element, multiprocessors);
     const int m = multiprocessors > 0 ? multiprocessors : detail::default_multiprocessors;
     std::vector<GpuStepShape> shapes{{}, suggested};
+    const auto add = [&](const GpuStepShape& shape) {
+        const auto same = [&](const GpuStepShape& other) { return steps_alike(shape, other, element_count); };
+        if (std::none_of(shapes.begin(), shapes.end(), same)) shapes.push_back(shape);
+    };
     const auto varied = [&](int GpuStepShape::*knob, int value) {
         GpuStepShape shape = suggested;
         shape.*knob = value;
-        add(shapes, shape);
+        add(shape);
     };
     for (const int fan : neighbours(fans, suggested.longest_fan)) varied(&GpuStepShape::longest_fan, fan);
     for (const int workgroup : neighbours(workgroups, suggested.workgroup)) varied(&GpuStepShape::workgroup, workgroup);
     varied(&GpuStepShape::at_once, suggested.at_once > 0 ? 0 : m);
+    if (suggested.patch_tets < small)
+        for (const int fan : fans) add({2 * suggested.patch_tets, fan, suggested.workgroup, suggested.at_once});
     for (const auto& side : sides) {
         // As many rounds of patches as their tetrahedra need room for.
         const int at_once = side.patches * m, room = detail::largest_patch_tets(element) / side.patches;
         const int rounds = (element_count - 1) / (at_once * room) + 1;
         const int tets = (element_count - 1) / (at_once * rounds) + 1;
         if (tets < detail::least_patch_tets) continue;
-        add(shapes, {tets, suggested.longest_fan, side.workgroup, at_once});
-        if (side.patches == 1) add(shapes, {tets, suggested.longest_fan, 768, 0});
+        add({tets, suggested.longest_fan, useful_workgroup(side.workgroup, tets), at_once});
+        if (side.patches == 1) add({tets, suggested.longest_fan, useful_workgroup(768, tets), 0});
     }
     return shapes;
 }
