@@ -195,17 +195,30 @@ class BenchmarkOptions(PhantomTest):
         self.assert_refused(run("bench", "--quick", "--output", path), IO, "taken")
 
 
-class Tuning(PhantomTest):
+def tune(cache, *more):
+    return run("bench", "--tune", "--quick", "--elements", 384, "--repeats", 2, *more, TISSUEWARP_CACHE=str(cache))
+
+
+class Tuning(unittest.TestCase):
     """One tuning of a tiny cube, and what later runs make of it."""
 
-    def tune(self, *more):
-        self.cache = self.phantom.folder / "cache"
-        return run("bench", "--tune", "--quick", "--elements", 384, "--repeats", 2, *more,
-                   TISSUEWARP_CACHE=str(self.cache))
+    @classmethod
+    def setUpClass(cls):
+        cls.phantom = Phantom()
+        cls.cache = cls.phantom.folder / "cache"
+        cls.file = cls.cache / "gpu_step_shapes.tsv"
+        cls.result = tune(cls.cache)
+        cls.text = cls.file.read_text() if cls.result.returncode == 0 else None
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.phantom.temporary.cleanup()
+
+    def setUp(self):
+        self.assertEqual(self.result.returncode, 0, self.result.stderr)
 
     def lines(self):
-        text = (self.cache / "gpu_step_shapes.tsv").read_text()
-        return [line.split("\t") for line in text.splitlines() if not line.startswith("#")]
+        return [line.split("\t") for line in self.text.splitlines() if not line.startswith("#")]
 
     def fused_shape(self):
         output = self.phantom.folder / "bench"
@@ -217,10 +230,9 @@ class Tuning(PhantomTest):
 
     # A table that is not sorted, a cache that holds another shape than the fastest, one element alone.
     def test_keeps_the_fastest_of_each_table(self):
-        result = self.tune()
-        self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertIn(str(self.cache / "gpu_step_shapes.tsv"), result.stdout)
-        tables = re.findall(r"(?m)^384 (linear tetrahedra|averaged pressure)\nshape.*\n((?:.+\n)+)", result.stdout)
+        printed = self.result.stdout
+        self.assertIn(str(self.file), printed)
+        tables = re.findall(r"(?m)^384 (linear tetrahedra|averaged pressure)\nshape.*\n((?:.+\n)+)", printed)
         self.assertEqual([kind for kind, _ in tables], ["linear tetrahedra", "averaged pressure"])
         self.assertEqual([line[2:4] for line in self.lines()], [["t4", "384"], ["averaged", "384"]])
         for (_, table), line in zip(tables, self.lines()):
@@ -236,28 +248,28 @@ class Tuning(PhantomTest):
 
     # A measured shape that no run takes; one of which nobody hears; a damaged line that ends a run.
     def test_later_runs_take_what_was_measured_and_say_so(self):
-        self.assertEqual(self.tune("--quiet").returncode, 0)
         line = self.lines()[0]
         line[4:8] = ["100", "2", "64", "0"]
-        file = self.cache / "gpu_step_shapes.tsv"
-        file.write_text("\t".join(line) + "\nnonsense\n")
+        self.file.write_text("\t".join(line) + "\nnonsense\n")
         shape, printed = self.fused_shape()
         self.assertEqual(shape, {"patch_tets": 100, "longest_fan": 2, "workgroup": 64, "at_once": 0,
                                  "source": "measured"})
         self.assertIn("measured 100:2:64", printed)
-        self.assertIn(f"1 lines of {file} could not be used", printed)
+        self.assertIn(f"1 lines of {self.file} could not be used", printed)
         line[1] = "another driver"
-        file.write_text("\t".join(line) + "\n")
+        self.file.write_text("\t".join(line) + "\n")
         shape, printed = self.fused_shape()
         self.assertEqual(shape["source"], "suggested")
         self.assertIn("  suggested ", printed)
 
+
+class TuningOptions(PhantomTest):
     def test_options_of_the_studies_are_refused(self):
         for option in (["--study", "cube"], ["--engines", "fused"], ["--output", self.phantom.output]):
-            self.assert_refused(self.tune(*option), INPUT, option[0], "--tune")
+            self.assert_refused(tune(self.phantom.folder / "cache", *option), INPUT, option[0], "--tune")
 
     def test_needs_a_device(self):
-        self.assert_refused(self.tune("--device", "cpu"), INPUT, "--tune", "--device cpu")
+        self.assert_refused(tune(self.phantom.folder / "cache", "--device", "cpu"), INPUT, "--tune", "--device cpu")
 
     # Found before an hour of measuring, not after it.
     def test_place_that_cannot_be_written(self):
