@@ -151,9 +151,10 @@ std::string fault_of(const Matrix3Xd& u, const std::optional<Matrix3Xd>& expecte
 GpuStepShape suggested_gpu_step_shape(int element_count, Element element, int multiprocessors) {
     // Patches in multiples of the multiprocessors, so that none of these idles; larger ones lose less at their surfaces
     // as long as their nodes fit into shared memory, of which a regular mesh has more than others; patches that do not
-    // are made smaller. Two workgroups on a multiprocessor overlap where one would wait. What no cache holds gains
-    // nothing from going round and round in one dispatch.
-    constexpr int largest_patch = detail::largest_patch_tets(Element::T4), cached = 2000000;
+    // are made smaller. One workgroup of 640 always fits on a multiprocessor; two smaller ones may be faster, but
+    // whether they fit depends on how many registers the compiler takes. From a few patches each on, memory is what
+    // limits, and going round and round in one dispatch gains nothing: 2 were measured to be the faster, 6 the slower.
+    constexpr int largest_patch = detail::largest_patch_tets(Element::T4), few_each = 3;
     if (multiprocessors <= 0) multiprocessors = detail::default_multiprocessors;
     const int of_each = element_count / multiprocessors;
     const auto shared_out = [&](int patches) {
@@ -163,9 +164,9 @@ GpuStepShape suggested_gpu_step_shape(int element_count, Element element, int mu
     if (of_each < 150) return {shared_out(multiprocessors), 1, 128, 4 * multiprocessors};
     if (of_each < 900) return {shared_out(multiprocessors), 2, 512, multiprocessors};
     if (of_each < detail::largest_patch_tets(element)) return {shared_out(multiprocessors), 5, 640, multiprocessors};
-    if (element_count < cached)
-        return {shared_out(multiple(2 * multiprocessors, largest_patch / 2)), 5, 320, 2 * multiprocessors};
-    return {shared_out(multiple(multiprocessors, largest_patch)), 5, 768, 0};
+    const int patches = multiple(multiprocessors, largest_patch);
+    if (patches <= few_each * multiprocessors) return {shared_out(patches), 5, 640, multiprocessors};
+    return {shared_out(patches), 5, 768, 0};
 }
 
 std::vector<GpuStepShape> candidate_gpu_step_shapes(int element_count, Element element, int multiprocessors) {
@@ -173,7 +174,7 @@ std::vector<GpuStepShape> candidate_gpu_step_shapes(int element_count, Element e
     constexpr int small = 300;  // tetrahedra of a patch: twice as many may lose less at its surface than they cost
     // Patches on a multiprocessor at the same time and the invocations for which it then has registers
     // (docs/decisions/gpu_patches.md).
-    constexpr struct { int patches, workgroup; } sides[] = {{1, 640}, {2, 320}, {4, 128}};
+    constexpr struct { int patches, workgroup; } sides[] = {{1, 640}, {2, 256}, {2, 320}, {4, 128}};
     const GpuStepShape suggested = suggested_gpu_step_shape(element_count, element, multiprocessors);
     const int m = multiprocessors > 0 ? multiprocessors : detail::default_multiprocessors;
     std::vector<GpuStepShape> shapes{{}, suggested};
