@@ -57,9 +57,9 @@ public:
         CLI::Option* csv =
             path("--landmarks", target.csv,
                  "Corresponding points for scoring only: CSV pre_x,pre_y,pre_z,intra_x,intra_y,intra_z (mm, LPS)");
-        CLI::Option* moving =
-            path("--landmarks-moving", target.moving, "elastix point file of the moving image (mm, LPS)");
-        CLI::Option* fixed = path("--landmarks-fixed", target.fixed, "elastix point file of the fixed image (mm, LPS)");
+        CLI::Option* moving = path("--landmarks-moving", target.moving,
+                                   "points of the moving image: elastix or 3D Slicer (.mrk.json, .fcsv)");
+        CLI::Option* fixed = path("--landmarks-fixed", target.fixed, "points of the fixed image, likewise");
         moving->needs(fixed)->excludes(csv);
         fixed->needs(moving)->excludes(csv);
     }

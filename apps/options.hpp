@@ -22,7 +22,7 @@ struct DeviceChoice {
     std::string name = "auto";  ///< "auto", "cpu", "gpu" or "gpu:<n>", n counting EGL devices
 };
 
-/// Known correspondences, for scoring only: one CSV, or a pair of elastix point files.
+/// Known correspondences, for scoring only: one CSV, or a pair of point files of elastix or 3D Slicer.
 struct LandmarkFiles {
     std::filesystem::path csv, moving, fixed;
     [[nodiscard]] bool given() const { return !csv.empty() || !moving.empty(); }

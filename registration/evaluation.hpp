@@ -27,7 +27,9 @@ struct Landmarks {
 /// Throws IoError or InvalidInput with line numbers.
 Landmarks read_landmarks(const std::filesystem::path& path);
 
-/// Reads a pair of elastix/transformix point files ("point", count, then x y z per line), LPS mm.
+/// Reads a pair of point files: elastix/transformix ("point", count, then x y z per line), LPS mm, or 3D Slicer's
+/// (slicer_markups.hpp). Points correspond by name where both files give all of them the same names, by order
+/// otherwise. Throws IoError or InvalidInput.
 Landmarks read_landmarks(const std::filesystem::path& moving, const std::filesystem::path& fixed);
 
 /// Target registration error ‖mapped − fixed‖ in mm.

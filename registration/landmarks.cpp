@@ -1,11 +1,11 @@
 #include "core/errors.hpp"
+#include "registration/detail/line_reader.hpp"
 #include "registration/evaluation.hpp"
+#include "registration/slicer_markups.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
-#include <cmath>
-#include <fstream>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -13,74 +13,10 @@ namespace tissuewarp::registration {
 
 namespace {
 
-std::string_view trimmed(std::string_view text) {
-    const auto blank = [](char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; };
-    while (!text.empty() && blank(text.front())) text.remove_prefix(1);
-    while (!text.empty() && blank(text.back())) text.remove_suffix(1);
-    if (text.size() >= 2 && text.front() == '"' && text.back() == '"') text = text.substr(1, text.size() - 2);
-    return text;
-}
-
-std::vector<std::string_view> split(std::string_view line, char separator) {
-    std::vector<std::string_view> fields;
-    for (std::size_t start = 0;;) {
-        const std::size_t end = std::min(line.find(separator, start), line.size());
-        fields.push_back(trimmed(line.substr(start, end - start)));
-        if (end == line.size()) return fields;
-        start = end + 1;
-    }
-}
-
-std::vector<std::string_view> words(std::string_view line) {
-    std::vector<std::string_view> fields;
-    for (std::string_view rest = trimmed(line); !rest.empty();) {
-        const std::size_t end = std::min(rest.find_first_of(" \t,"), rest.size());
-        fields.push_back(rest.substr(0, end));
-        rest = trimmed(rest.substr(std::min(end + 1, rest.size())));
-    }
-    return fields;
-}
-
-/// Lines with content, each with its number; knows how to complain about them.
-class LineReader {
-public:
-    explicit LineReader(const std::filesystem::path& path) : path_(path), file_(path) {
-        if (!file_ || std::filesystem::is_directory(path))
-            throw IoError(path.string() + ": cannot be opened; check that the file exists and may be read");
-    }
-
-    bool next() {
-        while (std::getline(file_, line_)) {
-            if (++number_ == 1 && line_.starts_with("\xEF\xBB\xBF")) line_.erase(0, 3);  // byte-order mark
-            if (const auto text = trimmed(line_); !text.empty() && text.front() != '#') return true;
-        }
-        if (file_.bad()) throw IoError(path_.string() + ": reading failed after line " + std::to_string(number_));
-        return false;
-    }
-
-    [[nodiscard]] std::string_view line() const { return line_; }
-
-    [[noreturn]] void refuse(const std::string& reason) const {
-        throw InvalidInput(path_.string() + ":" + std::to_string(number_) + ": " + reason);
-    }
-
-    [[nodiscard]] double coordinate(std::string_view text, std::string_view name) const {
-        double value = 0.0;
-        const std::string_view digits = text.starts_with('+') ? text.substr(1) : text;
-        const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-        if (error != std::errc{} || end != digits.data() + digits.size() || digits.empty())
-            refuse(std::string(name) + " is '" + std::string(text.substr(0, 40)) + "'; a number in mm is needed");
-        if (!std::isfinite(value) || std::abs(value) > 1e6)
-            refuse(std::string(name) + " is " + std::string(text) + "; a finite coordinate in mm is needed");
-        return value;
-    }
-
-private:
-    std::filesystem::path path_;
-    std::ifstream file_;
-    std::string line_;
-    int number_ = 0;
-};
+using detail::LineReader;
+using detail::split;
+using detail::trimmed;
+using detail::words;
 
 Eigen::Matrix3Xd as_matrix(const std::vector<Eigen::Vector3d>& points) {
     Eigen::Matrix3Xd matrix(3, static_cast<Eigen::Index>(points.size()));
@@ -115,6 +51,38 @@ Eigen::Matrix3Xd read_elastix_points(const std::filesystem::path& path) {
     return as_matrix(points);
 }
 
+Markups read_points_of_any_kind(const std::filesystem::path& path) {
+    if (is_slicer_markups(path)) return read_slicer_markups(path);
+    return {read_elastix_points(path), {}};
+}
+
+/// Whether both files name all points, each differently, and by the same names.
+bool same_names(const Markups& a, const Markups& b) {
+    const std::set<std::string> names(a.labels.begin(), a.labels.end());
+    return !names.empty() && names.size() == a.labels.size() && !names.contains("") &&
+           names.size() == b.labels.size() && names == std::set<std::string>(b.labels.begin(), b.labels.end());
+}
+
+std::string names_without_partner(const Markups& a, const Markups& b) {
+    const std::set<std::string> left(a.labels.begin(), a.labels.end()), right(b.labels.begin(), b.labels.end());
+    std::vector<std::string> alone;
+    std::set_symmetric_difference(left.begin(), left.end(), right.begin(), right.end(), std::back_inserter(alone));
+    if (left.empty() || right.empty() || alone.empty()) return "";
+    std::string text = "; only one of them has " + alone.front();
+    for (std::size_t i = 1; i < std::min<std::size_t>(alone.size(), 5); ++i) text += ", " + alone[i];
+    return text + (alone.size() > 5 ? ", …" : "");
+}
+
+/// Precondition: same_names.
+Eigen::Matrix3Xd in_the_order_of(const std::vector<std::string>& labels, const Markups& markups) {
+    Eigen::Matrix3Xd points(3, markups.points.cols());
+    for (std::size_t i = 0; i < labels.size(); ++i) {
+        const auto at = std::find(markups.labels.begin(), markups.labels.end(), labels[i]) - markups.labels.begin();
+        points.col(static_cast<Eigen::Index>(i)) = markups.points.col(at);
+    }
+    return points;
+}
+
 }  // namespace
 
 Landmarks read_landmarks(const std::filesystem::path& path) {
@@ -147,12 +115,13 @@ Landmarks read_landmarks(const std::filesystem::path& path) {
 }
 
 Landmarks read_landmarks(const std::filesystem::path& moving, const std::filesystem::path& fixed) {
-    Landmarks landmarks{read_elastix_points(moving), read_elastix_points(fixed)};
-    if (landmarks.moving.cols() != landmarks.fixed.cols())
-        throw InvalidInput(moving.string() + " has " + std::to_string(landmarks.moving.cols()) + " points and " +
-                           fixed.string() + " has " + std::to_string(landmarks.fixed.cols()) +
-                           "; corresponding points need equal numbers");
-    return landmarks;
+    Markups from = read_points_of_any_kind(moving), to = read_points_of_any_kind(fixed);
+    if (from.points.cols() != to.points.cols())
+        throw InvalidInput(moving.string() + " has " + std::to_string(from.points.cols()) + " points and " +
+                           fixed.string() + " has " + std::to_string(to.points.cols()) +
+                           "; corresponding points need equal numbers" + names_without_partner(from, to));
+    if (!same_names(from, to)) return {from.points, to.points};
+    return {from.points, in_the_order_of(from.labels, to)};
 }
 
 }  // namespace tissuewarp::registration

@@ -1,4 +1,5 @@
 #include "registration/evaluation.hpp"
+#include "registration/slicer_markups.hpp"
 
 #include "core/errors.hpp"
 #include "shapes.hpp"
@@ -276,6 +277,72 @@ TEST_F(LandmarkFile, RefusesBadPointFilesWithTheLine) {
     EXPECT_THAT(refused("point\n1\n1 2\n"), HasSubstr("bad.txt:3: 2 numbers"));
     EXPECT_THAT(refused("point\n1\n1 2 z\n"), HasSubstr("bad.txt:3: z is 'z'"));
     EXPECT_THAT(refused("point\n2\n1 2 3\n1 2 3\n"), HasSubstr("equal numbers"));
+}
+
+const char* const slicer_points =
+    R"({"markups": [{"type": "Fiducial", "coordinateSystem": "LPS", "coordinateUnits": "mm",
+  "controlPoints": [{"label": "tip", "position": [-53.5, -73, 1.25]}, {"label": "base", "position": [4, 5, 6]},
+                    {"label": "not yet", "position": [0, 0, 0], "positionStatus": "undefined"}]}]})";
+
+// Left taken for right would still look like landmarks.
+TEST_F(LandmarkFile, ReadsPointListsOfSlicerInTheSystemThatTheySay) {
+    const auto lps = write("moving.mrk.json", slicer_points);
+    std::string text = slicer_points;
+    const auto ras = write("fixed.mrk.json", text.replace(text.find("LPS"), 3, "RAS"));
+    const Landmarks landmarks = read_landmarks(lps, ras);
+    ASSERT_EQ(landmarks.moving.cols(), 2);
+    EXPECT_EQ(landmarks.moving.col(0), Eigen::Vector3d(-53.5, -73, 1.25));
+    EXPECT_EQ(landmarks.fixed.col(0), Eigen::Vector3d(53.5, 73, 1.25));
+}
+
+TEST_F(LandmarkFile, ReadsOldPointListsOfSlicer) {
+    const std::string columns = "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n";
+    const auto old = write("old.fcsv", "# Markups fiducial file version = 4.10\n# CoordinateSystem = 0\n" + columns +
+                                           "vtk_0,1,2,3,0,0,0,1,1,1,0,F-1,,\n");
+    const auto recent = write("recent.fcsv", "# Markups fiducial file version = 4.13\n# CoordinateSystem = LPS\n" +
+                                                 columns + "0,-1,-2,3,0,0,0,1,1,1,0,F-1,,\n");
+    const Landmarks landmarks = read_landmarks(old, recent);
+    EXPECT_EQ(landmarks.moving, landmarks.fixed);
+    EXPECT_EQ(landmarks.moving.col(0), Eigen::Vector3d(-1, -2, 3));
+}
+
+// People place points in any order; a pair by place would be an error of centimetres.
+TEST_F(LandmarkFile, PairsPointsByNameWhereBothFilesNameThem) {
+    const std::string head = "# CoordinateSystem = LPS\n# columns = x,y,z,label\n";
+    const auto moving = write("moving.fcsv", head + "1,0,0,apex\n2,0,0,hilum\n");
+    EXPECT_EQ(read_landmarks(moving, write("turned.fcsv", head + "20,0,0,hilum\n10,0,0,apex\n")).fixed.row(0),
+              Eigen::RowVector2d(10, 20));
+    EXPECT_EQ(read_landmarks(moving, write("other.fcsv", head + "20,0,0,a\n10,0,0,b\n")).fixed.row(0),
+              Eigen::RowVector2d(20, 10));
+    EXPECT_THAT(refusal([&] { read_landmarks(moving, write("one.fcsv", head + "10,0,0,apex\n")); }),
+                HasSubstr("only one of them has hilum"));
+}
+
+TEST_F(LandmarkFile, RefusesPointListsOfSlicerThatDoNotSayEnough) {
+    const auto good = write("good.mrk.json", slicer_points);
+    const auto refused = [&](const std::string& name, const std::string& text) {
+        const auto path = write(name, text);
+        return refusal([&] { read_landmarks(path, good); });
+    };
+    const auto changed = [&](const std::string& from, const std::string& to) {
+        std::string text = slicer_points;
+        return refused("bad.mrk.json", text.replace(text.find(from), from.size(), to));
+    };
+    EXPECT_THAT(refused("bad.mrk.json", "{"), HasSubstr("is no JSON"));
+    EXPECT_THAT(refused("bad.mrk.json", "{}"), HasSubstr("has no \"markups\""));
+    EXPECT_THAT(refused("bad.mrk.json", "[1]"), HasSubstr("has no \"markups\""));
+    EXPECT_THAT(changed("coordinateSystem", "system"), HasSubstr("list 1: has no coordinateSystem"));
+    EXPECT_THAT(changed("LPS", "IJK"), HasSubstr("the coordinate system is 'IJK'"));
+    EXPECT_THAT(changed("\"mm\"", "\"cm\""), HasSubstr("coordinateUnits is \"cm\""));
+    EXPECT_THAT(changed("[4, 5, 6]", "[4, 5]"), HasSubstr("point 2: has no position of three numbers"));
+    EXPECT_THAT(changed("[4, 5, 6]", "[4, 5, null]"), HasSubstr("point 2: position holds null"));
+    EXPECT_THAT(changed("[4, 5, 6]", "[4, 5, 1e300]"), HasSubstr("a finite coordinate"));
+    EXPECT_THAT(changed("\"base\"", "7"), HasSubstr("is no point list of 3D Slicer"));
+    EXPECT_THAT(refused("bad.fcsv", "# columns = x,y,z,label\n1,2,3,F-1\n"), HasSubstr("bad.fcsv:2: no line"));
+    EXPECT_THAT(refused("bad.fcsv", "# CoordinateSystem = LPS\n# columns = x,y,label\n1,2,F\n"),
+                HasSubstr("bad.fcsv:3: z is ''"));
+    EXPECT_THAT(refused("bad.fcsv", "# CoordinateSystem = LPS\n"), HasSubstr("holds no placed point"));
+    EXPECT_THROW(read_slicer_markups("no such file.mrk.json"), IoError);
 }
 
 }  // namespace
