@@ -239,7 +239,8 @@ public:
     }
 
     [[nodiscard]] std::string description() const override {
-        return "GPU " + device_.renderer() + " (OpenGL " + device_.version().substr(0, 3) + ")";
+        const std::string steps = patches_ ? "patches " + name_of(patches_->shape()) : name_of(GpuStepShape{});
+        return "GPU " + device_.renderer() + " (OpenGL " + device_.version().substr(0, 3) + "), " + steps;
     }
 
     [[nodiscard]] Processor processor() const override { return Processor::Gpu; }

@@ -195,7 +195,9 @@ protected:
 
 TEST_F(GpuEngine, SaysWhereItRuns) {
     const auto engine = make_gpu_engine(rest);
-    EXPECT_EQ(engine->description(), "GPU " + shaders::Device().renderer() + " (OpenGL 4.5)");
+    const std::string device = "GPU " + shaders::Device().renderer() + " (OpenGL 4.5)";
+    EXPECT_THAT(engine->description(), ::testing::StartsWith(device + ", "));
+    EXPECT_EQ(make_gpu_engine(rest, -1, {})->description(), device + ", two passes");
     EXPECT_EQ(engine->precision(), std::ldexp(1.0, -23));
 }
 

@@ -3,6 +3,7 @@
 #include "tests/tled/engine_scene.hpp"
 #include "tled/detail/patch_layout.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
@@ -155,6 +156,13 @@ TEST_P(GpuSteps, GoOnOneByOneWherePatchesDoNotRunAtTheSameTime) {
     const Matrix3Xd expected = after(shape, {40}, wavy(X, 0.3), zero);
     shape.at_once = 1000;
     EXPECT_LT(largest(after(shape, {40}, wavy(X, 0.3), zero) - expected), 1e-5 * largest(expected));
+}
+
+// The last bits of a result follow from the shape of the steps: whoever keeps the result must be able to keep that too.
+TEST_P(GpuSteps, AreNamedWithTheEngine) {
+    EXPECT_THAT(make_gpu_engine(rest, -1, {150, 5, 128, 1})->description(),
+                ::testing::EndsWith(", patches 150:5:128:1"));
+    EXPECT_THAT(make_gpu_engine(rest, -1, {150, 5, 128, 0})->description(), ::testing::EndsWith(", patches 150:5:128"));
 }
 
 // Integers that overflow would turn a push into a pull.

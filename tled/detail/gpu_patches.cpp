@@ -96,6 +96,7 @@ GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& pro
                        const GpuStepShape& shape, BlockBuffers& blocks)
     : programs_(programs),
       law_(law_of(rest)),
+      shape_(shape),
       averages_(rest.pressure.count() > 0),
       node_count_(static_cast<std::size_t>(rest.node_count)) {
     const PatchLayout layout = fitting_layout(rest, shape, device.limits().shared_memory_bytes);
@@ -220,6 +221,12 @@ void GpuPatches::store(const BlockBuffers& blocks) {
     blocks.bind(store);
     store.dispatch(node_count_);
     shaders::storage_barrier();
+}
+
+GpuStepShape GpuPatches::shape() const {
+    GpuStepShape shape = shape_;
+    if (!many_steps_) shape.at_once = 0;
+    return shape;
 }
 
 bool GpuPatches::gave_up() {

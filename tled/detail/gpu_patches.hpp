@@ -22,6 +22,8 @@ public:
     /// Advances what is bound as Displacement and Increment.
     void run(int steps, const StepCoefficients& coefficients, const shaders::NodeEffects& effects,
              const BlockBuffers& blocks);
+    /// As asked for, without many steps in a dispatch once the device has proved unable to run them.
+    [[nodiscard]] GpuStepShape shape() const;
     /// Displacement, Increment, masses or conditions were changed from outside.
     void forget_state() { loaded_ = false; }
 
@@ -46,6 +48,7 @@ private:
 
     shaders::ProgramCache& programs_;
     shaders::Law law_;
+    GpuStepShape shape_;
     bool averages_, many_steps_;
     std::size_t node_count_, slot_count_;
     PatchCapacity capacity_;
