@@ -1,0 +1,215 @@
+// Prints the tables of docs/results.md, section "Block matching": blocks of the moving image found in the bare fixed
+// image, against the true displacement of the phantoms and the landmarks of the lung.
+//     image_matching_bench DATA [--case PART] [--csv FILE]
+// DATA holds phantom-brainshift, phantom-brain-sag and lung-ct; PART selects cases whose name holds it; FILE takes a
+// line per match kept.
+
+#include "core/errors.hpp"
+#include "imaging/filters.hpp"
+#include "imaging/image_io.hpp"
+#include "imaging/labels.hpp"
+#include "imaging/sampling.hpp"
+#include "registration/alignment.hpp"
+#include "registration/evaluation.hpp"
+#include "registration/image_matching.hpp"
+
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+using namespace tissuewarp;
+using namespace tissuewarp::registration;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// A displacement field, sampled.
+class Field {
+public:
+    explicit Field(const imaging::Volume& field) {
+        std::vector<cv::Mat> channels(3);
+        for (int c = 0; c < 3; ++c) {
+            imaging::Volume component(field.geometry, CV_32FC1);
+            const auto* vector = field.data<cv::Vec3f>();
+            for (std::int64_t n = 0; n < field.geometry.voxel_count(); ++n) component.data<float>()[n] = vector[n][c];
+            components_.emplace_back(component);
+        }
+    }
+    [[nodiscard]] Eigen::Vector3d operator()(const Eigen::Vector3d& point) const {
+        return {components_[0].value(point), components_[1].value(point), components_[2].value(point)};
+    }
+
+private:
+    std::vector<imaging::LinearSampler> components_;
+};
+
+struct Case {
+    std::string name;
+    imaging::Volume moving, mask, fixed;
+    Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();
+    BlockMatchingOptions options;
+};
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+double quantile(std::vector<double> values, double share) {
+    if (values.empty()) return std::nan("");
+    const auto n = static_cast<std::ptrdiff_t>(share * double(values.size() - 1) + 0.5);
+    std::nth_element(values.begin(), values.begin() + n, values.end());
+    return values[static_cast<std::size_t>(n)];
+}
+
+struct Errors {
+    std::vector<double> full, informative, squared;  // mm, mm, eᵀ I e
+
+    void add(const BlockMatch& match, const Eigen::Vector3d& truth) {
+        const Eigen::Vector3d e = match.fixed - truth;
+        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(match.information);
+        full.push_back(e.norm());
+        informative.push_back(std::abs(axes.eigenvectors().col(2).dot(e)));
+        squared.push_back(e.dot(match.information * e));
+    }
+    void print_row(const std::string& name, std::size_t points, double seconds) const {
+        const auto outliers =
+            static_cast<double>(std::count_if(full.begin(), full.end(), [](double e) { return e > 3; }));
+        std::printf("| %s | %zu / %zu | %.2f / %.2f | %.2f / %.2f | %.1f | %.2f / %.1f | %.1f |\n", name.c_str(),
+                    full.size(), points, quantile(informative, 0.5), quantile(informative, 0.9), quantile(full, 0.5),
+                    quantile(full, 0.9), 100 * outliers / double(std::max<std::size_t>(full.size(), 1)),
+                    quantile(squared, 0.5), quantile(squared, 0.9), seconds);
+        std::fflush(stdout);
+    }
+};
+
+struct Found {
+    Eigen::Index points = 0;
+    std::vector<BlockMatch> all, kept;
+    double seconds = 0;
+};
+
+Found find(const Case& study) {
+    const auto start = std::chrono::steady_clock::now();
+    const FeaturePoints features = select_feature_points(study.moving, study.mask);
+    const double selected = seconds_since(start);
+    Found found{features.points.cols(), {}, {}, 0};
+    BlockMatchingOptions options = study.options;
+    options.rotation = study.placement.linear();
+    found.all = match_blocks(study.moving, study.fixed, features.points, study.placement * features.points, options);
+    const double matched = seconds_since(start);
+    found.kept = consistent_matches(found.all);
+    found.seconds = seconds_since(start);
+    std::fprintf(stderr, "%s: select %.2f s, match %.2f s, filter %.2f s\n", study.name.c_str(), selected,
+                 matched - selected, found.seconds - matched);
+    return found;
+}
+
+void print_head() {
+    std::printf(
+        "| case | kept / points | informative direction: median / 90th, mm | full: median / 90th, mm | beyond 3 mm, %% "
+        "| "
+        "eᵀIe: median / 90th | seconds |\n|---|---|---|---|---|---|---|\n");
+}
+
+void write_csv(const fs::path& path, const std::string& name, const BlockMatch& match, const Eigen::Vector3d& truth) {
+    if (path.empty()) return;
+    std::ofstream csv(path, std::ios::app);
+    const Eigen::Vector3d strength =
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(match.information, Eigen::EigenvaluesOnly).eigenvalues();
+    csv << name << ',' << match.moving.transpose() << ',' << match.fixed.transpose() << ',' << truth.transpose() << ','
+        << match.cost << ',' << match.uniqueness << ',' << match.back_match_mm << ',' << match.confidence << ','
+        << strength.transpose() << '\n';
+}
+
+void against_field(const Case& study, const Field& truth, const fs::path& csv) {
+    const Found found = find(study);
+    Errors all, kept;
+    const auto true_place = [&](const BlockMatch& match) -> Eigen::Vector3d {
+        return match.moving + truth(match.moving);
+    };
+    for (const BlockMatch& match : found.all) {
+        all.add(match, true_place(match));
+        write_csv(csv, study.name, match, true_place(match));
+    }
+    for (const BlockMatch& match : found.kept) kept.add(match, true_place(match));
+    const auto points = static_cast<std::size_t>(found.points);
+    all.print_row(study.name + ", all found", points, found.seconds);
+    kept.print_row(study.name + ", consistent", points, found.seconds);
+}
+
+/// At each landmark, the displacement of the match nearest to it.
+void against_landmarks(const Case& study, const Landmarks& landmarks) {
+    const Found found = find(study);
+    Errors errors;
+    std::vector<double> distances;
+    for (Eigen::Index n = 0; n < landmarks.moving.cols(); ++n) {
+        const auto nearest =
+            std::min_element(found.kept.begin(), found.kept.end(), [&](const BlockMatch& a, const BlockMatch& b) {
+                return (a.moving - landmarks.moving.col(n)).norm() < (b.moving - landmarks.moving.col(n)).norm();
+            });
+        if (nearest == found.kept.end()) continue;
+        distances.push_back((nearest->moving - landmarks.moving.col(n)).norm());
+        errors.add(*nearest, nearest->moving + landmarks.fixed.col(n) - landmarks.moving.col(n));
+    }
+    errors.print_row(study.name + ", nearest to " + std::to_string(errors.full.size()) + " landmarks (" +
+                         std::to_string(found.kept.size()) + " kept)",
+                     static_cast<std::size_t>(found.points), found.seconds);
+    std::printf("\nThe nearest match lies %.1f mm from its landmark (median).\n", quantile(distances, 0.5));
+}
+
+BlockMatchingOptions with(Similarity similarity) {
+    BlockMatchingOptions options;
+    options.similarity = similarity;
+    return options;
+}
+
+void run(const fs::path& data, const std::string& part, const fs::path& csv) {
+    const auto chosen = [&](const std::string& name) { return name.find(part) != std::string::npos; };
+    const std::vector<std::pair<std::string, Similarity>> similarities{
+        {"self-similarity", Similarity::SelfSimilarityContext}, {"correlation", Similarity::CrossCorrelation}};
+    print_head();
+    for (const auto& [label, similarity] : similarities) {
+        const fs::path shift = data / "phantom-brainshift", sag = data / "phantom-brain-sag", lung = data / "lung-ct";
+        if (const std::string name = "brain shift, " + label; chosen(name))
+            against_field(
+                {name, imaging::read_volume(shift / "preop.nii.gz"),
+                 imaging::mask_of_all(imaging::read_labels(shift / "preop_labels.nii.gz")),
+                 imaging::read_volume(shift / "intraop.nii.gz"), Eigen::Isometry3d::Identity(), with(similarity)},
+                Field(imaging::read_volume(shift / "truth_forward.nii.gz")), csv);
+        for (const std::string volume : {"intraop", "intraop_degraded"})
+            if (const std::string name = "brain sag " + volume + ", " + label; chosen(name))
+                against_field(
+                    {name, imaging::read_volume(sag / "preop.nii.gz"), imaging::read_labels(sag / "preop_mask.nii.gz"),
+                     imaging::read_volume(sag / (volume + ".nii.gz")), Eigen::Isometry3d::Identity(), with(similarity)},
+                    Field(imaging::read_volume(sag / "truth_forward.nii.gz")), csv);
+        if (const std::string name = "lung, " + label; chosen(name)) {
+            const imaging::Volume mask = imaging::read_labels(lung / "moving_mask.mha");
+            const auto pose = align_labels(mask, imaging::read_labels(lung / "fixed_mask.mha")).placement;
+            against_landmarks({name, imaging::read_volume(lung / "moving.mha"), mask,
+                               imaging::read_volume(lung / "fixed.mha"), pose, with(similarity)},
+                              read_landmarks(lung / "moving_pts.txt", lung / "fixed_pts.txt"));
+        }
+    }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    try {
+        if (argc < 2) throw InvalidInput("give the folder of the data; see the head of image_matching_bench.cpp");
+        std::string part, csv;
+        for (int n = 2; n + 1 < argc; n += 2) (std::string(argv[n]) == "--case" ? part : csv) = argv[n + 1];
+        run(argv[1], part, csv);
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "image_matching_bench: %s\n", error.what());
+        return 2;
+    }
+    return 0;
+}

@@ -1,0 +1,299 @@
+#include "registration/detail/block_cost.hpp"
+#include "registration/detail/local_affine.hpp"
+#include "registration/detail/matching_grid.hpp"
+#include "registration/detail/quadratic_fit.hpp"
+
+#include <Eigen/Eigenvalues>
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace tissuewarp::registration {
+
+using detail::Block;
+using detail::CostLattice;
+using detail::MatchingImage;
+using detail::Voxel;
+using imaging::Volume;
+
+namespace {
+
+constexpr int refinement_reach = 3;         // voxels of the level, about the neighbours' story
+constexpr int neighbours = 24;              // that tell it
+constexpr double trimmed_share = 0.3;       // of them, left out
+constexpr double independent_share = 0.05;  // of a block's voxels: the others repeat them (docs/method.md)
+constexpr double least_deviation = 0.1;     // voxels: what interpolation leaves of the best match
+
+Voxel nearest_voxel(const imaging::Geometry& grid, const Eigen::Vector3d& point) {
+    const Eigen::Vector3d index = grid.index(point);
+    Voxel voxel;
+    for (std::size_t a = 0; a < 3; ++a) {
+        const double rounded = std::round(index[static_cast<Eigen::Index>(a)]);
+        voxel[a] = static_cast<int>(std::clamp(rounded, -1e6, 1e6));  // far off any grid stays far off
+    }
+    return voxel;
+}
+
+Eigen::Vector3d as_vector(const Voxel& v) {
+    return {double(v[0]), double(v[1]), double(v[2])};
+}
+
+Voxel sum(const Voxel& a, const Voxel& b) {
+    return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
+}
+
+/// A minimum of the cost over a lattice.
+struct Minimum {
+    Voxel at{0, 0, 0};
+    double cost = 0;
+    double uniqueness = 0;
+    detail::Quadratic fit{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()};
+
+    [[nodiscard]] Eigen::Vector3d index() const { return as_vector(at) + fit.minimum; }
+};
+
+/// How clearly the minimum stands out: the least rise of cost, over the mean rise in the lattice, among the places
+/// that the curvature says are clearly worse. Along an edge the curvature says no such thing, and no place is a rival.
+double uniqueness(const CostLattice& lattice, const Minimum& minimum) {
+    double total = 0;
+    int count = 0;
+    for (const double cost : lattice.costs)
+        if (std::isfinite(cost)) {
+            total += cost - minimum.cost;
+            ++count;
+        }
+    const double mean_rise = total / std::max(count, 1);
+    double least = 0;
+    bool found = false;
+    for (std::size_t n = 0; n < lattice.costs.size(); ++n) {
+        if (!std::isfinite(lattice.costs[n])) continue;
+        const Eigen::Vector3d away = as_vector(sum(lattice.centre, lattice.displacement(n))) - as_vector(minimum.at);
+        if (0.5 * away.dot(minimum.fit.hessian * away) <= mean_rise) continue;
+        const double rise = lattice.costs[n] - minimum.cost;
+        least = found ? std::min(least, rise) : rise;
+        found = true;
+    }
+    return found && mean_rise > 0 ? std::clamp(least / mean_rise, 0.0, 1.0) : 0.0;
+}
+
+/// Walks from a lattice point to the lowest of its 27 until that is itself, then fits.
+std::optional<Minimum> descend(const MatchingImage& moving, const MatchingImage& fixed, const Block& block, Voxel at) {
+    for (int step = 0; step < 4; ++step) {
+        const CostLattice near = detail::cost_lattice(moving, fixed, block, at, 1);
+        const auto lowest =
+            static_cast<std::size_t>(std::min_element(near.costs.begin(), near.costs.end()) - near.costs.begin());
+        if (near.costs[lowest] < near.costs[13]) {
+            at = sum(at, near.displacement(lowest));
+            continue;
+        }
+        std::array<double, 27> costs{};
+        std::copy(near.costs.begin(), near.costs.end(), costs.begin());
+        const auto fit = detail::fit_quadratic(costs);
+        if (!fit) return std::nullopt;
+        return Minimum{at, costs[13], 0, *fit};
+    }
+    return std::nullopt;
+}
+
+std::optional<Minimum> find_block(const MatchingImage& moving, const MatchingImage& fixed, const Block& block,
+                                  const Voxel& start, int reach) {
+    const CostLattice lattice = detail::cost_lattice(moving, fixed, block, start, reach);
+    const auto lowest =
+        static_cast<std::size_t>(std::min_element(lattice.costs.begin(), lattice.costs.end()) - lattice.costs.begin());
+    if (!std::isfinite(lattice.costs[lowest])) return std::nullopt;
+    auto minimum = descend(moving, fixed, block, sum(start, lattice.displacement(lowest)));
+    if (minimum) minimum->uniqueness = uniqueness(lattice, *minimum);
+    return minimum;
+}
+
+/// Error (voxels) of the way back, along what the block shows: the block about the match, searched in the moving image,
+/// should lie where the first one lay.
+std::optional<double> back_match(const MatchingImage& moving, const MatchingImage& fixed, const Block& block,
+                                 const Minimum& forward) {
+    const auto back =
+        find_block(fixed, moving, {forward.at, block.radius, block.least_share}, block.centre, refinement_reach);
+    if (!back) return std::nullopt;
+    const Eigen::Vector3d error = back->index() - as_vector(block.centre) + forward.fit.minimum;
+    return std::sqrt(error.dot(forward.fit.hessian * error) / forward.fit.hessian.operatorNorm());
+}
+
+/// Inverse covariance of a match, 1/mm²: least squares of N independent residuals of variance c about the minimum has
+/// the covariance 2 c/(N H) (H the Hessian of the mean square), to which the interpolation adds its own.
+Eigen::Matrix3d information(const Minimum& minimum, const imaging::Geometry& grid, int radius) {
+    const double independent = independent_share * std::pow(2 * radius + 1, 3), h = grid.spacing[0];
+    const Eigen::Matrix3d raw = independent / (2 * std::max(minimum.cost, 1e-6)) * minimum.fit.hessian;
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(raw);
+    const Eigen::Array3d strength = axes.eigenvalues().array().max(0.0);
+    const Eigen::Vector3d bounded = strength / (1 + strength * least_deviation * least_deviation) / (h * h);
+    const Eigen::Matrix3d turn = grid.direction * axes.eigenvectors();
+    return turn * bounded.asDiagonal() * turn.transpose();
+}
+
+struct Level {
+    MatchingImage moving, fixed;
+    int reach;
+};
+
+enum class Verification { None, BackMatch };
+
+/// The whole search: images, points and where they are expected.
+class BlockSearch {
+public:
+    BlockSearch(const Volume& moving, const Volume& fixed, const Eigen::Matrix3Xd& points,
+                const Eigen::Matrix3Xd& predicted, const BlockMatchingOptions& options)
+        : moving_(moving.as(CV_32F)),
+          fixed_(fixed.as(CV_32F)),
+          seen_moving_(detail::seen_region(moving_)),
+          seen_fixed_(detail::seen_region(fixed_)),
+          points_(points),
+          predicted_(predicted),
+          options_(options),
+          neighbours_(detail::nearest_neighbours(points, neighbours)) {}
+
+    std::vector<BlockMatch> run(Observer& observer) {
+        std::vector<BlockMatch> matches;
+        for (int level = 0; level < options_.levels; ++level) {
+            const bool last = level + 1 == options_.levels;
+            matches = match(prepare(level), last ? Verification::BackMatch : Verification::None);
+            observer.checkpoint("block matching", double(level + 1) / options_.levels);
+            if (!last) predict(matches);
+        }
+        std::erase_if(matches, [](const BlockMatch& match) { return match.point < 0; });
+        return matches;
+    }
+
+private:
+    Volume moving_, fixed_, seen_moving_, seen_fixed_;
+    const Eigen::Matrix3Xd& points_;
+    Eigen::Matrix3Xd predicted_;
+    const BlockMatchingOptions& options_;
+    std::vector<std::vector<int>> neighbours_;
+
+    [[nodiscard]] Level prepare(int level) const {
+        const double spacing = options_.grid_spacing_mm * std::pow(2, options_.levels - 1 - level);
+        const int reach = level == 0 ? static_cast<int>(std::ceil(options_.search_mm / spacing)) : refinement_reach;
+        const double margin = (reach + options_.block_radius + detail::descriptor_reach + 2) * spacing;
+        const Eigen::Matrix3d& axes = fixed_.geometry.direction;
+        const auto image = [&](const Volume& from, const Volume& seen, const Eigen::Matrix3Xd& about,
+                               const Eigen::Matrix3d& direction) {
+            return detail::matching_image(from, seen, detail::grid_about(about, direction, spacing, margin),
+                                          options_.similarity);
+        };
+        return {image(moving_, seen_moving_, points_, options_.rotation.transpose() * axes),
+                image(fixed_, seen_fixed_, predicted_, axes), reach};
+    }
+
+    /// One entry per point; `point` stays −1 where the block was not found.
+    [[nodiscard]] std::vector<BlockMatch> match(const Level& level, Verification verification) const {
+        std::vector<BlockMatch> matches(static_cast<std::size_t>(points_.cols()));
+        tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t n) {
+            if (const auto found = match_point(level, static_cast<Eigen::Index>(n), verification)) matches[n] = *found;
+        });
+        return matches;
+    }
+
+    [[nodiscard]] std::optional<BlockMatch> match_point(const Level& level, Eigen::Index n,
+                                                        Verification verification) const {
+        const Block block{nearest_voxel(level.moving.grid, points_.col(n)), options_.block_radius,
+                          options_.least_share};
+        BlockMatch result;
+        result.moving = level.moving.grid.point(as_vector(block.centre));
+        const Eigen::Vector3d expected = predicted_.col(n) + options_.rotation * (result.moving - points_.col(n));
+        const auto found =
+            find_block(level.moving, level.fixed, block, nearest_voxel(level.fixed.grid, expected), level.reach);
+        if (!found) return std::nullopt;
+        double error = 0;
+        if (verification == Verification::BackMatch) {
+            const auto back = back_match(level.moving, level.fixed, block, *found);
+            if (!back) return std::nullopt;
+            error = *back * level.fixed.grid.spacing[0] / options_.back_match_mm;
+        }
+        result.point = static_cast<int>(n);
+        result.fixed = level.fixed.grid.point(found->index());
+        result.cost = found->cost;
+        result.uniqueness = found->uniqueness;
+        result.back_match_mm = error * options_.back_match_mm;
+        result.confidence = found->uniqueness * std::exp(-0.5 * error * error);
+        result.information = information(*found, level.fixed.grid, block.radius);
+        return result;
+    }
+
+    /// The next level starts from what the neighbours of each point agree on.
+    void predict(const std::vector<BlockMatch>& matches) {
+        detail::ScatteredMotion motion{points_, predicted_ - points_, {}};
+        for (std::size_t n = 0; n < matches.size(); ++n) {
+            const auto column = static_cast<Eigen::Index>(n);
+            if (matches[n].point >= 0) motion.displacements.col(column) = matches[n].fixed - matches[n].moving;
+            motion.weights.push_back(detail::neighbour_weight(matches[n]));
+        }
+        tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t n) {
+            const auto column = static_cast<Eigen::Index>(n);
+            const bool vouched = std::any_of(neighbours_[n].begin(), neighbours_[n].end(), [&](int other) {
+                return motion.weights[static_cast<std::size_t>(other)].trace() > 0.1;
+            });
+            if (!vouched) return;
+            const Eigen::Vector3d point = points_.col(column);
+            predicted_.col(column) =
+                point + detail::fit_local_affine(motion, point, neighbours_[n], trimmed_share).displacement;
+        });
+    }
+};
+
+void require_usable(const Eigen::Matrix3Xd& points, const Eigen::Matrix3Xd& predicted,
+                    const BlockMatchingOptions& options) {
+    if (points.cols() == 0 || points.cols() != predicted.cols())
+        throw InvalidInput("block matching: " + std::to_string(points.cols()) + " points and " +
+                           std::to_string(predicted.cols()) +
+                           " predicted positions; give as many of both, one or more");
+    if (!points.allFinite() || !predicted.allFinite())
+        throw InvalidInput("block matching: a point or predicted position is not finite; give LPS mm");
+    const bool in_range = options.grid_spacing_mm > 0.05 && options.grid_spacing_mm < 50 && options.levels >= 1 &&
+                          options.levels <= 8 && options.block_radius >= 1 && options.block_radius <= 64 &&
+                          options.search_mm >= 0 && options.search_mm <= 1000 && options.back_match_mm > 0 &&
+                          options.least_share > 0 && options.least_share <= 1;
+    if (!in_range)
+        throw InvalidInput(
+            "block matching: options out of range; grid spacing 0.05 to 50 mm, 1 to 8 levels, block radius 1 to 64 "
+            "voxels, search 0 to 1000 mm, back match above 0 mm, least share above 0 and up to 1");
+    if (!(options.rotation.transpose() * options.rotation).isIdentity(1e-6))
+        throw InvalidInput("block matching: the rotation is not orthonormal; give the linear part of a rigid motion");
+}
+
+/// Whether a point lies in the box of the voxels.
+bool in_image(const imaging::Geometry& grid, const Eigen::Vector3d& point) {
+    const Eigen::Array3d index = grid.index(point).array();
+    const Eigen::Array3d last(grid.size[0] - 0.5, grid.size[1] - 0.5, grid.size[2] - 0.5);
+    return (index >= -0.5).all() && (index <= last).all();
+}
+
+std::vector<int> in_both_images(const Volume& moving, const Volume& fixed, const Eigen::Matrix3Xd& points,
+                                const Eigen::Matrix3Xd& predicted) {
+    std::vector<int> result;
+    for (Eigen::Index n = 0; n < points.cols(); ++n)
+        if (in_image(moving.geometry, points.col(n)) && in_image(fixed.geometry, predicted.col(n)))
+            result.push_back(static_cast<int>(n));
+    if (result.empty())
+        throw InvalidInput("block matching: none of " + std::to_string(points.cols()) +
+                           " points is expected to lie in both images; align them first");
+    return result;
+}
+
+}  // namespace
+
+std::vector<BlockMatch> match_blocks(const Volume& moving, const Volume& fixed, const Eigen::Matrix3Xd& points,
+                                     const Eigen::Matrix3Xd& predicted, const BlockMatchingOptions& options,
+                                     Observer& observer) {
+    require_usable(points, predicted, options);
+    detail::require_finite(moving, "block matching: the moving image");
+    detail::require_finite(fixed, "block matching: the fixed image");
+    const std::vector<int> usable = in_both_images(moving, fixed, points, predicted);
+    const Eigen::Matrix3Xd from = points(Eigen::all, usable), to = predicted(Eigen::all, usable);
+    std::vector<BlockMatch> matches = BlockSearch(moving, fixed, from, to, options).run(observer);
+    for (BlockMatch& match : matches) match.point = usable[static_cast<std::size_t>(match.point)];
+    return matches;
+}
+
+}  // namespace tissuewarp::registration

@@ -1,0 +1,91 @@
+#pragma once
+/// Image-driven correspondence: where does each textured point of the preoperative image lie in a bare intraoperative
+/// volume? Feature points, block matching, and outlier rejection by neighbours; no model and no labels of the fixed
+/// image needed.
+
+#include "core/observer.hpp"
+#include "imaging/volume.hpp"
+
+#include <Eigen/Core>
+
+#include <vector>
+
+namespace tissuewarp::registration {
+
+struct FeatureOptions {
+    int count = 5000;              ///< most points returned; fewer when the organ is too small to spread them
+    double margin_mm = 2.0;        ///< points up to this far outside the mask: the organ's own surface is an edge
+    double grid_spacing_mm = 1.0;  ///< structure is looked at on a grid of at most this spacing
+    double gradient_mm = 1.0;      ///< standard deviation of the smoothing before the gradient
+    double window_mm = 2.0;        ///< standard deviation of the window over gradient products
+};
+
+/// Feature points, LPS mm (3 × N), and their structure tensors G * (∇I ∇Iᵀ) in LPS, (intensity/mm)².
+struct FeaturePoints {
+    Eigen::Matrix3Xd points;
+    std::vector<Eigen::Matrix3d> structure;
+};
+
+/// Points of high structure in and near the mask (voxels != 0, any grid), spread evenly: in the order of the score
+/// Σ λᵢ/(λᵢ + λ₀), λ₀ the median of the mean eigenvalue in the mask, each point that lies far enough from those taken.
+/// Corners (three strong eigenvalues, Rohr 1997) score close to 3 and come first, plane edges up to 1; flat tissue is
+/// left out. Throws InvalidInput on non-finite voxels, an empty mask, one off the image, or an image that is constant
+/// in it.
+FeaturePoints select_feature_points(const imaging::Volume& image, const imaging::Volume& mask,
+                                    const FeatureOptions& options = {});
+
+/// What makes two blocks alike.
+enum class Similarity {
+    SelfSimilarityContext,  ///< MIND-SSC descriptors (Heinrich et al., MICCAI 2013): any pair of modalities
+    CrossCorrelation        ///< normalised cross-correlation: images of one modality
+};
+
+struct BlockMatchingOptions {
+    Similarity similarity = Similarity::SelfSimilarityContext;
+    double grid_spacing_mm = 1.0;  ///< isotropic working grid of the last level; every level before doubles it
+    int levels = 3;                ///< 4, 2, 1 mm: the first finds, the others refine
+    int block_radius = 4;          ///< voxels of the level's grid: blocks of 36, 18 and 9 mm
+    double search_mm = 16.0;       ///< range of the first level about the predicted position, along each axis
+    double least_share = 0.5;      ///< share of a block that both images must show
+    double back_match_mm = 1.0;    ///< standard deviation of the back-match error in the confidence
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< moving → fixed, that the predicted positions contain
+};
+
+/// A block of the moving image found in the fixed one.
+struct BlockMatch {
+    int point = -1;                                         ///< column of the points given
+    Eigen::Vector3d moving = Eigen::Vector3d::Zero();       ///< centre of the block, LPS mm
+    Eigen::Vector3d fixed = Eigen::Vector3d::Zero();        ///< where it was found, LPS mm, sub-voxel
+    double cost = 0;                                        ///< mean squared difference at the match
+    double uniqueness = 0;                                  ///< 0..1, see docs/method.md
+    double back_match_mm = 0;                               ///< error of the way back, along what the block shows
+    double confidence = 0;                                  ///< 0..1: uniqueness × exp(−½ (back match / scale)²)
+    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< inverse covariance of `fixed`, 1/mm², LPS
+};
+
+/// Finds the blocks around `points` (3 × N, LPS mm, moving frame) near `predicted` (3 × N, LPS mm, fixed frame), coarse
+/// to fine. Between levels each block's prediction is the robust local affine fit of its neighbours' matches. What lies
+/// outside of either image, or in parts of them that are exactly constant (padding beyond the field of view), counts
+/// in no cost. Returns the blocks found, in the order of the points; those that left the fixed image or show too little
+/// of themselves there are absent. Threads do not change the result. Formulas: docs/method.md. Throws InvalidInput on
+/// non-finite voxels or points, sizes that differ, options out of range, and when no block lies in both images;
+/// Cancelled.
+std::vector<BlockMatch> match_blocks(const imaging::Volume& moving, const imaging::Volume& fixed,
+                                     const Eigen::Matrix3Xd& points, const Eigen::Matrix3Xd& predicted,
+                                     const BlockMatchingOptions& options = {}, Observer& observer = silent_observer());
+
+struct ConsistencyOptions {
+    int neighbours = 24;             ///< matches around each that must tell the same story
+    double trimmed_share = 0.3;      ///< of the neighbours, left out of each fit
+    double least_confidence = 0.1;   ///< matches below it are dropped, and vouch for none
+    double most_residual_mm = 1.5;   ///< matches further from their neighbours' story are outliers …
+    double most_residual_ratio = 3;  ///< … unless the neighbours' own median residual, times this, is larger
+};
+
+/// The matches that agree with a local affine motion of their neighbours, fitted by least trimmed squares (Rousseeuw
+/// 1984, concentration steps of Rousseeuw and Van Driessen 2006). Residuals are taken along what the blocks show: a
+/// block on a plane edge is judged across the edge alone.
+std::vector<BlockMatch> consistent_matches(const std::vector<BlockMatch>& matches,
+                                           const ConsistencyOptions& options = {});
+
+}  // namespace tissuewarp::registration

@@ -1,0 +1,47 @@
+#include "registration/detail/local_affine.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace tissuewarp::registration {
+
+namespace {
+
+detail::ScatteredMotion motion_of(const std::vector<BlockMatch>& matches) {
+    const auto count = static_cast<Eigen::Index>(matches.size());
+    detail::ScatteredMotion motion{Eigen::Matrix3Xd(3, count), Eigen::Matrix3Xd(3, count), {}};
+    for (Eigen::Index n = 0; n < count; ++n) {
+        const BlockMatch& match = matches[static_cast<std::size_t>(n)];
+        motion.points.col(n) = match.moving;
+        motion.displacements.col(n) = match.fixed - match.moving;
+        motion.weights.push_back(detail::neighbour_weight(match));
+    }
+    return motion;
+}
+
+}  // namespace
+
+std::vector<BlockMatch> consistent_matches(const std::vector<BlockMatch>& matches, const ConsistencyOptions& options) {
+    std::vector<BlockMatch> candidates;
+    std::copy_if(matches.begin(), matches.end(), std::back_inserter(candidates),
+                 [&](const BlockMatch& match) { return match.confidence >= options.least_confidence; });
+    const detail::ScatteredMotion motion = motion_of(candidates);
+    const auto neighbours = detail::nearest_neighbours(motion.points, options.neighbours);
+    std::vector<char> agrees(candidates.size(), 0);
+    tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t n) {
+        const auto column = static_cast<Eigen::Index>(n);
+        const detail::LocalMotion local =
+            detail::fit_local_affine(motion, motion.points.col(column), neighbours[n], options.trimmed_share);
+        const Eigen::Vector3d e = motion.displacements.col(column) - local.displacement;
+        const double residual = std::sqrt(e.dot(motion.weights[n] * e) / candidates[n].confidence);
+        agrees[n] = residual <= std::max(options.most_residual_mm, options.most_residual_ratio * local.residual_mm);
+    });
+    std::vector<BlockMatch> result;
+    for (std::size_t n = 0; n < candidates.size(); ++n)
+        if (agrees[n]) result.push_back(candidates[n]);
+    return result;
+}
+
+}  // namespace tissuewarp::registration
