@@ -1,8 +1,8 @@
 // Prints the tables of docs/results.md, section "Block matching": blocks of the moving image found in the bare fixed
 // image, against the true displacement of the phantoms and the landmarks of the lung.
-//     image_matching_bench DATA [--case PART] [--csv FILE]
+//     image_matching_bench DATA [--case PART] [--csv FILE] [--count POINTS] [--grid MM] [--radius VOXELS]
 // DATA holds phantom-brainshift, phantom-brain-sag and lung-ct; PART selects cases whose name holds it; FILE takes a
-// line per match kept.
+// line per match found.
 
 #include "core/errors.hpp"
 #include "imaging/filters.hpp"
@@ -50,11 +50,39 @@ private:
     std::vector<imaging::LinearSampler> components_;
 };
 
+struct Arguments {
+    fs::path data, csv;
+    std::string part;
+    FeatureOptions features;
+    BlockMatchingOptions matching;
+};
+
+Arguments parse(int argc, char** argv) {
+    if (argc < 2 || argc % 2 == 1) throw InvalidInput("see the head of image_matching_bench.cpp for the arguments");
+    Arguments result{argv[1], {}, {}, {}, {}};
+    for (int n = 2; n < argc; n += 2) {
+        const std::string key = argv[n], value = argv[n + 1];
+        if (key == "--case") {
+            result.part = value;
+        } else if (key == "--csv") {
+            result.csv = value;
+        } else if (key == "--count") {
+            result.features.count = std::stoi(value);
+        } else if (key == "--grid") {
+            result.matching.grid_spacing_mm = std::stod(value);
+        } else if (key == "--radius") {
+            result.matching.block_radius = std::stoi(value);
+        } else {
+            throw InvalidInput("unknown argument " + key + "; see the head of image_matching_bench.cpp");
+        }
+    }
+    return result;
+}
+
 struct Case {
     std::string name;
     imaging::Volume moving, mask, fixed;
     Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();
-    BlockMatchingOptions options;
 };
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
@@ -69,7 +97,7 @@ double quantile(std::vector<double> values, double share) {
 }
 
 struct Errors {
-    std::vector<double> full, informative, squared;  // mm, mm, eᵀ I e
+    std::vector<double> full, informative, squared, deviation;  // mm, mm, eᵀ I e, det(I)^(−1/6) mm
 
     void add(const BlockMatch& match, const Eigen::Vector3d& truth) {
         const Eigen::Vector3d e = match.fixed - truth;
@@ -77,14 +105,15 @@ struct Errors {
         full.push_back(e.norm());
         informative.push_back(std::abs(axes.eigenvectors().col(2).dot(e)));
         squared.push_back(e.dot(match.information * e));
+        deviation.push_back(std::pow(match.information.determinant(), -1.0 / 6));
     }
     void print_row(const std::string& name, std::size_t points, double seconds) const {
         const auto outliers =
             static_cast<double>(std::count_if(full.begin(), full.end(), [](double e) { return e > 3; }));
-        std::printf("| %s | %zu / %zu | %.2f / %.2f | %.2f / %.2f | %.1f | %.2f / %.1f | %.1f |\n", name.c_str(),
+        std::printf("| %s | %zu / %zu | %.2f / %.2f | %.2f / %.2f | %.1f | %.2f / %.1f | %.2f | %.1f |\n", name.c_str(),
                     full.size(), points, quantile(informative, 0.5), quantile(informative, 0.9), quantile(full, 0.5),
                     quantile(full, 0.9), 100 * outliers / double(std::max<std::size_t>(full.size(), 1)),
-                    quantile(squared, 0.5), quantile(squared, 0.9), seconds);
+                    quantile(squared, 0.5), quantile(squared, 0.9), quantile(deviation, 0.5), seconds);
         std::fflush(stdout);
     }
 };
@@ -95,12 +124,12 @@ struct Found {
     double seconds = 0;
 };
 
-Found find(const Case& study) {
+Found find(const Case& study, const Arguments& arguments) {
     const auto start = std::chrono::steady_clock::now();
-    const FeaturePoints features = select_feature_points(study.moving, study.mask);
+    const FeaturePoints features = select_feature_points(study.moving, study.mask, arguments.features);
     const double selected = seconds_since(start);
     Found found{features.points.cols(), {}, {}, 0};
-    BlockMatchingOptions options = study.options;
+    BlockMatchingOptions options = arguments.matching;
     options.rotation = study.placement.linear();
     found.all = match_blocks(study.moving, study.fixed, features.points, study.placement * features.points, options);
     const double matched = seconds_since(start);
@@ -115,7 +144,7 @@ void print_head() {
     std::printf(
         "| case | kept / points | informative direction: median / 90th, mm | full: median / 90th, mm | beyond 3 mm, %% "
         "| "
-        "eᵀIe: median / 90th | seconds |\n|---|---|---|---|---|---|---|\n");
+        "eᵀIe: median / 90th | stated deviation: median, mm | seconds |\n|---|---|---|---|---|---|---|---|\n");
 }
 
 void write_csv(const fs::path& path, const std::string& name, const BlockMatch& match, const Eigen::Vector3d& truth) {
@@ -128,15 +157,15 @@ void write_csv(const fs::path& path, const std::string& name, const BlockMatch& 
         << strength.transpose() << '\n';
 }
 
-void against_field(const Case& study, const Field& truth, const fs::path& csv) {
-    const Found found = find(study);
+void against_field(const Case& study, const Field& truth, const Arguments& arguments) {
+    const Found found = find(study, arguments);
     Errors all, kept;
     const auto true_place = [&](const BlockMatch& match) -> Eigen::Vector3d {
         return match.moving + truth(match.moving);
     };
     for (const BlockMatch& match : found.all) {
         all.add(match, true_place(match));
-        write_csv(csv, study.name, match, true_place(match));
+        write_csv(arguments.csv, study.name, match, true_place(match));
     }
     for (const BlockMatch& match : found.kept) kept.add(match, true_place(match));
     const auto points = static_cast<std::size_t>(found.points);
@@ -145,8 +174,8 @@ void against_field(const Case& study, const Field& truth, const fs::path& csv) {
 }
 
 /// At each landmark, the displacement of the match nearest to it.
-void against_landmarks(const Case& study, const Landmarks& landmarks) {
-    const Found found = find(study);
+void against_landmarks(const Case& study, const Landmarks& landmarks, const Arguments& arguments) {
+    const Found found = find(study, arguments);
     Errors errors;
     std::vector<double> distances;
     for (Eigen::Index n = 0; n < landmarks.moving.cols(); ++n) {
@@ -161,41 +190,46 @@ void against_landmarks(const Case& study, const Landmarks& landmarks) {
     errors.print_row(study.name + ", nearest to " + std::to_string(errors.full.size()) + " landmarks (" +
                          std::to_string(found.kept.size()) + " kept)",
                      static_cast<std::size_t>(found.points), found.seconds);
-    std::printf("\nThe nearest match lies %.1f mm from its landmark (median).\n", quantile(distances, 0.5));
+    std::fprintf(stderr, "the nearest match lies %.1f mm from its landmark (median)\n", quantile(distances, 0.5));
 }
 
-BlockMatchingOptions with(Similarity similarity) {
-    BlockMatchingOptions options;
-    options.similarity = similarity;
-    return options;
+void brain_shift(const Arguments& arguments, const std::string& name) {
+    const fs::path folder = arguments.data / "phantom-brainshift";
+    against_field({name, imaging::read_volume(folder / "preop.nii.gz"),
+                   imaging::mask_of_all(imaging::read_labels(folder / "preop_labels.nii.gz")),
+                   imaging::read_volume(folder / "intraop.nii.gz")},
+                  Field(imaging::read_volume(folder / "truth_forward.nii.gz")), arguments);
 }
 
-void run(const fs::path& data, const std::string& part, const fs::path& csv) {
-    const auto chosen = [&](const std::string& name) { return name.find(part) != std::string::npos; };
-    const std::vector<std::pair<std::string, Similarity>> similarities{
-        {"self-similarity", Similarity::SelfSimilarityContext}, {"correlation", Similarity::CrossCorrelation}};
+void brain_sag(const Arguments& arguments, const std::string& name, const std::string& volume) {
+    const fs::path folder = arguments.data / "phantom-brain-sag";
+    against_field({name, imaging::read_volume(folder / "preop.nii.gz"),
+                   imaging::read_labels(folder / "preop_mask.nii.gz"), imaging::read_volume(folder / volume)},
+                  Field(imaging::read_volume(folder / "truth_forward.nii.gz")), arguments);
+}
+
+/// From the pose that the masks give.
+void lung(const Arguments& arguments, const std::string& name) {
+    const fs::path folder = arguments.data / "lung-ct";
+    const imaging::Volume mask = imaging::read_labels(folder / "moving_mask.mha");
+    const auto pose = align_labels(mask, imaging::read_labels(folder / "fixed_mask.mha")).placement;
+    against_landmarks(
+        {name, imaging::read_volume(folder / "moving.mha"), mask, imaging::read_volume(folder / "fixed.mha"), pose},
+        read_landmarks(folder / "moving_pts.txt", folder / "fixed_pts.txt"), arguments);
+}
+
+void run(Arguments arguments) {
     print_head();
-    for (const auto& [label, similarity] : similarities) {
-        const fs::path shift = data / "phantom-brainshift", sag = data / "phantom-brain-sag", lung = data / "lung-ct";
-        if (const std::string name = "brain shift, " + label; chosen(name))
-            against_field(
-                {name, imaging::read_volume(shift / "preop.nii.gz"),
-                 imaging::mask_of_all(imaging::read_labels(shift / "preop_labels.nii.gz")),
-                 imaging::read_volume(shift / "intraop.nii.gz"), Eigen::Isometry3d::Identity(), with(similarity)},
-                Field(imaging::read_volume(shift / "truth_forward.nii.gz")), csv);
-        for (const std::string volume : {"intraop", "intraop_degraded"})
-            if (const std::string name = "brain sag " + volume + ", " + label; chosen(name))
-                against_field(
-                    {name, imaging::read_volume(sag / "preop.nii.gz"), imaging::read_labels(sag / "preop_mask.nii.gz"),
-                     imaging::read_volume(sag / (volume + ".nii.gz")), Eigen::Isometry3d::Identity(), with(similarity)},
-                    Field(imaging::read_volume(sag / "truth_forward.nii.gz")), csv);
-        if (const std::string name = "lung, " + label; chosen(name)) {
-            const imaging::Volume mask = imaging::read_labels(lung / "moving_mask.mha");
-            const auto pose = align_labels(mask, imaging::read_labels(lung / "fixed_mask.mha")).placement;
-            against_landmarks({name, imaging::read_volume(lung / "moving.mha"), mask,
-                               imaging::read_volume(lung / "fixed.mha"), pose, with(similarity)},
-                              read_landmarks(lung / "moving_pts.txt", lung / "fixed_pts.txt"));
-        }
+    for (const Similarity similarity : {Similarity::SelfSimilarityContext, Similarity::CrossCorrelation}) {
+        const std::string by = similarity == Similarity::CrossCorrelation ? " by correlation" : " by self-similarity";
+        const auto chosen = [&](const std::string& name) {
+            return (name + by).find(arguments.part) != std::string::npos;
+        };
+        arguments.matching.similarity = similarity;
+        if (chosen("brain shift")) brain_shift(arguments, "brain shift" + by);
+        if (chosen("brain sag clean")) brain_sag(arguments, "brain sag clean" + by, "intraop.nii.gz");
+        if (chosen("brain sag degraded")) brain_sag(arguments, "brain sag degraded" + by, "intraop_degraded.nii.gz");
+        if (chosen("lung")) lung(arguments, "lung" + by);
     }
 }
 
@@ -203,10 +237,7 @@ void run(const fs::path& data, const std::string& part, const fs::path& csv) {
 
 int main(int argc, char** argv) {
     try {
-        if (argc < 2) throw InvalidInput("give the folder of the data; see the head of image_matching_bench.cpp");
-        std::string part, csv;
-        for (int n = 2; n + 1 < argc; n += 2) (std::string(argv[n]) == "--case" ? part : csv) = argv[n + 1];
-        run(argv[1], part, csv);
+        run(parse(argc, argv));
     } catch (const std::exception& error) {
         std::fprintf(stderr, "image_matching_bench: %s\n", error.what());
         return 2;

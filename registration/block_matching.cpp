@@ -25,7 +25,7 @@ constexpr int refinement_reach = 3;         // voxels of the level, about the ne
 constexpr int neighbours = 24;              // that tell it
 constexpr double trimmed_share = 0.3;       // of them, left out
 constexpr double independent_share = 0.05;  // of a block's voxels: the others repeat them (docs/method.md)
-constexpr double least_deviation = 0.1;     // voxels: what interpolation leaves of the best match
+constexpr double least_deviation = 0.05;    // voxels: what interpolation leaves of the best match
 
 Voxel nearest_voxel(const imaging::Geometry& grid, const Eigen::Vector3d& point) {
     const Eigen::Vector3d index = grid.index(point);
@@ -100,7 +100,9 @@ std::optional<Minimum> descend(const MatchingImage& moving, const MatchingImage&
 
 std::optional<Minimum> find_block(const MatchingImage& moving, const MatchingImage& fixed, const Block& block,
                                   const Voxel& start, int reach) {
-    const CostLattice lattice = detail::cost_lattice(moving, fixed, block, start, reach);
+    Block coarse = block;
+    coarse.stride = 2;
+    const CostLattice lattice = detail::cost_lattice(moving, fixed, coarse, start, reach);
     const auto lowest =
         static_cast<std::size_t>(std::min_element(lattice.costs.begin(), lattice.costs.end()) - lattice.costs.begin());
     if (!std::isfinite(lattice.costs[lowest])) return std::nullopt;
@@ -137,7 +139,12 @@ struct Level {
     int reach;
 };
 
-enum class Verification { None, BackMatch };
+/// Mean inverse standard deviation of all blocks, 1/mm; those not found count as 0.
+double mean_certainty(const std::vector<BlockMatch>& matches) {
+    double total = 0;
+    for (const BlockMatch& match : matches) total += std::pow(std::max(match.information.determinant(), 0.0), 1.0 / 6);
+    return total / double(matches.size());
+}
 
 /// The whole search: images, points and where they are expected.
 class BlockSearch {
@@ -154,15 +161,19 @@ public:
           neighbours_(detail::nearest_neighbours(points, neighbours)) {}
 
     std::vector<BlockMatch> run(Observer& observer) {
-        std::vector<BlockMatch> matches;
+        std::vector<BlockMatch> best;
+        double certainty = -1;
         for (int level = 0; level < options_.levels; ++level) {
-            const bool last = level + 1 == options_.levels;
-            matches = match(prepare(level), last ? Verification::BackMatch : Verification::None);
+            std::vector<BlockMatch> matches = match(prepare(level));
+            if (level + 1 < options_.levels) predict(matches);
+            if (const double candidate = mean_certainty(matches); candidate >= certainty) {
+                certainty = candidate;
+                best = std::move(matches);
+            }
             observer.checkpoint("block matching", double(level + 1) / options_.levels);
-            if (!last) predict(matches);
         }
-        std::erase_if(matches, [](const BlockMatch& match) { return match.point < 0; });
-        return matches;
+        std::erase_if(best, [](const BlockMatch& match) { return match.point < 0; });
+        return best;
     }
 
 private:
@@ -187,16 +198,15 @@ private:
     }
 
     /// One entry per point; `point` stays −1 where the block was not found.
-    [[nodiscard]] std::vector<BlockMatch> match(const Level& level, Verification verification) const {
+    [[nodiscard]] std::vector<BlockMatch> match(const Level& level) const {
         std::vector<BlockMatch> matches(static_cast<std::size_t>(points_.cols()));
         tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t n) {
-            if (const auto found = match_point(level, static_cast<Eigen::Index>(n), verification)) matches[n] = *found;
+            if (const auto found = match_point(level, static_cast<Eigen::Index>(n))) matches[n] = *found;
         });
         return matches;
     }
 
-    [[nodiscard]] std::optional<BlockMatch> match_point(const Level& level, Eigen::Index n,
-                                                        Verification verification) const {
+    [[nodiscard]] std::optional<BlockMatch> match_point(const Level& level, Eigen::Index n) const {
         const Block block{nearest_voxel(level.moving.grid, points_.col(n)), options_.block_radius,
                           options_.least_share};
         BlockMatch result;
@@ -205,17 +215,14 @@ private:
         const auto found =
             find_block(level.moving, level.fixed, block, nearest_voxel(level.fixed.grid, expected), level.reach);
         if (!found) return std::nullopt;
-        double error = 0;
-        if (verification == Verification::BackMatch) {
-            const auto back = back_match(level.moving, level.fixed, block, *found);
-            if (!back) return std::nullopt;
-            error = *back * level.fixed.grid.spacing[0] / options_.back_match_mm;
-        }
+        const auto back = back_match(level.moving, level.fixed, block, *found);
+        if (!back) return std::nullopt;
+        const double error = *back / options_.back_match_voxels;
         result.point = static_cast<int>(n);
         result.fixed = level.fixed.grid.point(found->index());
         result.cost = found->cost;
         result.uniqueness = found->uniqueness;
-        result.back_match_mm = error * options_.back_match_mm;
+        result.back_match_mm = *back * level.fixed.grid.spacing[0];
         result.confidence = found->uniqueness * std::exp(-0.5 * error * error);
         result.information = information(*found, level.fixed.grid, block.radius);
         return result;
@@ -252,12 +259,12 @@ void require_usable(const Eigen::Matrix3Xd& points, const Eigen::Matrix3Xd& pred
         throw InvalidInput("block matching: a point or predicted position is not finite; give LPS mm");
     const bool in_range = options.grid_spacing_mm > 0.05 && options.grid_spacing_mm < 50 && options.levels >= 1 &&
                           options.levels <= 8 && options.block_radius >= 1 && options.block_radius <= 64 &&
-                          options.search_mm >= 0 && options.search_mm <= 1000 && options.back_match_mm > 0 &&
+                          options.search_mm >= 0 && options.search_mm <= 1000 && options.back_match_voxels > 0 &&
                           options.least_share > 0 && options.least_share <= 1;
     if (!in_range)
         throw InvalidInput(
             "block matching: options out of range; grid spacing 0.05 to 50 mm, 1 to 8 levels, block radius 1 to 64 "
-            "voxels, search 0 to 1000 mm, back match above 0 mm, least share above 0 and up to 1");
+            "voxels, search 0 to 1000 mm, back match above 0, least share above 0 and up to 1");
     if (!(options.rotation.transpose() * options.rotation).isIdentity(1e-6))
         throw InvalidInput("block matching: the rotation is not orthonormal; give the linear part of a rigid motion");
 }

@@ -1,6 +1,7 @@
 #include "imaging/filters.hpp"
 #include "imaging/sampling.hpp"
 #include "registration/detail/matching_grid.hpp"
+#include "registration/detail/matching_image.hpp"
 #include "registration/image_matching.hpp"
 
 #include <Eigen/Eigenvalues>
@@ -46,12 +47,14 @@ Eigen::Matrix3d tensor_at(const TensorField& field, std::int64_t n) {
     return tensor;
 }
 
-/// Offsets of the voxels in or near the mask.
-std::vector<std::int64_t> candidates(const Volume& mask, double margin_mm) {
-    const Volume distance = imaging::signed_distance(mask);
+/// Offsets of the voxels in or near the mask, away from padding, whose rim would pass for structure.
+std::vector<std::int64_t> candidates(const Volume& image, const Volume& mask, const FeatureOptions& options) {
+    const Volume near = imaging::dilate(mask, options.margin_mm);
+    const Volume seen = imaging::erode(detail::seen_region(image), options.gradient_mm + options.window_mm);
     std::vector<std::int64_t> result;
     for (std::int64_t n = 0; n < mask.geometry.voxel_count(); ++n)
-        if (double(distance.data<float>()[n]) <= margin_mm) result.push_back(n);
+        if (near.data<std::uint8_t>()[n] && seen.data<std::uint8_t>()[n]) result.push_back(n);
+    if (result.empty()) throw InvalidInput("the image is constant in the mask: there is nothing to match");
     return result;
 }
 
@@ -120,7 +123,7 @@ FeaturePoints select_feature_points(const Volume& image, const Volume& mask, con
     const Volume values = imaging::resample(image.as(CV_32F), grid, imaging::Interpolation::Linear);
     const Volume inside = imaging::resample(mask, grid, imaging::Interpolation::Nearest, 0);
     const TensorField field = structure_tensors(values, options);
-    const std::vector<std::int64_t> near = candidates(inside, options.margin_mm);
+    const std::vector<std::int64_t> near = candidates(values, inside, options);
 
     // Balls about points taken at random until none fits fill 0.38 of space (random sequential adsorption).
     const double volume = double(near.size()) * grid.voxel_volume();

@@ -43,11 +43,11 @@ enum class Similarity {
 struct BlockMatchingOptions {
     Similarity similarity = Similarity::SelfSimilarityContext;
     double grid_spacing_mm = 1.0;  ///< isotropic working grid of the last level; every level before doubles it
-    int levels = 3;                ///< 4, 2, 1 mm: the first finds, the others refine
+    int levels = 3;                ///< 4, 2, 1 mm
     int block_radius = 4;          ///< voxels of the level's grid: blocks of 36, 18 and 9 mm
     double search_mm = 16.0;       ///< range of the first level about the predicted position, along each axis
-    double least_share = 0.5;      ///< share of a block that both images must show
-    double back_match_mm = 1.0;    ///< standard deviation of the back-match error in the confidence
+    double least_share = 0.35;     ///< share of a block that both images must show
+    double back_match_voxels = 1;  ///< standard deviation of the back-match error in the confidence
     Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< moving → fixed, that the predicted positions contain
 };
 
@@ -64,7 +64,9 @@ struct BlockMatch {
 };
 
 /// Finds the blocks around `points` (3 × N, LPS mm, moving frame) near `predicted` (3 × N, LPS mm, fixed frame), coarse
-/// to fine. Between levels each block's prediction is the robust local affine fit of its neighbours' matches. What lies
+/// to fine. Between levels each block's prediction is the robust local affine fit of its neighbours' matches. The
+/// matches returned are those of the level that is the most certain of them: noise leaves the finest grid less to see
+/// than the one before. What lies
 /// outside of either image, or in parts of them that are exactly constant (padding beyond the field of view), counts
 /// in no cost. Returns the blocks found, in the order of the points; those that left the fixed image or show too little
 /// of themselves there are absent. Threads do not change the result. Formulas: docs/method.md. Throws InvalidInput on

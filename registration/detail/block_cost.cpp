@@ -85,11 +85,12 @@ double cost_of(Sums sums, const Block& block, const Voxel& at) {
     const Span i(block, sums.moving, sums.fixed, at, 0), j(block, sums.moving, sums.fixed, at, 1),
         k(block, sums.moving, sums.fixed, at, 2);
     if (i.first > i.last) return nowhere;
-    for (int dk = k.first; dk <= k.last; ++dk)
-        for (int dj = j.first; dj <= j.last; ++dj)
+    for (int dk = k.first; dk <= k.last; dk += block.stride)
+        for (int dj = j.first; dj <= j.last; dj += block.stride)
             add_row(sums, sums.moving.offset({block.centre[0] + i.first, block.centre[1] + dj, block.centre[2] + dk}),
                     sums.fixed.offset({at[0] + i.first, at[1] + dj, at[2] + dk}), i.last - i.first + 1);
-    const double all = std::pow(2 * block.radius + 1, 3);
+    const int side = 2 * block.radius + 1, rows = (side + block.stride - 1) / block.stride;
+    const double all = double(side) * rows * rows;
     return double(sums.voxels) < std::max(1.0, block.least_share * all) ? nowhere : sums.cost();
 }
 

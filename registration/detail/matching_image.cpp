@@ -91,8 +91,7 @@ Volume seen_region(const Volume& image) {
 
 MatchingImage matching_image(const Volume& image, const Volume& seen, const imaging::Geometry& grid,
                              Similarity similarity) {
-    const bool coarser = grid.spacing[0] > 1.5 * image.geometry.spacing.maxCoeff();
-    const Volume smoothed = coarser ? imaging::smooth(image, 0.4 * grid.spacing[0]) : image;
+    const Volume smoothed = imaging::smooth(image, 0.4 * grid.spacing[0]);
     const Volume values = imaging::resample(smoothed, grid, imaging::Interpolation::Linear);
     const Volume there = imaging::resample(seen, grid, imaging::Interpolation::Nearest, 0);
     MatchingImage result{grid, {}, {}, {}};

@@ -25,8 +25,8 @@ struct MatchingImage {
     }
 };
 
-/// Resamples `image` (float32, whose voxels `seen` != 0 count) on `grid`. A grid coarser than the image is reached by a
-/// Gaussian of 0.4 of its spacing. Voxels whose descriptor reaches beyond what is seen are not seen.
+/// Resamples `image` (float32, whose voxels `seen` != 0 count) on `grid`, smoothed by a Gaussian of 0.4 of
+/// its spacing. Voxels whose descriptor reaches beyond what is seen are not seen.
 MatchingImage matching_image(const imaging::Volume& image, const imaging::Volume& seen, const imaging::Geometry& grid,
                              Similarity similarity);
 
