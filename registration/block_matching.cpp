@@ -21,11 +21,12 @@ using imaging::Volume;
 
 namespace {
 
-constexpr int refinement_reach = 3;         // voxels of the level, about the neighbours' story
-constexpr int neighbours = 24;              // that tell it
-constexpr double trimmed_share = 0.3;       // of them, left out
-constexpr double independent_share = 0.05;  // of a block's voxels: the others repeat them (docs/method.md)
-constexpr double least_deviation = 0.05;    // voxels: what interpolation leaves of the best match
+constexpr int refinement_reach = 3;        // voxels of the level, about the neighbours' story
+constexpr int most_steps = 8;              // downhill, from the lowest place of the lattice
+constexpr int neighbours = 24;             // that tell it
+constexpr double trimmed_share = 0.3;      // of them, left out
+constexpr double independent_share = 0.1;  // of a block's voxels: the others repeat them (docs/method.md)
+constexpr double least_deviation = 0.05;   // voxels: what interpolation leaves of the best match
 
 Voxel nearest_voxel(const imaging::Geometry& grid, const Eigen::Vector3d& point) {
     const Eigen::Vector3d index = grid.index(point);
@@ -81,7 +82,7 @@ double uniqueness(const CostLattice& lattice, const Minimum& minimum) {
 
 /// Walks from a lattice point to the lowest of its 27 until that is itself, then fits.
 std::optional<Minimum> descend(const MatchingImage& moving, const MatchingImage& fixed, const Block& block, Voxel at) {
-    for (int step = 0; step < 4; ++step) {
+    for (int step = 0; step < most_steps; ++step) {
         const CostLattice near = detail::cost_lattice(moving, fixed, block, at, 1);
         const auto lowest =
             static_cast<std::size_t>(std::min_element(near.costs.begin(), near.costs.end()) - near.costs.begin());
@@ -123,12 +124,17 @@ std::optional<double> back_match(const MatchingImage& moving, const MatchingImag
 }
 
 /// Inverse covariance of a match, 1/mm²: least squares of N independent residuals of variance c about the minimum has
-/// the covariance 2 c/(N H) (H the Hessian of the mean square), to which the interpolation adds its own.
+/// the covariance 2 c/(N H), H the Hessian of the mean square. Two things are taken off first. Chance: the minimum was
+/// chosen among places whose mean squares scatter by c √(2/N), which alone looks like a curvature of some three times
+/// that at the lowest of them. Leakage: a parabola fitted to the cost of a plane edge, which is none, curves along the
+/// edge too. What interpolation leaves is added to the covariance.
 Eigen::Matrix3d information(const Minimum& minimum, const imaging::Geometry& grid, int radius) {
     const double independent = independent_share * std::pow(2 * radius + 1, 3), h = grid.spacing[0];
+    const double chance = 1.5 * std::sqrt(2 * independent);
     const Eigen::Matrix3d raw = independent / (2 * std::max(minimum.cost, 1e-6)) * minimum.fit.hessian;
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(raw);
-    const Eigen::Array3d strength = axes.eigenvalues().array().max(0.0);
+    const double leakage = 0.05 * axes.eigenvalues()[2];
+    const Eigen::Array3d strength = (axes.eigenvalues().array() - chance - leakage).max(0.0);
     const Eigen::Vector3d bounded = strength / (1 + strength * least_deviation * least_deviation) / (h * h);
     const Eigen::Matrix3d turn = grid.direction * axes.eigenvectors();
     return turn * bounded.asDiagonal() * turn.transpose();
@@ -172,7 +178,7 @@ public:
             }
             observer.checkpoint("block matching", double(level + 1) / options_.levels);
         }
-        std::erase_if(best, [](const BlockMatch& match) { return match.point < 0; });
+        std::erase_if(best, [](const BlockMatch& match) { return match.point < 0 || match.information.trace() <= 0; });
         return best;
     }
 

@@ -68,8 +68,8 @@ struct BlockMatch {
 /// matches returned are those of the level that is the most certain of them: noise leaves the finest grid less to see
 /// than the one before. What lies
 /// outside of either image, or in parts of them that are exactly constant (padding beyond the field of view), counts
-/// in no cost. Returns the blocks found, in the order of the points; those that left the fixed image or show too little
-/// of themselves there are absent. Threads do not change the result. Formulas: docs/method.md. Throws InvalidInput on
+/// in no cost. Returns the blocks found, in the order of the points; those that left the fixed image, show too little
+/// of themselves there or are no better found than chance finds are absent. Threads do not change the result. Formulas: docs/method.md. Throws InvalidInput on
 /// non-finite voxels or points, sizes that differ, options out of range, and when no block lies in both images;
 /// Cancelled.
 std::vector<BlockMatch> match_blocks(const imaging::Volume& moving, const imaging::Volume& fixed,
@@ -78,10 +78,10 @@ std::vector<BlockMatch> match_blocks(const imaging::Volume& moving, const imagin
 
 struct ConsistencyOptions {
     int neighbours = 24;             ///< matches around each that must tell the same story
-    double trimmed_share = 0.3;      ///< of the neighbours, left out of each fit
-    double least_confidence = 0.1;   ///< matches below it are dropped, and vouch for none
-    double most_residual_mm = 1.5;   ///< matches further from their neighbours' story are outliers …
-    double most_residual_ratio = 3;  ///< … unless the neighbours' own median residual, times this, is larger
+    double trimmed_share = 0.4;      ///< of the neighbours, left out of each fit
+    double least_confidence = 0.15;  ///< matches below it are dropped, and vouch for none
+    double most_residual_mm = 2.0;   ///< matches further from their neighbours' story are outliers; so are those
+                                     ///< whose neighbours are that far from any story (median)
 };
 
 /// The matches that agree with a local affine motion of their neighbours, fitted by least trimmed squares (Rousseeuw

@@ -36,7 +36,7 @@ std::vector<BlockMatch> consistent_matches(const std::vector<BlockMatch>& matche
             detail::fit_local_affine(motion, motion.points.col(column), neighbours[n], options.trimmed_share);
         const Eigen::Vector3d e = motion.displacements.col(column) - local.displacement;
         const double residual = std::sqrt(e.dot(motion.weights[n] * e) / candidates[n].confidence);
-        agrees[n] = residual <= std::max(options.most_residual_mm, options.most_residual_ratio * local.residual_mm);
+        agrees[n] = std::max(residual, local.residual_mm) <= options.most_residual_mm;
     });
     std::vector<BlockMatch> result;
     for (std::size_t n = 0; n < candidates.size(); ++n)

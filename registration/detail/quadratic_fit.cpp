@@ -26,14 +26,16 @@ struct Moments {
 
 std::optional<Quadratic> fit_quadratic(const std::array<double, 27>& costs) {
     Moments moments;
+    double size = 0;
     for (int n = 0; n < 27; ++n) {
         const double cost = costs[static_cast<std::size_t>(n)];
         if (!std::isfinite(cost)) return std::nullopt;
+        size = std::max(size, std::abs(cost));
         moments.add({n % 3 - 1.0, n / 3 % 3 - 1.0, n / 9 - 1.0}, cost);
     }
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(moments.hessian);
     const double largest = axes.eigenvalues()[2];
-    if (!(largest > 0)) return std::nullopt;
+    if (!(largest > 1e-12 * size)) return std::nullopt;  // rounding
     Quadratic result{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()};
     for (int a = 0; a < 3; ++a) {
         const double curvature = axes.eigenvalues()[a];
