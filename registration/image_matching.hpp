@@ -57,7 +57,7 @@ struct BlockMatch {
     Eigen::Vector3d moving = Eigen::Vector3d::Zero();       ///< centre of the block, LPS mm
     Eigen::Vector3d fixed = Eigen::Vector3d::Zero();        ///< where it was found, LPS mm, sub-voxel
     double cost = 0;                                        ///< mean squared difference at the match
-    double uniqueness = 0;                                  ///< 0..1, see docs/method.md
+    double uniqueness = 0;                                  ///< 0..1, see docs/method.md, "Blocks of a bare volume"
     double back_match_mm = 0;                               ///< error of the way back, along what the block shows
     double confidence = 0;                                  ///< 0..1: uniqueness × exp(−½ (back match / scale)²)
     Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< inverse covariance of `fixed`, 1/mm², LPS
@@ -69,9 +69,9 @@ struct BlockMatch {
 /// than the one before. What lies
 /// outside of either image, or in parts of them that are exactly constant (padding beyond the field of view), counts
 /// in no cost. Returns the blocks found, in the order of the points; those that left the fixed image, show too little
-/// of themselves there or are no better found than chance finds are absent. Threads do not change the result. Formulas: docs/method.md. Throws InvalidInput on
-/// non-finite voxels or points, sizes that differ, options out of range, and when no block lies in both images;
-/// Cancelled.
+/// of themselves there or are no better found than chance finds are absent. Threads do not change the result. Formulas:
+/// docs/method.md. Throws InvalidInput on non-finite voxels or points, sizes that differ, options out of range, and
+/// when no block lies in both images; Cancelled.
 std::vector<BlockMatch> match_blocks(const imaging::Volume& moving, const imaging::Volume& fixed,
                                      const Eigen::Matrix3Xd& points, const Eigen::Matrix3Xd& predicted,
                                      const BlockMatchingOptions& options = {}, Observer& observer = silent_observer());
