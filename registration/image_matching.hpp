@@ -57,7 +57,7 @@ struct BlockMatch {
     Eigen::Vector3d moving = Eigen::Vector3d::Zero();       ///< centre of the block, LPS mm
     Eigen::Vector3d fixed = Eigen::Vector3d::Zero();        ///< where it was found, LPS mm, sub-voxel
     double cost = 0;                                        ///< mean squared difference at the match
-    double uniqueness = 0;                                  ///< 0..1, see docs/method.md, "Blocks of a bare volume"
+    double uniqueness = 0;                                  ///< 0..1, see docs/method.md, section 7
     double back_match_mm = 0;                               ///< error of the way back, along what the block shows
     double confidence = 0;                                  ///< 0..1: uniqueness × exp(−½ (back match / scale)²)
     Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< inverse covariance of `fixed`, 1/mm², LPS
