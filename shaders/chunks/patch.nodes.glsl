@@ -57,8 +57,8 @@ void load_node(uint s, uint i) {
 
 void store_displacement(uint s, uint i) { store_state(s, 0u, vec3(node_b[i].y, node_c[i])); }
 
-/// The time step in increment form under the internal force f, mN: v⁺ = momentum v + gain r / m, u⁺ = u + v⁺. Where a dispatch
-/// is one step, u⁺ goes to memory too.
+/// The time step in increment form under the internal force f, mN: v⁺ = momentum v + gain r / m, u⁺ = u + v⁺. Unless
+/// the patch stays in shared memory, u⁺ goes to memory too.
 void advance_node(uint s, uint i, vec3 f, float momentum, float gain) {
     vec3 u = vec3(node_b[i].y, node_c[i]);
     vec3 residual = -f;

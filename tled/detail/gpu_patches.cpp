@@ -52,7 +52,7 @@ std::size_t shared_bytes(std::size_t slots, bool averages) {
 std::size_t most_slots(const std::vector<Patch>& patches) {
     std::size_t most = 0;
     for (const Patch& patch : patches) most = std::max(most, patch.node.size());
-    return (most + slot_step - 1) / slot_step * slot_step;
+    return slots_for(most);
 }
 
 /// Patches that do not fit into shared memory shrink, such that their number grows by halves: what was shared out
@@ -113,7 +113,6 @@ GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& pro
     sources_.emplace(device, layout.sources, "sources of forces");
     neighbours_.emplace(device, layout.neighbours, "neighbours of patches");
     progress_.emplace(device, static_cast<std::size_t>(c.patches) + 1, "progress of patches");
-    progress_copy_.emplace(device, progress_->size(), "progress of patches");
     largest_.emplace(device, static_cast<std::size_t>(c.patches), "largest forces of patches");
     volumes_.emplace(device, averages_ ? slot_count_ + 1 : 1, "volume changes of patches");
     node_of_slot_.emplace(device, layout.node_of_slot, "nodes of slots");
@@ -229,10 +228,9 @@ GpuStepShape GpuPatches::shape() const {
     return shape;
 }
 
-bool GpuPatches::gave_up() {
+bool GpuPatches::gave_up() const {
     std::array<std::uint32_t, 1> flag{};
-    progress_copy_->copy_from(*progress_, progress_->size() * sizeof(std::uint32_t));
-    progress_copy_->download(flag, progress_->size() - 1);
+    progress_->download(flag, progress_->size() - 1);
     return flag[0] != 0;
 }
 

@@ -44,7 +44,7 @@ private:
     void load(const shaders::NodeEffects& effects, const BlockBuffers& blocks);
     void store(const BlockBuffers& blocks);
     /// Whether a patch waited too long for its neighbours: the state is then not that of any step.
-    [[nodiscard]] bool gave_up();
+    [[nodiscard]] bool gave_up() const;
 
     shaders::ProgramCache& programs_;
     shaders::Law law_;
@@ -56,8 +56,7 @@ private:
     shaders::PatchSizes sizes_;
     std::optional<shaders::Buffer<Uint4>> head_, fans_;
     std::optional<shaders::Buffer<float>> rest_, state_, volumes_;
-    std::optional<shaders::Buffer<std::uint32_t>> sources_, neighbours_, progress_, progress_copy_, node_of_slot_,
-        slot_of_node_;
+    std::optional<shaders::Buffer<std::uint32_t>> sources_, neighbours_, progress_, node_of_slot_, slot_of_node_;
     std::optional<shaders::Buffer<std::array<std::uint32_t, 2>>> largest_;
     std::optional<shaders::Buffer<Float4>> forces_;
     std::uint32_t step_ = 0;

@@ -99,7 +99,7 @@ PatchCapacity capacity_of(const std::vector<Patch>& patches, const std::vector<s
     c.patches = static_cast<int>(patches.size());
     const auto grow = [](int& value, std::size_t to) { value = std::max(value, static_cast<int>(to)); };
     for (std::size_t p = 0; p < patches.size(); ++p) {
-        grow(c.slots, (patches[p].node.size() + slot_step - 1) / slot_step * slot_step);
+        grow(c.slots, slots_for(patches[p].node.size()));
         grow(c.fans, patches[p].fan.size());
         const std::size_t in_planes = planes[p].empty() ? 0 : planes[p].front();
         grow(c.sources, sum(planes[p]) + shared_count(patches[p], slots) - in_planes);

@@ -15,6 +15,9 @@ inline constexpr std::size_t most_sharing_patches = 16;
 
 /// Programs hold the number of slots of a patch as a constant: few different ones, or every mesh is compiled anew.
 inline constexpr std::size_t slot_step = 64;
+constexpr std::size_t slots_for(std::size_t nodes) {
+    return (nodes + slot_step - 1) / slot_step * slot_step;
+}
 
 /// Every patch has as much room as the largest, so that addresses follow from the patch's number alone.
 struct PatchCapacity {
