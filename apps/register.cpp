@@ -133,7 +133,7 @@ void run_register(const RegisterOptions& options) {
     append(run.times, run.prepared->times);
 
     progress.begin("registering", 0.20, 0.47);
-    run.result = update(*run.prepared, run.inputs.fixed_labels, update_options(options), progress);
+    run.result = update(*run.prepared, {.labels = run.inputs.fixed_labels}, update_options(options), progress);
     append(run.times, run.result.times);
     clock.lap("");
 

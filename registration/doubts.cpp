@@ -22,12 +22,11 @@ std::string to_text(double value) {
     return text;
 }
 
-std::vector<std::string> doubts(const PreparedModel& prepared, const imaging::Volume& fixed_labels,
-                                const UpdateResult& result) {
+std::vector<std::string> doubts(const PreparedModel& prepared, const Intraoperative& seen, const UpdateResult& result) {
     std::vector<std::string> reasons;
     const Round& last = result.rounds.back();
     const double spacing = prepared.labels.geometry.spacing.maxCoeff();
-    if (2 * last.matched < last.interface_nodes)
+    if (seen.labels && 2 * last.matched < last.interface_nodes)
         reasons.push_back("only " + std::to_string(last.matched) + " of " + std::to_string(last.interface_nodes) +
                           " boundary nodes found their boundary in the fixed labels");
     if (last.mean_residual_mm > spacing)
@@ -38,7 +37,8 @@ std::vector<std::string> doubts(const PreparedModel& prepared, const imaging::Vo
                           " boundary nodes are still far from where they belong; allow more rounds");
     if (result.min_jacobian < 0.1)
         reasons.push_back("tissue is compressed to " + to_text(result.min_jacobian) + " of its volume in one element");
-    const double growth = labelled_volume(fixed_labels) / labelled_volume(prepared.labels);
+    if (!seen.labels) return reasons;
+    const double growth = labelled_volume(*seen.labels) / labelled_volume(prepared.labels);
     double poisson = 0;
     for (const auto& [label, material] : prepared.model.materials)
         poisson = std::max(poisson, tled::poisson_ratio(material));

@@ -7,25 +7,23 @@
 
 namespace tissuewarp::registration::detail {
 
-std::vector<Match> match_interfaces(const PreparedModel& prepared, const LabelBoundaryField& fixed,
-                                    const Eigen::Isometry3d& placement, const Eigen::Matrix3Xd& displacement,
-                                    const Eigen::Matrix3Xd& normals, const Search& search) {
+std::vector<Match> match_interfaces(const PreparedModel& prepared, const LabelBoundaryField& fixed, const State& state,
+                                    const Eigen::Matrix3Xd& normals, const RoundPlan& plan, double max_angle_deg) {
     const auto& nodes = prepared.interfaces.nodes();
     std::vector<Match> matches(nodes.size());
     tbb::parallel_for(std::size_t{0}, nodes.size(), [&](std::size_t i) {
         const InterfaceNode& node = nodes[i];
         if (std::isnan(node.offset)) return;
-        const Eigen::Vector3d normal = placement.linear() * normals.col(static_cast<Eigen::Index>(i));
-        const Eigen::Vector3d point =
-            placement * Eigen::Vector3d(prepared.model.mesh.nodes.col(node.node) + displacement.col(node.node));
-        const double crossing =
-            fixed.crossing(point, normal, node.inner, node.outer, search.range_mm, search.max_angle_deg);
+        const Eigen::Vector3d normal = state.placement.linear() * normals.col(static_cast<Eigen::Index>(i));
+        const Eigen::Vector3d point = state.placement * Eigen::Vector3d(prepared.model.mesh.nodes.col(node.node) +
+                                                                        state.displacement.col(node.node));
+        const double crossing = fixed.crossing(point, normal, node.inner, node.outer, plan.range_mm, max_angle_deg);
         if (std::isnan(crossing)) return;
-        const double distance = crossing - node.offset, squared = search.scale_mm * search.scale_mm;
+        const double distance = crossing - node.offset;
         matches[i].found = true;
-        matches[i].held_back = std::abs(distance) > search.most_step_mm;
-        matches[i].distance_mm = std::clamp(distance, -search.most_step_mm, search.most_step_mm);
-        matches[i].weight = std::pow(squared / (squared + distance * distance), 2);
+        matches[i].held_back = std::abs(distance) > plan.most_step_mm;
+        matches[i].distance_mm = std::clamp(distance, -plan.most_step_mm, plan.most_step_mm);
+        matches[i].weight = robust_weight(distance, plan.scale_mm);
     });
     return matches;
 }

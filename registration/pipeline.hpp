@@ -7,6 +7,8 @@
 #include "registration/alignment.hpp"
 #include "registration/correspondence.hpp"
 #include "registration/deformation.hpp"
+#include "registration/image_matching.hpp"
+#include "registration/intraoperative.hpp"
 #include "tled/equilibrium.hpp"
 #include "tled/model.hpp"
 
@@ -36,6 +38,12 @@ struct PrepareOptions {
     double tangential_ratio = 0.02;        ///< stiffness along the surface over stiffness along the normal
 };
 
+/// What the preoperative image shows of the tissue, to be found again in a bare intraoperative volume.
+struct ImageModel {
+    imaging::Volume image;
+    FeaturePoints features;
+};
+
 /// Everything that does not depend on intraoperative data.
 struct PreparedModel {
     tled::Model model;       ///< mesh in LPS mm of the preoperative image
@@ -45,6 +53,7 @@ struct PreparedModel {
     tled::RestState rest;
     tled::RestStiffness stiffness;  ///< K₀ with all interface springs at full weight
     std::vector<StageTime> times;
+    std::optional<ImageModel> image;  ///< see prepare_image
 };
 
 /// Label map → mesh → rest state → factor. Throws InvalidInput, Cancelled.
@@ -55,9 +64,28 @@ PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions
 PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_labels, const PrepareOptions& options = {},
                       Observer& observer = silent_observer());
 
+/// Adds what registering to a bare intraoperative volume takes: feature points of the preoperative image, in and near
+/// the labels. Throws InvalidInput, Cancelled.
+void prepare_image(PreparedModel& prepared, const imaging::Volume& moving, const FeatureOptions& options = {},
+                   Observer& observer = silent_observer());
+
 enum class Device { Auto, Cpu, Gpu };
 
+/// How blocks of a bare volume are matched and weighed.
+struct ImageOptions {
+    BlockMatchingOptions matching;
+    ConsistencyOptions consistency;
+    int searches = 2;                ///< the first about the rigid pose, the others about where the model then is
+    int refinement_levels = 2;       ///< grids of the later searches, the finest ones
+    double refinement_mm = 4.0;      ///< and their range
+    double expected_strain = 0.03;   ///< deviation of the strain of tissue as large as …
+    double strain_length_mm = 10;    ///< … this: the weight of strain energy against matches
+    double expected_motion_mm = 10;  ///< of tissue that no datum shows
+    double trimmed_share = 0.05;     ///< of the matches, dropped at the end: those the model did not follow
+};
+
 struct UpdateOptions {
+    ImageOptions image;
     AlignmentOptions alignment;
     bool align = true;               ///< false: the images are in one frame already
     int rematches = 8;               ///< rounds of correspondence and equilibrium; up to twice as many when the
@@ -68,7 +96,7 @@ struct UpdateOptions {
     double last_range_mm = 4.0;      ///< and of the last, geometric in between
     double max_angle_deg = 50.0;     ///< between mesh normal and image boundary normal
     double residual_scale_mm = 1.0;  ///< Geman–McClure scale of the last round for what the model cannot follow
-    double trimmed_share = 0.02;  ///< of the matches, dropped in the last round: those the model did not follow
+    double trimmed_share = 0.02;     ///< of the matches, dropped in the last round: those the model did not follow
     tled::EquilibriumOptions equilibrium;
     Device device = Device::Auto;
     int gpu_index = -1;  ///< EGL device, −1: the first with hardware
@@ -95,10 +123,10 @@ struct UpdateResult {
     std::vector<std::string> doubts;  ///< reasons not to trust the result, empty when there are none
 };
 
-/// Registers the prepared model to a segmented intraoperative volume. Throws InvalidInput when the volumes share no
-/// label or do not meet, SolverFailure when no trustworthy equilibrium is found, GpuUnavailable when a GPU was
-/// demanded.
-UpdateResult update(const PreparedModel& prepared, const imaging::Volume& fixed_labels,
-                    const UpdateOptions& options = {}, Observer& observer = silent_observer());
+/// Registers the prepared model to what was seen during the operation. Throws InvalidInput when there is nothing to
+/// register to, a bare volume without prepare_image, label maps that share no label or do not meet; SolverFailure when
+/// no trustworthy equilibrium is found, GpuUnavailable when a GPU was demanded.
+UpdateResult update(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options = {},
+                    Observer& observer = silent_observer());
 
 }  // namespace tissuewarp::registration

@@ -65,8 +65,16 @@ PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_label
     const auto springs = tled::nodal_conditions(detail::full_weight_springs(interfaces, options), rest.node_count);
     tled::RestStiffness stiffness(rest, springs);
     times.push_back(stopwatch.lap("factor"));
-    return {std::move(model), moving_labels,        options,         std::move(interfaces),
-            std::move(rest),  std::move(stiffness), std::move(times)};
+    return {std::move(model), moving_labels,        options,          std::move(interfaces),
+            std::move(rest),  std::move(stiffness), std::move(times), std::nullopt};
+}
+
+void prepare_image(PreparedModel& prepared, const imaging::Volume& moving, const FeatureOptions& options,
+                   Observer& observer) {
+    detail::Stopwatch stopwatch;
+    observer.checkpoint("feature points", 0.0);
+    prepared.image = ImageModel{moving, select_feature_points(moving, imaging::mask_of_all(prepared.labels), options)};
+    prepared.times.push_back(stopwatch.lap("feature points"));
 }
 
 }  // namespace tissuewarp::registration

@@ -6,7 +6,8 @@
 #include "imaging/labels.hpp"
 #include "registration/detail/doubts.hpp"
 #include "registration/detail/engine_choice.hpp"
-#include "registration/detail/matching.hpp"
+#include "registration/detail/image_evidence.hpp"
+#include "registration/detail/label_evidence.hpp"
 #include "registration/detail/stopwatch.hpp"
 
 #include <algorithm>
@@ -15,8 +16,6 @@
 namespace tissuewarp::registration {
 
 namespace {
-
-using detail::Match;
 
 /// Search range of a round: geometric from the first to the last.
 double range_of(const UpdateOptions& options, int round) {
@@ -31,20 +30,41 @@ void require_common_labels(const PreparedModel& prepared, const imaging::Volume&
     throw InvalidInput("the fixed label map holds none of the labels of the model; check the label tables");
 }
 
+void require_usable(const PreparedModel& prepared, const Intraoperative& seen) {
+    if (!seen.labels && !seen.image) throw InvalidInput("nothing to register to; give labels or an image");
+    if (seen.image && !prepared.image)
+        throw InvalidInput("a bare volume was given, but the model holds no preoperative image; call prepare_image");
+    if (seen.labels) require_common_labels(prepared, *seen.labels);
+}
+
+/// The data that are there.
+struct Evidence {
+    std::optional<detail::LabelEvidence> labels;
+    std::optional<detail::ImageEvidence> image;
+
+    /// Springs of all data together.
+    [[nodiscard]] detail::Contribution contribution(const detail::RoundPlan& plan, const detail::State& state) const {
+        detail::Contribution sum;
+        if (labels) detail::add(sum, labels->contribution(plan, state));
+        if (image) detail::add(sum, image->contribution(plan, state));
+        return sum;
+    }
+};
+
 /// The rounds of matching and equilibrium.
 class Rematching {
 public:
-    Rematching(const PreparedModel& prepared, const LabelBoundaryField& fixed, const UpdateOptions& options,
-               UpdateResult& result, Observer& observer)
+    Rematching(const PreparedModel& prepared, Evidence& evidence, const UpdateOptions& options, UpdateResult& result,
+               Observer& observer)
         : prepared_(prepared),
-          fixed_(fixed),
+          evidence_(evidence),
           options_(options),
           result_(result),
           observer_(observer),
           engine_(detail::make_engine(prepared, options, observer)),
           equilibrium_(options.equilibrium),
           step_mm_(options.most_step_mm),
-          displacement_(Eigen::Matrix3Xd::Zero(3, prepared.rest.node_count)) {
+          state_{result.alignment.placement, Eigen::Matrix3Xd::Zero(3, prepared.rest.node_count)} {
         result_.engine = engine_->description();
     }
 
@@ -52,6 +72,7 @@ public:
     Eigen::Matrix3Xd run() {
         int round = 0;
         for (int done = 0; done < 2 * options_.rematches && round < options_.rematches; ++done) {
+            search_image(round);
             const Round record = attempt(round);
             result_.rounds.push_back(record);
             observer_.checkpoint("registration", double(round + 1) / options_.rematches);
@@ -61,20 +82,29 @@ public:
         }
         result_.times.push_back({"correspondence", matching_seconds_});
         result_.times.push_back({"equilibrium", solving_seconds_});
-        return displacement_;
+        return state_.displacement;
     }
 
 private:
     const PreparedModel& prepared_;
-    const LabelBoundaryField& fixed_;
+    Evidence& evidence_;
     const UpdateOptions& options_;
     UpdateResult& result_;
     Observer& observer_;
     std::unique_ptr<tled::Engine> engine_;
     tled::EquilibriumOptions equilibrium_;
     double step_mm_;
-    Eigen::Matrix3Xd displacement_;
+    detail::State state_;
     double matching_seconds_ = 0, solving_seconds_ = 0;
+
+    /// The searches for blocks are spread over the rounds: those between only weigh the matches anew.
+    void search_image(int round) {
+        if (!evidence_.image || evidence_.image->searches_done() >= options_.image.searches) return;
+        if (round * options_.image.searches < evidence_.image->searches_done() * options_.rematches) return;
+        detail::Stopwatch stopwatch;
+        evidence_.image->search(state_, observer_);
+        matching_seconds_ += stopwatch.lap("").seconds;
+    }
 
     /// One round; where the equilibrium fails, again with half the step bound.
     Round attempt(int round) {
@@ -92,62 +122,65 @@ private:
         }
     }
 
+    [[nodiscard]] detail::RoundPlan plan_of(int round) const {
+        const double range = range_of(options_, round);
+        const double scale = round == 0 ? 1e6 : std::max(options_.residual_scale_mm, range / 3);
+        return {round, round == options_.rematches - 1, range, scale, step_mm_};
+    }
+
     Round match_and_solve(int round) {
         detail::Stopwatch stopwatch;
+        const detail::RoundPlan plan = plan_of(round);
+        const detail::Contribution data = evidence_.contribution(plan, state_);
+        const auto conditions = tled::nodal_conditions(data.conditions, prepared_.rest.node_count);
         Round record;
-        record.range_mm = range_of(options_, round);
-        const auto& interfaces = prepared_.interfaces;
-        const Eigen::Matrix3Xd normals = interfaces.normals(prepared_.model.mesh.nodes + displacement_);
-        const double scale = round == 0 ? 1e6 : std::max(options_.residual_scale_mm, record.range_mm / 3);
-        std::vector<Match> matches =
-            detail::match_interfaces(prepared_, fixed_, result_.alignment.placement, displacement_, normals,
-                                     {record.range_mm, options_.max_angle_deg, scale, step_mm_});
-        if (round == options_.rematches - 1) detail::trim(matches, options_.trimmed_share, options_.residual_scale_mm);
-        const auto conditions = tled::nodal_conditions(
-            detail::matched_springs(interfaces, matches, normals, displacement_, prepared_.options),
-            prepared_.rest.node_count);
-        record.interface_nodes = static_cast<int>(matches.size());
-        for (const Match& match : matches) {
-            record.matched += match.found;
-            record.held_back += match.held_back;
-        }
-        if (record.matched == 0)
-            throw InvalidInput("no boundary of the model was found in the fixed labels within " +
-                               detail::to_text(record.range_mm) + " mm; check that the images show the same organ");
-        record.mean_residual_mm = detail::mean_residual(matches);
+        record.range_mm = plan.range_mm;
+        record.interface_nodes = data.candidates;
+        record.matched = data.matched;
+        record.held_back = data.held_back;
+        record.mean_residual_mm = data.mean_residual_mm;
         matching_seconds_ += stopwatch.lap("").seconds;
 
         const tled::EquilibriumResult solved =
-            tled::equilibrium(*engine_, prepared_.stiffness, conditions, equilibrium_, &displacement_, observer_);
+            tled::equilibrium(*engine_, prepared_.stiffness, conditions, equilibrium_, &state_.displacement, observer_);
         equilibrium_.method = solved.method;  // chosen and explained once, not in every round
-        record.largest_change_mm = std::sqrt((solved.displacement - displacement_).colwise().squaredNorm().maxCoeff());
+        record.largest_change_mm =
+            std::sqrt((solved.displacement - state_.displacement).colwise().squaredNorm().maxCoeff());
         record.force_evaluations = solved.force_evaluations;
         record.estimated_error_mm = solved.estimated_error_mm;
-        displacement_ = solved.displacement;
+        state_.displacement = solved.displacement;
         result_.min_jacobian = solved.min_jacobian;
         solving_seconds_ += stopwatch.lap("").seconds;
         return record;
     }
 };
 
+/// Where the model starts: by labels; or by the matches of a first search, from where the headers place the images.
+Alignment align(const PreparedModel& prepared, const Intraoperative& seen, Evidence& evidence,
+                const UpdateOptions& options, Observer& observer) {
+    if (seen.labels) return align_labels(prepared.labels, *seen.labels, options.alignment, observer);
+    const detail::State start{Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, prepared.rest.node_count)};
+    evidence.image->search(start, observer);
+    return {evidence.image->rigid_motion(), 0};
+}
+
 }  // namespace
 
-UpdateResult update(const PreparedModel& prepared, const imaging::Volume& fixed_labels, const UpdateOptions& options,
+UpdateResult update(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options,
                     Observer& observer) {
-    require_common_labels(prepared, fixed_labels);
+    require_usable(prepared, seen);
     detail::Stopwatch stopwatch;
     UpdateResult result;
-    if (options.align) result.alignment = align_labels(prepared.labels, fixed_labels, options.alignment, observer);
+    Evidence evidence;
+    if (seen.image) evidence.image.emplace(prepared, *seen.image, options.image);
+    if (options.align) result.alignment = align(prepared, seen, evidence, options, observer);
     result.times.push_back(stopwatch.lap("rigid alignment"));
-
-    std::vector<int> labels;
-    for (const auto& [label, material] : prepared.model.materials) labels.push_back(label);
-    const LabelBoundaryField fixed(fixed_labels, labels);
+    if (seen.labels) evidence.labels.emplace(prepared, *seen.labels, options);
     result.times.push_back(stopwatch.lap("boundary maps"));
 
-    const Eigen::Matrix3Xd displacement = Rematching(prepared, fixed, options, result, observer).run();
+    const Eigen::Matrix3Xd displacement = Rematching(prepared, evidence, options, result, observer).run();
     result.deformation = {prepared.model.mesh, displacement, result.alignment.placement};
-    result.doubts = detail::doubts(prepared, fixed_labels, result);
+    result.doubts = detail::doubts(prepared, seen, result);
     return result;
 }
 

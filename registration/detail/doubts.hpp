@@ -9,7 +9,6 @@ namespace tissuewarp::registration::detail {
 std::string to_text(double value);
 
 /// Reasons not to trust a result, in words that name the remedy; empty when there are none.
-std::vector<std::string> doubts(const PreparedModel& prepared, const imaging::Volume& fixed_labels,
-                                const UpdateResult& result);
+std::vector<std::string> doubts(const PreparedModel& prepared, const Intraoperative& seen, const UpdateResult& result);
 
 }  // namespace tissuewarp::registration::detail

@@ -30,8 +30,8 @@ imaging::Volume ball(double shift) {
 int main() {
     registration::PrepareOptions options;
     options.meshing.edge_length = 12;
-    const auto prepared = registration::prepare(ball(0), options);                // before the operation
-    const auto result = registration::update(prepared, ball(3));                  // during it
+    const auto prepared = registration::prepare(ball(0), options);            // before the operation
+    const auto result = registration::update(prepared, {.labels = ball(3)});  // during it
     const registration::PointTransform transform(result.deformation);
     const Eigen::Vector3d moved = transform(Eigen::Vector3d(10, 0, 0));
     std::printf("(10, 0, 0) went to (%.2f, %.2f, %.2f)\n", moved[0], moved[1], moved[2]);

@@ -68,7 +68,7 @@ TEST(GeneratedPhantom, APressedAndMovedOrganIsRegisteredToAMillimetre) {
     coarser.meshing.edge_length = 8;
     UpdateOptions options;
     options.device = Device::Cpu;
-    const auto result = update(prepare(moving, coarser), fixed, options);
+    const auto result = update(prepare(moving, coarser), {.labels = fixed}, options);
     const TargetError error = target_error(landmarks, PointTransform(result.deformation)(landmarks.moving));
 
     ASSERT_GT(error.before.count, 150);

@@ -19,7 +19,7 @@ TEST(HeadPhantom, LabelsAloneBringMovedTargetsWithinAMillimetre) {
 
     UpdateOptions options;
     options.device = Device::Cpu;
-    const auto result = update(prepare(moving), fixed, options);
+    const auto result = update(prepare(moving), {.labels = fixed}, options);
     const TargetError error = target_error(landmarks, PointTransform(result.deformation)(landmarks.moving));
 
     EXPECT_EQ(error.moved_before.count, 57);

@@ -36,7 +36,7 @@ TEST_F(SharedPhantoms, LiverFromLabels) {
     const auto moving = imaging::read_labels(data / "phantom-liver" / "preop_labels.nii.gz");
     const auto fixed = imaging::read_labels(data / "phantom-liver" / "intraop_labels.nii.gz");
     const Landmarks landmarks = read_landmarks(data / "phantom-liver" / "landmarks.csv");
-    const auto result = update(prepare(moving), fixed, on_cpu());
+    const auto result = update(prepare(moving), {.labels = fixed}, on_cpu());
     const TargetError error = target_error(landmarks, PointTransform(result.deformation)(landmarks.moving));
     EXPECT_GT(error.before.mean, 10);
     EXPECT_LT(error.after.mean, 0.7);
@@ -51,7 +51,7 @@ TEST_F(SharedPhantoms, LungFromMasks) {
     const Landmarks landmarks = read_landmarks(data / "lung-ct" / "moving_pts.txt", data / "lung-ct" / "fixed_pts.txt");
     PrepareOptions compressible;
     compressible.default_material = tled::neo_hookean_lnj(3.0, 0.3);
-    const auto result = update(prepare(moving, compressible), fixed, on_cpu());
+    const auto result = update(prepare(moving, compressible), {.labels = fixed}, on_cpu());
     const TargetError error = target_error(landmarks, PointTransform(result.deformation)(landmarks.moving));
     EXPECT_GT(error.before.mean, 30);
     EXPECT_LT(error.after.mean, 5.5);  // elastix and plastimatch from masks: 5.67 and 7.12
@@ -62,7 +62,7 @@ TEST_F(SharedPhantoms, LungFromMasks) {
 TEST_F(SharedPhantoms, ALungThatTissueResistsIsDoubted) {
     const auto moving = imaging::read_labels(data / "lung-ct" / "moving_mask.mha");
     const auto fixed = imaging::read_labels(data / "lung-ct" / "fixed_mask.mha");
-    const auto result = update(prepare(moving), fixed, on_cpu());
+    const auto result = update(prepare(moving), {.labels = fixed}, on_cpu());
     ASSERT_FALSE(result.doubts.empty());
     EXPECT_NE(result.doubts.back().find("Poisson"), std::string::npos);
 }
@@ -72,7 +72,7 @@ TEST_F(SharedPhantoms, SaggedBrainFromMasks) {
     const auto moving = imaging::read_labels(folder / "preop_mask.nii.gz");
     const auto fixed = imaging::read_labels(folder / "intraop_mask.nii.gz");
     const auto truth = imaging::read_volume(folder / "truth_forward.nii.gz");
-    const auto result = update(prepare(moving), fixed, on_cpu());
+    const auto result = update(prepare(moving), {.labels = fixed}, on_cpu());
     const PointTransform transform(result.deformation);
     double sum = 0;
     int count = 0;

@@ -33,7 +33,7 @@ TEST(Pipeline, AnImageRegisteredToItselfDoesNotMove) {
     const auto labels = organ_labels({});
     UpdateOptions options = on_cpu();
     options.align = false;
-    const auto result = update(prepare(labels, coarse()), labels, options);
+    const auto result = update(prepare(labels, coarse()), {.labels = labels}, options);
     EXPECT_LT(largest(result.deformation.displacement), 0.05);
     EXPECT_TRUE(result.doubts.empty());
 }
@@ -41,7 +41,7 @@ TEST(Pipeline, AnImageRegisteredToItselfDoesNotMove) {
 TEST(Pipeline, ARigidMotionIsFoundWithoutStrain) {
     const auto truth = shapes::motion(12, {1, 1, 0}, {6, -4, 5});
     const auto prepared = prepare(organ_labels({}), coarse());
-    const auto result = update(prepared, organ_labels({}, truth), on_cpu());
+    const auto result = update(prepared, {.labels = organ_labels({}, truth)}, on_cpu());
     const Eigen::Matrix3Xd expected = truth * prepared.model.mesh.nodes;
     const Eigen::Matrix3Xd error = result.deformation.deformed_nodes() - expected;
     EXPECT_LT(std::sqrt(error.colwise().squaredNorm().mean()), 0.4);  // voxels of 1.5 mm
@@ -56,7 +56,7 @@ TEST(Pipeline, AnOrganPressedFlatIsFollowed) {
     UpdateOptions options = on_cpu();
     options.align = false;
     const auto prepared = prepare(organ_labels({}), coarse());
-    const auto result = update(prepared, organ_labels(pressed), options);
+    const auto result = update(prepared, {.labels = organ_labels(pressed)}, options);
     const Eigen::Vector3d stretch = pressed.semi_axes.cwiseQuotient(shapes::Organ{}.semi_axes);
     const Eigen::Matrix3Xd error =
         result.deformation.deformed_nodes() - stretch.asDiagonal() * prepared.model.mesh.nodes;
@@ -69,7 +69,7 @@ TEST(Pipeline, SameBitsForOneThreadAndMany) {
     const auto moving = organ_labels({}), fixed = organ_labels({}, shapes::motion(5, {0, 0, 1}, {2, 1, 0}));
     const auto solve = [&](std::size_t threads) {
         const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-        return update(prepare(moving, coarse()), fixed, on_cpu()).deformation.deformed_nodes();
+        return update(prepare(moving, coarse()), {.labels = fixed}, on_cpu()).deformation.deformed_nodes();
     };
     const Eigen::Matrix3Xd one = solve(1), two = solve(2);
     ASSERT_EQ(one.cols(), two.cols());
@@ -81,8 +81,8 @@ TEST(Pipeline, TheGpuEngineGivesTheSameAnswer) {
     const auto prepared = prepare(moving, coarse());
     UpdateOptions gpu = on_cpu();
     gpu.device = Device::Gpu;
-    const Eigen::Matrix3Xd a = update(prepared, fixed, on_cpu()).deformation.displacement;
-    const Eigen::Matrix3Xd b = update(prepared, fixed, gpu).deformation.displacement;
+    const Eigen::Matrix3Xd a = update(prepared, {.labels = fixed}, on_cpu()).deformation.displacement;
+    const Eigen::Matrix3Xd b = update(prepared, {.labels = fixed}, gpu).deformation.displacement;
     EXPECT_LT(largest(a - b), 0.05);
 }
 
@@ -90,7 +90,7 @@ TEST(Pipeline, LabelsWithoutAnythingInCommonAreRefused) {
     const auto prepared = prepare(organ_labels({}), coarse());
     auto fixed = organ_labels({});
     fixed.voxels.setTo(7, fixed.voxels > 0);
-    EXPECT_THROW(update(prepared, fixed, on_cpu()), InvalidInput);
+    EXPECT_THROW(update(prepared, {.labels = fixed}, on_cpu()), InvalidInput);
 }
 
 TEST(Pipeline, StopsWhenAsked) {

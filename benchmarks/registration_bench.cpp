@@ -1,0 +1,216 @@
+// Registration from every kind of intraoperative data against known truth, with sweeps of one option:
+//     registration_bench DATA [--case PART] [--OPTION V1,V2,…] [--mesh-edge MM] [--threads N]
+// DATA holds phantom-brainshift, phantom-brain-sag and lung-ct; PART selects cases whose name holds it. Errors are at
+// the landmarks or, where there is a true field, at its points in the mask.
+
+#include "core/errors.hpp"
+#include "imaging/image_io.hpp"
+#include "imaging/labels.hpp"
+#include "imaging/sampling.hpp"
+#include "registration/evaluation.hpp"
+#include "registration/field.hpp"
+#include "registration/pipeline.hpp"
+
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <sstream>
+#include <string>
+
+using namespace tissuewarp;
+using namespace tissuewarp::registration;
+namespace fs = std::filesystem;
+
+namespace {
+
+struct Case {
+    std::string name;
+    imaging::Volume moving, labels;
+    Intraoperative seen;
+    Landmarks targets;
+    double poissons_ratio = 0.45;
+};
+
+/// Points of a field's grid in a mask, and where the field takes them.
+Landmarks field_targets(const fs::path& field_path, const fs::path& mask_path) {
+    const imaging::Volume field = imaging::read_volume(field_path);
+    const imaging::Volume mask = imaging::read_labels(mask_path).as(CV_32F);
+    const imaging::LinearSampler in_mask(mask);
+    std::vector<Eigen::Vector3d> from, to;
+    const auto* vector = field.data<cv::Vec3f>();
+    const auto& size = field.geometry.size;
+    for (int k = 0; k < size[2]; ++k)
+        for (int j = 0; j < size[1]; ++j)
+            for (int i = 0; i < size[0]; ++i) {
+                const Eigen::Vector3d point = field.geometry.point(Eigen::Vector3d(i, j, k));
+                if (!(in_mask.value(point) > 0.999F)) continue;
+                const cv::Vec3f& u = vector[field.offset(i, j, k)];
+                from.push_back(point);
+                to.push_back(point + Eigen::Vector3d(u[0], u[1], u[2]));
+            }
+    Landmarks result{Eigen::Matrix3Xd(3, from.size()), Eigen::Matrix3Xd(3, from.size())};
+    for (std::size_t n = 0; n < from.size(); ++n) {
+        result.moving.col(static_cast<Eigen::Index>(n)) = from[n];
+        result.fixed.col(static_cast<Eigen::Index>(n)) = to[n];
+    }
+    return result;
+}
+
+std::vector<std::function<Case()>> cases(const fs::path& data, const std::string& part) {
+    std::vector<std::function<Case()>> result;
+    const auto add = [&](const std::string& name, const std::function<Case()>& make) {
+        if (name.find(part) == std::string::npos) return;
+        result.push_back([name, make] {
+            Case study = make();
+            study.name = name;
+            return study;
+        });
+    };
+    const fs::path shift = data / "phantom-brainshift", sag = data / "phantom-brain-sag", lung = data / "lung-ct";
+    const auto shift_case = [shift](const std::string& image) {
+        return [shift, image] {
+            return Case{{},
+                        imaging::read_volume(shift / "preop.nii.gz"),
+                        imaging::read_labels(shift / "preop_labels.nii.gz"),
+                        {.image = imaging::read_volume(shift / image)},
+                        read_landmarks(shift / "landmarks.csv")};
+        };
+    };
+    const auto sag_case = [sag](const std::string& image) {
+        return [sag, image] {
+            return Case{{},
+                        imaging::read_volume(sag / "preop.nii.gz"),
+                        imaging::read_labels(sag / "preop_mask.nii.gz"),
+                        {.image = imaging::read_volume(sag / image)},
+                        field_targets(sag / "truth_forward.nii.gz", sag / "preop_mask.nii.gz")};
+        };
+    };
+    const auto lung_case = [lung](bool masks) {
+        return [lung, masks] {
+            Case study{{},
+                       imaging::read_volume(lung / "moving.mha"),
+                       imaging::read_labels(lung / "moving_mask.mha"),
+                       {.image = imaging::read_volume(lung / "fixed.mha")},
+                       read_landmarks(lung / "moving_pts.txt", lung / "fixed_pts.txt"),
+                       0.3};
+            if (masks) study.seen.labels = imaging::read_labels(lung / "fixed_mask.mha");
+            return study;
+        };
+    };
+    add("brain shift image", shift_case("intraop.nii.gz"));
+    add("brain sag clean image", sag_case("intraop.nii.gz"));
+    add("brain sag degraded image", sag_case("intraop_degraded.nii.gz"));
+    add("lung image and masks", lung_case(true));
+    add("lung image", lung_case(false));
+    return result;
+}
+
+using Setter = std::function<void(UpdateOptions&, double)>;
+
+std::map<std::string, Setter> setters() {
+    return {{"expected-strain", [](UpdateOptions& o, double v) { o.image.expected_strain = v; }},
+            {"expected-motion", [](UpdateOptions& o, double v) { o.image.expected_motion_mm = v; }},
+            {"searches", [](UpdateOptions& o, double v) { o.image.searches = int(v); }},
+            {"rounds", [](UpdateOptions& o, double v) { o.rematches = int(v); }},
+            {"residual-scale", [](UpdateOptions& o, double v) { o.residual_scale_mm = v; }},
+            {"trimmed", [](UpdateOptions& o, double v) { o.image.trimmed_share = v; }},
+            {"refinement-levels", [](UpdateOptions& o, double v) { o.image.refinement_levels = int(v); }},
+            {"levels", [](UpdateOptions& o, double v) { o.image.matching.levels = int(v); }},
+            {"grid", [](UpdateOptions& o, double v) { o.image.matching.grid_spacing_mm = v; }},
+            {"least-confidence", [](UpdateOptions& o, double v) { o.image.consistency.least_confidence = v; }},
+            {"consistent-mm", [](UpdateOptions& o, double v) { o.image.consistency.most_residual_mm = v; }},
+            {"radius", [](UpdateOptions& o, double v) { o.image.matching.block_radius = int(v); }}};
+}
+
+struct Arguments {
+    fs::path data;
+    std::string part, option;
+    std::vector<double> values;
+    double edge_length = 0, poissons_ratio = 0;
+    int count = 5000;
+};
+
+Arguments parse(int argc, char** argv) {
+    if (argc < 2 || argc % 2 == 1) throw InvalidInput("see the head of registration_bench.cpp for the arguments");
+    Arguments result{argv[1], {}, {}, {}};
+    for (int n = 2; n < argc; n += 2) {
+        const std::string key = argv[n], value = argv[n + 1];
+        if (key == "--case") {
+            result.part = value;
+        } else if (key == "--mesh-edge") {
+            result.edge_length = std::stod(value);
+        } else if (key == "--poisson") {
+            result.poissons_ratio = std::stod(value);
+        } else if (key == "--count") {
+            result.count = std::stoi(value);
+        } else if (key.starts_with("--") && setters().contains(key.substr(2))) {
+            result.option = key.substr(2);
+            std::istringstream list(value);
+            for (std::string number; std::getline(list, number, ',');) result.values.push_back(std::stod(number));
+        } else {
+            throw InvalidInput("unknown argument " + key + "; see the head of registration_bench.cpp");
+        }
+    }
+    if (result.values.empty()) result.values.push_back(0);
+    return result;
+}
+
+void print_row(const std::string& name, const UpdateResult& result, const Landmarks& targets, double seconds) {
+    const TargetError error = target_error(targets, PointTransform(result.deformation)(targets.moving));
+    const Round& last = result.rounds.back();
+    int evaluations = 0;
+    for (const Round& round : result.rounds) evaluations += round.force_evaluations;
+    std::printf("| %s | %.2f / %.2f / %.2f | %.2f / %.2f / %.2f | %zu, %d | %d / %d | %.2f | %.2f | %.1f |\n",
+                name.c_str(), error.after.mean, error.after.median, error.after.percentile_95, error.moved_after.mean,
+                error.moved_after.median, error.moved_after.percentile_95, result.rounds.size(), evaluations,
+                last.matched, last.interface_nodes, last.mean_residual_mm, result.min_jacobian, seconds);
+    for (const StageTime& time : result.times) std::fprintf(stderr, "  %s %.2f s", time.stage.c_str(), time.seconds);
+    std::fprintf(stderr, "\n");
+    std::fflush(stdout);
+}
+
+void run(const Arguments& arguments) {
+    std::printf(
+        "| case | mean / median / 95th, mm | moved > 2 mm | rounds, evaluations | matched | residual, mm | min J | s "
+        "|\n|---|---|---|---|---|---|---|---|\n");
+    for (const auto& make : cases(arguments.data, arguments.part)) {
+        const Case study = make();
+        PrepareOptions options;
+        options.meshing.edge_length = arguments.edge_length;
+        options.default_material =
+            tled::neo_hookean_lnj(3.0, arguments.poissons_ratio > 0 ? arguments.poissons_ratio : study.poissons_ratio);
+        PreparedModel prepared = prepare(study.labels, options);
+        FeatureOptions features;
+        features.count = arguments.count;
+        prepare_image(prepared, study.moving, features);
+        for (const double value : arguments.values) {
+            UpdateOptions update_options;
+            update_options.device = Device::Cpu;
+            std::string name = study.name;
+            if (!arguments.option.empty()) {
+                setters().at(arguments.option)(update_options, value);
+                std::ostringstream text;
+                text << name << ", " << arguments.option << ' ' << value;
+                name = text.str();
+            }
+            const auto start = std::chrono::steady_clock::now();
+            const UpdateResult result = update(prepared, study.seen, update_options);
+            const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+            print_row(name, result, study.targets, seconds);
+        }
+    }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    try {
+        run(parse(argc, argv));
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "registration_bench: %s\n", error.what());
+        return 2;
+    }
+    return 0;
+}

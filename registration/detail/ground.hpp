@@ -1,0 +1,15 @@
+#pragma once
+/// What holds tissue of which no datum says where it went.
+
+#include "registration/detail/evidence.hpp"
+
+namespace tissuewarp::registration::detail {
+
+/// The strain energy (mN mm) that weighs as much as one standard deviation of a datum: E ε² ℓ³ of the expected strain.
+double strain_energy_unit(const PreparedModel& prepared, const ImageOptions& options);
+
+/// Weak springs from every surface node to where the rigid placement has it: the prior that unseen tissue moved by
+/// about `expected_mm`. `energy` is the strain energy (mN mm) that weighs as much as one standard deviation.
+std::vector<tled::Spring> ground_springs(const PreparedModel& prepared, double energy, double expected_mm);
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,35 @@
+#pragma once
+/// Data on points inside elements, as springs on nodes.
+
+#include "meshing/point_location.hpp"
+#include "tled/conditions.hpp"
+
+#include <Eigen/Core>
+
+#include <optional>
+#include <vector>
+
+namespace tissuewarp::registration::detail {
+
+/// Energy ½ (u(X) − target)ᵀ K (u(X) − target) of the displacement at a point of the tissue.
+struct Pull {
+    meshing::Location at;
+    Eigen::Vector3d target = Eigen::Vector3d::Zero();     ///< displacement, mm, moving frame
+    Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero();  ///< K, mN/mm, symmetric positive semi-definite
+};
+
+/// The place in the mesh of a point in it, or of one up to about half an element outside, drawn to the surface.
+std::optional<meshing::Location> locate_near(const meshing::PointLocator& locator, const Eigen::Vector3d& point);
+
+/// Displacement (3 × N nodal) at a place in the mesh, mm.
+Eigen::Vector3d displacement_at(const meshing::TetMesh& mesh, const Eigen::Matrix3Xd& displacement,
+                                const meshing::Location& at);
+
+/// Springs on the nodes with the pulls' forces at `displacement` (3 × N, mm) and a stiffness not below theirs: node a
+/// gets K_a = Σ w_a K and the target u_a + K_a⁻¹ Σ w_a K (target − u(X)), w its barycentric weights. By Jensen's
+/// inequality Σ_a w_a ‖u_a‖²_K ≥ ‖u(X)‖²_K: equilibria under springs renewed at the equilibrium before lower the
+/// energy of tissue and pulls each time and end where the pulls' own forces balance (majorise-minimise).
+std::vector<tled::Spring> lumped_springs(const meshing::TetMesh& mesh, const std::vector<Pull>& pulls,
+                                         const Eigen::Matrix3Xd& displacement);
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,31 @@
+#include "registration/detail/ground.hpp"
+
+#include <cmath>
+
+namespace tissuewarp::registration::detail {
+
+double strain_energy_unit(const PreparedModel& prepared, const ImageOptions& options) {
+    const meshing::TetMesh& mesh = prepared.model.mesh;
+    const Eigen::VectorXd volumes = meshing::tet_volumes(mesh);
+    double energy = 0;
+    for (Eigen::Index tet = 0; tet < volumes.size(); ++tet) {
+        const tled::Material& material = prepared.model.materials.at(mesh.labels[static_cast<std::size_t>(tet)]);
+        const double youngs_modulus = 2 * tled::shear_modulus(material) * (1 + tled::poisson_ratio(material));
+        energy += volumes[tet] * youngs_modulus;
+    }
+    const double modulus = energy / volumes.sum();
+    return modulus * options.expected_strain * options.expected_strain * std::pow(options.strain_length_mm, 3);
+}
+
+std::vector<tled::Spring> ground_springs(const PreparedModel& prepared, double energy, double expected_mm) {
+    constexpr double independent_area = 100.0;  // mm², that moves on its own
+    std::vector<tled::Spring> springs;
+    for (const InterfaceNode& node : prepared.interfaces.nodes()) {
+        if (node.outer != 0) continue;
+        const double stiffness = energy / (expected_mm * expected_mm) * node.area / independent_area;
+        springs.push_back({node.node, stiffness * Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero()});
+    }
+    return springs;
+}
+
+}  // namespace tissuewarp::registration::detail

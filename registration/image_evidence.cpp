@@ -1,0 +1,110 @@
+#include "registration/detail/image_evidence.hpp"
+
+#include "registration/detail/ground.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace tissuewarp::registration::detail {
+
+ImageEvidence::ImageEvidence(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options)
+    : prepared_(prepared),
+      fixed_(fixed),
+      options_(options),
+      locator_(prepared.model.mesh),
+      energy_(strain_energy_unit(prepared, options)) {}
+
+void ImageEvidence::search(const State& state, Observer& observer) {
+    const ImageModel& model = *prepared_.image;
+    const Eigen::Matrix3Xd& points = model.features.points;
+    Eigen::Matrix3Xd predicted = points;
+    for (Eigen::Index n = 0; n < points.cols(); ++n)
+        if (const auto at = locate_near(locator_, points.col(n)))
+            predicted.col(n) += displacement_at(prepared_.model.mesh, state.displacement, *at);
+    BlockMatchingOptions matching = options_.matching;
+    matching.rotation = state.placement.linear();
+    if (searches_ > 0) {
+        matching.levels = options_.refinement_levels;
+        matching.search_mm = options_.refinement_mm;
+    }
+    keep_those_in_tissue(
+        consistent_matches(match_blocks(model.image, fixed_, points, state.placement * predicted, matching, observer),
+                           options_.consistency));
+    ++searches_;
+}
+
+void ImageEvidence::keep_those_in_tissue(std::vector<BlockMatch> matches) {
+    matches_.clear();
+    places_.clear();
+    for (const BlockMatch& match : matches) {
+        const auto at = locate_near(locator_, match.moving);
+        if (!at) continue;
+        matches_.push_back(match);
+        places_.push_back(*at);
+    }
+}
+
+Eigen::Isometry3d ImageEvidence::rigid_motion() const {
+    constexpr double kept_share = 0.7;
+    constexpr int concentrations = 10;
+    const auto count = static_cast<Eigen::Index>(matches_.size());
+    if (count < 10)
+        throw InvalidInput("only " + std::to_string(count) +
+                           " blocks of the moving image were found in the fixed one; check that they show the same "
+                           "organ, and bring them within the search range of each other");
+    Eigen::Matrix3Xd moving(3, count), fixed(3, count);
+    for (Eigen::Index n = 0; n < count; ++n) {
+        moving.col(n) = matches_[static_cast<std::size_t>(n)].moving;
+        fixed.col(n) = matches_[static_cast<std::size_t>(n)].fixed;
+    }
+    std::vector<Eigen::Index> kept(static_cast<std::size_t>(count));
+    std::iota(kept.begin(), kept.end(), Eigen::Index{0});
+    Eigen::Isometry3d motion;
+    for (int pass = 0; pass < concentrations; ++pass) {
+        motion = Eigen::umeyama(moving(Eigen::all, kept), fixed(Eigen::all, kept), false);
+        const Eigen::VectorXd residual = ((motion * moving) - fixed).colwise().squaredNorm();
+        kept.resize(static_cast<std::size_t>(count));
+        std::iota(kept.begin(), kept.end(), Eigen::Index{0});
+        const auto share = static_cast<std::ptrdiff_t>(kept_share * double(count));
+        std::nth_element(kept.begin(), kept.begin() + share, kept.end(),
+                         [&](Eigen::Index a, Eigen::Index b) { return residual[a] < residual[b]; });
+        kept.resize(static_cast<std::size_t>(share));
+    }
+    return motion;
+}
+
+Contribution ImageEvidence::contribution(const RoundPlan& plan, const State& state) const {
+    const Eigen::Isometry3d back = state.placement.inverse();
+    const meshing::TetMesh& mesh = prepared_.model.mesh;
+    std::vector<Pull> pulls(matches_.size());
+    std::vector<double> residuals(matches_.size());
+    for (std::size_t n = 0; n < matches_.size(); ++n) {
+        const BlockMatch& match = matches_[n];
+        const Eigen::Matrix3d information = back.linear() * match.information * back.linear().transpose();
+        pulls[n] = {places_[n], back * match.fixed - match.moving, information};
+        const Eigen::Vector3d e = pulls[n].target - displacement_at(mesh, state.displacement, places_[n]);
+        const double strongest =
+            Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(information, Eigen::EigenvaluesOnly).eigenvalues()[2];
+        residuals[n] = std::sqrt(e.dot(information * e) / strongest);
+        pulls[n].stiffness *= energy_ * match.confidence * robust_weight(residuals[n], plan.scale_mm);
+    }
+    Contribution result;
+    result.candidates = static_cast<int>(prepared_.image->features.points.cols());
+    result.matched = static_cast<int>(matches_.size());
+    double weights = 0;
+    for (std::size_t n = 0; n < matches_.size(); ++n) {
+        result.mean_residual_mm += matches_[n].confidence * residuals[n];
+        weights += matches_[n].confidence;
+    }
+    if (weights > 0) result.mean_residual_mm /= weights;
+    result.conditions.springs = lumped_springs(mesh, pulls, state.displacement);
+    for (const tled::Spring& spring : ground_springs(prepared_, energy_, options_.expected_motion_mm))
+        result.conditions.springs.push_back(spring);
+    return result;
+}
+
+}  // namespace tissuewarp::registration::detail

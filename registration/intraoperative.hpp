@@ -1,0 +1,33 @@
+#pragma once
+/// What was seen during the operation: the data that a registration may use, alone or together.
+
+#include "imaging/volume.hpp"
+
+#include <Eigen/Core>
+
+#include <optional>
+
+namespace tissuewarp::registration {
+
+/// Points on a part of the organ's outer surface: a laser or stereo patch, the sweep of a tracked probe.
+struct SurfacePoints {
+    Eigen::Matrix3Xd points;    ///< 3 × P, LPS mm, fixed frame
+    Eigen::Matrix3Xd normals;   ///< 3 × P, unit, outward, or 3 × 0 when not known
+    double deviation_mm = 1.0;  ///< standard deviation of a point along the normal
+};
+
+/// Points of the tissue that were found again: anatomical landmarks, vessel branchings.
+struct PointPairs {
+    Eigen::Matrix3Xd moving, fixed;  ///< 3 × P, LPS mm, each in its frame
+    double deviation_mm = 1.0;       ///< standard deviation of a pair along each axis
+};
+
+/// Any of it may be absent; something must be there.
+struct Intraoperative {
+    std::optional<imaging::Volume> labels = std::nullopt;  ///< label map with the numbers of the preoperative one
+    std::optional<imaging::Volume> image = std::nullopt;   ///< grey values of the tissue, not segmented, any modality
+    std::optional<SurfacePoints> surface = std::nullopt;
+    std::optional<PointPairs> points = std::nullopt;
+};
+
+}  // namespace tissuewarp::registration

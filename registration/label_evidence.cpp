@@ -1,0 +1,39 @@
+#include "registration/detail/label_evidence.hpp"
+
+#include "registration/detail/doubts.hpp"
+#include "registration/detail/matching.hpp"
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+std::vector<int> labels_of(const PreparedModel& prepared) {
+    std::vector<int> labels;
+    for (const auto& [label, material] : prepared.model.materials) labels.push_back(label);
+    return labels;
+}
+
+}  // namespace
+
+LabelEvidence::LabelEvidence(const PreparedModel& prepared, const imaging::Volume& fixed_labels,
+                             const UpdateOptions& options)
+    : prepared_(prepared), options_(options), fixed_(fixed_labels, labels_of(prepared)) {}
+
+Contribution LabelEvidence::contribution(const RoundPlan& plan, const State& state) const {
+    const Interfaces& interfaces = prepared_.interfaces;
+    const Eigen::Matrix3Xd normals = interfaces.normals(prepared_.model.mesh.nodes + state.displacement);
+    std::vector<Match> matches = match_interfaces(prepared_, fixed_, state, normals, plan, options_.max_angle_deg);
+    if (plan.last) trim(matches, options_.trimmed_share, options_.residual_scale_mm);
+    Contribution result{matched_springs(interfaces, matches, normals, state.displacement, prepared_.options),
+                        static_cast<int>(matches.size()), 0, 0, mean_residual(matches)};
+    for (const Match& match : matches) {
+        result.matched += match.found;
+        result.held_back += match.held_back;
+    }
+    if (result.matched == 0)
+        throw InvalidInput("no boundary of the model was found in the fixed labels within " + to_text(plan.range_mm) +
+                           " mm; check that the images show the same organ");
+    return result;
+}
+
+}  // namespace tissuewarp::registration::detail
