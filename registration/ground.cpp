@@ -17,12 +17,14 @@ double strain_energy_unit(const PreparedModel& prepared, const ImageOptions& opt
     return modulus * options.expected_strain * options.expected_strain * std::pow(options.strain_length_mm, 3);
 }
 
-std::vector<tled::Spring> ground_springs(const PreparedModel& prepared, double energy, double expected_mm) {
+std::vector<tled::Spring> ground_springs(const PreparedModel& prepared, double energy,
+                                         const std::function<double(const InterfaceNode&)>& expected_mm) {
     constexpr double independent_area = 100.0;  // mm², that moves on its own
     std::vector<tled::Spring> springs;
     for (const InterfaceNode& node : prepared.interfaces.nodes()) {
         if (node.outer != 0) continue;
-        const double stiffness = energy / (expected_mm * expected_mm) * node.area / independent_area;
+        const double deviation = expected_mm(node);
+        const double stiffness = energy / (deviation * deviation) * node.area / independent_area;
         springs.push_back({node.node, stiffness * Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero()});
     }
     return springs;

@@ -1,6 +1,8 @@
 #include "registration/detail/image_evidence.hpp"
 
 #include "registration/detail/ground.hpp"
+#include "registration/field.hpp"
+#include "registration/warp.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
@@ -15,29 +17,52 @@ ImageEvidence::ImageEvidence(const PreparedModel& prepared, const imaging::Volum
     : prepared_(prepared),
       fixed_(fixed),
       options_(options),
+      view_(fixed),
       locator_(prepared.model.mesh),
       energy_(strain_energy_unit(prepared, options)) {}
 
 void ImageEvidence::search(const State& state, Observer& observer) {
-    const ImageModel& model = *prepared_.image;
-    const Eigen::Matrix3Xd& points = model.features.points;
-    Eigen::Matrix3Xd predicted = points;
-    for (Eigen::Index n = 0; n < points.cols(); ++n)
-        if (const auto at = locate_near(locator_, points.col(n)))
-            predicted.col(n) += displacement_at(prepared_.model.mesh, state.displacement, *at);
-    BlockMatchingOptions matching = options_.matching;
-    matching.rotation = state.placement.linear();
-    if (searches_ > 0) {
-        matching.levels = options_.refinement_levels;
-        matching.search_mm = options_.refinement_mm;
-    }
-    keep_those_in_tissue(
-        consistent_matches(match_blocks(model.image, fixed_, points, state.placement * predicted, matching, observer),
-                           options_.consistency));
+    std::vector<BlockMatch> found = searches_ == 0 ? first_search(state, observer) : refined_search(state, observer);
+    use(consistent_matches(found, options_.consistency));
     ++searches_;
 }
 
-void ImageEvidence::keep_those_in_tissue(std::vector<BlockMatch> matches) {
+std::vector<BlockMatch> ImageEvidence::first_search(const State& state, Observer& observer) const {
+    const ImageModel& model = *prepared_.image;
+    BlockMatchingOptions matching = options_.matching;
+    matching.rotation = state.placement.linear();
+    return match_blocks(model.image, fixed_, model.features.points, deformed(model.features.points, state), matching,
+                        observer);
+}
+
+// The image as the model deforms it differs from the fixed one by little: what changes within a block is taken out,
+// and a short search on the finest grids is left.
+std::vector<BlockMatch> ImageEvidence::refined_search(const State& state, Observer& observer) const {
+    const ImageModel& model = *prepared_.image;
+    const Deformation deformation{prepared_.model.mesh, state.displacement, state.placement};
+    const imaging::Volume warped =
+        warp_image(model.image, displacement_fixed_to_moving(deformation, fixed_.geometry, {}, observer));
+    const Eigen::Matrix3Xd here = deformed(model.features.points, state);
+    BlockMatchingOptions matching = options_.matching;
+    matching.levels = options_.refinement_levels;
+    matching.search_mm = options_.refinement_mm;
+    std::vector<BlockMatch> matches = match_blocks(warped, fixed_, here, here, matching, observer);
+    for (BlockMatch& match : matches) {  // centres of blocks are voxels near the points: back to the tissue
+        const Eigen::Vector3d shift = match.moving - here.col(match.point);
+        match.moving = model.features.points.col(match.point) + state.placement.linear().transpose() * shift;
+    }
+    return matches;
+}
+
+Eigen::Matrix3Xd ImageEvidence::deformed(const Eigen::Matrix3Xd& points, const State& state) const {
+    Eigen::Matrix3Xd result = points;
+    for (Eigen::Index n = 0; n < points.cols(); ++n)
+        if (const auto at = locate_near(locator_, points.col(n)))
+            result.col(n) += displacement_at(prepared_.model.mesh, state.displacement, *at);
+    return state.placement * result;
+}
+
+void ImageEvidence::use(std::vector<BlockMatch> matches) {
     matches_.clear();
     places_.clear();
     for (const BlockMatch& match : matches) {
@@ -102,7 +127,12 @@ Contribution ImageEvidence::contribution(const RoundPlan& plan, const State& sta
     }
     if (weights > 0) result.mean_residual_mm /= weights;
     result.conditions.springs = lumped_springs(mesh, pulls, state.displacement);
-    for (const tled::Spring& spring : ground_springs(prepared_, energy_, options_.expected_motion_mm))
+    constexpr double view_margin_mm = 10;  // tissue may have come from outside of what is shown now
+    const auto expected_motion = [&](const InterfaceNode& node) {
+        const Eigen::Vector3d place = state.placement * Eigen::Vector3d(mesh.nodes.col(node.node));
+        return view_.distance(place) < view_margin_mm ? options_.expected_motion_mm : options_.unseen_motion_mm;
+    };
+    for (const tled::Spring& spring : ground_springs(prepared_, energy_, expected_motion))
         result.conditions.springs.push_back(spring);
     return result;
 }

@@ -80,7 +80,8 @@ struct ImageOptions {
     double refinement_mm = 4.0;      ///< and their range
     double expected_strain = 0.03;   ///< deviation of the strain of tissue as large as …
     double strain_length_mm = 10;    ///< … this: the weight of strain energy against matches
-    double expected_motion_mm = 10;  ///< of tissue that no datum shows
+    double expected_motion_mm = 30;  ///< of the surface in the field of view
+    double unseen_motion_mm = 3;     ///< and out of it
     double trimmed_share = 0.05;     ///< of the matches, dropped at the end: those the model did not follow
 };
 

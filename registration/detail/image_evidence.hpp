@@ -2,6 +2,7 @@
 /// A bare intraoperative volume: blocks of the preoperative image belong where they were found.
 
 #include "registration/detail/evidence.hpp"
+#include "registration/detail/field_of_view.hpp"
 #include "registration/detail/pull.hpp"
 
 namespace tissuewarp::registration::detail {
@@ -13,24 +14,31 @@ public:
 
     /// Finds the blocks about where the model is.
     void search(const State& state, Observer& observer);
+    /// Takes matches that were found before.
+    void use(std::vector<BlockMatch> matches);
     /// The rigid motion that the matches found agree on: what is left of them is for the tissue.
     [[nodiscard]] Eigen::Isometry3d rigid_motion() const;
     /// Pulls of the matches on the nodes.
     [[nodiscard]] Contribution contribution(const RoundPlan& plan, const State& state) const;
 
+    void mark() { searches_ = 1; }
     [[nodiscard]] int searches_done() const { return searches_; }
 
 private:
     const PreparedModel& prepared_;
     const imaging::Volume& fixed_;
     const ImageOptions& options_;
+    FieldOfView view_;  // of `fixed_`
     meshing::PointLocator locator_;
     double energy_;  // mN mm that one standard deviation of a match weighs
     int searches_ = 0;
     std::vector<BlockMatch> matches_;
     std::vector<meshing::Location> places_;  // of the matches, in the mesh
 
-    void keep_those_in_tissue(std::vector<BlockMatch> matches);
+    [[nodiscard]] std::vector<BlockMatch> first_search(const State& state, Observer& observer) const;
+    [[nodiscard]] std::vector<BlockMatch> refined_search(const State& state, Observer& observer) const;
+    /// Where points of the moving image are in the fixed one.
+    [[nodiscard]] Eigen::Matrix3Xd deformed(const Eigen::Matrix3Xd& points, const State& state) const;
 };
 
 }  // namespace tissuewarp::registration::detail

@@ -1,0 +1,23 @@
+#pragma once
+/// Where an image could have shown tissue.
+
+#include "imaging/volume.hpp"
+
+#include <Eigen/Core>
+
+namespace tissuewarp::registration::detail {
+
+/// The convex hull of what an image shows, exactly constant regions left out, from outside: the half-spaces of a few
+/// hundred directions. Air beside the tissue lies in it when there is tissue around; padding beyond a plane does not.
+class FieldOfView {
+public:
+    explicit FieldOfView(const imaging::Volume& image);
+    /// mm from a point (LPS) to the hull's furthest half-space: positive outside, negative inside.
+    [[nodiscard]] double distance(const Eigen::Vector3d& point) const;
+
+private:
+    Eigen::Matrix3Xd directions_;
+    Eigen::VectorXd support_;  // max over the voxels shown of direction · point, mm
+};
+
+}  // namespace tissuewarp::registration::detail

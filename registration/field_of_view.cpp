@@ -1,0 +1,53 @@
+#include "registration/detail/field_of_view.hpp"
+
+#include "registration/detail/matching_image.hpp"
+
+#include <cmath>
+#include <limits>
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+/// Directions spread evenly over the sphere (Fibonacci lattice), then the axes of a grid both ways, where fields of
+/// view are mostly cut.
+Eigen::Matrix3Xd directions_for(const Eigen::Matrix3d& axes) {
+    constexpr int spread = 300;
+    const double golden_angle = EIGEN_PI * (3 - std::sqrt(5.0));
+    Eigen::Matrix3Xd directions(3, spread + 6);
+    for (int n = 0; n < spread; ++n) {
+        const double z = 1 - (2 * n + 1.0) / spread, radius = std::sqrt(1 - z * z);
+        directions.col(n) << radius * std::cos(golden_angle * n), radius * std::sin(golden_angle * n), z;
+    }
+    directions.rightCols(6) << axes, -axes;
+    return directions;
+}
+
+}  // namespace
+
+FieldOfView::FieldOfView(const imaging::Volume& image)
+    : directions_(directions_for(image.geometry.direction)),
+      support_(Eigen::VectorXd::Constant(directions_.cols(), -std::numeric_limits<double>::infinity())) {
+    const imaging::Volume seen = seen_region(image.as(CV_32F));
+    const auto& size = seen.geometry.size;
+    const auto include = [&](int i, int j, int k) {
+        const Eigen::Vector3d point = seen.geometry.point(Eigen::Vector3d(i, j, k));
+        support_ = support_.cwiseMax(directions_.transpose() * point);
+    };
+    for (int k = 0; k < size[2]; ++k)
+        for (int j = 0; j < size[1]; ++j) {  // the ends of a row span what the row adds to the hull
+            const auto* row = seen.data<std::uint8_t>() + seen.offset(0, j, k);
+            int first = 0, last = size[0] - 1;
+            while (first <= last && !row[first]) ++first;
+            while (last > first && !row[last]) --last;
+            if (first > last) continue;
+            include(first, j, k);
+            if (last > first) include(last, j, k);
+        }
+}
+
+double FieldOfView::distance(const Eigen::Vector3d& point) const {
+    return (directions_.transpose() * point - support_).maxCoeff();
+}
+
+}  // namespace tissuewarp::registration::detail
