@@ -2,6 +2,7 @@
 #include "registration/detail/local_affine.hpp"
 #include "registration/detail/matching_grid.hpp"
 #include "registration/detail/quadratic_fit.hpp"
+#include "registration/detail/template_images.hpp"
 
 #include <Eigen/Eigenvalues>
 
@@ -21,10 +22,7 @@ using imaging::Volume;
 
 namespace {
 
-constexpr int refinement_reach = 3;        // voxels of the level, about the neighbours' story
 constexpr int most_steps = 8;              // downhill, from the lowest place of the lattice
-constexpr int neighbours = 24;             // that tell it
-constexpr double trimmed_share = 0.3;      // of them, left out
 constexpr double independent_share = 0.1;  // of a block's voxels: the others repeat them (docs/method.md)
 constexpr double least_deviation = 0.05;   // voxels: what interpolation leaves of the best match
 
@@ -116,8 +114,8 @@ std::optional<Minimum> find_block(const MatchingImage& moving, const MatchingIma
 /// should lie where the first one lay.
 std::optional<double> back_match(const MatchingImage& moving, const MatchingImage& fixed, const Block& block,
                                  const Minimum& forward) {
-    const auto back =
-        find_block(fixed, moving, {forward.at, block.radius, block.least_share}, block.centre, refinement_reach);
+    const auto back = find_block(fixed, moving, {forward.at, block.radius, block.least_share}, block.centre,
+                                 detail::refinement_reach);
     if (!back) return std::nullopt;
     const Eigen::Vector3d error = back->index() - as_vector(block.centre) + forward.fit.minimum;
     return std::sqrt(error.dot(forward.fit.hessian * error) / forward.fit.hessian.operatorNorm());
@@ -141,7 +139,8 @@ Eigen::Matrix3d information(const Minimum& minimum, const imaging::Geometry& gri
 }
 
 struct Level {
-    MatchingImage moving, fixed;
+    const MatchingImage& moving;
+    MatchingImage fixed;
     int reach;
 };
 
@@ -152,55 +151,55 @@ double mean_certainty(const std::vector<BlockMatch>& matches) {
     return total / double(matches.size());
 }
 
-/// The whole search: images, points and where they are expected.
+/// The whole search: the template's points that may be seen, and where they are expected.
 class BlockSearch {
 public:
-    BlockSearch(const Volume& moving, const Volume& fixed, const Eigen::Matrix3Xd& points,
+    BlockSearch(const detail::TemplateImages& moving, const Volume& fixed, const Eigen::Matrix3Xd& points,
                 const Eigen::Matrix3Xd& predicted, const BlockMatchingOptions& options)
-        : moving_(moving.as(CV_32F)),
+        : moving_(moving),
           fixed_(fixed.as(CV_32F)),
-          seen_moving_(detail::seen_region(moving_)),
-          seen_fixed_(detail::seen_region(fixed_)),
+          seen_(detail::seen_region(fixed_)),
           points_(points),
           predicted_(predicted),
           options_(options),
-          neighbours_(detail::nearest_neighbours(points, neighbours)) {}
+          neighbours_(detail::nearest_neighbours(points, story_.neighbours)) {}
 
     std::vector<BlockMatch> run(Observer& observer) {
         std::vector<BlockMatch> best;
         double certainty = -1;
-        for (int level = 0; level < options_.levels; ++level) {
+        const int levels = moving_.options.levels;
+        for (int level = options_.skipped_levels; level < levels; ++level) {
             std::vector<BlockMatch> matches = match(prepare(level));
-            if (level + 1 < options_.levels) predict(matches);
+            if (level + 1 < levels) predict(matches);
             if (const double candidate = mean_certainty(matches); candidate >= certainty) {
                 certainty = candidate;
                 best = std::move(matches);
             }
-            observer.checkpoint("block matching", double(level + 1) / options_.levels);
+            observer.checkpoint("block matching", double(level + 1) / levels);
         }
         std::erase_if(best, [](const BlockMatch& match) { return match.point < 0 || match.information.trace() <= 0; });
         return best;
     }
 
 private:
-    Volume moving_, fixed_, seen_moving_, seen_fixed_;
+    const detail::TemplateImages& moving_;
+    Volume fixed_, seen_;
     const Eigen::Matrix3Xd& points_;
     Eigen::Matrix3Xd predicted_;
     const BlockMatchingOptions& options_;
+    const ConsistencyOptions story_{};  // what neighbours must agree on, between levels as afterwards
     std::vector<std::vector<int>> neighbours_;
 
+    /// The fixed image along the axes of the moving grid, turned: descriptors depend on the direction.
     [[nodiscard]] Level prepare(int level) const {
-        const double spacing = options_.grid_spacing_mm * std::pow(2, options_.levels - 1 - level);
-        const int reach = level == 0 ? static_cast<int>(std::ceil(options_.search_mm / spacing)) : refinement_reach;
-        const double margin = (reach + options_.block_radius + detail::descriptor_reach + 2) * spacing;
-        const Eigen::Matrix3d& axes = fixed_.geometry.direction;
-        const auto image = [&](const Volume& from, const Volume& seen, const Eigen::Matrix3Xd& about,
-                               const Eigen::Matrix3d& direction) {
-            return detail::matching_image(from, seen, detail::grid_about(about, direction, spacing, margin),
-                                          options_.similarity);
-        };
-        return {image(moving_, seen_moving_, points_, options_.rotation.transpose() * axes),
-                image(fixed_, seen_fixed_, predicted_, axes), reach};
+        const MatchingImage& moving = moving_.levels[static_cast<std::size_t>(level)];
+        const double spacing = moving.grid.spacing[0];
+        const bool first = level == options_.skipped_levels;
+        const int reach = first ? static_cast<int>(std::ceil(options_.search_mm / spacing)) : detail::refinement_reach;
+        const imaging::Geometry grid =
+            detail::grid_about(predicted_, options_.rotation * moving.grid.direction, spacing,
+                               detail::search_margin(reach, moving_.options.block_radius) * spacing);
+        return {moving, detail::matching_image(fixed_, seen_, grid, moving_.options.similarity), reach};
     }
 
     /// One entry per point; `point` stays −1 where the block was not found.
@@ -213,7 +212,7 @@ private:
     }
 
     [[nodiscard]] std::optional<BlockMatch> match_point(const Level& level, Eigen::Index n) const {
-        const Block block{nearest_voxel(level.moving.grid, points_.col(n)), options_.block_radius,
+        const Block block{nearest_voxel(level.moving.grid, points_.col(n)), moving_.options.block_radius,
                           options_.least_share};
         BlockMatch result;
         result.moving = level.moving.grid.point(as_vector(block.centre));
@@ -250,61 +249,53 @@ private:
             if (!vouched) return;
             const Eigen::Vector3d point = points_.col(column);
             predicted_.col(column) =
-                point + detail::fit_local_affine(motion, point, neighbours_[n], trimmed_share).displacement;
+                point + detail::fit_local_affine(motion, point, neighbours_[n], story_.trimmed_share).displacement;
         });
     }
 };
 
-void require_usable(const Eigen::Matrix3Xd& points, const Eigen::Matrix3Xd& predicted,
+void require_usable(const detail::TemplateImages& moving, const Eigen::Matrix3Xd& predicted,
                     const BlockMatchingOptions& options) {
-    if (points.cols() == 0 || points.cols() != predicted.cols())
-        throw InvalidInput("block matching: " + std::to_string(points.cols()) + " points and " +
-                           std::to_string(predicted.cols()) +
-                           " predicted positions; give as many of both, one or more");
-    if (!points.allFinite() || !predicted.allFinite())
-        throw InvalidInput("block matching: a point or predicted position is not finite; give LPS mm");
-    const bool in_range = options.grid_spacing_mm > 0.05 && options.grid_spacing_mm < 50 && options.levels >= 1 &&
-                          options.levels <= 8 && options.block_radius >= 1 && options.block_radius <= 64 &&
-                          options.search_mm >= 0 && options.search_mm <= 1000 && options.back_match_voxels > 0 &&
+    if (moving.points.cols() != predicted.cols())
+        throw InvalidInput("block matching: " + std::to_string(moving.points.cols()) + " points and " +
+                           std::to_string(predicted.cols()) + " predicted positions; give as many of both");
+    if (!predicted.allFinite()) throw InvalidInput("block matching: a predicted position is not finite; give LPS mm");
+    if (options.skipped_levels < 0 || options.skipped_levels >= moving.options.levels)
+        throw InvalidInput("block matching: " + std::to_string(options.skipped_levels) + " levels skipped of " +
+                           std::to_string(moving.options.levels) + "; leave one or more");
+    const bool in_range = options.search_mm >= 0 && options.search_mm <= 1000 && options.back_match_voxels > 0 &&
                           options.least_share > 0 && options.least_share <= 1;
     if (!in_range)
         throw InvalidInput(
-            "block matching: options out of range; grid spacing 0.05 to 50 mm, 1 to 8 levels, block radius 1 to 64 "
-            "voxels, search 0 to 1000 mm, back match above 0, least share above 0 and up to 1");
+            "block matching: options out of range; search 0 to 1000 mm, back match above 0, least share above 0 and up "
+            "to 1");
     if (!(options.rotation.transpose() * options.rotation).isIdentity(1e-6))
         throw InvalidInput("block matching: the rotation is not orthonormal; give the linear part of a rigid motion");
 }
 
-/// Whether a point lies in the box of the voxels.
-bool in_image(const imaging::Geometry& grid, const Eigen::Vector3d& point) {
-    const Eigen::Array3d index = grid.index(point).array();
-    const Eigen::Array3d last(grid.size[0] - 0.5, grid.size[1] - 0.5, grid.size[2] - 0.5);
-    return (index >= -0.5).all() && (index <= last).all();
-}
-
-std::vector<int> in_both_images(const Volume& moving, const Volume& fixed, const Eigen::Matrix3Xd& points,
+std::vector<int> in_both_images(const detail::TemplateImages& moving, const Volume& fixed,
                                 const Eigen::Matrix3Xd& predicted) {
     std::vector<int> result;
-    for (Eigen::Index n = 0; n < points.cols(); ++n)
-        if (in_image(moving.geometry, points.col(n)) && in_image(fixed.geometry, predicted.col(n)))
+    for (Eigen::Index n = 0; n < predicted.cols(); ++n)
+        if (detail::in_image(moving.image, moving.points.col(n)) && detail::in_image(fixed.geometry, predicted.col(n)))
             result.push_back(static_cast<int>(n));
     if (result.empty())
-        throw InvalidInput("block matching: none of " + std::to_string(points.cols()) +
+        throw InvalidInput("block matching: none of " + std::to_string(predicted.cols()) +
                            " points is expected to lie in both images; align them first");
     return result;
 }
 
 }  // namespace
 
-std::vector<BlockMatch> match_blocks(const Volume& moving, const Volume& fixed, const Eigen::Matrix3Xd& points,
+std::vector<BlockMatch> match_blocks(const MatchingTemplate& moving, const Volume& fixed,
                                      const Eigen::Matrix3Xd& predicted, const BlockMatchingOptions& options,
                                      Observer& observer) {
-    require_usable(points, predicted, options);
-    detail::require_finite(moving, "block matching: the moving image");
+    const detail::TemplateImages& images = moving.images();
+    require_usable(images, predicted, options);
     detail::require_finite(fixed, "block matching: the fixed image");
-    const std::vector<int> usable = in_both_images(moving, fixed, points, predicted);
-    const Eigen::Matrix3Xd from = points(Eigen::all, usable), to = predicted(Eigen::all, usable);
-    std::vector<BlockMatch> matches = BlockSearch(moving, fixed, from, to, options).run(observer);
+    const std::vector<int> usable = in_both_images(images, fixed, predicted);
+    const Eigen::Matrix3Xd from = images.points(Eigen::all, usable), to = predicted(Eigen::all, usable);
+    std::vector<BlockMatch> matches = BlockSearch(images, fixed, from, to, options).run(observer);
     for (BlockMatch& match : matches) match.point = usable[static_cast<std::size_t>(match.point)];
     return matches;
 }

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include <memory>
 #include <vector>
 
 namespace tissuewarp::registration {
@@ -40,11 +41,37 @@ enum class Similarity {
     CrossCorrelation        ///< normalised cross-correlation: images of one modality
 };
 
-struct BlockMatchingOptions {
+/// What of the moving image is compared, and on which grids.
+struct TemplateOptions {
     Similarity similarity = Similarity::SelfSimilarityContext;
     double grid_spacing_mm = 1.0;  ///< isotropic working grid of the last level; every level before doubles it
     int levels = 3;                ///< 4, 2, 1 mm
     int block_radius = 4;          ///< voxels of the level's grid: blocks of 36, 18 and 9 mm
+};
+
+namespace detail {
+struct TemplateImages;
+}
+
+/// All that block matching needs of the moving image, made once before the operation: the points, and the image around
+/// them on the working grids of every level, which lie along its own axes. Immutable; copies share it.
+class MatchingTemplate {
+public:
+    /// Points: 3 × N, LPS mm. Throws InvalidInput on non-finite voxels or points, options out of range, and when no
+    /// point lies in the image.
+    MatchingTemplate(const imaging::Volume& moving, const Eigen::Matrix3Xd& points,
+                     const TemplateOptions& options = {});
+
+    [[nodiscard]] const Eigen::Matrix3Xd& points() const;
+    [[nodiscard]] const TemplateOptions& options() const;
+    [[nodiscard]] const detail::TemplateImages& images() const { return *images_; }
+
+private:
+    std::shared_ptr<const detail::TemplateImages> images_;
+};
+
+struct BlockMatchingOptions {
+    int skipped_levels = 0;        ///< coarse levels left out: a prediction good to a few mm needs none of them
     double search_mm = 16.0;       ///< range of the first level about the predicted position, along each axis
     double least_share = 0.35;     ///< share of a block that both images must show
     double back_match_voxels = 1;  ///< standard deviation of the back-match error in the confidence
@@ -63,18 +90,18 @@ struct BlockMatch {
     Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< inverse covariance of `fixed`, 1/mm², LPS
 };
 
-/// Finds the blocks around `points` (3 × N, LPS mm, moving frame) near `predicted` (3 × N, LPS mm, fixed frame), coarse
-/// to fine. Between levels each block's prediction is the robust local affine fit of its neighbours' matches. The
-/// matches returned are those of the level that is the most certain of them: noise leaves the finest grid less to see
-/// than the one before. What lies
-/// outside of either image, or in parts of them that are exactly constant (padding beyond the field of view), counts
-/// in no cost. Returns the blocks found, in the order of the points; those that left the fixed image, show too little
-/// of themselves there or are no better found than chance finds are absent. Threads do not change the result. Formulas:
-/// docs/method.md. Throws InvalidInput on non-finite voxels or points, sizes that differ, options out of range, and
-/// when no block lies in both images; Cancelled.
-std::vector<BlockMatch> match_blocks(const imaging::Volume& moving, const imaging::Volume& fixed,
-                                     const Eigen::Matrix3Xd& points, const Eigen::Matrix3Xd& predicted,
-                                     const BlockMatchingOptions& options = {}, Observer& observer = silent_observer());
+/// Finds the blocks around the template's points near `predicted` (3 × N, LPS mm, fixed frame), coarse to fine. The
+/// fixed image is looked at along the template's axes, turned by `rotation`. Between levels each block's prediction is
+/// the robust local affine fit of its neighbours' matches. The matches returned are those of the level that is the most
+/// certain of them: noise leaves the finest grid less to see than the one before. What lies outside of either image, or
+/// in parts of them that are exactly constant (padding beyond the field of view), counts in no cost. Returns the blocks
+/// found, in the order of the points; those that left the fixed image, show too little of themselves there or are no
+/// better found than chance finds are absent. Threads do not change the result. Formulas: docs/method.md. Throws
+/// InvalidInput on non-finite voxels or positions, sizes that differ, options out of range, and when no block lies in
+/// both images; Cancelled.
+std::vector<BlockMatch> match_blocks(const MatchingTemplate& moving, const imaging::Volume& fixed,
+                                     const Eigen::Matrix3Xd& predicted, const BlockMatchingOptions& options = {},
+                                     Observer& observer = silent_observer());
 
 struct ConsistencyOptions {
     int neighbours = 24;             ///< matches around each that must tell the same story

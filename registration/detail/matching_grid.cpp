@@ -37,6 +37,12 @@ void require_finite(const Volume& image, const char* name) {
         throw InvalidInput(std::string(name) + " has voxels that are not finite; replace them, or cut them off");
 }
 
+bool in_image(const Geometry& grid, const Eigen::Vector3d& point) {
+    const Eigen::Array3d index = grid.index(point).array();
+    const Eigen::Array3d last(grid.size[0] - 0.5, grid.size[1] - 0.5, grid.size[2] - 0.5);
+    return (index >= -0.5).all() && (index <= last).all();
+}
+
 Geometry grid_about(const Eigen::Matrix3Xd& points, const Eigen::Matrix3d& direction, double spacing_mm,
                     double margin_mm) {
     const Eigen::Matrix3Xd along = direction.transpose() * points;

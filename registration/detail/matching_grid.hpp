@@ -10,6 +10,9 @@ namespace tissuewarp::registration::detail {
 /// Throws InvalidInput unless the volume is scalar and every voxel is finite. `name` opens the message.
 void require_finite(const imaging::Volume& image, const char* name);
 
+/// Whether a point (LPS mm) lies in the box of the voxels, half a voxel about the outermost centres included.
+bool in_image(const imaging::Geometry& grid, const Eigen::Vector3d& point);
+
 /// An isotropic grid over the bounding box of points (3 × N, LPS mm) along given axes, `margin_mm` wider.
 imaging::Geometry grid_about(const Eigen::Matrix3Xd& points, const Eigen::Matrix3d& direction, double spacing_mm,
                              double margin_mm);

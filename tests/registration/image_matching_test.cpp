@@ -49,11 +49,18 @@ std::vector<double> errors(const std::vector<BlockMatch>& matches) {
     return result;
 }
 
-BlockMatchingOptions searching(double range_mm, Similarity similarity = Similarity::SelfSimilarityContext) {
+BlockMatchingOptions searching(double range_mm) {
     BlockMatchingOptions options;
     options.search_mm = range_mm;
-    options.similarity = similarity;
     return options;
+}
+
+/// Points looked for where they were.
+std::vector<BlockMatch> matches_of(const Volume& moving, const Volume& fixed, const Eigen::Matrix3Xd& points,
+                                   double range_mm, Similarity similarity = Similarity::SelfSimilarityContext) {
+    TemplateOptions options;
+    options.similarity = similarity;
+    return match_blocks(MatchingTemplate(moving, points, options), fixed, points, searching(range_mm));
 }
 
 class KnownDeformation : public ::testing::TestWithParam<Similarity> {};
@@ -62,7 +69,7 @@ class KnownDeformation : public ::testing::TestWithParam<Similarity> {};
 TEST_P(KnownDeformation, IsFoundToAThirdOfAVoxel) {
     const Pair pair = deformed_pair();
     ASSERT_GE(pair.points.cols(), 200);
-    const auto matches = match_blocks(pair.moving, pair.fixed, pair.points, pair.points, searching(8, GetParam()));
+    const auto matches = matches_of(pair.moving, pair.fixed, pair.points, 8, GetParam());
     EXPECT_GE(static_cast<Eigen::Index>(matches.size()), pair.points.cols() * 9 / 10);
     EXPECT_LT(median(errors(matches)), 0.3);
     EXPECT_LT(median(errors(consistent_matches(matches))), 0.3);
@@ -74,7 +81,7 @@ INSTANTIATE_TEST_SUITE_P(Similarities, KnownDeformation,
 // A descriptor that depends on the sign or the scale of the contrast finds nothing here.
 TEST(ImageMatching, SeesThroughInvertedContrastAndNoise) {
     const Pair pair = deformed_pair([](double v) { return std::exp(-1.5 * v); }, 0.15);
-    const auto matches = match_blocks(pair.moving, pair.fixed, pair.points, pair.points, searching(8));
+    const auto matches = matches_of(pair.moving, pair.fixed, pair.points, 8);
     const auto kept = consistent_matches(matches);
     EXPECT_GE(static_cast<Eigen::Index>(kept.size()), pair.points.cols() / 2);
     EXPECT_LT(median(errors(kept)), 0.5);
@@ -93,7 +100,7 @@ TEST(ImageMatching, MapsBetweenObliqueAnisotropicGridsAcrossARotation) {
     BlockMatchingOptions options = searching(4);
     options.rotation = pose.linear();
     const Eigen::Matrix3Xd off = (pose * points).colwise() + Eigen::Vector3d(2, -1.5, 1);
-    const auto matches = match_blocks(moving, fixed, points, off, options);
+    const auto matches = match_blocks(MatchingTemplate(moving, points), fixed, off, options);
     ASSERT_GE(static_cast<Eigen::Index>(matches.size()), points.cols() * 9 / 10);
     std::vector<double> distances;
     for (const BlockMatch& match : matches) distances.push_back((match.fixed - pose * match.moving).norm());
@@ -112,7 +119,7 @@ TEST(ImageMatching, APlaneEdgeTellsOfItsNormalAlone) {
     const Eigen::Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
     for (int n = 0; n < 25; ++n) points.col(n) = 3.0 * (n % 5 - 2) * u + 3.0 * (n / 5 - 2) * v;
     for (const Similarity similarity : {Similarity::SelfSimilarityContext, Similarity::CrossCorrelation}) {
-        const auto matches = match_blocks(moving, fixed, points, points, searching(6, similarity));
+        const auto matches = matches_of(moving, fixed, points, 6, similarity);
         ASSERT_GE(matches.size(), 12u);
         std::vector<double> along, ratios, off;
         for (const BlockMatch& match : matches) {
@@ -134,7 +141,7 @@ TEST(ImageMatching, NothingIsFoundBeyondTheFieldOfView) {
     for_each_voxel(pair.fixed, [&](const Eigen::Vector3d& index, std::int64_t offset) {
         if (pair.fixed.geometry.point(index)[0] > cut) pair.fixed.data<float>()[offset] = 0;
     });
-    const auto matches = match_blocks(pair.moving, pair.fixed, pair.points, pair.points, searching(8));
+    const auto matches = matches_of(pair.moving, pair.fixed, pair.points, 8);
     ASSERT_GE(matches.size(), 80u);
     EXPECT_LT(median(errors(matches)), 0.3);
     for (const BlockMatch& match : matches) EXPECT_LT(match.fixed[0], cut) << "point " << match.point;
@@ -146,7 +153,7 @@ TEST(ImageMatching, OneThreadAndManyFindTheSame) {
     const Pair pair = deformed_pair([](double v) { return v; }, 0.1);
     const auto run = [&](std::size_t threads) {
         const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-        return consistent_matches(match_blocks(pair.moving, pair.fixed, pair.points, pair.points, searching(8)));
+        return consistent_matches(matches_of(pair.moving, pair.fixed, pair.points, 8));
     };
     const auto one = run(1), many = run(4);
     ASSERT_EQ(one.size(), many.size());
@@ -163,7 +170,7 @@ TEST(ImageMatching, AnUnrelatedImageIsNotBelieved) {
     const Pair pair = deformed_pair();
     const Volume noise = sampled(
         pair.fixed.geometry, [](const auto&) { return 0.0; }, 1, 9);
-    const auto matches = match_blocks(pair.moving, noise, pair.points, pair.points, searching(8));
+    const auto matches = matches_of(pair.moving, noise, pair.points, 8);
     EXPECT_LT(static_cast<Eigen::Index>(matches.size()), pair.points.cols() / 10);
     EXPECT_LT(static_cast<Eigen::Index>(consistent_matches(matches).size()), pair.points.cols() / 50);
 }
@@ -174,23 +181,33 @@ TEST(ImageMatching, RefusesHostileInput) {
     const Eigen::Matrix3Xd points = Eigen::Matrix3Xd::Constant(3, 2, 10.0);
     Volume broken = image.clone();
     broken.data<float>()[77] = std::numeric_limits<float>::quiet_NaN();
-    EXPECT_THROW(match_blocks(broken, image, points, points), InvalidInput);
-    EXPECT_THROW(match_blocks(image, broken, points, points), InvalidInput);
-    EXPECT_THROW(match_blocks(image, Volume(), points, points), InvalidInput);
-    EXPECT_THROW(match_blocks(image, image, points, Eigen::Matrix3Xd::Zero(3, 3)), InvalidInput);
-    EXPECT_THROW(match_blocks(image, image, Eigen::Matrix3Xd(3, 0), Eigen::Matrix3Xd(3, 0)), InvalidInput);
+    EXPECT_THROW(MatchingTemplate(broken, points), InvalidInput);
+    EXPECT_THROW(MatchingTemplate(Volume(), points), InvalidInput);
+    EXPECT_THROW(MatchingTemplate(image, Eigen::Matrix3Xd(3, 0)), InvalidInput);
     Eigen::Matrix3Xd infinite = points;
     infinite(1, 1) = std::numeric_limits<double>::infinity();
-    EXPECT_THROW(match_blocks(image, image, points, infinite), InvalidInput);
+    EXPECT_THROW(MatchingTemplate(image, infinite), InvalidInput);
     const Eigen::Matrix3Xd far_off = points.array() + 1e9;
-    EXPECT_THROW(match_blocks(image, image, points, far_off), InvalidInput);
-    EXPECT_THROW(match_blocks(image, image, far_off, points), InvalidInput);
+    EXPECT_THROW(MatchingTemplate(image, far_off), InvalidInput);
+    TemplateOptions too_fine;
+    too_fine.grid_spacing_mm = 0;
+    EXPECT_THROW(MatchingTemplate(image, points, too_fine), InvalidInput);
+
+    const MatchingTemplate moving(image, points);
+    EXPECT_THROW(match_blocks(moving, broken, points), InvalidInput);
+    EXPECT_THROW(match_blocks(moving, Volume(), points), InvalidInput);
+    EXPECT_THROW(match_blocks(moving, image, Eigen::Matrix3Xd::Zero(3, 3)), InvalidInput);
+    EXPECT_THROW(match_blocks(moving, image, infinite), InvalidInput);
+    EXPECT_THROW(match_blocks(moving, image, far_off), InvalidInput);
     BlockMatchingOptions options;
-    options.grid_spacing_mm = 0;
-    EXPECT_THROW(match_blocks(image, image, points, points, options), InvalidInput);
+    options.skipped_levels = moving.options().levels;
+    EXPECT_THROW(match_blocks(moving, image, points, options), InvalidInput);
+    options = {};
+    options.search_mm = -1;
+    EXPECT_THROW(match_blocks(moving, image, points, options), InvalidInput);
     options = {};
     options.rotation.setZero();
-    EXPECT_THROW(match_blocks(image, image, points, points, options), InvalidInput);
+    EXPECT_THROW(match_blocks(moving, image, points, options), InvalidInput);
 
     const Volume mask = core_mask(grid, 2), nothing(grid, CV_8UC1);
     EXPECT_THROW((void)select_feature_points(broken, mask), InvalidInput);

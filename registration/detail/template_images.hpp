@@ -1,0 +1,22 @@
+#pragma once
+/// What a matching template holds.
+
+#include "registration/detail/matching_image.hpp"
+
+namespace tissuewarp::registration::detail {
+
+constexpr int refinement_reach = 3;  ///< voxels of the level, about the neighbours' story; so far the back match looks
+
+/// Voxels about a point that a search of a given reach may look at: it walks on a little from where it began.
+constexpr int search_margin(int reach, int block_radius) {
+    return reach + block_radius + descriptor_reach + 2;
+}
+
+struct TemplateImages {
+    TemplateOptions options;
+    Eigen::Matrix3Xd points;            ///< LPS mm
+    imaging::Geometry image;            ///< the moving image's own grid
+    std::vector<MatchingImage> levels;  ///< coarse to fine
+};
+
+}  // namespace tissuewarp::registration::detail
