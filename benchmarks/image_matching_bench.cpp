@@ -111,7 +111,7 @@ struct Errors {
         full.push_back(e.norm());
         informative.push_back(std::abs(axes.eigenvectors().col(2).dot(e)));
         squared.push_back(e.dot(match.information * e));
-        deviation.push_back(std::pow(match.information.determinant(), -1.0 / 6));
+        deviation.push_back(std::pow(std::max(match.information.determinant(), 0.0), -1.0 / 6));
     }
     void print_row(const std::string& name, std::size_t points, double seconds) const {
         const auto outliers =

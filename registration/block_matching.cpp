@@ -196,10 +196,11 @@ private:
         const double spacing = moving.grid.spacing[0];
         const bool first = level == options_.skipped_levels;
         const int reach = first ? static_cast<int>(std::ceil(options_.search_mm / spacing)) : detail::refinement_reach;
+        const int margin = detail::search_margin(reach, moving_.options.block_radius);
         const imaging::Geometry grid =
-            detail::grid_about(predicted_, options_.rotation * moving.grid.direction, spacing,
-                               detail::search_margin(reach, moving_.options.block_radius) * spacing);
-        return {moving, detail::matching_image(fixed_, seen_, grid, moving_.options.similarity), reach};
+            detail::grid_about(predicted_, options_.rotation * moving.grid.direction, spacing, margin * spacing);
+        const detail::SearchRegion region(grid, predicted_, margin);
+        return {moving, detail::matching_image(fixed_, seen_, grid, region, moving_.options.similarity), reach};
     }
 
     /// One entry per point; `point` stays −1 where the block was not found.

@@ -46,9 +46,10 @@ MatchingTemplate::MatchingTemplate(const Volume& moving, const Eigen::Matrix3Xd&
     images->image = moving.geometry;
     for (int level = 0; level < options.levels; ++level) {
         const double spacing = options.grid_spacing_mm * std::pow(2, options.levels - 1 - level);
-        const double margin = detail::search_margin(detail::refinement_reach, options.block_radius) * spacing;
-        const imaging::Geometry grid = detail::grid_about(usable, moving.geometry.direction, spacing, margin);
-        images->levels.push_back(detail::matching_image(image, seen, grid, options.similarity));
+        const int margin = detail::search_margin(detail::refinement_reach, options.block_radius);
+        const imaging::Geometry grid = detail::grid_about(usable, moving.geometry.direction, spacing, margin * spacing);
+        const detail::SearchRegion region(grid, usable, margin);
+        images->levels.push_back(detail::matching_image(image, seen, grid, region, options.similarity));
     }
     images_ = std::move(images);
 }

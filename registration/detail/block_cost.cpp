@@ -1,6 +1,7 @@
 #include "registration/detail/block_cost.hpp"
 
-#include <algorithm>
+#include "registration/detail/block_window.hpp"
+
 #include <cmath>
 #include <limits>
 
@@ -9,46 +10,63 @@ namespace tissuewarp::registration::detail {
 namespace {
 
 constexpr double nowhere = std::numeric_limits<double>::infinity();
+constexpr double squared_range = 255.0 * 255.0;
 
-/// Squared differences of bytes; at most 255 voxels of 12 channels, which fit into 32 bits.
-int squared_difference(const std::uint8_t* a, const std::uint8_t* b, int count) {
-    int sum = 0;
-    for (int n = 0; n < count; ++n) {
-        const int difference = int{a[n]} - int{b[n]};
-        sum += difference * difference;
-    }
-    return sum;
+/// Voxels that the rows of a block hold when all are seen.
+double voxels_of(const Block& block) {
+    const int side = 2 * block.radius + 1, rows = (side + block.stride - 1) / block.stride;
+    return double(side) * rows * rows;
 }
 
-struct DescriptorSums {
-    const MatchingImage &moving, &fixed;
-    std::int64_t sum = 0, voxels = 0;
+/// Rows of costs along i, for the places (j, k) of a lattice of descriptors.
+class DescriptorCosts {
+public:
+    DescriptorCosts(const MatchingImage& moving, const MatchingImage& fixed, const Block& block, const Voxel& centre,
+                    int reach)
+        : least_(std::max(1.0, block.least_share * voxels_of(block)) * descriptor_channels),
+          all_(voxels_of(block) * descriptor_channels),
+          block_(moving, corner(block.centre, block.radius), 2 * block.radius + 1),
+          window_(fixed, corner(centre, block.radius + reach), 2 * (block.radius + reach) + 1),
+          comparison_{2 * block.radius + 1, block.stride, (2 * block.radius + 1) * descriptor_channels, 2 * reach + 1,
+                      descriptor_channels},
+          differences_(static_cast<std::size_t>(2 * reach + 1)),
+          counts_(differences_.size()) {}
 
-    void add(std::int64_t m, std::int64_t f, int count) {
-        sum += squared_difference(&moving.descriptors[static_cast<std::size_t>(m * descriptor_channels)],
-                                  &fixed.descriptors[static_cast<std::size_t>(f * descriptor_channels)],
-                                  count * descriptor_channels);
-        voxels += count;
+    void row(int j, int k, double* costs) {
+        if (block_.whole() && window_.whole())
+            whole_squared_differences(block_.rows(0, 0), window_.rows(j, k), comparison_, differences_.data());
+        else
+            masked_squared_differences(block_.rows(0, 0), window_.rows(j, k), comparison_, differences_.data(),
+                                       counts_.data());
+        for (std::size_t i = 0; i < differences_.size(); ++i) {
+            const double count = window_.whole() && block_.whole() ? all_ : double(counts_[i]) / squared_range;
+            costs[i] = count < least_ ? nowhere : double(differences_[i]) / (squared_range * count);
+        }
     }
-    [[nodiscard]] double cost() const { return double(sum) / (255.0 * 255.0 * descriptor_channels * double(voxels)); }
+
+private:
+    double least_, all_;  // bytes
+    BlockWindow block_, window_;
+    RowComparison comparison_;
+    std::vector<std::int64_t> differences_, counts_;
+
+    static Voxel corner(const Voxel& centre, int radius) {
+        return {centre[0] - radius, centre[1] - radius, centre[2] - radius};
+    }
 };
 
 struct CorrelationSums {
-    const MatchingImage &moving, &fixed;
     double m = 0, f = 0, mm = 0, ff = 0, mf = 0;
     std::int64_t voxels = 0;
 
-    void add(std::int64_t at_m, std::int64_t at_f, int count) {
-        for (int n = 0; n < count; ++n) {
-            const double a = double(moving.values[static_cast<std::size_t>(at_m + n)]);
-            const double b = double(fixed.values[static_cast<std::size_t>(at_f + n)]);
-            m += a;
-            f += b;
-            mm += a * a;
-            ff += b * b;
-            mf += a * b;
-        }
-        voxels += count;
+    void add(float moving, float fixed) {
+        const double a = double(moving), b = double(fixed);
+        m += a;
+        f += b;
+        mm += a * a;
+        ff += b * b;
+        mf += a * b;
+        ++voxels;
     }
     /// A constant block is like none: r = 0.
     [[nodiscard]] double cost() const {
@@ -58,58 +76,45 @@ struct CorrelationSums {
     }
 };
 
-/// Adds a row of `count` voxels, whole where both images see it and voxel by voxel where they do not.
-template <class Sums>
-void add_row(Sums& sums, std::int64_t m, std::int64_t f, int count) {
-    const std::uint8_t *run_m = &sums.moving.seen_run[static_cast<std::size_t>(m)],
-                       *run_f = &sums.fixed.seen_run[static_cast<std::size_t>(f)];
-    if (std::min(run_m[0], run_f[0]) >= count) {
-        sums.add(m, f, count);
-        return;
-    }
-    for (int n = 0; n < count; ++n)
-        if (run_m[n] && run_f[n]) sums.add(m + n, f + n, 1);
+bool on_grid(const MatchingImage& image, int j, int k) {
+    return j >= 0 && j < image.grid.size[1] && k >= 0 && k < image.grid.size[2];
 }
 
-/// Offsets from the centre of a block, along one axis, that stay in both grids.
-struct Span {
-    int first, last;
-    Span(const Block& block, const MatchingImage& moving, const MatchingImage& fixed, const Voxel& at, std::size_t axis)
-        : first(std::max({-block.radius, -block.centre[axis], -at[axis]})),
-          last(std::min(
-              {block.radius, moving.grid.size[axis] - 1 - block.centre[axis], fixed.grid.size[axis] - 1 - at[axis]})) {}
-};
-
-template <class Sums>
-double cost_of(Sums sums, const Block& block, const Voxel& at) {
-    const Span i(block, sums.moving, sums.fixed, at, 0), j(block, sums.moving, sums.fixed, at, 1),
-        k(block, sums.moving, sums.fixed, at, 2);
-    if (i.first > i.last) return nowhere;
-    for (int dk = k.first; dk <= k.last; dk += block.stride)
-        for (int dj = j.first; dj <= j.last; dj += block.stride)
-            add_row(sums, sums.moving.offset({block.centre[0] + i.first, block.centre[1] + dj, block.centre[2] + dk}),
-                    sums.fixed.offset({at[0] + i.first, at[1] + dj, at[2] + dk}), i.last - i.first + 1);
-    const int side = 2 * block.radius + 1, rows = (side + block.stride - 1) / block.stride;
-    const double all = double(side) * rows * rows;
-    return double(sums.voxels) < std::max(1.0, block.least_share * all) ? nowhere : sums.cost();
+double correlation_cost(const MatchingImage& moving, const MatchingImage& fixed, const Block& block, const Voxel& at) {
+    CorrelationSums sums;
+    const int r = block.radius, first = std::max({-r, -block.centre[0], -at[0]}),
+              last = std::min({r, moving.grid.size[0] - 1 - block.centre[0], fixed.grid.size[0] - 1 - at[0]});
+    for (int dk = -r; dk <= r; dk += block.stride)
+        for (int dj = -r; dj <= r; dj += block.stride) {
+            const Voxel m{block.centre[0] + first, block.centre[1] + dj, block.centre[2] + dk};
+            const Voxel f{at[0] + first, at[1] + dj, at[2] + dk};
+            if (!on_grid(moving, m[1], m[2]) || !on_grid(fixed, f[1], f[2])) continue;
+            auto a = static_cast<std::size_t>(moving.offset(m)), b = static_cast<std::size_t>(fixed.offset(f));
+            for (int n = first; n <= last; ++n, ++a, ++b)
+                if (moving.seen[a] && fixed.seen[b]) sums.add(moving.values[a], fixed.values[b]);
+        }
+    return double(sums.voxels) < std::max(1.0, block.least_share * voxels_of(block)) ? nowhere : sums.cost();
 }
 
 }  // namespace
 
-double block_cost(const MatchingImage& moving, const MatchingImage& fixed, const Block& block, const Voxel& at) {
-    if (!moving.descriptors.empty()) return cost_of(DescriptorSums{moving, fixed}, block, at);
-    return cost_of(CorrelationSums{moving, fixed}, block, at);
-}
-
 CostLattice cost_lattice(const MatchingImage& moving, const MatchingImage& fixed, const Block& block,
                          const Voxel& centre, int reach) {
     CostLattice lattice{centre, reach, {}};
-    const auto side = static_cast<std::size_t>(lattice.side());
-    lattice.costs.resize(side * side * side);
-    for (std::size_t n = 0; n < lattice.costs.size(); ++n) {
-        const Voxel d = lattice.displacement(n);
-        lattice.costs[n] = block_cost(moving, fixed, block, {centre[0] + d[0], centre[1] + d[1], centre[2] + d[2]});
+    const int side = lattice.side();
+    lattice.costs.resize(static_cast<std::size_t>(side) * side * side);
+    if (!moving.descriptors) {
+        for (std::size_t n = 0; n < lattice.costs.size(); ++n) {
+            const Voxel d = lattice.displacement(n);
+            lattice.costs[n] =
+                correlation_cost(moving, fixed, block, {centre[0] + d[0], centre[1] + d[1], centre[2] + d[2]});
+        }
+        return lattice;
     }
+    DescriptorCosts costs(moving, fixed, block, centre, reach);
+    double* row = lattice.costs.data();
+    for (int k = 0; k < side; ++k)
+        for (int j = 0; j < side; ++j, row += side) costs.row(j, k, row);
     return lattice;
 }
 

@@ -12,13 +12,10 @@ struct Block {
     int stride = 1;            ///< rows looked at along j and k: 2 takes a quarter of the time for a first look
 };
 
-/// Mean squared difference between the block and its like about a voxel of the fixed grid, over the voxels seen in
-/// both; infinity when they are less than the least share. SelfSimilarityContext: of descriptors, over channels, 0..1.
-/// CrossCorrelation: 2 (1 − r), which is the mean squared difference of blocks brought to mean 0 and variance 1. The
-/// images have the same spacing. Any voxel may be asked for: what lies off a grid is not seen.
-double block_cost(const MatchingImage& moving, const MatchingImage& fixed, const Block& block, const Voxel& at);
-
-/// Costs on the cube of ± reach voxels about a centre, i fastest.
+/// Costs on the cube of ± reach voxels about a centre, i fastest. A cost is the mean squared difference between the
+/// block and its like about a voxel of the fixed grid, over the voxels seen in both; infinity when they are less than
+/// the least share. SelfSimilarityContext: of descriptors, over channels, 0..1. CrossCorrelation: 2 (1 − r), which is
+/// the mean squared difference of blocks brought to mean 0 and variance 1.
 struct CostLattice {
     Voxel centre{0, 0, 0};
     int reach = 0;
@@ -31,6 +28,7 @@ struct CostLattice {
         return {m % s - reach, m / s % s - reach, m / (s * s) - reach};
     }
 };
+/// The images have the same spacing. Any voxel may be asked for: what lies off a grid is not seen.
 CostLattice cost_lattice(const MatchingImage& moving, const MatchingImage& fixed, const Block& block,
                          const Voxel& centre, int reach);
 

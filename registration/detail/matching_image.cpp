@@ -2,10 +2,7 @@
 
 #include "imaging/filters.hpp"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
-#include <cmath>
 
 namespace tissuewarp::registration::detail {
 
@@ -13,94 +10,69 @@ using imaging::Volume;
 
 namespace {
 
-/// Largest and smallest of three along one axis, borders replicated; the neighbourhoods of three axes make the cube.
-template <class Choose>
-cv::Mat along_axis(const cv::Mat& from, std::int64_t stride, int size, const Choose& choose) {
-    cv::Mat to(3, from.size.p, from.type());
-    const float* source = from.ptr<float>();
-    float* target = to.ptr<float>();
-    const auto total = static_cast<std::int64_t>(from.total());
-    tbb::parallel_for(std::int64_t{0}, total, [&](std::int64_t n) {
-        const auto index = (n / stride) % size;
-        const float before = source[index > 0 ? n - stride : n], after = source[index + 1 < size ? n + stride : n];
-        target[n] = choose(choose(before, source[n]), after);
-    });
-    return to;
-}
+/// The part of an image within `border` of a grid; the image itself when they do not meet.
+struct Cut {
+    Volume image, seen;
 
-template <class Choose>
-cv::Mat over_cube(const Volume& image, const Choose& choose) {
-    const auto& size = image.geometry.size;
-    cv::Mat result = along_axis(image.voxels, 1, size[0], choose);
-    result = along_axis(result, size[0], size[1], choose);
-    return along_axis(result, std::int64_t{size[0]} * size[1], size[2], choose);
-}
+    Cut(const Volume& from, const Volume& from_seen, const imaging::Geometry& grid, double border_mm) {
+        Eigen::Vector3d lower = Eigen::Vector3d::Constant(1e9), upper = -lower;
+        for (int c = 0; c < 8; ++c) {
+            const Eigen::Vector3d corner((c & 1) * grid.size[0], (c / 2 & 1) * grid.size[1], (c / 4) * grid.size[2]);
+            const Eigen::Vector3d index = from.geometry.index(grid.point(corner));
+            lower = lower.cwiseMin(index);
+            upper = upper.cwiseMax(index);
+        }
+        std::array<int, 3> first, last;
+        bool meets = true;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            const auto a = static_cast<Eigen::Index>(axis);
+            const double wide = border_mm / from.geometry.spacing[a] + 1, size = from.geometry.size[axis];
+            first[axis] = static_cast<int>(std::clamp(lower[a] - wide, 0.0, size));
+            last[axis] = static_cast<int>(std::clamp(upper[a] + wide + 1, 0.0, size));
+            meets = meets && first[axis] < last[axis];
+        }
+        image = meets ? imaging::crop(from, first, last) : from;
+        seen = meets ? imaging::crop(from_seen, first, last) : from_seen;
+    }
+};
 
-constexpr auto lower = [](float a, float b) { return std::min(a, b); };
-constexpr auto upper = [](float a, float b) { return std::max(a, b); };
-
-/// Seen voxels whose cube of ± reach is seen and lies in the grid.
-Volume eroded(const Volume& seen, int reach) {
-    Volume result = seen.as(CV_32F);
-    for (int pass = 0; pass < reach; ++pass) result.voxels = over_cube(result, lower);
-    const auto& size = seen.geometry.size;
-    for (int k = 0; k < size[2]; ++k)
-        for (int j = 0; j < size[1]; ++j)
-            for (int i = 0; i < size[0]; ++i)
-                if (std::min({i, j, k, size[0] - 1 - i, size[1] - 1 - j, size[2] - 1 - k}) < reach)
-                    result.data<float>()[result.offset(i, j, k)] = 0;
-    return result.as(CV_8U);
-}
-
-std::vector<std::uint8_t> runs_along_rows(const Volume& seen) {
-    const auto& size = seen.geometry.size;
-    std::vector<std::uint8_t> runs(static_cast<std::size_t>(seen.geometry.voxel_count()));
+/// Values brought to a mean of 0 where they are seen.
+void take_values(const GridSamples& samples, const SearchRegion& region, MatchingImage& result) {
+    const auto& size = result.grid.size;
+    const auto voxels = static_cast<std::size_t>(result.grid.voxel_count());
+    result.values.resize(voxels);
+    result.seen.resize(voxels);
+    double sum = 0, count = 0;
     for (int k = 0; k < size[2]; ++k)
         for (int j = 0; j < size[1]; ++j) {
-            int run = 0;
-            for (int i = size[0] - 1; i >= 0; --i) {
-                const auto n = static_cast<std::size_t>(seen.offset(i, j, k));
-                run = seen.data<std::uint8_t>()[n] ? std::min(run + 1, 255) : 0;
-                runs[n] = static_cast<std::uint8_t>(run);
+            const Range range = region.row(j, k, 0);
+            for (int i = range.first; i < range.last; ++i) {
+                const auto n = static_cast<std::size_t>(result.offset({i, j, k}));
+                result.seen[n] = *samples.seen(i, j, k);
+                result.values[n] = *samples.value(i, j, k);
+                if (!result.seen[n]) continue;
+                sum += double(result.values[n]);
+                ++count;
             }
         }
-    return runs;
-}
-
-std::vector<float> centred_values(const Volume& image, const Volume& seen) {
-    const float* value = image.data<float>();
-    std::vector<float> values(value, value + image.geometry.voxel_count());
-    const auto mean = static_cast<float>(cv::mean(
-        cv::Mat(1, static_cast<int>(values.size()), CV_32F, values.data()),
-        cv::Mat(1, static_cast<int>(values.size()), CV_8U, const_cast<std::uint8_t*>(seen.data<std::uint8_t>())))[0]);
-    for (float& v : values) v -= mean;
-    return values;
+    const auto mean = static_cast<float>(sum / std::max(count, 1.0));
+    for (float& value : result.values) value -= mean;
 }
 
 }  // namespace
 
-Volume seen_region(const Volume& image) {
-    Volume varies(image.geometry, CV_32FC1);
-    const cv::Mat least = over_cube(image, lower), most = over_cube(image, upper);
-    const auto total = image.geometry.voxel_count();
-    for (std::int64_t n = 0; n < total; ++n)
-        varies.data<float>()[n] = most.ptr<float>()[n] > least.ptr<float>()[n] ? 1.0F : 0.0F;
-    varies.voxels = over_cube(varies, lower);
-    return varies.as(CV_8U);
-}
-
 MatchingImage matching_image(const Volume& image, const Volume& seen, const imaging::Geometry& grid,
-                             Similarity similarity) {
-    const Volume smoothed = imaging::smooth(image, 0.4 * grid.spacing[0]);
-    const Volume values = imaging::resample(smoothed, grid, imaging::Interpolation::Linear);
-    const Volume there = imaging::resample(seen, grid, imaging::Interpolation::Nearest, 0);
+                             const SearchRegion& region, Similarity similarity) {
+    const double sigma = 0.4 * grid.spacing[0];
+    const Cut cut(image, seen, grid, GridSamples::rim * grid.spacing[0] + 4 * sigma);
+    const GridSamples samples(imaging::smooth(cut.image, sigma), cut.seen, grid, region);
     MatchingImage result{grid, {}, {}, {}};
     if (similarity == Similarity::SelfSimilarityContext) {
-        result.descriptors = self_similarity_context(values, there);
-        result.seen_run = runs_along_rows(eroded(there, descriptor_reach));
+        Descriptors descriptors = self_similarity_context(samples, grid, region);
+        result.descriptors = std::move(descriptors.channels);
+        result.seen = std::move(descriptors.seen);
     } else {
-        result.values = centred_values(values, there);
-        result.seen_run = runs_along_rows(there);
+        take_values(samples, region, result);
     }
     return result;
 }

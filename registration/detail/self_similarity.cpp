@@ -1,55 +1,30 @@
-#include "imaging/filters.hpp"
-#include "registration/detail/matching_image.hpp"
+#include "registration/detail/self_similarity.hpp"
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace tissuewarp::registration::detail {
 
-using imaging::Volume;
-
 namespace {
 
-constexpr int dilation = 2;        // voxels from the centre to the six neighbours
-constexpr double patch_sigma = 1;  // voxels, of the Gaussian window of a patch
+using Step = std::array<int, 3>;
+using Brick = SearchRegion::Brick;
 
-Voxel clamped(const Voxel& voxel, const Voxel& size) {
-    Voxel result;
-    for (std::size_t a = 0; a < 3; ++a) result[a] = std::clamp(voxel[a], 0, size[a] - 1);
-    return result;
-}
+constexpr int dilation = 2;      // voxels from the centre to the six neighbours
+constexpr int patch_radius = 4;  // voxels, where a Gaussian of one voxel has ended
 
-template <class Visit>
-void for_each_voxel(const imaging::Geometry& grid, const Visit& visit) {
-    tbb::parallel_for(0, grid.size[2], [&](int k) {
-        for (int j = 0; j < grid.size[1]; ++j)
-            for (int i = 0; i < grid.size[0]; ++i) visit(Voxel{i, j, k});
-    });
-}
-
-/// Patch distance between a voxel and the one `step` further.
-Volume patch_distance(const Volume& image, const Voxel& step) {
-    Volume squared(image.geometry, CV_32FC1);
-    const float* value = image.data<float>();
-    float* result = squared.data<float>();
-    for_each_voxel(image.geometry, [&](const Voxel& v) {
-        const Voxel w = clamped({v[0] + step[0], v[1] + step[1], v[2] + step[2]}, image.geometry.size);
-        const float difference = value[image.offset(w[0], w[1], w[2])] - value[image.offset(v[0], v[1], v[2])];
-        result[image.offset(v[0], v[1], v[2])] = difference * difference;
-    });
-    return imaging::smooth(squared, patch_sigma * image.geometry.spacing[0]);
-}
-
-/// Where a channel's patch distance is kept: in distances[pair], at a voxel `shift` away.
+/// Where a channel's patch distance is kept: in that of a pair, at a voxel `shift` away.
 struct Channel {
     std::size_t pair;
-    Voxel shift;
+    Step shift;
 };
 
 struct Pattern {
-    std::array<Voxel, 6> steps;  ///< between the two patches of a pair
+    std::array<Step, 6> steps;  ///< between the two patches of a pair
     std::array<Channel, descriptor_channels> channels;
 };
 
@@ -60,7 +35,7 @@ Pattern octahedron_edges() {
     for (std::size_t p = 0; p < 3; ++p)
         for (std::size_t q = p + 1; q < 3; ++q)
             for (const int sign : {-1, 1}) {
-                Voxel step{}, at_q{}, at_p{};
+                Step step{}, at_q{}, at_p{};
                 step[p] = dilation;
                 step[q] = sign * dilation;
                 at_q[q] = -sign * dilation;  // + step: the neighbour at +p
@@ -73,68 +48,215 @@ Pattern octahedron_edges() {
     return pattern;
 }
 
-using Distances = std::array<float, descriptor_channels>;
-
-class DistanceReader {
-public:
-    explicit DistanceReader(const Volume& image) : geometry_(image.geometry), pattern_(octahedron_edges()) {
-        for (std::size_t n = 0; n < maps_.size(); ++n) maps_[n] = patch_distance(image, pattern_.steps[n]);
+/// Half of a Gaussian window of one voxel, from its centre on; the whole sums to 1.
+std::array<float, patch_radius + 1> patch_window() {
+    std::array<double, patch_radius + 1> weights;
+    double sum = 0;
+    for (int t = 0; t <= patch_radius; ++t) {
+        weights[static_cast<std::size_t>(t)] = std::exp(-0.5 * t * t);
+        sum += (t == 0 ? 1 : 2) * weights[static_cast<std::size_t>(t)];
     }
-    [[nodiscard]] Distances at(const Voxel& v) const {
-        Distances result;
-        for (std::size_t c = 0; c < result.size(); ++c) {
-            const auto& [pair, shift] = pattern_.channels[c];
-            const Voxel w = clamped({v[0] + shift[0], v[1] + shift[1], v[2] + shift[2]}, geometry_.size);
-            result[c] = maps_[pair].data<float>()[maps_[pair].offset(w[0], w[1], w[2])];
-        }
-        return result;
+    std::array<float, patch_radius + 1> result;
+    for (std::size_t t = 0; t < result.size(); ++t) result[t] = static_cast<float>(weights[t] / sum);
+    return result;
+}
+
+/// Smooths `count` values along a line of neighbours `stride` apart.
+void smooth_along(const float* from, std::ptrdiff_t stride, int count, float* __restrict to) {
+    static const auto w = patch_window();
+    const float w0 = w[0], w1 = w[1], w2 = w[2], w3 = w[3], w4 = w[4];
+    for (int x = 0; x < count; ++x) {
+        const float* c = from + x;
+        to[x] = w0 * c[0] + w1 * (c[-stride] + c[stride]) + w2 * (c[-2 * stride] + c[2 * stride]) +
+                w3 * (c[-3 * stride] + c[3 * stride]) + w4 * (c[-4 * stride] + c[4 * stride]);
+    }
+}
+
+/// exp(−x), x ≥ 0, to 4e-5: eight bits need no more. Without calls or branches, so that compilers use vectors.
+float decay(float x) {
+    const float t = std::min(x * 1.442695F, 30.0F);  // log₂
+    const int whole = static_cast<int>(t);
+    const float y = (t - static_cast<float>(whole) - 0.5F) * 0.6931472F;
+    const float fraction = 0.7071068F * (1 - y * (1 - y * (0.5F - y * (1.0F / 6 - y * (1.0F / 24)))));
+    return fraction * std::bit_cast<float>((127 - whole) << 23);
+}
+
+/// Values over a box of rows.
+struct Box {
+    int rows = 0;              ///< along j
+    std::ptrdiff_t width = 0;  ///< along i
+    std::vector<float> values;
+
+    void shape(int along_i, int along_j, int along_k) {
+        rows = along_j;
+        width = along_i;
+        values.resize(static_cast<std::size_t>(along_i) * along_j * along_k);
+    }
+    [[nodiscard]] std::ptrdiff_t slice() const { return width * rows; }
+    [[nodiscard]] float* row(int j, int k) { return values.data() + j * width + k * slice(); }
+};
+
+struct VarianceBounds {
+    float least, most;
+};
+
+/// The descriptors of one brick after the other, in memory that is used again.
+class BrickDescriber {
+public:
+    void describe(const GridSamples& samples, const Brick& brick, const VarianceBounds& bounds,
+                  const imaging::Geometry& grid, Descriptors& result) {
+        for (std::size_t pair = 0; pair < 6; ++pair) patch_distances(samples, brick, pair);
+        mark_seen(samples, brick, grid, result.seen.data());
+        for (int k = brick.k.first; k < brick.k.last; ++k)
+            for (int j = brick.j.first; j < brick.j.last; ++j) {
+                const std::ptrdiff_t n = brick.i.first + grid.size[0] * (j + std::ptrdiff_t{grid.size[1]} * k);
+                describe_row(brick, j - brick.j.first, k - brick.k.first, bounds,
+                             result.channels.get() + n * descriptor_channels);
+            }
     }
 
 private:
-    imaging::Geometry geometry_;
-    Pattern pattern_;
-    std::array<Volume, 6> maps_;
+    const Pattern pattern_ = octahedron_edges();
+    Box along_i_, along_j_;
+    std::array<Box, 6> distances_;  ///< the brick and two voxels about it
+    std::vector<float> line_, scale_, smallest_;
+    std::vector<std::uint8_t> bytes_, seen_i_, seen_j_;
+
+    /// Squared differences of a pair, smoothed along i, j and k in turn.
+    void patch_distances(const GridSamples& samples, const Brick& brick, std::size_t pair) {
+        constexpr int wide = dilation + patch_radius;
+        const Step& step = pattern_.steps[pair];
+        const std::ptrdiff_t away = samples.offset(step[0], step[1], step[2]) - samples.offset(0, 0, 0);
+        const int width = brick.i.size() + 2 * dilation, rows = brick.j.size(), slices = brick.k.size();
+        along_i_.shape(width, rows + 2 * wide, slices + 2 * wide);
+        along_j_.shape(width, rows + 2 * dilation, slices + 2 * wide);
+        Box& distances = distances_[pair];
+        distances.shape(width, rows + 2 * dilation, slices + 2 * dilation);
+        line_.resize(static_cast<std::size_t>(width + 2 * patch_radius));
+        for (int k = 0; k < slices + 2 * wide; ++k) {
+            for (int j = 0; j < rows + 2 * wide; ++j) {
+                const float* value =
+                    samples.value(brick.i.first - wide, brick.j.first + j - wide, brick.k.first + k - wide);
+                for (std::ptrdiff_t x = 0; x < std::ssize(line_); ++x) {
+                    const float difference = value[x + away] - value[x];
+                    line_[static_cast<std::size_t>(x)] = difference * difference;
+                }
+                smooth_along(line_.data() + patch_radius, 1, width, along_i_.row(j, k));
+            }
+            for (int j = 0; j < rows + 2 * dilation; ++j)
+                smooth_along(along_i_.row(j + patch_radius, k), along_i_.width, width, along_j_.row(j, k));
+        }
+        for (int k = 0; k < slices + 2 * dilation; ++k)
+            for (int j = 0; j < rows + 2 * dilation; ++j)
+                smooth_along(along_j_.row(j, k + patch_radius), along_j_.slice(), width, distances.row(j, k));
+    }
+
+    void describe_row(const Brick& brick, int j, int k, const VarianceBounds& bounds, std::uint8_t* __restrict result) {
+        const auto width = static_cast<std::size_t>(brick.i.size());
+        scale_.assign(width, 0.0F);
+        smallest_.assign(width, std::numeric_limits<float>::max());
+        bytes_.resize(width);
+        float* __restrict scale = scale_.data();
+        float* __restrict smallest = smallest_.data();
+        std::uint8_t* __restrict bytes = bytes_.data();
+        const auto distances = [&](std::size_t c) {
+            const auto& [pair, shift] = pattern_.channels[c];
+            return distances_[pair].row(j + dilation + shift[1], k + dilation + shift[2]) + dilation + shift[0];
+        };
+        for (std::size_t c = 0; c < descriptor_channels; ++c) {
+            const float* d = distances(c);
+            for (std::size_t x = 0; x < width; ++x) {
+                scale[x] += d[x];
+                smallest[x] = std::min(smallest[x], d[x]);
+            }
+        }
+        for (std::size_t x = 0; x < width; ++x)
+            scale[x] = 1 / std::min(std::max(scale[x] / descriptor_channels, bounds.least), bounds.most);
+        for (std::size_t c = 0; c < descriptor_channels; ++c) {
+            const float* d = distances(c);
+            for (std::size_t x = 0; x < width; ++x)
+                bytes[x] =
+                    static_cast<std::uint8_t>(static_cast<int>(255 * decay((d[x] - smallest[x]) * scale[x]) + 0.5F));
+            for (std::size_t x = 0; x < width; ++x) result[x * descriptor_channels + c] = bytes[x];
+        }
+    }
+
+    /// Voxels whose cube of ± descriptor_reach is seen.
+    void mark_seen(const GridSamples& samples, const Brick& brick, const imaging::Geometry& grid,
+                   std::uint8_t* result) {
+        constexpr int reach = descriptor_reach, side = 2 * reach + 1;
+        const int width = brick.i.size(), rows = brick.j.size(), slices = brick.k.size();
+        seen_i_.resize(static_cast<std::size_t>(width) * (rows + 2 * reach) * (slices + 2 * reach));
+        seen_j_.resize(static_cast<std::size_t>(width) * rows * (slices + 2 * reach));
+        const auto least_of = [&](const std::uint8_t* from, std::ptrdiff_t stride, std::uint8_t* __restrict to) {
+            for (int x = 0; x < width; ++x) to[x] = from[x] != 0;
+            for (int t = 1; t < side; ++t)
+                for (int x = 0; x < width; ++x) to[x] &= from[x + t * stride] != 0;
+        };
+        for (int k = 0; k < slices + 2 * reach; ++k) {
+            std::uint8_t* slice = seen_i_.data() + std::ptrdiff_t{width} * (rows + 2 * reach) * k;
+            for (int j = 0; j < rows + 2 * reach; ++j)
+                least_of(samples.seen(brick.i.first - reach, brick.j.first + j - reach, brick.k.first + k - reach), 1,
+                         slice + std::ptrdiff_t{width} * j);
+            for (int j = 0; j < rows; ++j)
+                least_of(slice + std::ptrdiff_t{width} * j, width,
+                         seen_j_.data() + std::ptrdiff_t{width} * (j + std::ptrdiff_t{rows} * k));
+        }
+        for (int k = 0; k < slices; ++k)
+            for (int j = 0; j < rows; ++j)
+                least_of(seen_j_.data() + std::ptrdiff_t{width} * (j + std::ptrdiff_t{rows} * k),
+                         std::ptrdiff_t{width} * rows,
+                         result + brick.i.first +
+                             grid.size[0] * (brick.j.first + j + std::ptrdiff_t{grid.size[1]} * (brick.k.first + k)));
+    }
 };
 
-float mean_of(const Distances& distances) {
-    float sum = 0;
-    for (const float d : distances) sum += d;
-    return sum / descriptor_channels;
-}
-
-/// Mean over the seen voxels, summed slice by slice in order: the same for any number of threads.
-double mean_where_seen(const std::vector<float>& values, const Volume& seen) {
-    double sum = 0;
-    std::int64_t count = 0;
-    for (std::size_t n = 0; n < values.size(); ++n) {
-        if (!seen.data<std::uint8_t>()[n]) continue;
-        sum += double(values[n]);
-        ++count;
+/// Mean squared difference of a voxel's neighbours over every second row, where they are seen. Summed slice by slice:
+/// the same for any number of threads.
+double mean_squared_difference(const GridSamples& samples, const imaging::Geometry& grid, const SearchRegion& region) {
+    const Pattern pattern = octahedron_edges();
+    struct Sum {
+        double squares = 0, count = 0;
+    };
+    std::vector<Sum> sums(static_cast<std::size_t>(grid.size[2] + 1) / 2);
+    tbb::parallel_for(std::size_t{0}, sums.size(), [&](std::size_t slice) {
+        const int k = 2 * static_cast<int>(slice);
+        for (int j = 0; j < grid.size[1]; j += 2) {
+            const Range range = region.row(j, k, 0);
+            for (const Step& step : pattern.steps) {
+                const float *here = samples.value(0, j, k), *there = samples.value(step[0], j + step[1], k + step[2]);
+                const std::uint8_t *seen_here = samples.seen(0, j, k),
+                                   *seen_there = samples.seen(step[0], j + step[1], k + step[2]);
+                for (int i = range.first; i < range.last; ++i) {
+                    if (!seen_here[i] || !seen_there[i]) continue;
+                    const double difference = double(there[i]) - double(here[i]);
+                    sums[slice].squares += difference * difference;
+                    sums[slice].count += 1;
+                }
+            }
+        }
+    });
+    Sum all;
+    for (const Sum& sum : sums) {
+        all.squares += sum.squares;
+        all.count += sum.count;
     }
-    return count > 0 ? sum / double(count) : 0.0;
+    return all.count > 0 ? all.squares / all.count : 0.0;
 }
 
 }  // namespace
 
-std::vector<std::uint8_t> self_similarity_context(const Volume& image, const Volume& seen) {
-    const DistanceReader distances(image);
-    std::vector<float> variance(static_cast<std::size_t>(image.geometry.voxel_count()));
-    for_each_voxel(image.geometry, [&](const Voxel& v) {
-        variance[static_cast<std::size_t>(image.offset(v[0], v[1], v[2]))] = mean_of(distances.at(v));
-    });
-    const double mean = std::max(mean_where_seen(variance, seen), 1e-30);
-    const auto least = static_cast<float>(1e-3 * mean), most = static_cast<float>(1e3 * mean);
-
-    std::vector<std::uint8_t> result(variance.size() * descriptor_channels);
-    for_each_voxel(image.geometry, [&](const Voxel& v) {
-        const auto n = static_cast<std::size_t>(image.offset(v[0], v[1], v[2]));
-        const Distances d = distances.at(v);
-        const float smallest = *std::min_element(d.begin(), d.end());
-        const float scale = 1 / std::clamp(variance[n], least, most);
-        for (std::size_t c = 0; c < d.size(); ++c)
-            result[n * descriptor_channels + c] =
-                static_cast<std::uint8_t>(std::lround(255 * std::exp((smallest - d[c]) * scale)));
-    });
+Descriptors self_similarity_context(const GridSamples& samples, const imaging::Geometry& grid,
+                                    const SearchRegion& region) {
+    const double mean = std::max(mean_squared_difference(samples, grid, region), 1e-30);
+    const VarianceBounds bounds{static_cast<float>(1e-3 * mean), static_cast<float>(1e3 * mean)};
+    const auto voxels = static_cast<std::size_t>(grid.voxel_count());
+    Descriptors result{std::make_unique_for_overwrite<std::uint8_t[]>(voxels * descriptor_channels),
+                       std::vector<std::uint8_t>(voxels)};
+    tbb::enumerable_thread_specific<BrickDescriber> describers;
+    const auto bricks = region.bricks();
+    tbb::parallel_for(std::size_t{0}, bricks.size(),
+                      [&](std::size_t n) { describers.local().describe(samples, bricks[n], bounds, grid, result); });
     return result;
 }
 

@@ -7,9 +7,10 @@ namespace tissuewarp::registration::detail {
 
 constexpr int refinement_reach = 3;  ///< voxels of the level, about the neighbours' story; so far the back match looks
 
-/// Voxels about a point that a search of a given reach may look at: it walks on a little from where it began.
+/// Voxels about a point that a search of a given reach may look at: it walks on
+/// a little from where it began.
 constexpr int search_margin(int reach, int block_radius) {
-    return reach + block_radius + descriptor_reach + 2;
+    return reach + block_radius + 3;
 }
 
 struct TemplateImages {
