@@ -115,13 +115,10 @@ std::map<std::string, Setter> setters() {
             {"searches", [](UpdateOptions& o, double v) { o.image.searches = int(v); }},
             {"rounds", [](UpdateOptions& o, double v) { o.rematches = int(v); }},
             {"residual-scale", [](UpdateOptions& o, double v) { o.residual_scale_mm = v; }},
-            {"trimmed", [](UpdateOptions& o, double v) { o.image.trimmed_share = v; }},
+            {"unseen-motion", [](UpdateOptions& o, double v) { o.image.unseen_motion_mm = v; }},
             {"refinement-levels", [](UpdateOptions& o, double v) { o.image.refinement_levels = int(v); }},
-            {"levels", [](UpdateOptions& o, double v) { o.image.matching.levels = int(v); }},
-            {"grid", [](UpdateOptions& o, double v) { o.image.matching.grid_spacing_mm = v; }},
             {"least-confidence", [](UpdateOptions& o, double v) { o.image.consistency.least_confidence = v; }},
-            {"consistent-mm", [](UpdateOptions& o, double v) { o.image.consistency.most_residual_mm = v; }},
-            {"radius", [](UpdateOptions& o, double v) { o.image.matching.block_radius = int(v); }}};
+            {"consistent-mm", [](UpdateOptions& o, double v) { o.image.consistency.most_residual_mm = v; }}};
 }
 
 struct Arguments {
@@ -182,9 +179,9 @@ void run(const Arguments& arguments) {
         options.default_material =
             tled::neo_hookean_lnj(3.0, arguments.poissons_ratio > 0 ? arguments.poissons_ratio : study.poissons_ratio);
         PreparedModel prepared = prepare(study.labels, options);
-        FeatureOptions features;
-        features.count = arguments.count;
-        prepare_image(prepared, study.moving, features);
+        ImageModelOptions image_options;
+        image_options.features.count = arguments.count;
+        prepare_image(prepared, study.moving, image_options);
         for (const double value : arguments.values) {
             UpdateOptions update_options;
             update_options.device = Device::Cpu;

@@ -28,11 +28,10 @@ void ImageEvidence::search(const State& state, Observer& observer) {
 }
 
 std::vector<BlockMatch> ImageEvidence::first_search(const State& state, Observer& observer) const {
-    const ImageModel& model = *prepared_.image;
+    const MatchingTemplate& blocks = prepared_.image->blocks;
     BlockMatchingOptions matching = options_.matching;
     matching.rotation = state.placement.linear();
-    return match_blocks(model.image, fixed_, model.features.points, deformed(model.features.points, state), matching,
-                        observer);
+    return match_blocks(blocks, fixed_, deformed(blocks.points(), state), matching, observer);
 }
 
 // The image as the model deforms it differs from the fixed one by little: what changes within a block is taken out,
@@ -42,14 +41,16 @@ std::vector<BlockMatch> ImageEvidence::refined_search(const State& state, Observ
     const Deformation deformation{prepared_.model.mesh, state.displacement, state.placement};
     const imaging::Volume warped =
         warp_image(model.image, displacement_fixed_to_moving(deformation, fixed_.geometry, {}, observer));
-    const Eigen::Matrix3Xd here = deformed(model.features.points, state);
+    const Eigen::Matrix3Xd here = deformed(model.blocks.points(), state);
+    TemplateOptions blocks = model.blocks.options();
+    blocks.levels = std::min(blocks.levels, options_.refinement_levels);
     BlockMatchingOptions matching = options_.matching;
-    matching.levels = options_.refinement_levels;
     matching.search_mm = options_.refinement_mm;
-    std::vector<BlockMatch> matches = match_blocks(warped, fixed_, here, here, matching, observer);
+    std::vector<BlockMatch> matches =
+        match_blocks(MatchingTemplate(warped, here, blocks), fixed_, here, matching, observer);
     for (BlockMatch& match : matches) {  // centres of blocks are voxels near the points: back to the tissue
         const Eigen::Vector3d shift = match.moving - here.col(match.point);
-        match.moving = model.features.points.col(match.point) + state.placement.linear().transpose() * shift;
+        match.moving = model.blocks.points().col(match.point) + state.placement.linear().transpose() * shift;
     }
     return matches;
 }
@@ -118,7 +119,7 @@ Contribution ImageEvidence::contribution(const RoundPlan& plan, const State& sta
         pulls[n].stiffness *= energy_ * match.confidence * robust_weight(residuals[n], plan.scale_mm);
     }
     Contribution result;
-    result.candidates = static_cast<int>(prepared_.image->features.points.cols());
+    result.candidates = static_cast<int>(prepared_.image->blocks.points().cols());
     result.matched = static_cast<int>(matches_.size());
     double weights = 0;
     for (std::size_t n = 0; n < matches_.size(); ++n) {

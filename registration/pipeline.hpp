@@ -41,7 +41,12 @@ struct PrepareOptions {
 /// What the preoperative image shows of the tissue, to be found again in a bare intraoperative volume.
 struct ImageModel {
     imaging::Volume image;
-    FeaturePoints features;
+    MatchingTemplate blocks;
+};
+
+struct ImageModelOptions {
+    FeatureOptions features;
+    TemplateOptions blocks;
 };
 
 /// Everything that does not depend on intraoperative data.
@@ -64,25 +69,24 @@ PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions
 PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_labels, const PrepareOptions& options = {},
                       Observer& observer = silent_observer());
 
-/// Adds what registering to a bare intraoperative volume takes: feature points of the preoperative image, in and near
-/// the labels. Throws InvalidInput, Cancelled.
-void prepare_image(PreparedModel& prepared, const imaging::Volume& moving, const FeatureOptions& options = {},
+/// Adds what registering to a bare intraoperative volume takes: blocks of the preoperative image about feature points in
+/// and near the labels. Throws InvalidInput, Cancelled.
+void prepare_image(PreparedModel& prepared, const imaging::Volume& moving, const ImageModelOptions& options = {},
                    Observer& observer = silent_observer());
 
 enum class Device { Auto, Cpu, Gpu };
 
-/// How blocks of a bare volume are matched and weighed.
+/// How blocks of a bare volume are searched and weighed (docs/method.md, section 8).
 struct ImageOptions {
     BlockMatchingOptions matching;
     ConsistencyOptions consistency;
-    int searches = 2;                ///< the first about the rigid pose, the others about where the model then is
-    int refinement_levels = 2;       ///< grids of the later searches, the finest ones
-    double refinement_mm = 4.0;      ///< and their range
-    double expected_strain = 0.03;   ///< deviation of the strain of tissue as large as …
-    double strain_length_mm = 10;    ///< … this: the weight of strain energy against matches
-    double expected_motion_mm = 30;  ///< of the surface in the field of view
-    double unseen_motion_mm = 3;     ///< and out of it
-    double trimmed_share = 0.05;     ///< of the matches, dropped at the end: those the model did not follow
+    int searches = 2;                 ///< the first about the rigid pose, the others with the image as then deformed
+    int refinement_levels = 2;        ///< grids of the later searches, the finest ones
+    double refinement_mm = 4.0;       ///< and their range
+    double expected_strain = 0.15;    ///< deviation of the strain of pieces of tissue …
+    double strain_length_mm = 10;     ///< … of this size: the weight of strain energy against matches
+    double expected_motion_mm = 100;  ///< of the organ's surface in the field of view of the intraoperative image
+    double unseen_motion_mm = 1;      ///< and out of it
 };
 
 struct UpdateOptions {

@@ -69,11 +69,13 @@ PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_label
             std::move(rest),  std::move(stiffness), std::move(times), std::nullopt};
 }
 
-void prepare_image(PreparedModel& prepared, const imaging::Volume& moving, const FeatureOptions& options,
+void prepare_image(PreparedModel& prepared, const imaging::Volume& moving, const ImageModelOptions& options,
                    Observer& observer) {
     detail::Stopwatch stopwatch;
     observer.checkpoint("feature points", 0.0);
-    prepared.image = ImageModel{moving, select_feature_points(moving, imaging::mask_of_all(prepared.labels), options)};
+    const FeaturePoints features =
+        select_feature_points(moving, imaging::mask_of_all(prepared.labels), options.features);
+    prepared.image = ImageModel{moving, MatchingTemplate(moving, features.points, options.blocks)};
     prepared.times.push_back(stopwatch.lap("feature points"));
 }
 

@@ -78,7 +78,7 @@ public:
             observer_.checkpoint("registration", double(round + 1) / options_.rematches);
             if (50 * record.held_back > record.matched) continue;  // more than 2 %: the same range once more
             const bool settled = record.largest_change_mm < options_.settled_mm;
-            round = settled && round < options_.rematches - 2 ? options_.rematches - 1 : round + 1;
+            round = settled ? std::max(round + 1, next_milestone(round)) : round + 1;
         }
         result_.times.push_back({"correspondence", matching_seconds_});
         result_.times.push_back({"equilibrium", solving_seconds_});
@@ -95,14 +95,31 @@ private:
     tled::EquilibriumOptions equilibrium_;
     double step_mm_;
     detail::State state_;
+    /// Matches within the tissue are other springs than those that the model was prepared with: a factor made with them
+    /// takes a tenth of the iterations.
+    std::optional<tled::RestStiffness> metric_;
     double matching_seconds_ = 0, solving_seconds_ = 0;
 
     /// The searches for blocks are spread over the rounds: those between only weigh the matches anew.
+    [[nodiscard]] int round_of_search(int search) const {
+        return search * options_.rematches / std::max(1, options_.image.searches);
+    }
+    [[nodiscard]] bool searches_left() const {
+        return evidence_.image && evidence_.image->searches_done() < options_.image.searches;
+    }
+
+    /// Where rounds that change nothing any more go on: the next search, or the last round.
+    [[nodiscard]] int next_milestone(int round) const {
+        const int last = options_.rematches - 1;
+        if (searches_left()) return std::min(last, round_of_search(evidence_.image->searches_done()));
+        return round < last ? last : options_.rematches;
+    }
+
     void search_image(int round) {
-        if (!evidence_.image || evidence_.image->searches_done() >= options_.image.searches) return;
-        if (round * options_.image.searches < evidence_.image->searches_done() * options_.rematches) return;
+        if (!searches_left() || round < round_of_search(evidence_.image->searches_done())) return;
         detail::Stopwatch stopwatch;
         evidence_.image->search(state_, observer_);
+        metric_.reset();
         matching_seconds_ += stopwatch.lap("").seconds;
     }
 
@@ -141,8 +158,10 @@ private:
         record.mean_residual_mm = data.mean_residual_mm;
         matching_seconds_ += stopwatch.lap("").seconds;
 
+        if (evidence_.image && !metric_) metric_.emplace(prepared_.rest, conditions);
         const tled::EquilibriumResult solved =
-            tled::equilibrium(*engine_, prepared_.stiffness, conditions, equilibrium_, &state_.displacement, observer_);
+            tled::equilibrium(*engine_, metric_ ? *metric_ : prepared_.stiffness, conditions, equilibrium_,
+                              &state_.displacement, observer_);
         equilibrium_.method = solved.method;  // chosen and explained once, not in every round
         record.largest_change_mm =
             std::sqrt((solved.displacement - state_.displacement).colwise().squaredNorm().maxCoeff());

@@ -26,9 +26,10 @@ PreparedModel textured_model() {
     PrepareOptions options;
     options.meshing.edge_length = 6;
     PreparedModel prepared = prepare(labels, options);
-    FeatureOptions features;
-    features.count = 800;
-    prepare_image(prepared, sampled(labels.geometry, Texture()), features);
+    ImageModelOptions image;
+    image.features.count = 800;
+    image.blocks.grid_spacing_mm = spacing_mm;
+    prepare_image(prepared, sampled(labels.geometry, Texture()), image);
     return prepared;
 }
 
@@ -42,7 +43,6 @@ Volume after(const PreparedModel& prepared, const Eigen::Isometry3d& pose, doubl
 UpdateOptions quick() {
     UpdateOptions options;
     options.device = Device::Cpu;
-    options.image.matching.grid_spacing_mm = spacing_mm;
     options.image.matching.search_mm = 10;
     return options;
 }
