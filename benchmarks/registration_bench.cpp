@@ -1,7 +1,8 @@
 // Registration from every kind of intraoperative data against known truth, with sweeps of one option:
-//     registration_bench DATA [--case PART] [--OPTION V1,V2,…] [--mesh-edge MM] [--threads N]
+//     registration_bench DATA [--case PART] [--OPTION V1,V2,…] [--mesh-edge MM] [--poisson NU] [--count POINTS]
+//                        [--errors FOLDER]
 // DATA holds phantom-brainshift, phantom-brain-sag and lung-ct; PART selects cases whose name holds it. Errors are at
-// the landmarks or, where there is a true field, at its points in the mask.
+// the landmarks or, where there is a true field, at its points in the mask; FOLDER gets them point by point, as CSV.
 
 #include "core/errors.hpp"
 #include "imaging/image_io.hpp"
@@ -14,6 +15,7 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <map>
 #include <sstream>
@@ -110,11 +112,16 @@ std::vector<std::function<Case()>> cases(const fs::path& data, const std::string
 using Setter = std::function<void(UpdateOptions&, double)>;
 
 std::map<std::string, Setter> setters() {
-    return {{"expected-strain", [](UpdateOptions& o, double v) { o.image.expected_strain = v; }},
+    return {{"align", [](UpdateOptions& o, double v) { o.align = v != 0; }},
+            {"expected-strain", [](UpdateOptions& o, double v) { o.image.expected_strain = v; }},
             {"expected-motion", [](UpdateOptions& o, double v) { o.image.expected_motion_mm = v; }},
             {"searches", [](UpdateOptions& o, double v) { o.image.searches = int(v); }},
             {"rounds", [](UpdateOptions& o, double v) { o.rematches = int(v); }},
             {"residual-scale", [](UpdateOptions& o, double v) { o.residual_scale_mm = v; }},
+            {"least-share", [](UpdateOptions& o, double v) { o.image.matching.least_share = v; }},
+            {"search-mm", [](UpdateOptions& o, double v) { o.image.matching.search_mm = v; }},
+            {"refinement-mm", [](UpdateOptions& o, double v) { o.image.refinement_mm = v; }},
+            {"tolerance", [](UpdateOptions& o, double v) { o.equilibrium.tolerance_mm = v; }},
             {"unseen-motion", [](UpdateOptions& o, double v) { o.image.unseen_motion_mm = v; }},
             {"refinement-levels", [](UpdateOptions& o, double v) { o.image.refinement_levels = int(v); }},
             {"least-confidence", [](UpdateOptions& o, double v) { o.image.consistency.least_confidence = v; }},
@@ -122,7 +129,7 @@ std::map<std::string, Setter> setters() {
 }
 
 struct Arguments {
-    fs::path data;
+    fs::path data, errors;
     std::string part, option;
     std::vector<double> values;
     double edge_length = 0, poissons_ratio = 0;
@@ -131,7 +138,8 @@ struct Arguments {
 
 Arguments parse(int argc, char** argv) {
     if (argc < 2 || argc % 2 == 1) throw InvalidInput("see the head of registration_bench.cpp for the arguments");
-    Arguments result{argv[1], {}, {}, {}};
+    Arguments result;
+    result.data = argv[1];
     for (int n = 2; n < argc; n += 2) {
         const std::string key = argv[n], value = argv[n + 1];
         if (key == "--case") {
@@ -140,6 +148,8 @@ Arguments parse(int argc, char** argv) {
             result.edge_length = std::stod(value);
         } else if (key == "--poisson") {
             result.poissons_ratio = std::stod(value);
+        } else if (key == "--errors") {
+            result.errors = value;
         } else if (key == "--count") {
             result.count = std::stoi(value);
         } else if (key.starts_with("--") && setters().contains(key.substr(2))) {
@@ -165,7 +175,21 @@ void print_row(const std::string& name, const UpdateResult& result, const Landma
                 last.matched, last.interface_nodes, last.mean_residual_mm, result.min_jacobian, seconds);
     for (const StageTime& time : result.times) std::fprintf(stderr, "  %s %.2f s", time.stage.c_str(), time.seconds);
     std::fprintf(stderr, "\n");
+    for (const Round& round : result.rounds)
+        std::fprintf(stderr, "    matched %d of %d, residual %.3f mm, change %.3f mm, %d evaluations\n", round.matched,
+                     round.interface_nodes, round.mean_residual_mm, round.largest_change_mm, round.force_evaluations);
     std::fflush(stdout);
+}
+
+void write_errors(const fs::path& file, const Deformation& deformation, const Landmarks& targets) {
+    const Eigen::Matrix3Xd found = PointTransform(deformation)(targets.moving);
+    std::ofstream out(file);
+    out << "x,y,z,moved_mm,error_x,error_y,error_z\n";
+    for (Eigen::Index n = 0; n < found.cols(); ++n) {
+        const Eigen::Vector3d at = targets.moving.col(n), error = found.col(n) - targets.fixed.col(n);
+        out << at[0] << ',' << at[1] << ',' << at[2] << ',' << (targets.fixed.col(n) - at).norm() << ',' << error[0]
+            << ',' << error[1] << ',' << error[2] << '\n';
+    }
 }
 
 void run(const Arguments& arguments) {
@@ -196,6 +220,8 @@ void run(const Arguments& arguments) {
             const UpdateResult result = update(prepared, study.seen, update_options);
             const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
             print_row(name, result, study.targets, seconds);
+            if (!arguments.errors.empty())
+                write_errors(arguments.errors / (name + ".csv"), result.deformation, study.targets);
         }
     }
 }

@@ -1,17 +1,27 @@
 #include "registration/detail/image_evidence.hpp"
 
 #include "registration/detail/ground.hpp"
+#include "registration/detail/least_trimmed_motion.hpp"
 #include "registration/field.hpp"
 #include "registration/warp.hpp"
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace tissuewarp::registration::detail {
+
+namespace {
+
+double median_distance(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to) {
+    Eigen::VectorXd distances = (to - from).colwise().norm();
+    const auto middle = distances.begin() + distances.size() / 2;
+    std::nth_element(distances.begin(), middle, distances.end());
+    return *middle;
+}
+
+}  // namespace
 
 ImageEvidence::ImageEvidence(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options)
     : prepared_(prepared),
@@ -75,32 +85,35 @@ void ImageEvidence::use(std::vector<BlockMatch> matches) {
 }
 
 Eigen::Isometry3d ImageEvidence::rigid_motion() const {
-    constexpr double kept_share = 0.7;
-    constexpr int concentrations = 10;
-    const auto count = static_cast<Eigen::Index>(matches_.size());
-    if (count < 10)
-        throw InvalidInput("only " + std::to_string(count) +
+    constexpr std::size_t fewest = 10;
+    if (matches_.size() < fewest)
+        throw InvalidInput("only " + std::to_string(matches_.size()) +
                            " blocks of the moving image were found in the fixed one; check that they show the same "
                            "organ, and bring them within the search range of each other");
+    const auto count = static_cast<Eigen::Index>(matches_.size());
     Eigen::Matrix3Xd moving(3, count), fixed(3, count);
     for (Eigen::Index n = 0; n < count; ++n) {
         moving.col(n) = matches_[static_cast<std::size_t>(n)].moving;
         fixed.col(n) = matches_[static_cast<std::size_t>(n)].fixed;
     }
-    std::vector<Eigen::Index> kept(static_cast<std::size_t>(count));
-    std::iota(kept.begin(), kept.end(), Eigen::Index{0});
-    Eigen::Isometry3d motion;
-    for (int pass = 0; pass < concentrations; ++pass) {
-        motion = Eigen::umeyama(moving(Eigen::all, kept), fixed(Eigen::all, kept), false);
-        const Eigen::VectorXd residual = ((motion * moving) - fixed).colwise().squaredNorm();
-        kept.resize(static_cast<std::size_t>(count));
-        std::iota(kept.begin(), kept.end(), Eigen::Index{0});
-        const auto share = static_cast<std::ptrdiff_t>(kept_share * double(count));
-        std::nth_element(kept.begin(), kept.begin() + share, kept.end(),
-                         [&](Eigen::Index a, Eigen::Index b) { return residual[a] < residual[b]; });
-        kept.resize(static_cast<std::size_t>(share));
+    if (view_share() < 0.9 && median_distance(moving, fixed) < options_.headers_within_mm)
+        return Eigen::Isometry3d::Identity();
+    return least_trimmed_motion(moving, fixed);
+}
+
+bool ImageEvidence::in_view(const Eigen::Vector3d& point) const {
+    constexpr double margin_mm = 10;  // tissue may have come from outside of what is shown now
+    return view_.distance(point) < margin_mm;
+}
+
+double ImageEvidence::view_share() const {
+    double all = 0, seen = 0;
+    for (const InterfaceNode& node : prepared_.interfaces.nodes()) {
+        if (node.outer != 0) continue;
+        all += node.area;
+        if (in_view(prepared_.model.mesh.nodes.col(node.node))) seen += node.area;
     }
-    return motion;
+    return all > 0 ? seen / all : 0;
 }
 
 Contribution ImageEvidence::contribution(const RoundPlan& plan, const State& state) const {
@@ -128,10 +141,9 @@ Contribution ImageEvidence::contribution(const RoundPlan& plan, const State& sta
     }
     if (weights > 0) result.mean_residual_mm /= weights;
     result.conditions.springs = lumped_springs(mesh, pulls, state.displacement);
-    constexpr double view_margin_mm = 10;  // tissue may have come from outside of what is shown now
     const auto expected_motion = [&](const InterfaceNode& node) {
-        const Eigen::Vector3d place = state.placement * Eigen::Vector3d(mesh.nodes.col(node.node));
-        return view_.distance(place) < view_margin_mm ? options_.expected_motion_mm : options_.unseen_motion_mm;
+        const bool seen = in_view(state.placement * Eigen::Vector3d(prepared_.model.mesh.nodes.col(node.node)));
+        return seen ? options_.expected_motion_mm : options_.unseen_motion_mm;
     };
     for (const tled::Spring& spring : ground_springs(prepared_, energy_, expected_motion))
         result.conditions.springs.push_back(spring);

@@ -73,7 +73,7 @@ private:
 struct BlockMatchingOptions {
     int skipped_levels = 0;        ///< coarse levels left out: a prediction good to a few mm needs none of them
     double search_mm = 16.0;       ///< range of the first level about the predicted position, along each axis
-    double least_share = 0.35;     ///< share of a block that both images must show
+    double least_share = 0.05;     ///< share of a block that both images must show
     double back_match_voxels = 1;  ///< standard deviation of the back-match error in the confidence
     Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< moving → fixed, that the predicted positions contain
 };

@@ -69,8 +69,8 @@ PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions
 PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_labels, const PrepareOptions& options = {},
                       Observer& observer = silent_observer());
 
-/// Adds what registering to a bare intraoperative volume takes: blocks of the preoperative image about feature points in
-/// and near the labels. Throws InvalidInput, Cancelled.
+/// Adds what registering to a bare intraoperative volume takes: blocks of the preoperative image about feature points
+/// in and near the labels. Throws InvalidInput, Cancelled.
 void prepare_image(PreparedModel& prepared, const imaging::Volume& moving, const ImageModelOptions& options = {},
                    Observer& observer = silent_observer());
 
@@ -83,10 +83,11 @@ struct ImageOptions {
     int searches = 2;                 ///< the first about the rigid pose, the others with the image as then deformed
     int refinement_levels = 2;        ///< grids of the later searches, the finest ones
     double refinement_mm = 4.0;       ///< and their range
-    double expected_strain = 0.15;    ///< deviation of the strain of pieces of tissue …
+    double expected_strain = 0.1;     ///< deviation of the strain of pieces of tissue …
     double strain_length_mm = 10;     ///< … of this size: the weight of strain energy against matches
     double expected_motion_mm = 100;  ///< of the organ's surface in the field of view of the intraoperative image
     double unseen_motion_mm = 1;      ///< and out of it
+    double headers_within_mm = 15;    ///< the headers place an organ, part of which is out of view, closer than this
 };
 
 struct UpdateOptions {

@@ -16,7 +16,9 @@ public:
     void search(const State& state, Observer& observer);
     /// Takes matches that were found before.
     void use(std::vector<BlockMatch> matches);
-    /// The rigid motion that the matches found agree on: what is left of them is for the tissue.
+    /// The rigid motion that most matches agree on, the rest of them is for the tissue. Where part of the organ is out
+    /// of view, a deformation of the part in view would turn it as a whole: then none, unless the headers are far off.
+    /// Throws InvalidInput when too few blocks were found.
     [[nodiscard]] Eigen::Isometry3d rigid_motion() const;
     /// Pulls of the matches on the nodes.
     [[nodiscard]] Contribution contribution(const RoundPlan& plan, const State& state) const;
@@ -35,6 +37,10 @@ private:
     std::vector<BlockMatch> matches_;
     std::vector<meshing::Location> places_;  // of the matches, in the mesh
 
+    /// Whether the fixed image could show tissue at a point of its frame.
+    [[nodiscard]] bool in_view(const Eigen::Vector3d& point) const;
+    /// Of the organ's outer surface, where the headers place it.
+    [[nodiscard]] double view_share() const;
     [[nodiscard]] std::vector<BlockMatch> first_search(const State& state, Observer& observer) const;
     [[nodiscard]] std::vector<BlockMatch> refined_search(const State& state, Observer& observer) const;
     /// Where points of the moving image are in the fixed one.
