@@ -3,11 +3,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace tissuewarp::registration::detail {
 
@@ -63,23 +60,6 @@ private:
 };
 
 }  // namespace
-
-std::vector<std::vector<int>> nearest_neighbours(const Eigen::Matrix3Xd& points, int count) {
-    const Eigen::Index total = points.cols();
-    std::vector<std::vector<int>> result(static_cast<std::size_t>(total));
-    const auto kept = static_cast<std::ptrdiff_t>(std::min<Eigen::Index>(count, total - 1));
-    tbb::parallel_for(Eigen::Index{0}, total, [&](Eigen::Index p) {
-        std::vector<std::pair<double, int>> others;
-        others.reserve(static_cast<std::size_t>(total));
-        for (Eigen::Index n = 0; n < total; ++n)
-            if (n != p) others.emplace_back((points.col(n) - points.col(p)).squaredNorm(), static_cast<int>(n));
-        std::nth_element(others.begin(), others.begin() + kept, others.end());
-        std::sort(others.begin(), others.begin() + kept);
-        for (std::ptrdiff_t n = 0; n < kept; ++n)
-            result[static_cast<std::size_t>(p)].push_back(others[static_cast<std::size_t>(n)].second);
-    });
-    return result;
-}
 
 LocalMotion fit_local_affine(const ScatteredMotion& motion, const Eigen::Vector3d& point,
                              const std::vector<int>& neighbours, double trimmed_share) {

@@ -1,0 +1,101 @@
+#include "registration/detail/local_affine.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <numeric>
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+/// A balanced k-d tree (Bentley 1975) over columns, kept as a permutation of them.
+class ColumnTree {
+public:
+    explicit ColumnTree(const Eigen::Matrix3Xd& points)
+        : points_(points), order_(static_cast<std::size_t>(points.cols())) {
+        std::iota(order_.begin(), order_.end(), 0);
+        build(0, order_.size(), 0);
+    }
+
+    /// The nearest others of a column, by distance and then by index.
+    [[nodiscard]] std::vector<int> nearest(int column, std::size_t count) const {
+        Search search{points_.col(column), column, count, {}};
+        if (count > 0) gather(search, 0, order_.size(), 0);
+        std::sort_heap(search.found.begin(), search.found.end());
+        std::vector<int> result;
+        for (const auto& [distance, other] : search.found) result.push_back(other);
+        return result;
+    }
+
+private:
+    static constexpr std::size_t leaf = 8;
+    const Eigen::Matrix3Xd& points_;
+    std::vector<int> order_;
+
+    struct Search {
+        Eigen::Vector3d query;
+        int self;
+        std::size_t count;
+        std::vector<std::pair<double, int>> found;  // a heap of squared distances, the largest first
+    };
+
+    void build(std::size_t first, std::size_t last, int axis) {
+        if (last - first <= leaf) return;
+        const std::size_t middle = first + (last - first) / 2;
+        const auto at = [&](std::size_t n) { return order_.begin() + static_cast<std::ptrdiff_t>(n); };
+        std::nth_element(at(first), at(middle), at(last),
+                         [&](int a, int b) { return points_(axis, a) < points_(axis, b); });
+        build(first, middle, (axis + 1) % 3);
+        build(middle + 1, last, (axis + 1) % 3);
+    }
+
+    void offer(Search& search, std::size_t n) const {
+        const int other = order_[n];
+        if (other == search.self) return;
+        const std::pair<double, int> candidate{(points_.col(other) - search.query).squaredNorm(), other};
+        if (search.found.size() == search.count) {
+            if (!(candidate < search.found.front())) return;
+            std::pop_heap(search.found.begin(), search.found.end());
+            search.found.pop_back();
+        }
+        search.found.push_back(candidate);
+        std::push_heap(search.found.begin(), search.found.end());
+    }
+
+    void gather(Search& search, std::size_t first, std::size_t last, int axis) const {
+        if (last - first <= leaf) {
+            for (std::size_t n = first; n < last; ++n) offer(search, n);
+            return;
+        }
+        const std::size_t middle = first + (last - first) / 2;
+        offer(search, middle);
+        const double offset = search.query[axis] - points_(axis, order_[middle]);
+        const int next = (axis + 1) % 3;
+        const auto below = [&] { gather(search, first, middle, next); };
+        const auto above = [&] { gather(search, middle + 1, last, next); };
+        if (offset < 0.0)
+            below();
+        else
+            above();
+        const bool full = search.found.size() == search.count;
+        if (full && offset * offset > search.found.front().first) return;
+        if (offset < 0.0)
+            above();
+        else
+            below();
+    }
+};
+
+}  // namespace
+
+std::vector<std::vector<int>> nearest_neighbours(const Eigen::Matrix3Xd& points, int count) {
+    const ColumnTree tree(points);
+    std::vector<std::vector<int>> result(static_cast<std::size_t>(points.cols()));
+    tbb::parallel_for(std::size_t{0}, result.size(), [&](std::size_t n) {
+        result[n] = tree.nearest(static_cast<int>(n), static_cast<std::size_t>(std::max(count, 0)));
+    });
+    return result;
+}
+
+}  // namespace tissuewarp::registration::detail
