@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
+#include <limits>
 
 namespace tissuewarp::registration::detail {
 
@@ -120,7 +122,8 @@ private:
     Box along_i_, along_j_;
     std::array<Box, 6> distances_;  ///< the brick and two voxels about it
     std::vector<float> line_, scale_, smallest_;
-    std::vector<std::uint8_t> bytes_, seen_i_, seen_j_;
+    std::vector<std::uint32_t> bytes_;
+    std::vector<std::uint8_t> seen_i_, seen_j_;
 
     /// Squared differences of a pair, smoothed along i, j and k in turn.
     void patch_distances(const GridSamples& samples, const Brick& brick, std::size_t pair) {
@@ -158,7 +161,6 @@ private:
         bytes_.resize(width);
         float* __restrict scale = scale_.data();
         float* __restrict smallest = smallest_.data();
-        std::uint8_t* __restrict bytes = bytes_.data();
         const auto distances = [&](std::size_t c) {
             const auto& [pair, shift] = pattern_.channels[c];
             return distances_[pair].row(j + dilation + shift[1], k + dilation + shift[2]) + dilation + shift[0];
@@ -172,12 +174,23 @@ private:
         }
         for (std::size_t x = 0; x < width; ++x)
             scale[x] = 1 / std::min(std::max(scale[x] / descriptor_channels, bounds.least), bounds.most);
-        for (std::size_t c = 0; c < descriptor_channels; ++c) {
-            const float* d = distances(c);
-            for (std::size_t x = 0; x < width; ++x)
-                bytes[x] =
-                    static_cast<std::uint8_t>(static_cast<int>(255 * decay((d[x] - smallest[x]) * scale[x]) + 0.5F));
-            for (std::size_t x = 0; x < width; ++x) result[x * descriptor_channels + c] = bytes[x];
+        for (std::size_t c = 0; c < descriptor_channels; c += 4) {  // four bytes at a time
+            std::fill(bytes_.begin(), bytes_.end(), 0U);
+            for (std::size_t part = 0; part < 4; ++part)
+                add_levels(distances(c + part), smallest, scale, static_cast<int>(8 * part));
+            for (std::size_t x = 0; x < width; ++x) std::memcpy(result + x * descriptor_channels + c, &bytes_[x], 4);
+        }
+    }
+
+    /// Eight bits of exp((smallest − d) scale), moved up by `place` bits.
+    void add_levels(const float* __restrict d, const float* __restrict smallest, const float* __restrict scale,
+                    int place) {
+        std::uint32_t* __restrict bytes = bytes_.data();
+        const auto unit = static_cast<std::uint32_t>(1) << place;
+        const std::size_t width = bytes_.size();
+        for (std::size_t x = 0; x < width; ++x) {
+            const int level = static_cast<int>(255 * decay((d[x] - smallest[x]) * scale[x]) + 0.5F);
+            bytes[x] += static_cast<std::uint32_t>(level) * unit;
         }
     }
 
