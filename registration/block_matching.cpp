@@ -10,11 +10,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 namespace tissuewarp::registration {
 
 using detail::Block;
+using detail::BlockCosts;
 using detail::CostLattice;
 using detail::MatchingImage;
 using detail::Voxel;
@@ -22,9 +24,11 @@ using imaging::Volume;
 
 namespace {
 
-constexpr int most_steps = 8;              // downhill, from the lowest place of the lattice
-constexpr double independent_share = 0.1;  // of a block's voxels: the others repeat them (docs/method.md)
-constexpr double least_deviation = 0.05;   // voxels: what interpolation leaves of the best match
+constexpr int first_look = 3;                // every third row of a block, over the whole lattice
+constexpr std::size_t candidate_share = 20;  // one place in so many is then compared in full
+constexpr int most_steps = 8;                // downhill
+constexpr double independent_share = 0.1;    // of a block's voxels: the others repeat them (docs/method.md)
+constexpr double least_deviation = 0.05;     // voxels: what interpolation leaves of the best match
 
 Voxel nearest_voxel(const imaging::Geometry& grid, const Eigen::Vector3d& point) {
     const Eigen::Vector3d index = grid.index(point);
@@ -38,10 +42,6 @@ Voxel nearest_voxel(const imaging::Geometry& grid, const Eigen::Vector3d& point)
 
 Eigen::Vector3d as_vector(const Voxel& v) {
     return {double(v[0]), double(v[1]), double(v[2])};
-}
-
-Voxel sum(const Voxel& a, const Voxel& b) {
-    return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
 }
 
 /// A minimum of the cost over a lattice.
@@ -69,7 +69,7 @@ double uniqueness(const CostLattice& lattice, const Minimum& minimum) {
     bool found = false;
     for (std::size_t n = 0; n < lattice.costs.size(); ++n) {
         if (!std::isfinite(lattice.costs[n])) continue;
-        const Eigen::Vector3d away = as_vector(sum(lattice.centre, lattice.displacement(n))) - as_vector(minimum.at);
+        const Eigen::Vector3d away = as_vector(lattice.place(n)) - as_vector(minimum.at);
         if (0.5 * away.dot(minimum.fit.hessian * away) <= mean_rise) continue;
         const double rise = lattice.costs[n] - minimum.cost;
         least = found ? std::min(least, rise) : rise;
@@ -78,35 +78,58 @@ double uniqueness(const CostLattice& lattice, const Minimum& minimum) {
     return found && mean_rise > 0 ? std::clamp(least / mean_rise, 0.0, 1.0) : 0.0;
 }
 
-/// Walks from a lattice point to the lowest of its 27 until that is itself, then fits.
-std::optional<Minimum> descend(const MatchingImage& moving, const MatchingImage& fixed, const Block& block, Voxel at) {
+/// The lowest place of a lattice; none when nothing of it is seen.
+std::optional<Voxel> lowest_of(const CostLattice& lattice) {
+    const auto lowest = std::min_element(lattice.costs.begin(), lattice.costs.end());
+    if (!std::isfinite(*lowest)) return std::nullopt;
+    return lattice.place(static_cast<std::size_t>(lowest - lattice.costs.begin()));
+}
+
+/// The lowest place by all rows of the block, among those that the first look puts lowest. Along an edge many places
+/// are nearly as low, and the one that a few rows prefer is no minimum of all of them.
+std::optional<Voxel> lowest_of_candidates(BlockCosts& costs, const CostLattice& first) {
+    std::vector<std::pair<double, std::size_t>> ranked;
+    for (std::size_t n = 0; n < first.costs.size(); ++n)
+        if (std::isfinite(first.costs[n])) ranked.emplace_back(first.costs[n], n);
+    const std::size_t count = std::min(ranked.size(), 1 + first.costs.size() / candidate_share);
+    std::partial_sort(ranked.begin(), ranked.begin() + static_cast<std::ptrdiff_t>(count), ranked.end());
+    std::optional<Voxel> lowest;
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t n = 0; n < count; ++n) {
+        const Voxel place = first.place(ranked[n].second);
+        const double cost = costs.lattice(place, 0, 1).costs[0];
+        if (cost < least) lowest = place;
+        least = std::min(least, cost);
+    }
+    return lowest;
+}
+
+/// Walks from a place to the lowest of its 27 until that is itself. Returns the costs about it.
+std::optional<CostLattice> descend(BlockCosts& costs, Voxel at) {
     for (int step = 0; step < most_steps; ++step) {
-        const CostLattice near = detail::cost_lattice(moving, fixed, block, at, 1);
-        const auto lowest =
-            static_cast<std::size_t>(std::min_element(near.costs.begin(), near.costs.end()) - near.costs.begin());
-        if (near.costs[lowest] < near.costs[13]) {
-            at = sum(at, near.displacement(lowest));
-            continue;
-        }
-        std::array<double, 27> costs{};
-        std::copy(near.costs.begin(), near.costs.end(), costs.begin());
-        const auto fit = detail::fit_quadratic(costs);
-        if (!fit) return std::nullopt;
-        return Minimum{at, costs[13], 0, *fit};
+        const CostLattice near = costs.lattice(at, 1, 1);
+        const auto lowest = lowest_of(near);
+        if (!lowest) return std::nullopt;
+        if (!(near.cost(*lowest) < near.cost(at))) return near;
+        at = *lowest;
     }
     return std::nullopt;
 }
 
 std::optional<Minimum> find_block(const MatchingImage& moving, const MatchingImage& fixed, const Block& block,
                                   const Voxel& start, int reach) {
-    Block coarse = block;
-    coarse.stride = 2;
-    const CostLattice lattice = detail::cost_lattice(moving, fixed, coarse, start, reach);
-    const auto lowest =
-        static_cast<std::size_t>(std::min_element(lattice.costs.begin(), lattice.costs.end()) - lattice.costs.begin());
-    if (!std::isfinite(lattice.costs[lowest])) return std::nullopt;
-    auto minimum = descend(moving, fixed, block, sum(start, lattice.displacement(lowest)));
-    if (minimum) minimum->uniqueness = uniqueness(lattice, *minimum);
+    BlockCosts costs(moving, fixed, block, start, reach + 1);
+    const CostLattice lattice = costs.lattice(start, reach, first_look);
+    const auto lowest = lowest_of_candidates(costs, lattice);
+    if (!lowest) return std::nullopt;
+    const auto near = descend(costs, *lowest);
+    if (!near) return std::nullopt;
+    std::array<double, 27> about{};
+    std::copy(near->costs.begin(), near->costs.end(), about.begin());
+    const auto fit = detail::fit_quadratic(about);
+    if (!fit) return std::nullopt;
+    Minimum minimum{near->centre, about[13], 0, *fit};
+    minimum.uniqueness = uniqueness(lattice, minimum);
     return minimum;
 }
 
@@ -114,8 +137,8 @@ std::optional<Minimum> find_block(const MatchingImage& moving, const MatchingIma
 /// should lie where the first one lay.
 std::optional<double> back_match(const MatchingImage& moving, const MatchingImage& fixed, const Block& block,
                                  const Minimum& forward) {
-    const auto back = find_block(fixed, moving, {forward.at, block.radius, block.least_share}, block.centre,
-                                 detail::refinement_reach);
+    const auto back =
+        find_block(fixed, moving, {forward.at, block.radius, block.least_share}, block.centre, detail::back_reach);
     if (!back) return std::nullopt;
     const Eigen::Vector3d error = back->index() - as_vector(block.centre) + forward.fit.minimum;
     return std::sqrt(error.dot(forward.fit.hessian * error) / forward.fit.hessian.operatorNorm());
@@ -151,6 +174,19 @@ double mean_certainty(const std::vector<BlockMatch>& matches) {
     return total / double(matches.size());
 }
 
+/// Points by cubes of 16 mm: those searched one after the other find the image in the cache.
+std::vector<std::size_t> near_after_near(const Eigen::Matrix3Xd& points) {
+    std::vector<std::pair<std::array<double, 3>, std::size_t>> cubes(static_cast<std::size_t>(points.cols()));
+    for (std::size_t n = 0; n < cubes.size(); ++n) {
+        const Eigen::Vector3d point = points.col(static_cast<Eigen::Index>(n)) / 16;
+        cubes[n] = {{std::floor(point[2]), std::floor(point[1]), std::floor(point[0])}, n};
+    }
+    std::sort(cubes.begin(), cubes.end());
+    std::vector<std::size_t> order;
+    for (const auto& [cube, n] : cubes) order.push_back(n);
+    return order;
+}
+
 /// The whole search: the template's points that may be seen, and where they are expected.
 class BlockSearch {
 public:
@@ -162,7 +198,8 @@ public:
           points_(points),
           predicted_(predicted),
           options_(options),
-          neighbours_(detail::nearest_neighbours(points, story_.neighbours)) {}
+          neighbours_(detail::nearest_neighbours(points, story_.neighbours)),
+          order_(near_after_near(points)) {}
 
     std::vector<BlockMatch> run(Observer& observer) {
         std::vector<BlockMatch> best;
@@ -189,6 +226,7 @@ private:
     const BlockMatchingOptions& options_;
     const ConsistencyOptions story_{};  // what neighbours must agree on, between levels as afterwards
     std::vector<std::vector<int>> neighbours_;
+    std::vector<std::size_t> order_;
 
     /// The fixed image along the axes of the moving grid, turned: descriptors depend on the direction.
     [[nodiscard]] Level prepare(int level) const {
@@ -196,6 +234,11 @@ private:
         const double spacing = moving.grid.spacing[0];
         const bool first = level == options_.skipped_levels;
         const int reach = first ? static_cast<int>(std::ceil(options_.search_mm / spacing)) : detail::refinement_reach;
+        const int most = (detail::most_row_voxels - 1) / 2 - moving_.options.block_radius - 1;
+        if (reach > most)
+            throw InvalidInput("block matching: a search of " + std::to_string(options_.search_mm) + " mm is " +
+                               std::to_string(reach) + " voxels of the first level, more than " + std::to_string(most) +
+                               "; take more levels or a coarser grid");
         const int margin = detail::search_margin(reach, moving_.options.block_radius);
         const imaging::Geometry grid =
             detail::grid_about(predicted_, options_.rotation * moving.grid.direction, spacing, margin * spacing);
@@ -206,7 +249,8 @@ private:
     /// One entry per point; `point` stays −1 where the block was not found.
     [[nodiscard]] std::vector<BlockMatch> match(const Level& level) const {
         std::vector<BlockMatch> matches(static_cast<std::size_t>(points_.cols()));
-        tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t n) {
+        tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t place) {
+            const std::size_t n = order_[place];
             if (const auto found = match_point(level, static_cast<Eigen::Index>(n))) matches[n] = *found;
         });
         return matches;

@@ -1,8 +1,8 @@
 #include "registration/detail/block_cost.hpp"
 
-#include "registration/detail/block_window.hpp"
-
+#include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 
 namespace tissuewarp::registration::detail {
@@ -10,50 +10,27 @@ namespace tissuewarp::registration::detail {
 namespace {
 
 constexpr double nowhere = std::numeric_limits<double>::infinity();
-constexpr double squared_range = 255.0 * 255.0;
+constexpr double full_difference = 255.0 * 255.0 * descriptor_channels;
+
+/// The first of every `stride`-th row, from the edge of the block: as many are left out at its other edge, if it can
+/// be.
+int first_row(const Block& block, int stride) {
+    return 2 * block.radius % stride / 2;
+}
 
 /// Voxels that the rows of a block hold when all are seen.
-double voxels_of(const Block& block) {
-    const int side = 2 * block.radius + 1, rows = (side + block.stride - 1) / block.stride;
+double voxels_of(const Block& block, int stride) {
+    const int side = 2 * block.radius + 1, rows = (side + stride - 1) / stride;
     return double(side) * rows * rows;
 }
 
-/// Rows of costs along i, for the places (j, k) of a lattice of descriptors.
-class DescriptorCosts {
-public:
-    DescriptorCosts(const MatchingImage& moving, const MatchingImage& fixed, const Block& block, const Voxel& centre,
-                    int reach)
-        : least_(std::max(1.0, block.least_share * voxels_of(block)) * descriptor_channels),
-          all_(voxels_of(block) * descriptor_channels),
-          block_(moving, corner(block.centre, block.radius), 2 * block.radius + 1),
-          window_(fixed, corner(centre, block.radius + reach), 2 * (block.radius + reach) + 1),
-          comparison_{2 * block.radius + 1, block.stride, (2 * block.radius + 1) * descriptor_channels, 2 * reach + 1,
-                      descriptor_channels},
-          differences_(static_cast<std::size_t>(2 * reach + 1)),
-          counts_(differences_.size()) {}
+Voxel corner(const Voxel& centre, int radius) {
+    return {centre[0] - radius, centre[1] - radius, centre[2] - radius};
+}
 
-    void row(int j, int k, double* costs) {
-        if (block_.whole() && window_.whole())
-            whole_squared_differences(block_.rows(0, 0), window_.rows(j, k), comparison_, differences_.data());
-        else
-            masked_squared_differences(block_.rows(0, 0), window_.rows(j, k), comparison_, differences_.data(),
-                                       counts_.data());
-        for (std::size_t i = 0; i < differences_.size(); ++i) {
-            const double count = window_.whole() && block_.whole() ? all_ : double(counts_[i]) / squared_range;
-            costs[i] = count < least_ ? nowhere : double(differences_[i]) / (squared_range * count);
-        }
-    }
-
-private:
-    double least_, all_;  // bytes
-    BlockWindow block_, window_;
-    RowComparison comparison_;
-    std::vector<std::int64_t> differences_, counts_;
-
-    static Voxel corner(const Voxel& centre, int radius) {
-        return {centre[0] - radius, centre[1] - radius, centre[2] - radius};
-    }
-};
+int distance(const Voxel& a, const Voxel& b) {
+    return std::max({std::abs(a[0] - b[0]), std::abs(a[1] - b[1]), std::abs(a[2] - b[2])});
+}
 
 struct CorrelationSums {
     double m = 0, f = 0, mm = 0, ff = 0, mf = 0;
@@ -80,12 +57,13 @@ bool on_grid(const MatchingImage& image, int j, int k) {
     return j >= 0 && j < image.grid.size[1] && k >= 0 && k < image.grid.size[2];
 }
 
-double correlation_cost(const MatchingImage& moving, const MatchingImage& fixed, const Block& block, const Voxel& at) {
+double correlation_cost(const MatchingImage& moving, const MatchingImage& fixed, const Block& block, int stride,
+                        const Voxel& at) {
     CorrelationSums sums;
     const int r = block.radius, first = std::max({-r, -block.centre[0], -at[0]}),
               last = std::min({r, moving.grid.size[0] - 1 - block.centre[0], fixed.grid.size[0] - 1 - at[0]});
-    for (int dk = -r; dk <= r; dk += block.stride)
-        for (int dj = -r; dj <= r; dj += block.stride) {
+    for (int dk = first_row(block, stride) - r; dk <= r; dk += stride)
+        for (int dj = first_row(block, stride) - r; dj <= r; dj += stride) {
             const Voxel m{block.centre[0] + first, block.centre[1] + dj, block.centre[2] + dk};
             const Voxel f{at[0] + first, at[1] + dj, at[2] + dk};
             if (!on_grid(moving, m[1], m[2]) || !on_grid(fixed, f[1], f[2])) continue;
@@ -93,29 +71,62 @@ double correlation_cost(const MatchingImage& moving, const MatchingImage& fixed,
             for (int n = first; n <= last; ++n, ++a, ++b)
                 if (moving.seen[a] && fixed.seen[b]) sums.add(moving.values[a], fixed.values[b]);
         }
-    return double(sums.voxels) < std::max(1.0, block.least_share * voxels_of(block)) ? nowhere : sums.cost();
+    return double(sums.voxels) < std::max(1.0, block.least_share * voxels_of(block, stride)) ? nowhere : sums.cost();
 }
 
 }  // namespace
 
-CostLattice cost_lattice(const MatchingImage& moving, const MatchingImage& fixed, const Block& block,
-                         const Voxel& centre, int reach) {
-    CostLattice lattice{centre, reach, {}};
-    const int side = lattice.side();
-    lattice.costs.resize(static_cast<std::size_t>(side) * side * side);
-    if (!moving.descriptors) {
-        for (std::size_t n = 0; n < lattice.costs.size(); ++n) {
-            const Voxel d = lattice.displacement(n);
-            lattice.costs[n] =
-                correlation_cost(moving, fixed, block, {centre[0] + d[0], centre[1] + d[1], centre[2] + d[2]});
+BlockCosts::BlockCosts(const MatchingImage& moving, const MatchingImage& fixed, const Block& block, const Voxel& centre,
+                       int reach)
+    : moving_(moving), fixed_(fixed), block_(block), centre_(centre), reach_(reach) {
+    if (!moving.descriptors) return;
+    shown_.emplace(moving, corner(block.centre, block.radius), 2 * block.radius + 1);
+    look_at(centre, reach);
+}
+
+void BlockCosts::look_at(const Voxel& centre, int reach) {
+    centre_ = centre;
+    reach_ = reach;
+    window_.emplace(fixed_, corner(centre, block_.radius + reach), 2 * (block_.radius + reach) + 1);
+}
+
+CostLattice BlockCosts::lattice(const Voxel& centre, int reach, int stride) {
+    CostLattice result{centre, reach, {}};
+    const auto side = static_cast<std::size_t>(result.side());
+    result.costs.resize(side * side * side);
+    if (moving_.descriptors)
+        descriptor_costs(result, stride);
+    else
+        correlation_costs(result, stride);
+    return result;
+}
+
+void BlockCosts::descriptor_costs(CostLattice& lattice, int stride) {
+    if (distance(lattice.centre, centre_) + lattice.reach > reach_) look_at(lattice.centre, lattice.reach);
+    const int shifts = lattice.side();
+    const RowComparison comparison{2 * block_.radius + 1, first_row(block_, stride), stride, shifts,
+                                   descriptor_channels};
+    const double least = std::max(1.0, block_.least_share * voxels_of(block_, stride));
+    differences_.resize(static_cast<std::size_t>(shifts));
+    voxels_.resize(differences_.size());
+    Voxel first;
+    for (std::size_t a = 0; a < 3; ++a) first[a] = reach_ + lattice.centre[a] - centre_[a] - lattice.reach;
+    double* cost = lattice.costs.data();
+    for (int k = 0; k < shifts; ++k)
+        for (int j = 0; j < shifts; ++j) {
+            squared_differences(shown_->rows({0, 0, 0}), window_->rows({first[0], first[1] + j, first[2] + k}),
+                                comparison, differences_.data(), voxels_.data());
+            for (std::size_t i = 0; i < voxels_.size(); ++i)
+                *cost++ = double(voxels_[i]) < least ? nowhere
+                                                     : double(differences_[i]) / (full_difference * double(voxels_[i]));
         }
-        return lattice;
+}
+
+void BlockCosts::correlation_costs(CostLattice& lattice, int stride) const {
+    for (std::size_t n = 0; n < lattice.costs.size(); ++n) {
+        const Voxel d = lattice.displacement(n), &c = lattice.centre;
+        lattice.costs[n] = correlation_cost(moving_, fixed_, block_, stride, {c[0] + d[0], c[1] + d[1], c[2] + d[2]});
     }
-    DescriptorCosts costs(moving, fixed, block, centre, reach);
-    double* row = lattice.costs.data();
-    for (int k = 0; k < side; ++k)
-        for (int j = 0; j < side; ++j, row += side) costs.row(j, k, row);
-    return lattice;
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -1,7 +1,9 @@
 #pragma once
-/// The cost of placing a block of the moving image somewhere in the fixed one, over a lattice of displacements.
+/// The cost of placing a block of the moving image somewhere in the fixed one, over lattices of displacements.
 
-#include "registration/detail/matching_image.hpp"
+#include "registration/detail/block_window.hpp"
+
+#include <optional>
 
 namespace tissuewarp::registration::detail {
 
@@ -9,13 +11,9 @@ struct Block {
     Voxel centre{0, 0, 0};     ///< voxel of the moving grid
     int radius = 4;            ///< voxels: the block has 2 radius + 1 along each axis
     double least_share = 0.5;  ///< of its voxels, that must be seen in both images
-    int stride = 1;            ///< rows looked at along j and k: 2 takes a quarter of the time for a first look
 };
 
-/// Costs on the cube of ± reach voxels about a centre, i fastest. A cost is the mean squared difference between the
-/// block and its like about a voxel of the fixed grid, over the voxels seen in both; infinity when they are less than
-/// the least share. SelfSimilarityContext: of descriptors, over channels, 0..1. CrossCorrelation: 2 (1 − r), which is
-/// the mean squared difference of blocks brought to mean 0 and variance 1.
+/// Costs on the cube of ± reach voxels about a centre, i fastest.
 struct CostLattice {
     Voxel centre{0, 0, 0};
     int reach = 0;
@@ -27,9 +25,44 @@ struct CostLattice {
         const int m = static_cast<int>(n), s = side();
         return {m % s - reach, m / s % s - reach, m / (s * s) - reach};
     }
+    /// The voxel of an entry.
+    [[nodiscard]] Voxel place(std::size_t n) const {
+        const Voxel d = displacement(n);
+        return {centre[0] + d[0], centre[1] + d[1], centre[2] + d[2]};
+    }
+    /// At a voxel within the lattice.
+    [[nodiscard]] double cost(const Voxel& at) const {
+        const int i = at[0] - centre[0] + reach, j = at[1] - centre[1] + reach, k = at[2] - centre[2] + reach;
+        return costs[static_cast<std::size_t>(i + side() * (j + side() * k))];
+    }
 };
-/// The images have the same spacing. Any voxel may be asked for: what lies off a grid is not seen.
-CostLattice cost_lattice(const MatchingImage& moving, const MatchingImage& fixed, const Block& block,
-                         const Voxel& centre, int reach);
+
+/// Costs of one block near one place. A cost is the mean squared difference between the block and its like about a
+/// voxel of the fixed grid, over the voxels seen in both; infinity when they are less than the least share.
+/// SelfSimilarityContext: of descriptors, over channels, 0..1. CrossCorrelation: 2 (1 − r), which is the mean squared
+/// difference of blocks brought to mean 0 and variance 1. The images have the same spacing and outlive this.
+class BlockCosts {
+public:
+    /// Within ± reach voxels of `centre` of the fixed grid costs are cheap; they may be asked for anywhere: what lies
+    /// off a grid is not seen. The radius and the reach are up to 31 together.
+    BlockCosts(const MatchingImage& moving, const MatchingImage& fixed, const Block& block, const Voxel& centre,
+               int reach);
+
+    /// Costs about a place; of every `stride`-th row of the block along j and k: 2 takes a quarter of the time for a
+    /// first look.
+    [[nodiscard]] CostLattice lattice(const Voxel& centre, int reach, int stride);
+
+private:
+    const MatchingImage &moving_, &fixed_;
+    Block block_;
+    Voxel centre_;
+    int reach_;
+    std::optional<BlockWindow> shown_, window_;  ///< of descriptors: the block and what lies about `centre_`
+    std::vector<std::int64_t> differences_, voxels_;
+
+    void look_at(const Voxel& centre, int reach);
+    void descriptor_costs(CostLattice& lattice, int stride);
+    void correlation_costs(CostLattice& lattice, int stride) const;
+};
 
 }  // namespace tissuewarp::registration::detail

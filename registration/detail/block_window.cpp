@@ -1,41 +1,50 @@
 #include "registration/detail/block_window.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 
 namespace tissuewarp::registration::detail {
 
-BlockWindow::BlockWindow(const MatchingImage& image, const Voxel& lower, int side) : side_(side) {
-    const auto row = static_cast<std::size_t>(side * descriptor_channels + row_padding),
-               count = std::size_t(side) * side;
-    value_.resize(row * count);
-    mask_.resize(row * count);
-    std::size_t target = 0;
+BlockWindow::BlockWindow(const MatchingImage& image, const Voxel& lower, int side)
+    : side_(side),
+      row_bytes_(side * descriptor_channels + row_padding),
+      kind_(static_cast<std::size_t>(side) * static_cast<std::size_t>(side), RowKind::Nothing),
+      seen_(kind_.size()) {
+    const std::size_t bytes = kind_.size() * static_cast<std::size_t>(row_bytes_);
+    value_ = std::make_unique_for_overwrite<std::uint8_t[]>(bytes);
+    mask_ = std::make_unique_for_overwrite<std::uint8_t[]>(bytes);
+    std::size_t row = 0;
     for (int k = 0; k < side; ++k)
-        for (int j = 0; j < side; ++j, target += row) copy_row(image, {lower[0], lower[1] + j, lower[2] + k}, target);
+        for (int j = 0; j < side; ++j, ++row) copy_row(image, {lower[0], lower[1] + j, lower[2] + k}, row);
 }
 
-void BlockWindow::copy_row(const MatchingImage& image, const Voxel& lower, std::size_t target) {
+void BlockWindow::copy_row(const MatchingImage& image, const Voxel& lower, std::size_t row) {
     const auto& size = image.grid.size;
     const int first = std::max(lower[0], 0), last = std::min(lower[0] + side_, size[0]);
-    const bool on_grid = lower[1] >= 0 && lower[1] < size[1] && lower[2] >= 0 && lower[2] < size[2] && first < last;
-    whole_ = whole_ && on_grid && last - first == side_;
-    if (!on_grid) return;
+    if (lower[1] < 0 || lower[1] >= size[1] || lower[2] < 0 || lower[2] >= size[2] || first >= last) return;
     const auto source = static_cast<std::size_t>(image.offset({first, lower[1], lower[2]}));
-    target += static_cast<std::size_t>(first - lower[0]) * descriptor_channels;
-    std::memcpy(&value_[target], &image.descriptors[source * descriptor_channels],
-                static_cast<std::size_t>(last - first) * descriptor_channels);
-    for (int i = 0; i < last - first; ++i, target += descriptor_channels)
-        if (image.seen[source + static_cast<std::size_t>(i)])
-            std::memset(&mask_[target], 255, descriptor_channels);
-        else
-            whole_ = false;
+    const auto skipped = static_cast<std::size_t>(first - lower[0]), voxels = static_cast<std::size_t>(last - first);
+    std::uint64_t bits = 0;
+    for (std::size_t i = 0; i < voxels; ++i) bits |= std::uint64_t{image.seen[source + i]} << (skipped + i);
+    if (bits == 0) return;
+    const std::size_t target = row * static_cast<std::size_t>(row_bytes_);
+    std::memcpy(&value_[target + skipped * descriptor_channels], &image.descriptors[source * descriptor_channels],
+                voxels * descriptor_channels);
+    seen_[row] = bits;
+    kind_[row] = std::popcount(bits) == side_ ? RowKind::Whole : RowKind::Part;
+    if (kind_[row] == RowKind::Whole) return;
+    std::memset(&mask_[target], 0, static_cast<std::size_t>(row_bytes_));
+    for (std::size_t i = 0; i < voxels; ++i)
+        if (image.seen[source + i])
+            std::memset(&mask_[target + (skipped + i) * descriptor_channels], 255, descriptor_channels);
 }
 
-ByteRows BlockWindow::rows(int j, int k) const {
-    const std::ptrdiff_t row = side_ * descriptor_channels + row_padding, slice = row * side_;
-    const std::ptrdiff_t start = j * row + k * slice;
-    return {value_.data() + start, mask_.data() + start, row, slice};
+VoxelRows BlockWindow::rows(const Voxel& from) const {
+    const std::ptrdiff_t row = from[1] + std::ptrdiff_t{side_} * from[2];
+    const std::ptrdiff_t start = row * row_bytes_ + std::ptrdiff_t{descriptor_channels} * from[0];
+    return {
+        value_.get() + start, mask_.get() + start, kind_.data() + row, seen_.data() + row, from[0], row_bytes_, side_};
 }
 
 }  // namespace tissuewarp::registration::detail

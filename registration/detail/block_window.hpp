@@ -6,21 +6,22 @@
 
 namespace tissuewarp::registration::detail {
 
-/// Descriptors of a box of voxels. What is not seen, or off the grid, is masked.
+/// Descriptors of a cube of voxels, up to `most_row_voxels` to a side. What is not seen, or off the grid, is masked.
 class BlockWindow {
 public:
     BlockWindow(const MatchingImage& image, const Voxel& lower, int side);
 
-    [[nodiscard]] bool whole() const { return whole_; }  ///< every voxel is seen
-    /// Rows from the voxel (0, j, k) of the box on.
-    [[nodiscard]] ByteRows rows(int j, int k) const;
+    /// Rows from the voxel (i, j, k) of the box on.
+    [[nodiscard]] VoxelRows rows(const Voxel& from) const;
 
 private:
     int side_;
-    bool whole_ = true;
-    std::vector<std::uint8_t> value_, mask_;
+    std::ptrdiff_t row_bytes_;
+    std::unique_ptr<std::uint8_t[]> value_, mask_;
+    std::vector<RowKind> kind_;
+    std::vector<std::uint64_t> seen_;
 
-    void copy_row(const MatchingImage& image, const Voxel& lower, std::size_t target);
+    void copy_row(const MatchingImage& image, const Voxel& lower, std::size_t row);
 };
 
 }  // namespace tissuewarp::registration::detail

@@ -10,13 +10,15 @@
 
 #include "registration/detail/squared_differences.hpp"
 
+#include <array>
+
 HWY_BEFORE_NAMESPACE();
 namespace tissuewarp::registration::detail {
 namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-using Tag16 = hn::ScalableTag<std::int16_t>;
+using Tag16 = hn::CappedTag<std::int16_t, row_padding>;
 using Tag8 = hn::Rebind<std::uint8_t, Tag16>;
 using Tag32 = hn::Repartition<std::int32_t, Tag16>;
 using Bytes = hn::Vec<Tag8>;
@@ -43,91 +45,132 @@ HWY_INLINE Words words(Bytes bytes) {
     return hn::PromoteTo(Tag16(), bytes);
 }
 
-/// Four shifts at a time share the loads of the block.
-struct WholeSums {
-    Squares s0, s1, s2, s3;
+HWY_INLINE Bytes load(const std::uint8_t* at) {
+    return hn::LoadU(Tag8(), at);
+}
 
-    HWY_INLINE WholeSums() : s0(), s1(), s2(), s3() {}
-    template <int shifts>
-    HWY_INLINE void add(const std::uint8_t* block, const std::uint8_t* window, int step) {
-        const Words m = words(hn::LoadU(Tag8(), block));
-        s0.add(hn::Sub(m, words(hn::LoadU(Tag8(), window))));
-        if constexpr (shifts > 1) s1.add(hn::Sub(m, words(hn::LoadU(Tag8(), window + step))));
-        if constexpr (shifts > 2) s2.add(hn::Sub(m, words(hn::LoadU(Tag8(), window + 2 * step))));
-        if constexpr (shifts > 3) s3.add(hn::Sub(m, words(hn::LoadU(Tag8(), window + 3 * step))));
+/// 255 in the first `count` lanes.
+HWY_INLINE Bytes first_lanes(int count) {
+    constexpr int widest = row_padding;
+    static constexpr auto mask = [] {
+        std::array<std::uint8_t, 2 * std::size_t{widest}> bytes{};
+        for (std::size_t n = 0; n < widest; ++n) bytes[n] = 255;
+        return bytes;
+    }();
+    return load(mask.data() + widest - count);
+}
+
+/// Up to four shifts at a time share the loads of the block.
+template <int shifts>
+class ShiftSums {
+public:
+    HWY_INLINE ShiftSums() : d0(), d1(), d2(), d3() {}
+
+    HWY_INLINE void add_whole(const std::uint8_t* block, const std::uint8_t* window, int bytes, int step) {
+        const int lanes = static_cast<int>(hn::Lanes(Tag8()));
+        int x = 0;
+        for (; x + lanes <= bytes; x += lanes) {
+            const Words m = words(load(block + x));
+            const std::uint8_t* w = window + x;
+            d0.add(hn::Sub(m, words(load(w))));
+            if constexpr (shifts > 1) d1.add(hn::Sub(m, words(load(w + step))));
+            if constexpr (shifts > 2) d2.add(hn::Sub(m, words(load(w + 2 * step))));
+            if constexpr (shifts > 3) d3.add(hn::Sub(m, words(load(w + 3 * step))));
+        }
+        if (x < bytes) {
+            const Bytes end = first_lanes(bytes - x);
+            const Words m = words(hn::And(end, load(block + x)));
+            const std::uint8_t* w = window + x;
+            d0.add(hn::Sub(m, words(hn::And(end, load(w)))));
+            if constexpr (shifts > 1) d1.add(hn::Sub(m, words(hn::And(end, load(w + step)))));
+            if constexpr (shifts > 2) d2.add(hn::Sub(m, words(hn::And(end, load(w + 2 * step)))));
+            if constexpr (shifts > 3) d3.add(hn::Sub(m, words(hn::And(end, load(w + 3 * step)))));
+        }
     }
-    /// The end of a row: what lies behind it is 0 in the block and masked in the window.
-    template <int shifts>
-    HWY_INLINE void add_end(const std::uint8_t* block, const std::uint8_t* mask, const std::uint8_t* window, int step) {
-        const Words m = words(hn::LoadU(Tag8(), block));
-        const Bytes in_row = hn::LoadU(Tag8(), mask);
-        const auto masked = [&](const std::uint8_t* at) { return words(hn::And(in_row, hn::LoadU(Tag8(), at))); };
-        s0.add(hn::Sub(m, masked(window)));
-        if constexpr (shifts > 1) s1.add(hn::Sub(m, masked(window + step)));
-        if constexpr (shifts > 2) s2.add(hn::Sub(m, masked(window + 2 * step)));
-        if constexpr (shifts > 3) s3.add(hn::Sub(m, masked(window + 3 * step)));
+
+    /// What a row of the block shows is given by `block_mask`, where it is not null, and likewise of the window.
+    HWY_INLINE void add_part(const std::uint8_t* block, const std::uint8_t* block_mask, const std::uint8_t* window,
+                             const std::uint8_t* window_mask, int bytes, int step) {
+        const int lanes = static_cast<int>(hn::Lanes(Tag8()));
+        for (int x = 0; x < bytes; x += lanes) {
+            Bytes shown = first_lanes(bytes - x < lanes ? bytes - x : lanes);
+            if (block_mask) shown = hn::And(shown, load(block_mask + x));
+            const Bytes m = load(block + x);
+            const auto mask = [&](int s) { return window_mask ? window_mask + x + s * step : nullptr; };
+            const std::uint8_t* w = window + x;
+            add_masked(m, shown, w, mask(0), d0);
+            if constexpr (shifts > 1) add_masked(m, shown, w + step, mask(1), d1);
+            if constexpr (shifts > 2) add_masked(m, shown, w + 2 * step, mask(2), d2);
+            if constexpr (shifts > 3) add_masked(m, shown, w + 3 * step, mask(3), d3);
+        }
+    }
+
+    void store(std::int64_t* differences) const {
+        differences[0] = d0.total();
+        if constexpr (shifts > 1) differences[1] = d1.total();
+        if constexpr (shifts > 2) differences[2] = d2.total();
+        if constexpr (shifts > 3) differences[3] = d3.total();
+    }
+
+private:
+    Squares d0, d1, d2, d3;
+
+    HWY_INLINE static void add_masked(Bytes m, Bytes shown, const std::uint8_t* window, const std::uint8_t* mask,
+                                      Squares& difference) {
+        const Bytes both = mask ? hn::And(shown, load(mask)) : shown;
+        difference.add(hn::Sub(words(hn::And(both, m)), words(hn::And(both, load(window)))));
     }
 };
 
 template <int shifts>
-void whole_shifts(const ByteRows& block, const ByteRows& window, const RowComparison& c, std::int64_t* differences) {
-    const int lanes = static_cast<int>(hn::Lanes(Tag8()));
-    WholeSums sums;
-    for (int k = 0; k < c.count; k += c.stride)
-        for (int j = 0; j < c.count; j += c.stride) {
-            const std::ptrdiff_t m = k * block.slice + j * block.row;
-            const std::uint8_t* row = window.value + k * window.slice + j * window.row;
-            int x = 0;
-            for (; x + lanes <= c.bytes; x += lanes) sums.add<shifts>(block.value + m + x, row + x, c.step);
-            if (x < c.bytes) sums.add_end<shifts>(block.value + m + x, block.mask + m + x, row + x, c.step);
-        }
-    differences[0] = sums.s0.total();
-    if constexpr (shifts > 1) differences[1] = sums.s1.total();
-    if constexpr (shifts > 2) differences[2] = sums.s2.total();
-    if constexpr (shifts > 3) differences[3] = sums.s3.total();
-}
-
-void whole_rows(const ByteRows& block, const ByteRows& window, const RowComparison& comparison,
-                std::int64_t* differences) {
-    ByteRows at = window;
-    for (int s = 0; s < comparison.shifts; s += 4, at.value += 4 * comparison.step) {
-        const int left = comparison.shifts - s;
-        if (left >= 4)
-            whole_shifts<4>(block, at, comparison, differences + s);
-        else if (left == 3)
-            whole_shifts<3>(block, at, comparison, differences + s);
-        else if (left == 2)
-            whole_shifts<2>(block, at, comparison, differences + s);
-        else
-            whole_shifts<1>(block, at, comparison, differences + s);
-    }
-}
-
-void masked_shift(const ByteRows& block, const ByteRows& window, const RowComparison& c, std::int64_t* difference,
-                  std::int64_t* count) {
-    const int lanes = static_cast<int>(hn::Lanes(Tag8()));
-    Squares squares, both_seen;
-    for (int k = 0; k < c.count; k += c.stride)
-        for (int j = 0; j < c.count; j += c.stride) {
-            const std::ptrdiff_t m = k * block.slice + j * block.row, f = k * window.slice + j * window.row;
-            for (int x = 0; x < c.bytes; x += lanes) {
-                const Bytes both =
-                    hn::And(hn::LoadU(Tag8(), block.mask + m + x), hn::LoadU(Tag8(), window.mask + f + x));
-                const Bytes a = hn::And(both, hn::LoadU(Tag8(), block.value + m + x));
-                const Bytes b = hn::And(both, hn::LoadU(Tag8(), window.value + f + x));
-                squares.add(hn::Sub(words(a), words(b)));
-                both_seen.add(words(both));
+void compare_shifts(const VoxelRows& block, const VoxelRows& window, const RowComparison& c, std::int64_t* differences,
+                    std::int64_t* voxels) {
+    ShiftSums<shifts> sums;
+    std::int64_t whole = 0;
+    for (int s = 0; s < shifts; ++s) voxels[s] = 0;
+    const int bytes = c.side * c.voxel_bytes;
+    for (int k = c.first; k < c.side; k += c.stride)
+        for (int j = c.first; j < c.side; j += c.stride) {
+            const std::ptrdiff_t b = j + k * block.slice_rows, w = j + k * window.slice_rows;
+            const std::uint8_t *from = block.value + b * block.row_bytes, *to = window.value + w * window.row_bytes;
+            const RowKind shown = block.kind[b], seen = window.kind[w];
+            if (shown == RowKind::Nothing || seen == RowKind::Nothing) continue;
+            if (shown == RowKind::Whole && seen == RowKind::Whole) {
+                sums.add_whole(from, to, bytes, c.voxel_bytes);
+                whole += c.side;
+                continue;
             }
+            sums.add_part(from, shown == RowKind::Part ? block.mask + b * block.row_bytes : nullptr, to,
+                          seen == RowKind::Part ? window.mask + w * window.row_bytes : nullptr, bytes, c.voxel_bytes);
+            for (int s = 0; s < shifts; ++s)
+                voxels[s] += static_cast<std::int64_t>(
+                    hwy::PopCount((block.seen[b] >> block.first) & (window.seen[w] >> (window.first + s))));
         }
-    *difference = squares.total();
-    *count = both_seen.total();
+    sums.store(differences);
+    for (int s = 0; s < shifts; ++s) voxels[s] += whole;
 }
 
-void masked_rows(const ByteRows& block, const ByteRows& window, const RowComparison& comparison,
-                 std::int64_t* differences, std::int64_t* counts) {
-    ByteRows at = window;
-    for (int s = 0; s < comparison.shifts; ++s, at.value += comparison.step, at.mask += comparison.step)
-        masked_shift(block, at, comparison, differences + s, counts + s);
+void compare(const VoxelRows& block, const VoxelRows& window, const RowComparison& comparison,
+             std::int64_t* differences, std::int64_t* voxels) {
+    VoxelRows at = window;
+    for (int s = 0; s < comparison.shifts; s += 4) {
+        switch (comparison.shifts - s) {
+            case 1:
+                compare_shifts<1>(block, at, comparison, differences + s, voxels + s);
+                break;
+            case 2:
+                compare_shifts<2>(block, at, comparison, differences + s, voxels + s);
+                break;
+            case 3:
+                compare_shifts<3>(block, at, comparison, differences + s, voxels + s);
+                break;
+            default:
+                compare_shifts<4>(block, at, comparison, differences + s, voxels + s);
+        }
+        at.value += 4 * comparison.voxel_bytes;
+        at.mask += 4 * comparison.voxel_bytes;
+        at.first += 4;
+    }
 }
 
 }  // namespace HWY_NAMESPACE
@@ -137,17 +180,11 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace tissuewarp::registration::detail {
 
-HWY_EXPORT(whole_rows);
-HWY_EXPORT(masked_rows);
+HWY_EXPORT(compare);
 
-void whole_squared_differences(const ByteRows& block, const ByteRows& window, const RowComparison& comparison,
-                               std::int64_t* differences) {
-    HWY_DYNAMIC_DISPATCH(whole_rows)(block, window, comparison, differences);
-}
-
-void masked_squared_differences(const ByteRows& block, const ByteRows& window, const RowComparison& comparison,
-                                std::int64_t* differences, std::int64_t* counts) {
-    HWY_DYNAMIC_DISPATCH(masked_rows)(block, window, comparison, differences, counts);
+void squared_differences(const VoxelRows& block, const VoxelRows& window, const RowComparison& comparison,
+                         std::int64_t* differences, std::int64_t* voxels) {
+    HWY_DYNAMIC_DISPATCH(compare)(block, window, comparison, differences, voxels);
 }
 
 }  // namespace tissuewarp::registration::detail

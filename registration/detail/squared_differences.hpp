@@ -7,31 +7,38 @@
 namespace tissuewarp::registration::detail {
 
 /// Bytes that may be read beyond the end of a row.
-constexpr int row_padding = 64;
+constexpr int row_padding = 32;
 
-/// Rows of bytes in memory, ordered (k, j), with a mask of the same layout: 255 where a byte counts and 0 where it does
-/// not. `row_padding` bytes behind each row can be read.
-struct ByteRows {
+/// Most voxels in a row: their masks have one bit each in a word.
+constexpr int most_row_voxels = 64;
+
+/// What a row shows.
+enum class RowKind : std::uint8_t { Nothing, Part, Whole };
+
+/// Rows of voxels in memory, ordered (k, j), some bytes to each voxel. Bit n of a row's `seen` says whether voxel n of
+/// it counts. The mask has the layout of the values and is looked at in rows of kind Part alone: 255 where a byte
+/// counts, 0 where it does not and in the `row_padding` bytes behind the row.
+struct VoxelRows {
     const std::uint8_t* value = nullptr;
     const std::uint8_t* mask = nullptr;
-    std::ptrdiff_t row = 0, slice = 0;  ///< bytes from one to the next
+    const RowKind* kind = nullptr;
+    const std::uint64_t* seen = nullptr;
+    int first = 0;                  ///< voxel of the rows that value and mask point to
+    std::ptrdiff_t row_bytes = 0;   ///< from one row to the next
+    std::ptrdiff_t slice_rows = 0;  ///< from one slice to the next
 };
 
-/// Which rows of a block are compared: `count` along j and k, every `stride`-th of them, `bytes` long; and how many
-/// shifts of the block along its rows, `step` bytes apart.
+/// Which rows of a block are compared: first, first + stride, … of its `side` rows along j and k; and at how many
+/// shifts of the block along its rows, voxel by voxel.
 struct RowComparison {
-    int count = 0, stride = 1, bytes = 0;
-    int shifts = 1, step = 1;
+    int side = 0, first = 0, stride = 1, shifts = 1;
+    int voxel_bytes = 12;
 };
 
-/// For each shift s: differences[s] = Σ (block[x] − window[x + s step])² over the block's bytes. The mask of the block
-/// is 255 in its rows and 0 behind them; that of the window is not looked at. Σ over one 32-bit lane must not overflow:
-/// up to 21 rows of 252 bytes along j and k.
-void whole_squared_differences(const ByteRows& block, const ByteRows& window, const RowComparison& comparison,
-                               std::int64_t* differences);
-
-/// The same where both masks are 255; and counts[s] = 255² times the number of bytes that are.
-void masked_squared_differences(const ByteRows& block, const ByteRows& window, const RowComparison& comparison,
-                                std::int64_t* differences, std::int64_t* counts);
+/// For each shift s, over the voxels x that count in the block and at x + s in the window: differences[s] =
+/// Σ (block[x] − window[x + s])² over their bytes, voxels[s] their number. A row of the window is Whole when it is
+/// along all of the shifts. Sums are of 32 bits before they are gathered: up to 21 voxels of 12 bytes to a side.
+void squared_differences(const VoxelRows& block, const VoxelRows& window, const RowComparison& comparison,
+                         std::int64_t* differences, std::int64_t* voxels);
 
 }  // namespace tissuewarp::registration::detail
