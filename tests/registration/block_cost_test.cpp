@@ -13,22 +13,23 @@ namespace {
 
 using namespace test;
 
-/// The mean squared difference of descriptors by its definition, voxel by voxel.
-double plain_cost(const MatchingImage& moving, const MatchingImage& fixed, const Block& block, const Voxel& at) {
+bool is_seen(const MatchingImage& image, const Voxel& v) {
+    for (std::size_t a = 0; a < 3; ++a)
+        if (v[a] < 0 || v[a] >= image.grid.size[a]) return false;
+    return image.seen[static_cast<std::size_t>(image.offset(v))] > 0;
+}
+
+/// The mean squared difference of descriptors by its definition, voxel by voxel, over the rows at given offsets.
+double plain_cost(const MatchingImage& moving, const MatchingImage& fixed, const Block& block, const Voxel& at,
+                  const std::vector<int>& rows) {
     double sum = 0;
     int voxels = 0;
-    const auto seen = [](const MatchingImage& image, const Voxel& v) {
-        for (std::size_t a = 0; a < 3; ++a)
-            if (v[a] < 0 || v[a] >= image.grid.size[a]) return false;
-        return image.seen[static_cast<std::size_t>(image.offset(v))] > 0;
-    };
-    const int r = block.radius;
-    for (int k = -r; k <= r; ++k)
-        for (int j = -r; j <= r; ++j)
-            for (int i = -r; i <= r; ++i) {
+    for (const int k : rows)
+        for (const int j : rows)
+            for (int i = -block.radius; i <= block.radius; ++i) {
                 const Voxel m{block.centre[0] + i, block.centre[1] + j, block.centre[2] + k};
                 const Voxel f{at[0] + i, at[1] + j, at[2] + k};
-                if (!seen(moving, m) || !seen(fixed, f)) continue;
+                if (!is_seen(moving, m) || !is_seen(fixed, f)) continue;
                 ++voxels;
                 for (std::size_t c = 0; c < 12; ++c) {
                     const double a = moving.descriptors[12 * static_cast<std::size_t>(moving.offset(m)) + c];
@@ -36,7 +37,7 @@ double plain_cost(const MatchingImage& moving, const MatchingImage& fixed, const
                     sum += (a - b) * (a - b) / (255.0 * 255.0);
                 }
             }
-    const double all = std::pow(2 * r + 1, 3);
+    const double all = double(rows.size() * rows.size()) * (2 * block.radius + 1);
     return voxels < block.least_share * all ? std::numeric_limits<double>::infinity() : sum / (12.0 * voxels);
 }
 
@@ -50,38 +51,49 @@ MatchingImage image_with_hole(unsigned seed, const Voxel& hole) {
     return matching_image(image, seen, grid, SearchRegion(grid), Similarity::SelfSimilarityContext);
 }
 
-// Rows cut by holes and borders are where the fast path could count voxels that are not seen, or twice.
-TEST(BlockCost, IsItsPlainDefinitionEverywhere) {
+/// Every cost of lattices of a reach about many places, against the plain definition. Counts the finite and the others.
+std::pair<int, int> compare_lattices(int reach, int stride, const std::vector<int>& rows) {
     const MatchingImage moving = image_with_hole(1, {8, 9, 9}), fixed = image_with_hole(2, {15, 12, 10});
     int finite = 0, infinite = 0;
-    for (int n = 0; n < 4000; ++n) {
-        const Block block{{(7 * n) % 24, (5 * n) % 22, (3 * n) % 20}, 3, 0.1, 1};
+    for (int n = 0; n < 600; ++n) {
+        const Block block{{(7 * n) % 24, (5 * n) % 22, (3 * n) % 20}, 4, 0.1};
         const Voxel at{(11 * n) % 30 - 3, (13 * n) % 28 - 3, (17 * n) % 26 - 3};
-        const double expected = plain_cost(moving, fixed, block, at),
-                     cost = cost_lattice(moving, fixed, block, at, 0).costs[0];
-        if (std::isinf(expected)) {
-            ++infinite;
-            EXPECT_TRUE(std::isinf(cost));
-        } else {
-            ++finite;
-            EXPECT_NEAR(cost, expected, 1e-12);
+        const CostLattice lattice = BlockCosts(moving, fixed, block, at, reach).lattice(at, reach, stride);
+        for (std::size_t m = 0; m < lattice.costs.size(); ++m) {
+            const double expected = plain_cost(moving, fixed, block, lattice.place(m), rows);
+            ++(std::isinf(expected) ? infinite : finite);
+            if (std::isinf(expected))
+                EXPECT_TRUE(std::isinf(lattice.costs[m]));
+            else
+                EXPECT_NEAR(lattice.costs[m], expected, 1e-12);
         }
     }
-    EXPECT_GT(finite, 50);
-    EXPECT_GT(infinite, 50);
+    return {finite, infinite};
 }
 
-// A hole of one value is padding; real tissue with noise is not.
-TEST(SeenRegion, LeavesOutPaddingAlone) {
-    const auto grid = plain_grid({20, 20, 20});
-    imaging::Volume image = sampled(grid, Texture(), 0.01);
-    for_each_voxel(image, [&](const Eigen::Vector3d& index, std::int64_t offset) {
-        if (index[0] >= 12) image.data<float>()[offset] = 0;
-    });
-    const imaging::Volume seen = seen_region(image);
-    for_each_voxel(seen, [&](const Eigen::Vector3d& index, std::int64_t offset) {
-        EXPECT_EQ(seen.data<std::uint8_t>()[offset] != 0, index[0] < 12) << index.transpose();
-    });
+// Rows cut by holes and borders are where the fast path could count voxels that are not seen, or twice; a reach of 1, 2
+// and 0 takes it through three, four and one, and one shift at a time.
+TEST(BlockCost, IsItsPlainDefinitionEverywhere) {
+    for (const int reach : {0, 1, 2}) {
+        const auto [finite, infinite] = compare_lattices(reach, 1, {-4, -3, -2, -1, 0, 1, 2, 3, 4});
+        EXPECT_GT(finite, 50);
+        EXPECT_GT(infinite, 50);
+    }
+}
+
+// A first look at some of the rows: symmetric about the centre, or it prefers one side.
+TEST(BlockCost, OfSomeRowsIsItsPlainDefinition) {
+    EXPECT_GT(compare_lattices(1, 3, {-3, 0, 3}).first, 50);
+    EXPECT_GT(compare_lattices(1, 2, {-4, -2, 0, 2, 4}).first, 50);
+}
+
+// Costs asked for beyond the window that was cut are those of a window cut there.
+TEST(BlockCost, IsTheSameFromAnyWindow) {
+    const MatchingImage moving = image_with_hole(1, {8, 9, 9}), fixed = image_with_hole(2, {15, 12, 10});
+    const Block block{{12, 11, 10}, 4, 0.1};
+    BlockCosts costs(moving, fixed, block, {10, 10, 10}, 3);
+    for (const Voxel& at : {Voxel{11, 9, 10}, Voxel{12, 12, 8}, Voxel{15, 10, 10}, Voxel{10, 10, 10}})
+        EXPECT_EQ(costs.lattice(at, 1, 1).costs, BlockCosts(moving, fixed, block, at, 1).lattice(at, 1, 1).costs);
 }
 
 TEST(QuadraticFit, IsExactOnAParabola) {

@@ -148,6 +148,21 @@ TEST(ImageMatching, NothingIsFoundBeyondTheFieldOfView) {
     for (const BlockMatch& match : matches) EXPECT_LT(match.moving[0] + smooth_displacement(match.moving)[0], cut + 3);
 }
 
+// A second search, from where a model puts the points, needs the finest grids alone; copies of a template share it.
+TEST(ImageMatching, TheFinestGridsAloneServeAGoodPrediction) {
+    const Pair pair = deformed_pair();
+    const MatchingTemplate first(pair.moving, pair.points), copy = first;
+    EXPECT_EQ(&first.images(), &copy.images());
+    Eigen::Matrix3Xd predicted = pair.points;
+    for (Eigen::Index n = 0; n < predicted.cols(); ++n)
+        predicted.col(n) += smooth_displacement(pair.points.col(n)) + Eigen::Vector3d(1, -1, 0.5);
+    BlockMatchingOptions options = searching(3);
+    options.skipped_levels = 2;
+    const auto matches = match_blocks(copy, pair.fixed, predicted, options);
+    EXPECT_GE(static_cast<Eigen::Index>(matches.size()), pair.points.cols() * 9 / 10);
+    EXPECT_LT(median(errors(matches)), 0.3);
+}
+
 // Sums in an order that depends on scheduling differ in their last digits.
 TEST(ImageMatching, OneThreadAndManyFindTheSame) {
     const Pair pair = deformed_pair([](double v) { return v; }, 0.1);
@@ -201,6 +216,9 @@ TEST(ImageMatching, RefusesHostileInput) {
     EXPECT_THROW(match_blocks(moving, image, far_off), InvalidInput);
     BlockMatchingOptions options;
     options.skipped_levels = moving.options().levels;
+    EXPECT_THROW(match_blocks(moving, image, points, options), InvalidInput);
+    options = {};
+    options.search_mm = 900;  // far more voxels than a lattice can have
     EXPECT_THROW(match_blocks(moving, image, points, options), InvalidInput);
     options = {};
     options.search_mm = -1;
