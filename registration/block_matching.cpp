@@ -19,6 +19,7 @@ using detail::Block;
 using detail::BlockCosts;
 using detail::CostLattice;
 using detail::MatchingImage;
+using detail::Surroundings;
 using detail::Voxel;
 using imaging::Volume;
 
@@ -69,10 +70,11 @@ double uniqueness(const CostLattice& lattice, const Minimum& minimum) {
     bool found = false;
     for (std::size_t n = 0; n < lattice.costs.size(); ++n) {
         if (!std::isfinite(lattice.costs[n])) continue;
+        const double rise = lattice.costs[n] - minimum.cost;
+        if (found && rise >= least) continue;
         const Eigen::Vector3d away = as_vector(lattice.place(n)) - as_vector(minimum.at);
         if (0.5 * away.dot(minimum.fit.hessian * away) <= mean_rise) continue;
-        const double rise = lattice.costs[n] - minimum.cost;
-        least = found ? std::min(least, rise) : rise;
+        least = rise;
         found = true;
     }
     return found && mean_rise > 0 ? std::clamp(least / mean_rise, 0.0, 1.0) : 0.0;
@@ -85,18 +87,34 @@ std::optional<Voxel> lowest_of(const CostLattice& lattice) {
     return lattice.place(static_cast<std::size_t>(lowest - lattice.costs.begin()));
 }
 
-/// The lowest place by all rows of the block, among those that the first look puts lowest. Along an edge many places
-/// are nearly as low, and the one that a few rows prefer is no minimum of all of them.
-std::optional<Voxel> lowest_of_candidates(BlockCosts& costs, const CostLattice& first) {
+bool adjoin(const Voxel& a, const Voxel& b) {
+    return std::abs(a[0] - b[0]) <= 1 && std::abs(a[1] - b[1]) <= 1 && std::abs(a[2] - b[2]) <= 1;
+}
+
+/// The places that a first look puts lowest, one of those that adjoin, the lowest first.
+std::vector<Voxel> candidates(const CostLattice& first) {
     std::vector<std::pair<double, std::size_t>> ranked;
     for (std::size_t n = 0; n < first.costs.size(); ++n)
         if (std::isfinite(first.costs[n])) ranked.emplace_back(first.costs[n], n);
     const std::size_t count = std::min(ranked.size(), 1 + first.costs.size() / candidate_share);
     std::partial_sort(ranked.begin(), ranked.begin() + static_cast<std::ptrdiff_t>(count), ranked.end());
-    std::optional<Voxel> lowest;
-    double least = std::numeric_limits<double>::infinity();
+    std::vector<Voxel> result;
     for (std::size_t n = 0; n < count; ++n) {
         const Voxel place = first.place(ranked[n].second);
+        if (std::none_of(result.begin(), result.end(), [&](const Voxel& other) { return adjoin(place, other); }))
+            result.push_back(place);
+    }
+    return result;
+}
+
+/// The lowest candidate by all rows of the block. Along an edge many places are nearly as low, and the one that a few
+/// rows prefer is no minimum of all of them.
+std::optional<Voxel> lowest_of_candidates(BlockCosts& costs, const CostLattice& first) {
+    const std::vector<Voxel> places = candidates(first);
+    if (places.size() == 1) return places.front();
+    std::optional<Voxel> lowest;
+    double least = std::numeric_limits<double>::infinity();
+    for (const Voxel& place : places) {
         const double cost = costs.lattice(place, 0, 1).costs[0];
         if (cost < least) lowest = place;
         least = std::min(least, cost);
@@ -116,29 +134,31 @@ std::optional<CostLattice> descend(BlockCosts& costs, Voxel at) {
     return std::nullopt;
 }
 
-std::optional<Minimum> find_block(const MatchingImage& moving, const MatchingImage& fixed, const Block& block,
-                                  const Voxel& start, int reach) {
-    BlockCosts costs(moving, fixed, block, start, reach + 1);
-    const CostLattice lattice = costs.lattice(start, reach, first_look);
-    const auto lowest = lowest_of_candidates(costs, lattice);
-    if (!lowest) return std::nullopt;
-    const auto near = descend(costs, *lowest);
+/// The minimum that lies downhill of a place.
+std::optional<Minimum> minimum_below(BlockCosts& costs, const Voxel& from) {
+    const auto near = descend(costs, from);
     if (!near) return std::nullopt;
     std::array<double, 27> about{};
     std::copy(near->costs.begin(), near->costs.end(), about.begin());
     const auto fit = detail::fit_quadratic(about);
     if (!fit) return std::nullopt;
-    Minimum minimum{near->centre, about[13], 0, *fit};
-    minimum.uniqueness = uniqueness(lattice, minimum);
+    return Minimum{near->centre, about[13], 0, *fit};
+}
+
+/// The lowest minimum within reach of a place.
+std::optional<Minimum> find_block(BlockCosts& costs, const Voxel& start, int reach) {
+    const CostLattice lattice = costs.lattice(start, reach, first_look);
+    const auto lowest = lowest_of_candidates(costs, lattice);
+    if (!lowest) return std::nullopt;
+    auto minimum = minimum_below(costs, *lowest);
+    if (minimum) minimum->uniqueness = uniqueness(lattice, *minimum);
     return minimum;
 }
 
-/// Error (voxels) of the way back, along what the block shows: the block about the match, searched in the moving image,
-/// should lie where the first one lay.
-std::optional<double> back_match(const MatchingImage& moving, const MatchingImage& fixed, const Block& block,
-                                 const Minimum& forward) {
-    const auto back =
-        find_block(fixed, moving, {forward.at, block.radius, block.least_share}, block.centre, detail::back_reach);
+/// Error (voxels) of the way back, along what the block shows: the block about the match, searched downhill in the
+/// moving image, should lie where the first one lay.
+std::optional<double> back_match(BlockCosts& costs, const Block& block, const Minimum& forward) {
+    const auto back = minimum_below(costs, block.centre);
     if (!back) return std::nullopt;
     const Eigen::Vector3d error = back->index() - as_vector(block.centre) + forward.fit.minimum;
     return std::sqrt(error.dot(forward.fit.hessian * error) / forward.fit.hessian.operatorNorm());
@@ -262,10 +282,14 @@ private:
         BlockMatch result;
         result.moving = level.moving.grid.point(as_vector(block.centre));
         const Eigen::Vector3d expected = predicted_.col(n) + options_.rotation * (result.moving - points_.col(n));
-        const auto found =
-            find_block(level.moving, level.fixed, block, nearest_voxel(level.fixed.grid, expected), level.reach);
+        const Voxel start = nearest_voxel(level.fixed.grid, expected);
+        Surroundings here(level.moving, block.centre, block.radius + detail::back_reach),
+            there(level.fixed, start, block.radius + level.reach + 1);
+        BlockCosts forward(here, there, block);
+        const auto found = find_block(forward, start, level.reach);
         if (!found) return std::nullopt;
-        const auto back = back_match(level.moving, level.fixed, block, *found);
+        BlockCosts backward(there, here, {found->at, block.radius, block.least_share});
+        const auto back = back_match(backward, block, *found);
         if (!back) return std::nullopt;
         const double error = *back / options_.back_match_voxels;
         result.point = static_cast<int>(n);

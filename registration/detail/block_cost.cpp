@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 
 namespace tissuewarp::registration::detail {
@@ -26,10 +25,6 @@ double voxels_of(const Block& block, int stride) {
 
 Voxel corner(const Voxel& centre, int radius) {
     return {centre[0] - radius, centre[1] - radius, centre[2] - radius};
-}
-
-int distance(const Voxel& a, const Voxel& b) {
-    return std::max({std::abs(a[0] - b[0]), std::abs(a[1] - b[1]), std::abs(a[2] - b[2])});
 }
 
 struct CorrelationSums {
@@ -76,25 +71,14 @@ double correlation_cost(const MatchingImage& moving, const MatchingImage& fixed,
 
 }  // namespace
 
-BlockCosts::BlockCosts(const MatchingImage& moving, const MatchingImage& fixed, const Block& block, const Voxel& centre,
-                       int reach)
-    : moving_(moving), fixed_(fixed), block_(block), centre_(centre), reach_(reach) {
-    if (!moving.descriptors) return;
-    shown_.emplace(moving, corner(block.centre, block.radius), 2 * block.radius + 1);
-    look_at(centre, reach);
-}
-
-void BlockCosts::look_at(const Voxel& centre, int reach) {
-    centre_ = centre;
-    reach_ = reach;
-    window_.emplace(fixed_, corner(centre, block_.radius + reach), 2 * (block_.radius + reach) + 1);
-}
+BlockCosts::BlockCosts(Surroundings& shown, Surroundings& looked_at, const Block& block)
+    : shown_(shown), looked_at_(looked_at), block_(block) {}
 
 CostLattice BlockCosts::lattice(const Voxel& centre, int reach, int stride) {
     CostLattice result{centre, reach, {}};
     const auto side = static_cast<std::size_t>(result.side());
     result.costs.resize(side * side * side);
-    if (moving_.descriptors)
+    if (shown_.image().descriptors)
         descriptor_costs(result, stride);
     else
         correlation_costs(result, stride);
@@ -102,20 +86,21 @@ CostLattice BlockCosts::lattice(const Voxel& centre, int reach, int stride) {
 }
 
 void BlockCosts::descriptor_costs(CostLattice& lattice, int stride) {
-    if (distance(lattice.centre, centre_) + lattice.reach > reach_) look_at(lattice.centre, lattice.reach);
+    shown_.cover(block_.centre, block_.radius);
+    looked_at_.cover(lattice.centre, block_.radius + lattice.reach);
     const int shifts = lattice.side();
     const RowComparison comparison{2 * block_.radius + 1, first_row(block_, stride), stride, shifts,
                                    descriptor_channels};
     const double least = std::max(1.0, block_.least_share * voxels_of(block_, stride));
     differences_.resize(static_cast<std::size_t>(shifts));
     voxels_.resize(differences_.size());
-    Voxel first;
-    for (std::size_t a = 0; a < 3; ++a) first[a] = reach_ + lattice.centre[a] - centre_[a] - lattice.reach;
+    const VoxelRows block = shown_.rows(corner(block_.centre, block_.radius));
+    const Voxel first = corner(lattice.centre, block_.radius + lattice.reach);
     double* cost = lattice.costs.data();
     for (int k = 0; k < shifts; ++k)
         for (int j = 0; j < shifts; ++j) {
-            squared_differences(shown_->rows({0, 0, 0}), window_->rows({first[0], first[1] + j, first[2] + k}),
-                                comparison, differences_.data(), voxels_.data());
+            squared_differences(block, looked_at_.rows({first[0], first[1] + j, first[2] + k}), comparison,
+                                differences_.data(), voxels_.data());
             for (std::size_t i = 0; i < voxels_.size(); ++i)
                 *cost++ = double(voxels_[i]) < least ? nowhere
                                                      : double(differences_[i]) / (full_difference * double(voxels_[i]));
@@ -123,10 +108,8 @@ void BlockCosts::descriptor_costs(CostLattice& lattice, int stride) {
 }
 
 void BlockCosts::correlation_costs(CostLattice& lattice, int stride) const {
-    for (std::size_t n = 0; n < lattice.costs.size(); ++n) {
-        const Voxel d = lattice.displacement(n), &c = lattice.centre;
-        lattice.costs[n] = correlation_cost(moving_, fixed_, block_, stride, {c[0] + d[0], c[1] + d[1], c[2] + d[2]});
-    }
+    for (std::size_t n = 0; n < lattice.costs.size(); ++n)
+        lattice.costs[n] = correlation_cost(shown_.image(), looked_at_.image(), block_, stride, lattice.place(n));
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -3,8 +3,6 @@
 
 #include "registration/detail/block_window.hpp"
 
-#include <optional>
-
 namespace tissuewarp::registration::detail {
 
 struct Block {
@@ -37,30 +35,25 @@ struct CostLattice {
     }
 };
 
-/// Costs of one block near one place. A cost is the mean squared difference between the block and its like about a
-/// voxel of the fixed grid, over the voxels seen in both; infinity when they are less than the least share.
+/// Costs of one block of an image about places of another. A cost is the mean squared difference between the block and
+/// its like about a voxel, over the voxels seen in both; infinity when they are less than the least share.
 /// SelfSimilarityContext: of descriptors, over channels, 0..1. CrossCorrelation: 2 (1 − r), which is the mean squared
-/// difference of blocks brought to mean 0 and variance 1. The images have the same spacing and outlive this.
+/// difference of blocks brought to mean 0 and variance 1. The images have the same spacing; what lies off a grid is not
+/// seen.
 class BlockCosts {
 public:
-    /// Within ± reach voxels of `centre` of the fixed grid costs are cheap; they may be asked for anywhere: what lies
-    /// off a grid is not seen. The radius and the reach are up to 31 together.
-    BlockCosts(const MatchingImage& moving, const MatchingImage& fixed, const Block& block, const Voxel& centre,
-               int reach);
+    /// `block` is one of `shown`. Both surroundings outlive this.
+    BlockCosts(Surroundings& shown, Surroundings& looked_at, const Block& block);
 
-    /// Costs about a place; of every `stride`-th row of the block along j and k: 2 takes a quarter of the time for a
-    /// first look.
+    /// Costs about a voxel of the image looked at; of every `stride`-th row of the block along j and k: 3 takes a ninth
+    /// of the time for a first look. The radius of the block and the reach are up to 31 together.
     [[nodiscard]] CostLattice lattice(const Voxel& centre, int reach, int stride);
 
 private:
-    const MatchingImage &moving_, &fixed_;
+    Surroundings &shown_, &looked_at_;
     Block block_;
-    Voxel centre_;
-    int reach_;
-    std::optional<BlockWindow> shown_, window_;  ///< of descriptors: the block and what lies about `centre_`
     std::vector<std::int64_t> differences_, voxels_;
 
-    void look_at(const Voxel& centre, int reach);
     void descriptor_costs(CostLattice& lattice, int stride);
     void correlation_costs(CostLattice& lattice, int stride) const;
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstdlib>
 #include <cstring>
 
 namespace tissuewarp::registration::detail {
@@ -45,6 +46,22 @@ VoxelRows BlockWindow::rows(const Voxel& from) const {
     const std::ptrdiff_t start = row * row_bytes_ + std::ptrdiff_t{descriptor_channels} * from[0];
     return {
         value_.get() + start, mask_.get() + start, kind_.data() + row, seen_.data() + row, from[0], row_bytes_, side_};
+}
+
+void Surroundings::cover(const Voxel& centre, int reach) {
+    bool within = true;
+    for (std::size_t a = 0; a < 3; ++a) within = within && std::abs(centre[a] - centre_[a]) + reach <= reach_;
+    if (within && window_) return;
+    if (!within) {
+        centre_ = centre;
+        reach_ = reach;
+    }
+    window_.emplace(image_, lower(), 2 * reach_ + 1);
+}
+
+VoxelRows Surroundings::rows(const Voxel& from) const {
+    const Voxel first = lower();
+    return window_->rows({from[0] - first[0], from[1] - first[1], from[2] - first[2]});
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -1,8 +1,10 @@
 #pragma once
-/// A box cut out of a matching image, so that the inner loops meet neither the border of the grid nor memory far apart.
+/// Boxes cut out of a matching image, so that the inner loops meet neither the border of the grid nor memory far apart.
 
 #include "registration/detail/matching_image.hpp"
 #include "registration/detail/squared_differences.hpp"
+
+#include <optional>
 
 namespace tissuewarp::registration::detail {
 
@@ -22,6 +24,28 @@ private:
     std::vector<std::uint64_t> seen_;
 
     void copy_row(const MatchingImage& image, const Voxel& lower, std::size_t row);
+};
+
+/// An image about a place. What lies near is cut out once, for many looks; the image outlives this.
+class Surroundings {
+public:
+    /// Of descriptors, the cube of ± reach voxels about `centre`, up to 31, is cut out at the first look.
+    Surroundings(const MatchingImage& image, const Voxel& centre, int reach)
+        : image_(image), centre_(centre), reach_(reach) {}
+
+    [[nodiscard]] const MatchingImage& image() const { return image_; }
+    /// Sees to it that the cube of ± reach voxels about a voxel of the image is cut out.
+    void cover(const Voxel& centre, int reach);
+    /// Rows from a voxel of the image on, which is covered.
+    [[nodiscard]] VoxelRows rows(const Voxel& from) const;
+
+private:
+    const MatchingImage& image_;
+    Voxel centre_;
+    int reach_;
+    std::optional<BlockWindow> window_;
+
+    [[nodiscard]] Voxel lower() const { return {centre_[0] - reach_, centre_[1] - reach_, centre_[2] - reach_}; }
 };
 
 }  // namespace tissuewarp::registration::detail

@@ -9,12 +9,10 @@ namespace tissuewarp::registration::detail {
 
 namespace {
 
-/// A balanced k-d tree (Bentley 1975) over columns, kept as a permutation of them.
+/// A balanced k-d tree (Bentley 1975) over some columns, kept as a permutation of them.
 class ColumnTree {
 public:
-    explicit ColumnTree(const Eigen::Matrix3Xd& points)
-        : points_(points), order_(static_cast<std::size_t>(points.cols())) {
-        std::iota(order_.begin(), order_.end(), 0);
+    ColumnTree(const Eigen::Matrix3Xd& points, const std::vector<int>& columns) : points_(points), order_(columns) {
         build(0, order_.size(), 0);
     }
 
@@ -89,13 +87,20 @@ private:
 
 }  // namespace
 
-std::vector<std::vector<int>> nearest_neighbours(const Eigen::Matrix3Xd& points, int count) {
-    const ColumnTree tree(points);
+std::vector<std::vector<int>> nearest_neighbours(const Eigen::Matrix3Xd& points, const std::vector<int>& among,
+                                                 int count) {
+    const ColumnTree tree(points, among);
     std::vector<std::vector<int>> result(static_cast<std::size_t>(points.cols()));
     tbb::parallel_for(std::size_t{0}, result.size(), [&](std::size_t n) {
         result[n] = tree.nearest(static_cast<int>(n), static_cast<std::size_t>(std::max(count, 0)));
     });
     return result;
+}
+
+std::vector<std::vector<int>> nearest_neighbours(const Eigen::Matrix3Xd& points, int count) {
+    std::vector<int> all(static_cast<std::size_t>(points.cols()));
+    std::iota(all.begin(), all.end(), 0);
+    return nearest_neighbours(points, all, count);
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -129,6 +129,7 @@ void compare_shifts(const VoxelRows& block, const VoxelRows& window, const RowCo
     std::int64_t whole = 0;
     for (int s = 0; s < shifts; ++s) voxels[s] = 0;
     const int bytes = c.side * c.voxel_bytes;
+    const std::uint64_t one_row = ~std::uint64_t{0} >> (most_row_voxels - c.side);
     for (int k = c.first; k < c.side; k += c.stride)
         for (int j = c.first; j < c.side; j += c.stride) {
             const std::ptrdiff_t b = j + k * block.slice_rows, w = j + k * window.slice_rows;
@@ -144,7 +145,7 @@ void compare_shifts(const VoxelRows& block, const VoxelRows& window, const RowCo
                           seen == RowKind::Part ? window.mask + w * window.row_bytes : nullptr, bytes, c.voxel_bytes);
             for (int s = 0; s < shifts; ++s)
                 voxels[s] += static_cast<std::int64_t>(
-                    hwy::PopCount((block.seen[b] >> block.first) & (window.seen[w] >> (window.first + s))));
+                    hwy::PopCount(one_row & (block.seen[b] >> block.first) & (window.seen[w] >> (window.first + s))));
         }
     sums.store(differences);
     for (int s = 0; s < shifts; ++s) voxels[s] += whole;

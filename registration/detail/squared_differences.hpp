@@ -36,8 +36,9 @@ struct RowComparison {
 };
 
 /// For each shift s, over the voxels x that count in the block and at x + s in the window: differences[s] =
-/// Σ (block[x] − window[x + s])² over their bytes, voxels[s] their number. A row of the window is Whole when it is
-/// along all of the shifts. Sums are of 32 bits before they are gathered: up to 21 voxels of 12 bytes to a side.
+/// Σ (block[x] − window[x + s])² over their bytes, voxels[s] their number. Rows may go on beyond the block
+/// and the last shift; Whole ones are so all along. Sums are of 32 bits before they are gathered: up to 21 voxels of 12
+/// bytes to a side.
 void squared_differences(const VoxelRows& block, const VoxelRows& window, const RowComparison& comparison,
                          std::int64_t* differences, std::int64_t* voxels);
 

@@ -58,7 +58,8 @@ std::pair<int, int> compare_lattices(int reach, int stride, const std::vector<in
     for (int n = 0; n < 600; ++n) {
         const Block block{{(7 * n) % 24, (5 * n) % 22, (3 * n) % 20}, 4, 0.1};
         const Voxel at{(11 * n) % 30 - 3, (13 * n) % 28 - 3, (17 * n) % 26 - 3};
-        const CostLattice lattice = BlockCosts(moving, fixed, block, at, reach).lattice(at, reach, stride);
+        Surroundings shown(moving, block.centre, block.radius + n % 3), about(fixed, at, block.radius + reach + n % 2);
+        const CostLattice lattice = BlockCosts(shown, about, block).lattice(at, reach, stride);
         for (std::size_t m = 0; m < lattice.costs.size(); ++m) {
             const double expected = plain_cost(moving, fixed, block, lattice.place(m), rows);
             ++(std::isinf(expected) ? infinite : finite);
@@ -87,13 +88,16 @@ TEST(BlockCost, OfSomeRowsIsItsPlainDefinition) {
     EXPECT_GT(compare_lattices(1, 2, {-4, -2, 0, 2, 4}).first, 50);
 }
 
-// Costs asked for beyond the window that was cut are those of a window cut there.
-TEST(BlockCost, IsTheSameFromAnyWindow) {
+// Costs asked for beyond what was cut out are those of surroundings cut there.
+TEST(BlockCost, IsTheSameFromAnySurroundings) {
     const MatchingImage moving = image_with_hole(1, {8, 9, 9}), fixed = image_with_hole(2, {15, 12, 10});
     const Block block{{12, 11, 10}, 4, 0.1};
-    BlockCosts costs(moving, fixed, block, {10, 10, 10}, 3);
-    for (const Voxel& at : {Voxel{11, 9, 10}, Voxel{12, 12, 8}, Voxel{15, 10, 10}, Voxel{10, 10, 10}})
-        EXPECT_EQ(costs.lattice(at, 1, 1).costs, BlockCosts(moving, fixed, block, at, 1).lattice(at, 1, 1).costs);
+    Surroundings shown(moving, {11, 11, 11}, 6), about(fixed, {10, 10, 10}, 7);
+    BlockCosts costs(shown, about, block);
+    for (const Voxel& at : {Voxel{11, 9, 10}, Voxel{12, 12, 8}, Voxel{15, 10, 10}, Voxel{10, 10, 10}}) {
+        Surroundings block_alone(moving, block.centre, block.radius), here(fixed, at, block.radius + 1);
+        EXPECT_EQ(costs.lattice(at, 1, 1).costs, BlockCosts(block_alone, here, block).lattice(at, 1, 1).costs);
+    }
 }
 
 TEST(QuadraticFit, IsExactOnAParabola) {

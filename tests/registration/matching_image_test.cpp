@@ -175,19 +175,25 @@ TEST(NearestNeighbours, AreThoseOfAFullSearch) {
     cv::RNG random(3);
     Eigen::Matrix3Xd points(3, 500);
     for (Eigen::Index n = 0; n < points.size(); ++n) points(n) = random.uniform(0, 12);  // whole numbers: many ties
-    for (const int count : {0, 1, 24, 600}) {
-        const auto found = nearest_neighbours(points, count);
-        for (Eigen::Index p = 0; p < points.cols(); ++p) {
-            std::vector<std::pair<double, int>> all;
-            for (Eigen::Index n = 0; n < points.cols(); ++n)
-                if (n != p) all.emplace_back((points.col(n) - points.col(p)).squaredNorm(), static_cast<int>(n));
-            std::sort(all.begin(), all.end());
-            all.resize(std::min<std::size_t>(all.size(), static_cast<std::size_t>(count)));
-            std::vector<int> expected;
-            for (const auto& [distance, n] : all) expected.push_back(n);
-            EXPECT_EQ(found[static_cast<std::size_t>(p)], expected) << p;
+    for (const int step : {1, 3})
+        for (const int count : {0, 1, 24, 600}) {
+            std::vector<int> among;
+            for (int n = 0; n < 500; n += step) among.push_back(n);
+            const auto found = nearest_neighbours(points, among, count);
+            for (Eigen::Index p = 0; p < points.cols(); ++p) {
+                std::vector<std::pair<double, int>> all;
+                for (const int n : among)
+                    if (n != p) all.emplace_back((points.col(n) - points.col(p)).squaredNorm(), n);
+                std::sort(all.begin(), all.end());
+                all.resize(std::min<std::size_t>(all.size(), static_cast<std::size_t>(count)));
+                std::vector<int> expected;
+                for (const auto& [distance, n] : all) expected.push_back(n);
+                EXPECT_EQ(found[static_cast<std::size_t>(p)], expected) << p;
+            }
+            if (step == 1) {
+                EXPECT_EQ(nearest_neighbours(points, count), found);
+            }
         }
-    }
 }
 
 }  // namespace
