@@ -25,7 +25,8 @@ using imaging::Volume;
 
 namespace {
 
-constexpr int first_look = 3;                // every third row of a block, over the whole lattice
+constexpr int least_searched = 1000;  // points on a coarse grid: from there on, every second, fourth … is left out
+constexpr int first_look = 3;         // every third row of a block, over the whole lattice
 constexpr std::size_t candidate_share = 20;  // one place in so many is then compared in full
 constexpr int most_steps = 8;                // downhill
 constexpr double independent_share = 0.1;    // of a block's voxels: the others repeat them (docs/method.md)
@@ -185,13 +186,15 @@ struct Level {
     const MatchingImage& moving;
     MatchingImage fixed;
     int reach;
+    std::vector<std::size_t> searched, left_out;  // points
 };
 
-/// Mean inverse standard deviation of all blocks, 1/mm; those not found count as 0.
-double mean_certainty(const std::vector<BlockMatch>& matches) {
+/// Mean inverse standard deviation of the blocks that were searched, 1/mm; those not found count as 0.
+double mean_certainty(const std::vector<BlockMatch>& matches, const std::vector<std::size_t>& searched) {
     double total = 0;
-    for (const BlockMatch& match : matches) total += std::pow(std::max(match.information.determinant(), 0.0), 1.0 / 6);
-    return total / double(matches.size());
+    for (const std::size_t n : searched)
+        total += std::pow(std::max(matches[n].information.determinant(), 0.0), 1.0 / 6);
+    return total / double(searched.size());
 }
 
 /// Points by cubes of 16 mm: those searched one after the other find the image in the cache.
@@ -218,22 +221,26 @@ public:
           points_(points),
           predicted_(predicted),
           options_(options),
-          neighbours_(detail::nearest_neighbours(points, story_.neighbours)),
           order_(near_after_near(points)) {}
 
     std::vector<BlockMatch> run(Observer& observer) {
+        std::optional<Level> best_level;
         std::vector<BlockMatch> best;
         double certainty = -1;
         const int levels = moving_.options.levels;
-        for (int level = options_.skipped_levels; level < levels; ++level) {
-            std::vector<BlockMatch> matches = match(prepare(level));
-            if (level + 1 < levels) predict(matches);
-            if (const double candidate = mean_certainty(matches); candidate >= certainty) {
+        for (int n = options_.skipped_levels; n < levels; ++n) {
+            Level level = prepare(n);
+            std::vector<BlockMatch> matches(order_.size());
+            match(level, level.searched, matches);
+            if (n + 1 < levels) predict(matches, level.searched);
+            if (const double candidate = mean_certainty(matches, level.searched); candidate >= certainty) {
                 certainty = candidate;
                 best = std::move(matches);
+                best_level.emplace(std::move(level));
             }
-            observer.checkpoint("block matching", double(level + 1) / levels);
+            observer.checkpoint("block matching", double(n + 1) / levels);
         }
+        match(*best_level, best_level->left_out, best);
         std::erase_if(best, [](const BlockMatch& match) { return match.point < 0 || match.information.trace() <= 0; });
         return best;
     }
@@ -245,7 +252,6 @@ private:
     Eigen::Matrix3Xd predicted_;
     const BlockMatchingOptions& options_;
     const ConsistencyOptions story_{};  // what neighbours must agree on, between levels as afterwards
-    std::vector<std::vector<int>> neighbours_;
     std::vector<std::size_t> order_;
 
     /// The fixed image along the axes of the moving grid, turned: descriptors depend on the direction.
@@ -263,17 +269,22 @@ private:
         const imaging::Geometry grid =
             detail::grid_about(predicted_, options_.rotation * moving.grid.direction, spacing, margin * spacing);
         const detail::SearchRegion region(grid, predicted_, margin);
-        return {moving, detail::matching_image(fixed_, seen_, grid, region, moving_.options.similarity), reach};
+        Level result{
+            moving, detail::matching_image(fixed_, seen_, grid, region, moving_.options.similarity), reach, {}, {}};
+        // Blocks of a coarse grid overlap so much that some tell the story of all.
+        const std::size_t coarser = std::size_t{1} << (moving_.options.levels - 1 - level);
+        const std::size_t step = std::clamp(order_.size() / least_searched, std::size_t{1}, coarser);
+        for (std::size_t place = 0; place < order_.size(); ++place)
+            (place % step == 0 ? result.searched : result.left_out).push_back(order_[place]);
+        return result;
     }
 
-    /// One entry per point; `point` stays −1 where the block was not found.
-    [[nodiscard]] std::vector<BlockMatch> match(const Level& level) const {
-        std::vector<BlockMatch> matches(static_cast<std::size_t>(points_.cols()));
-        tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t place) {
-            const std::size_t n = order_[place];
+    /// Fills in the entries of some points; `point` stays −1 where the block was not found.
+    void match(const Level& level, const std::vector<std::size_t>& points, std::vector<BlockMatch>& matches) const {
+        tbb::parallel_for(std::size_t{0}, points.size(), [&](std::size_t place) {
+            const std::size_t n = points[place];
             if (const auto found = match_point(level, static_cast<Eigen::Index>(n))) matches[n] = *found;
         });
-        return matches;
     }
 
     [[nodiscard]] std::optional<BlockMatch> match_point(const Level& level, Eigen::Index n) const {
@@ -302,8 +313,10 @@ private:
         return result;
     }
 
-    /// The next level starts from what the neighbours of each point agree on.
-    void predict(const std::vector<BlockMatch>& matches) {
+    /// The next level starts from what the searched neighbours of each point agree on.
+    void predict(const std::vector<BlockMatch>& matches, const std::vector<std::size_t>& searched) {
+        const auto neighbours =
+            detail::nearest_neighbours(points_, std::vector<int>(searched.begin(), searched.end()), story_.neighbours);
         detail::ScatteredMotion motion{points_, predicted_ - points_, {}};
         for (std::size_t n = 0; n < matches.size(); ++n) {
             const auto column = static_cast<Eigen::Index>(n);
@@ -312,13 +325,13 @@ private:
         }
         tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t n) {
             const auto column = static_cast<Eigen::Index>(n);
-            const bool vouched = std::any_of(neighbours_[n].begin(), neighbours_[n].end(), [&](int other) {
+            const bool vouched = std::any_of(neighbours[n].begin(), neighbours[n].end(), [&](int other) {
                 return motion.weights[static_cast<std::size_t>(other)].trace() > 0.1;
             });
             if (!vouched) return;
             const Eigen::Vector3d point = points_.col(column);
             predicted_.col(column) =
-                point + detail::fit_local_affine(motion, point, neighbours_[n], story_.trimmed_share).displacement;
+                point + detail::fit_local_affine(motion, point, neighbours[n], story_.trimmed_share).displacement;
         });
     }
 };
