@@ -1,11 +1,31 @@
 #include "registration/detail/block_window.hpp"
 
+#include <hwy/cache_control.h>
+
 #include <algorithm>
 #include <bit>
 #include <cstdlib>
 #include <cstring>
 
 namespace tissuewarp::registration::detail {
+
+namespace {
+
+constexpr int cache_line = 64;  // bytes
+
+/// Asks for the memory of a row, which is far from the one before.
+void fetch_row(const MatchingImage& image, const Voxel& lower, int side) {
+    const auto& size = image.grid.size;
+    if (lower[0] < 0 || lower[0] + side > size[0] || lower[1] < 0 || lower[1] >= size[1] || lower[2] < 0 ||
+        lower[2] >= size[2])
+        return;
+    const std::int64_t first = image.offset(lower);
+    hwy::Prefetch(image.seen.data() + first);
+    for (int byte = 0; byte < side * descriptor_channels; byte += cache_line)
+        hwy::Prefetch(image.descriptors.get() + first * descriptor_channels + byte);
+}
+
+}  // namespace
 
 BlockWindow::BlockWindow(const MatchingImage& image, const Voxel& lower, int side)
     : side_(side),
@@ -15,9 +35,13 @@ BlockWindow::BlockWindow(const MatchingImage& image, const Voxel& lower, int sid
     const std::size_t bytes = kind_.size() * static_cast<std::size_t>(row_bytes_);
     value_ = std::make_unique_for_overwrite<std::uint8_t[]>(bytes);
     mask_ = std::make_unique_for_overwrite<std::uint8_t[]>(bytes);
-    std::size_t row = 0;
-    for (int k = 0; k < side; ++k)
-        for (int j = 0; j < side; ++j, ++row) copy_row(image, {lower[0], lower[1] + j, lower[2] + k}, row);
+    constexpr int rows_ahead = 12;
+    const int rows = side * side;
+    for (int row = 0; row < rows; ++row) {
+        const int ahead = std::min(row + rows_ahead, rows - 1);
+        fetch_row(image, {lower[0], lower[1] + ahead % side, lower[2] + ahead / side}, side);
+        copy_row(image, {lower[0], lower[1] + row % side, lower[2] + row / side}, static_cast<std::size_t>(row));
+    }
 }
 
 void BlockWindow::copy_row(const MatchingImage& image, const Voxel& lower, std::size_t row) {
