@@ -6,6 +6,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -189,6 +190,11 @@ struct Level {
     std::vector<std::size_t> searched, left_out;  // points
 };
 
+/// Memory of a thread.
+struct Windows {
+    detail::BlockWindow moving, fixed;
+};
+
 /// Mean inverse standard deviation of the blocks that were searched, 1/mm; those not found count as 0.
 double mean_certainty(const std::vector<BlockMatch>& matches, const std::vector<std::size_t>& searched) {
     double total = 0;
@@ -281,21 +287,23 @@ private:
 
     /// Fills in the entries of some points; `point` stays −1 where the block was not found.
     void match(const Level& level, const std::vector<std::size_t>& points, std::vector<BlockMatch>& matches) const {
+        tbb::enumerable_thread_specific<Windows> windows;
         tbb::parallel_for(std::size_t{0}, points.size(), [&](std::size_t place) {
             const std::size_t n = points[place];
-            if (const auto found = match_point(level, static_cast<Eigen::Index>(n))) matches[n] = *found;
+            const auto found = match_point(level, static_cast<Eigen::Index>(n), windows.local());
+            if (found) matches[n] = *found;
         });
     }
 
-    [[nodiscard]] std::optional<BlockMatch> match_point(const Level& level, Eigen::Index n) const {
+    [[nodiscard]] std::optional<BlockMatch> match_point(const Level& level, Eigen::Index n, Windows& windows) const {
         const Block block{nearest_voxel(level.moving.grid, points_.col(n)), moving_.options.block_radius,
                           options_.least_share};
         BlockMatch result;
         result.moving = level.moving.grid.point(as_vector(block.centre));
         const Eigen::Vector3d expected = predicted_.col(n) + options_.rotation * (result.moving - points_.col(n));
         const Voxel start = nearest_voxel(level.fixed.grid, expected);
-        Surroundings here(level.moving, block.centre, block.radius + detail::back_reach),
-            there(level.fixed, start, block.radius + level.reach + 1);
+        Surroundings here(level.moving, block.centre, block.radius + detail::back_reach, windows.moving),
+            there(level.fixed, start, block.radius + level.reach + 1, windows.fixed);
         BlockCosts forward(here, there, block);
         const auto found = find_block(forward, start, level.reach);
         if (!found) return std::nullopt;

@@ -1,7 +1,5 @@
 #include "registration/detail/block_window.hpp"
 
-#include <hwy/cache_control.h>
-
 #include <algorithm>
 #include <bit>
 #include <cstdlib>
@@ -9,39 +7,20 @@
 
 namespace tissuewarp::registration::detail {
 
-namespace {
-
-constexpr int cache_line = 64;  // bytes
-
-/// Asks for the memory of a row, which is far from the one before.
-void fetch_row(const MatchingImage& image, const Voxel& lower, int side) {
-    const auto& size = image.grid.size;
-    if (lower[0] < 0 || lower[0] + side > size[0] || lower[1] < 0 || lower[1] >= size[1] || lower[2] < 0 ||
-        lower[2] >= size[2])
-        return;
-    const std::int64_t first = image.offset(lower);
-    hwy::Prefetch(image.seen.data() + first);
-    for (int byte = 0; byte < side * descriptor_channels; byte += cache_line)
-        hwy::Prefetch(image.descriptors.get() + first * descriptor_channels + byte);
-}
-
-}  // namespace
-
-BlockWindow::BlockWindow(const MatchingImage& image, const Voxel& lower, int side)
-    : side_(side),
-      row_bytes_(side * descriptor_channels + row_padding),
-      kind_(static_cast<std::size_t>(side) * static_cast<std::size_t>(side), RowKind::Nothing),
-      seen_(kind_.size()) {
+void BlockWindow::cut(const MatchingImage& image, const Voxel& lower, int side) {
+    side_ = side;
+    row_bytes_ = side * descriptor_channels + row_padding;
+    kind_.assign(static_cast<std::size_t>(side) * static_cast<std::size_t>(side), RowKind::Nothing);
+    seen_.assign(kind_.size(), 0);
     const std::size_t bytes = kind_.size() * static_cast<std::size_t>(row_bytes_);
-    value_ = std::make_unique_for_overwrite<std::uint8_t[]>(bytes);
-    mask_ = std::make_unique_for_overwrite<std::uint8_t[]>(bytes);
-    constexpr int rows_ahead = 12;
-    const int rows = side * side;
-    for (int row = 0; row < rows; ++row) {
-        const int ahead = std::min(row + rows_ahead, rows - 1);
-        fetch_row(image, {lower[0], lower[1] + ahead % side, lower[2] + ahead / side}, side);
-        copy_row(image, {lower[0], lower[1] + row % side, lower[2] + row / side}, static_cast<std::size_t>(row));
+    if (bytes > bytes_) {
+        bytes_ = bytes;
+        value_ = std::make_unique_for_overwrite<std::uint8_t[]>(bytes);
+        mask_ = std::make_unique_for_overwrite<std::uint8_t[]>(bytes);
     }
+    std::size_t row = 0;
+    for (int k = 0; k < side; ++k)
+        for (int j = 0; j < side; ++j, ++row) copy_row(image, {lower[0], lower[1] + j, lower[2] + k}, row);
 }
 
 void BlockWindow::copy_row(const MatchingImage& image, const Voxel& lower, std::size_t row) {
@@ -75,17 +54,18 @@ VoxelRows BlockWindow::rows(const Voxel& from) const {
 void Surroundings::cover(const Voxel& centre, int reach) {
     bool within = true;
     for (std::size_t a = 0; a < 3; ++a) within = within && std::abs(centre[a] - centre_[a]) + reach <= reach_;
-    if (within && window_) return;
+    if (within && cut_) return;
     if (!within) {
         centre_ = centre;
         reach_ = reach;
     }
-    window_.emplace(image_, lower(), 2 * reach_ + 1);
+    window_.cut(image_, lower(), 2 * reach_ + 1);
+    cut_ = true;
 }
 
 VoxelRows Surroundings::rows(const Voxel& from) const {
     const Voxel first = lower();
-    return window_->rows({from[0] - first[0], from[1] - first[1], from[2] - first[2]});
+    return window_.rows({from[0] - first[0], from[1] - first[1], from[2] - first[2]});
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -55,10 +55,12 @@ MatchingImage image_with_hole(unsigned seed, const Voxel& hole) {
 std::pair<int, int> compare_lattices(int reach, int stride, const std::vector<int>& rows) {
     const MatchingImage moving = image_with_hole(1, {8, 9, 9}), fixed = image_with_hole(2, {15, 12, 10});
     int finite = 0, infinite = 0;
+    std::array<BlockWindow, 2> windows;
     for (int n = 0; n < 600; ++n) {
         const Block block{{(7 * n) % 24, (5 * n) % 22, (3 * n) % 20}, 4, 0.1};
         const Voxel at{(11 * n) % 30 - 3, (13 * n) % 28 - 3, (17 * n) % 26 - 3};
-        Surroundings shown(moving, block.centre, block.radius + n % 3), about(fixed, at, block.radius + reach + n % 2);
+        Surroundings shown(moving, block.centre, block.radius + n % 3, windows[0]),
+            about(fixed, at, block.radius + reach + n % 2, windows[1]);
         const CostLattice lattice = BlockCosts(shown, about, block).lattice(at, reach, stride);
         for (std::size_t m = 0; m < lattice.costs.size(); ++m) {
             const double expected = plain_cost(moving, fixed, block, lattice.place(m), rows);
@@ -92,10 +94,12 @@ TEST(BlockCost, OfSomeRowsIsItsPlainDefinition) {
 TEST(BlockCost, IsTheSameFromAnySurroundings) {
     const MatchingImage moving = image_with_hole(1, {8, 9, 9}), fixed = image_with_hole(2, {15, 12, 10});
     const Block block{{12, 11, 10}, 4, 0.1};
-    Surroundings shown(moving, {11, 11, 11}, 6), about(fixed, {10, 10, 10}, 7);
+    std::array<BlockWindow, 4> windows;
+    Surroundings shown(moving, {11, 11, 11}, 6, windows[0]), about(fixed, {10, 10, 10}, 7, windows[1]);
     BlockCosts costs(shown, about, block);
     for (const Voxel& at : {Voxel{11, 9, 10}, Voxel{12, 12, 8}, Voxel{15, 10, 10}, Voxel{10, 10, 10}}) {
-        Surroundings block_alone(moving, block.centre, block.radius), here(fixed, at, block.radius + 1);
+        Surroundings block_alone(moving, block.centre, block.radius, windows[2]),
+            here(fixed, at, block.radius + 1, windows[3]);
         EXPECT_EQ(costs.lattice(at, 1, 1).costs, BlockCosts(block_alone, here, block).lattice(at, 1, 1).costs);
     }
 }
