@@ -3,8 +3,8 @@
 #include "imaging/filters.hpp"
 #include "imaging/labels.hpp"
 #include "imaging/sampling.hpp"
-#include "registration/detail/point_tree.hpp"
 #include "registration/detail/pose_search.hpp"
+#include "registration/detail/surface_pose.hpp"
 
 #include <tbb/parallel_for.h>
 #include <nlopt.hpp>
@@ -151,21 +151,6 @@ struct DistanceCost {
     }
 };
 
-/// Points on the triangles of a surface, at most `spacing` mm apart: close enough to stand for it. A surface without
-/// triangles stands for itself.
-std::vector<Eigen::Vector3d> dense_points(const meshing::SurfaceMesh& surface, double spacing) {
-    std::vector<Eigen::Vector3d> points;
-    for (const auto& node : surface.nodes.colwise()) points.emplace_back(node);
-    for (const auto& triangle : surface.triangles.colwise()) {
-        const Eigen::Vector3d a = surface.nodes.col(triangle[0]), b = surface.nodes.col(triangle[1]) - a,
-                              c = surface.nodes.col(triangle[2]) - a;
-        const int parts = static_cast<int>(std::ceil(std::max({b.norm(), c.norm(), (b - c).norm()}) / spacing));
-        for (int i = 0; i <= parts; ++i)
-            for (int j = 0; i + j <= parts; ++j) points.push_back(a + b * i / parts + c * j / parts);
-    }
-    return points;
-}
-
 }  // namespace
 
 Alignment align_labels(const Volume& moving_labels, const Volume& fixed_labels, const AlignmentOptions& options,
@@ -176,25 +161,13 @@ Alignment align_labels(const Volume& moving_labels, const Volume& fixed_labels, 
                                detail::PoseFreedom::Similarity, options, observer);
 }
 
-Alignment align_surfaces(const meshing::SurfaceMesh& moving, const Eigen::Matrix3Xd& fixed,
+Alignment align_surfaces(const meshing::SurfaceMesh& moving, const SurfacePoints& fixed,
                          const AlignmentOptions& options, Observer& observer) {
-    if (moving.node_count() == 0 || fixed.cols() == 0)
-        throw InvalidInput("a surface to align has no points; give at least one on either side");
-    if (!moving.nodes.allFinite() || !fixed.allFinite())
-        throw InvalidInput("a surface to align has points that are not finite");
-    constexpr double spacing_mm = 1.5;
-    const detail::PointTree tree(dense_points(moving, spacing_mm));
-    const Eigen::Index step = std::max<Eigen::Index>(1, fixed.cols() / options.samples);
-    const auto cost = [&](const Eigen::Affine3d& map, double trim, int stride) {
-        const Eigen::Affine3d back = map.inverse();
-        double sum = 0;
-        long count = 0;
-        for (Eigen::Index i = 0; i < fixed.cols(); i += step * stride, ++count)
-            sum += std::min(trim, tree.distance(back * Eigen::Vector3d(fixed.col(i))));
-        return sum / double(count);
-    };
-    return detail::search_pose(cost, moving.nodes, fixed.rowwise().mean(), detail::PoseFreedom::Rigid, options,
-                               observer);
+    if (moving.triangle_count() == 0 || !moving.nodes.allFinite())
+        throw InvalidInput("the moving surface has no triangles, or nodes that are not finite");
+    const detail::SurfacePose found = detail::search_surface_pose(detail::SurfaceTree(moving), moving,
+                                                                  detail::surface_data(fixed), options, observer);
+    return {found.placement, found.typical_distance_mm()};
 }
 
 }  // namespace tissuewarp::registration

@@ -4,6 +4,7 @@
 #include "core/observer.hpp"
 #include "imaging/volume.hpp"
 #include "meshing/tet_mesh.hpp"
+#include "registration/intraoperative.hpp"
 
 #include <Eigen/Geometry>
 
@@ -28,10 +29,10 @@ struct Alignment {
 Alignment align_labels(const imaging::Volume& moving_labels, const imaging::Volume& fixed_labels,
                        const AlignmentOptions& options = {}, Observer& observer = silent_observer());
 
-/// The same for a whole moving surface and points of a fixed one, which may be a part of it (3 × P, LPS mm): minimises
-/// the mean truncated distance from the fixed points to the moving surface. No change of size, since a part does not
-/// show it. Throws InvalidInput on empty or non-finite input.
-Alignment align_surfaces(const meshing::SurfaceMesh& moving, const Eigen::Matrix3Xd& fixed,
+/// The placement of a whole moving surface (outward triangles) on points of a part of the fixed one, from anywhere: see
+/// detail/surface_pose.hpp. `mean_distance_mm` is the typical distance of those points that fit. Throws InvalidInput on
+/// points or surfaces that cannot be used.
+Alignment align_surfaces(const meshing::SurfaceMesh& moving, const SurfacePoints& fixed,
                          const AlignmentOptions& options = {}, Observer& observer = silent_observer());
 
 }  // namespace tissuewarp::registration

@@ -14,6 +14,27 @@ double labelled_volume(const imaging::Volume& labels) {
     return cv::countNonZero(imaging::mask_of_all(labels).voxels.reshape(1, 1)) * labels.geometry.voxel_volume();
 }
 
+std::string percent(double share) {
+    return std::to_string(std::lround(100 * share)) + " %";
+}
+
+void doubt_surface(const SurfaceFit& fit, double deviation_mm, std::vector<std::string>& reasons) {
+    constexpr double least_inliers = 0.5, most_residual = 1.4, least_coverage = 0.08, most_rival_support = 0.95;
+    if (fit.inlier_share < least_inliers)
+        reasons.push_back("only " + percent(fit.inlier_share) + " of the intraoperative surface lies on the model");
+    if (fit.residual_mm > most_residual * std::max(deviation_mm, 0.3))
+        reasons.push_back("points of the intraoperative surface lie " + to_text(fit.residual_mm) +
+                          " mm from the model where " + to_text(deviation_mm) + " mm were stated");
+    if (!fit.pose_searched) return;
+    if (fit.coverage < least_coverage)
+        reasons.push_back("the points show " + percent(fit.coverage) +
+                          " of the organ's surface, too little to tell where it lies; give images in one frame, or "
+                          "landmarks");
+    if (fit.rival_support > most_rival_support)
+        reasons.push_back("the points fit about as well with the organ placed " + to_text(fit.rival_mm) +
+                          " mm elsewhere; give a wider patch, or landmarks");
+}
+
 }  // namespace
 
 std::string to_text(double value) {
@@ -37,6 +58,7 @@ std::vector<std::string> doubts(const PreparedModel& prepared, const Intraoperat
                           " boundary nodes are still far from where they belong; allow more rounds");
     if (result.min_jacobian < 0.1)
         reasons.push_back("tissue is compressed to " + to_text(result.min_jacobian) + " of its volume in one element");
+    if (result.surface) doubt_surface(*result.surface, seen.surface->deviation_mm, reasons);
     if (!seen.labels) return reasons;
     const double growth = labelled_volume(*seen.labels) / labelled_volume(prepared.labels);
     double poisson = 0;

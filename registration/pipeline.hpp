@@ -90,8 +90,18 @@ struct ImageOptions {
     double headers_within_mm = 15;    ///< the headers place an organ, part of which is out of view, closer than this
 };
 
+/// How points of a surface are weighed.
+struct SurfaceOptions {
+    double expected_strain = 0.15;   ///< deviation of the strain of tissue as large as …
+    double patch_mm = 10;            ///< … this, whose points say one thing together: the weight of strain energy
+    double expected_motion_mm = 20;  ///< of tissue that no point shows, from where the organ lies as a whole
+    double max_angle_deg = 60;       ///< between the normals of a point and of the model
+    double outlier_deviations = 3;   ///< Geman–McClure scale of the last round, in standard deviations of a point
+};
+
 struct UpdateOptions {
     ImageOptions image;
+    SurfaceOptions surface;
     AlignmentOptions alignment;
     bool align = true;               ///< false: the images are in one frame already
     int rematches = 8;               ///< rounds of correspondence and equilibrium; up to twice as many when the
@@ -119,12 +129,23 @@ struct Round {
     double estimated_error_mm = 0;  ///< lifted residual at acceptance
 };
 
+/// How points of a surface agree with the registered model.
+struct SurfaceFit {
+    double inlier_share = 0;     ///< of the points: within the scale of the last round
+    double residual_mm = 0;      ///< root mean square of those, along normals
+    double coverage = 0;         ///< the area they stand for over that of the model's surface
+    bool pose_searched = false;  ///< among all places, not only near the headers'
+    double rival_mm = 0;         ///< how far the surface lies from the chosen start pose in the best other one, mean
+    double rival_support = 0;    ///< what that one explains of the points over what the chosen one explains
+};
+
 struct UpdateResult {
     Deformation deformation;
     Alignment alignment;
     std::vector<Round> rounds;
     std::string engine;  ///< description of the device that solved
     double min_jacobian = 1;
+    std::optional<SurfaceFit> surface;  ///< where points of a surface were given
     std::vector<StageTime> times;
     std::vector<std::string> doubts;  ///< reasons not to trust the result, empty when there are none
 };

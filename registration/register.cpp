@@ -8,7 +8,9 @@
 #include "registration/detail/engine_choice.hpp"
 #include "registration/detail/image_evidence.hpp"
 #include "registration/detail/label_evidence.hpp"
+#include "registration/detail/rigid_part.hpp"
 #include "registration/detail/stopwatch.hpp"
+#include "registration/detail/surface_evidence.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -31,7 +33,8 @@ void require_common_labels(const PreparedModel& prepared, const imaging::Volume&
 }
 
 void require_usable(const PreparedModel& prepared, const Intraoperative& seen) {
-    if (!seen.labels && !seen.image) throw InvalidInput("nothing to register to; give labels or an image");
+    if (!seen.labels && !seen.image && !seen.surface)
+        throw InvalidInput("nothing to register to; give labels, an image or points of a surface");
     if (seen.image && !prepared.image)
         throw InvalidInput("a bare volume was given, but the model holds no preoperative image; call prepare_image");
     if (seen.labels) require_common_labels(prepared, *seen.labels);
@@ -41,12 +44,14 @@ void require_usable(const PreparedModel& prepared, const Intraoperative& seen) {
 struct Evidence {
     std::optional<detail::LabelEvidence> labels;
     std::optional<detail::ImageEvidence> image;
+    std::optional<detail::SurfaceEvidence> surface;
 
     /// Springs of all data together.
-    [[nodiscard]] detail::Contribution contribution(const detail::RoundPlan& plan, const detail::State& state) const {
+    [[nodiscard]] detail::Contribution contribution(const detail::RoundPlan& plan, const detail::State& state) {
         detail::Contribution sum;
         if (labels) detail::add(sum, labels->contribution(plan, state));
         if (image) detail::add(sum, image->contribution(plan, state));
+        if (surface) detail::add(sum, surface->contribution(plan, state));
         return sum;
     }
 };
@@ -75,6 +80,7 @@ public:
             search_image(round);
             const Round record = attempt(round);
             result_.rounds.push_back(record);
+            if (evidence_.surface && options_.align) detail::give_rigid_part_to_placement(prepared_, state_);
             observer_.checkpoint("registration", double(round + 1) / options_.rematches);
             if (50 * record.held_back > record.matched) continue;  // more than 2 %: the same range once more
             const bool settled = record.largest_change_mm < options_.settled_mm;
@@ -82,6 +88,8 @@ public:
         }
         result_.times.push_back({"correspondence", matching_seconds_});
         result_.times.push_back({"equilibrium", solving_seconds_});
+        result_.alignment.placement = state_.placement;
+        if (evidence_.surface) result_.surface = evidence_.surface->fit(state_);
         return state_.displacement;
     }
 
@@ -95,8 +103,8 @@ private:
     tled::EquilibriumOptions equilibrium_;
     double step_mm_;
     detail::State state_;
-    /// Matches within the tissue are other springs than those that the model was prepared with: a factor made with them
-    /// takes a tenth of the iterations.
+    /// Data other than labels pull with other springs than those that the model was prepared with: a factor made with
+    /// them takes a tenth of the iterations.
     std::optional<tled::RestStiffness> metric_;
     double matching_seconds_ = 0, solving_seconds_ = 0;
 
@@ -158,7 +166,7 @@ private:
         record.mean_residual_mm = data.mean_residual_mm;
         matching_seconds_ += stopwatch.lap("").seconds;
 
-        if (evidence_.image && !metric_) metric_.emplace(prepared_.rest, conditions);
+        if (!evidence_.labels && !metric_) metric_.emplace(prepared_.rest, conditions);
         const tled::EquilibriumResult solved =
             tled::equilibrium(*engine_, metric_ ? *metric_ : prepared_.stiffness, conditions, equilibrium_,
                               &state_.displacement, observer_);
@@ -174,10 +182,12 @@ private:
     }
 };
 
-/// Where the model starts: by labels; or by the matches of a first search, from where the headers place the images.
+/// Where the model starts: by labels; or by points of its surface; or by the matches of a first search, from where the
+/// headers place the images.
 Alignment align(const PreparedModel& prepared, const Intraoperative& seen, Evidence& evidence,
                 const UpdateOptions& options, Observer& observer) {
     if (seen.labels) return align_labels(prepared.labels, *seen.labels, options.alignment, observer);
+    if (evidence.surface) return evidence.surface->align(options.alignment, observer);
     const detail::State start{Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, prepared.rest.node_count)};
     evidence.image->search(start, observer);
     return {evidence.image->rigid_motion(), 0};
@@ -192,6 +202,7 @@ UpdateResult update(const PreparedModel& prepared, const Intraoperative& seen, c
     UpdateResult result;
     Evidence evidence;
     if (seen.image) evidence.image.emplace(prepared, *seen.image, options.image);
+    if (seen.surface) evidence.surface.emplace(prepared, *seen.surface, options.surface);
     if (options.align) result.alignment = align(prepared, seen, evidence, options, observer);
     result.times.push_back(stopwatch.lap("rigid alignment"));
     if (seen.labels) evidence.labels.emplace(prepared, *seen.labels, options);

@@ -7,7 +7,9 @@
 
 namespace tissuewarp::registration::detail {
 
-/// The strain energy (mN mm) that weighs as much as one standard deviation of a datum: E ε² ℓ³ of the expected strain.
+/// The strain energy (mN mm) that weighs as much as one standard deviation of a datum: E ε² ℓ³ of the expected strain
+/// ε of pieces of tissue of size ℓ.
+double strain_energy_unit(const PreparedModel& prepared, double expected_strain, double length_mm);
 double strain_energy_unit(const PreparedModel& prepared, const ImageOptions& options);
 
 /// Weak springs from every node of the outer surface to where the rigid placement has it: the prior that it moved by

@@ -101,17 +101,17 @@ TEST(SurfaceAlignment, APartOfASurfaceIsEnough) {
         if (surface.nodes(1, node) < 10) seen.push_back(node);
     ASSERT_LT(double(seen.size()), 0.75 * surface.node_count());
     const Eigen::Matrix3Xd part = expected * surface.nodes(Eigen::all, seen).eval();
-    const Alignment found = align_surfaces(surface, part);
+    const Alignment found = align_surfaces(surface, {part, Eigen::Matrix3Xd(3, 0), 0.5});
     EXPECT_LT(pose_error(found.placement, expected), 1.5);
     EXPECT_LT(found.mean_distance_mm, 0.8);  // points against a dense sample of the surface
 }
 
 TEST(SurfaceAlignment, EmptyAndNonFiniteInputIsRefused) {
     const auto surface = ellipsoid();
-    EXPECT_THROW(align_surfaces(surface, Eigen::Matrix3Xd(3, 0)), InvalidInput);
+    EXPECT_THROW(align_surfaces(surface, SurfacePoints{}), InvalidInput);
     Eigen::Matrix3Xd bad = surface.nodes;
     bad(1, 5) = NAN;
-    EXPECT_THROW(align_surfaces(surface, bad), InvalidInput);
+    EXPECT_THROW(align_surfaces(surface, {bad, Eigen::Matrix3Xd(3, 0), 0.5}), InvalidInput);
 }
 
 }  // namespace

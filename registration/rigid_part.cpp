@@ -1,0 +1,36 @@
+#include "registration/detail/rigid_part.hpp"
+
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+/// argmin Σ w ‖R x + t − y‖².
+Eigen::Isometry3d closest_motion(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& y, const Eigen::VectorXd& weights) {
+    const Eigen::Vector3d from = x * weights / weights.sum(), to = y * weights / weights.sum();
+    const Eigen::Matrix3d covariance = (y.colwise() - to) * weights.asDiagonal() * (x.colwise() - from).transpose();
+    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    const double handedness = (svd.matrixU() * svd.matrixV().transpose()).determinant();
+    Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
+    motion.linear() =
+        svd.matrixU() * Eigen::Vector3d(1, 1, handedness < 0 ? -1 : 1).asDiagonal() * svd.matrixV().transpose();
+    motion.translation() = to - motion.linear() * from;
+    return motion;
+}
+
+}  // namespace
+
+void give_rigid_part_to_placement(const PreparedModel& prepared, State& state) {
+    const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
+    Eigen::VectorXd weights = Eigen::VectorXd::Zero(nodes.cols());
+    for (const InterfaceNode& node : prepared.interfaces.nodes())
+        if (node.outer == 0) weights[node.node] += node.area;
+    const Eigen::Matrix3Xd moved = nodes + state.displacement;
+    const Eigen::Isometry3d motion = closest_motion(nodes, moved, weights);
+    state.placement = state.placement * motion;
+    state.displacement = (motion.inverse() * moved) - nodes;
+}
+
+}  // namespace tissuewarp::registration::detail
