@@ -11,6 +11,7 @@
 #include "registration/evaluation.hpp"
 #include "registration/field.hpp"
 #include "registration/pipeline.hpp"
+#include "registration/surface_points.hpp"
 
 #include <chrono>
 #include <cstdio>
@@ -33,6 +34,7 @@ struct Case {
     Intraoperative seen;
     Landmarks targets;
     double poissons_ratio = 0.45;
+    bool align = true;
 };
 
 /// Points of a field's grid in a mask, and where the field takes them.
@@ -70,7 +72,8 @@ std::vector<std::function<Case()>> cases(const fs::path& data, const std::string
             return study;
         });
     };
-    const fs::path shift = data / "phantom-brainshift", sag = data / "phantom-brain-sag", lung = data / "lung-ct";
+    const fs::path shift = data / "phantom-brainshift", sag = data / "phantom-brain-sag", lung = data / "lung-ct",
+                   liver = data / "phantom-liver";
     const auto shift_case = [shift](const std::string& image) {
         return [shift, image] {
             return Case{{},
@@ -101,6 +104,19 @@ std::vector<std::function<Case()>> cases(const fs::path& data, const std::string
             return study;
         };
     };
+    const auto surface_case = [](const fs::path& folder, double deviation_mm, bool align) {
+        return [folder, deviation_mm, align] {
+            Case study{{},
+                       imaging::read_volume(folder / "preop.nii.gz"),
+                       imaging::read_labels(folder / "preop_labels.nii.gz"),
+                       {.surface = read_surface_points(folder / "intraop_surface.ply", deviation_mm)},
+                       read_landmarks(folder / "landmarks.csv")};
+            study.align = align;
+            return study;
+        };
+    };
+    add("liver surface", surface_case(liver, 0.7, true));
+    add("brain shift surface", surface_case(shift, 0.3, false));  // the head is held: both images are in one frame
     add("brain shift image", shift_case("intraop.nii.gz"));
     add("brain sag clean image", sag_case("intraop.nii.gz"));
     add("brain sag degraded image", sag_case("intraop_degraded.nii.gz"));
@@ -113,6 +129,10 @@ using Setter = std::function<void(UpdateOptions&, double)>;
 
 std::map<std::string, Setter> setters() {
     return {{"align", [](UpdateOptions& o, double v) { o.align = v != 0; }},
+            {"surface-strain", [](UpdateOptions& o, double v) { o.surface.expected_strain = v; }},
+            {"surface-patch", [](UpdateOptions& o, double v) { o.surface.patch_mm = v; }},
+            {"surface-motion", [](UpdateOptions& o, double v) { o.surface.expected_motion_mm = v; }},
+            {"surface-outliers", [](UpdateOptions& o, double v) { o.surface.outlier_deviations = v; }},
             {"expected-strain", [](UpdateOptions& o, double v) { o.image.expected_strain = v; }},
             {"expected-motion", [](UpdateOptions& o, double v) { o.image.expected_motion_mm = v; }},
             {"searches", [](UpdateOptions& o, double v) { o.image.searches = int(v); }},
@@ -173,6 +193,10 @@ void print_row(const std::string& name, const UpdateResult& result, const Landma
                 name.c_str(), error.after.mean, error.after.median, error.after.percentile_95, error.moved_after.mean,
                 error.moved_after.median, error.moved_after.percentile_95, result.rounds.size(), evaluations,
                 last.matched, last.interface_nodes, last.mean_residual_mm, result.min_jacobian, seconds);
+    if (result.surface)
+        std::fprintf(stderr, "  inliers %.3f, residual %.2f mm, coverage %.2f, rival %.1f mm %.3f",
+                     result.surface->inlier_share, result.surface->residual_mm, result.surface->coverage,
+                     result.surface->rival_mm, result.surface->rival_support);
     for (const StageTime& time : result.times) std::fprintf(stderr, "  %s %.2f s", time.stage.c_str(), time.seconds);
     std::fprintf(stderr, "\n");
     for (const Round& round : result.rounds)
@@ -205,10 +229,11 @@ void run(const Arguments& arguments) {
         PreparedModel prepared = prepare(study.labels, options);
         ImageModelOptions image_options;
         image_options.features.count = arguments.count;
-        prepare_image(prepared, study.moving, image_options);
+        if (study.seen.image) prepare_image(prepared, study.moving, image_options);
         for (const double value : arguments.values) {
             UpdateOptions update_options;
             update_options.device = Device::Cpu;
+            update_options.align = study.align;
             std::string name = study.name;
             if (!arguments.option.empty()) {
                 setters().at(arguments.option)(update_options, value);
