@@ -129,9 +129,10 @@ using Setter = std::function<void(UpdateOptions&, double)>;
 
 std::map<std::string, Setter> setters() {
     return {{"align", [](UpdateOptions& o, double v) { o.align = v != 0; }},
-            {"surface-strain", [](UpdateOptions& o, double v) { o.surface.expected_strain = v; }},
+            {"tissue-strain", [](UpdateOptions& o, double v) { o.tissue.expected_strain = v; }},
             {"surface-patch", [](UpdateOptions& o, double v) { o.surface.patch_mm = v; }},
-            {"surface-motion", [](UpdateOptions& o, double v) { o.surface.expected_motion_mm = v; }},
+            {"free-motion", [](UpdateOptions& o, double v) { o.tissue.free_motion_mm = v; }},
+            {"held-motion", [](UpdateOptions& o, double v) { o.tissue.held_motion_mm = v; }},
             {"surface-outliers", [](UpdateOptions& o, double v) { o.surface.outlier_deviations = v; }},
             {"expected-strain", [](UpdateOptions& o, double v) { o.image.expected_strain = v; }},
             {"expected-motion", [](UpdateOptions& o, double v) { o.image.expected_motion_mm = v; }},
@@ -193,6 +194,9 @@ void print_row(const std::string& name, const UpdateResult& result, const Landma
                 name.c_str(), error.after.mean, error.after.median, error.after.percentile_95, error.moved_after.mean,
                 error.moved_after.median, error.moved_after.percentile_95, result.rounds.size(), evaluations,
                 last.matched, last.interface_nodes, last.mean_residual_mm, result.min_jacobian, seconds);
+    if (result.expected)
+        std::fprintf(stderr, "  expected error %.2f mm, worst %.2f mm", result.expected->mean_mm,
+                     result.expected->worst_mm);
     if (result.surface)
         std::fprintf(stderr, "  inliers %.3f, residual %.2f mm, coverage %.2f, rival %.1f mm %.3f",
                      result.surface->inlier_share, result.surface->residual_mm, result.surface->coverage,

@@ -90,18 +90,32 @@ struct ImageOptions {
     double headers_within_mm = 15;    ///< the headers place an organ, part of which is out of view, closer than this
 };
 
+/// What is expected of tissue before any surface or landmark is seen. It weighs strain energy against data and holds
+/// what no datum shows.
+struct TissuePrior {
+    double expected_strain = 0.15;  ///< deviation of the strain of pieces of tissue …
+    double strain_length_mm = 10;   ///< … of this size
+    double free_motion_mm = 20;     ///< of the organ's surface, from where the organ lies as a whole
+    double held_motion_mm = 5;      ///< the same where the images are in one frame: what is around holds the organ
+};
+
 /// How points of a surface are weighed.
 struct SurfaceOptions {
-    double expected_strain = 0.15;   ///< deviation of the strain of tissue as large as …
-    double patch_mm = 10;            ///< … this, whose points say one thing together: the weight of strain energy
-    double expected_motion_mm = 20;  ///< of tissue that no point shows, from where the organ lies as a whole
-    double max_angle_deg = 60;       ///< between the normals of a point and of the model
-    double outlier_deviations = 3;   ///< Geman–McClure scale of the last round, in standard deviations of a point
+    double patch_mm = 10;           ///< size of a piece of surface whose points say one thing together
+    double max_angle_deg = 60;      ///< between the normals of a point and of the model
+    double outlier_deviations = 3;  ///< Geman–McClure scale of the last round, in standard deviations of a point
+};
+
+/// How pairs of points are weighed.
+struct PointOptions {
+    double outlier_deviations = 3;  ///< Geman–McClure scale of the last round, in standard deviations of a pair
 };
 
 struct UpdateOptions {
     ImageOptions image;
+    TissuePrior tissue;
     SurfaceOptions surface;
+    PointOptions points;
     AlignmentOptions alignment;
     bool align = true;               ///< false: the images are in one frame already
     int rematches = 8;               ///< rounds of correspondence and equilibrium; up to twice as many when the
@@ -139,19 +153,36 @@ struct SurfaceFit {
     double rival_support = 0;    ///< what that one explains of the points over what the chosen one explains
 };
 
+/// How pairs of points agree with the registered model.
+struct PointFit {
+    int used = 0;            ///< pairs whose moving point lies in the model
+    int outliers = 0;        ///< of those: beyond the scale of the last round
+    double residual_mm = 0;  ///< root mean square of the others
+};
+
+/// How far off tissue is expected to lie, from the deviations of the data and the prior alone: root mean square over
+/// places all over the organ, and the place that is known least.
+struct ExpectedError {
+    double mean_mm = 0, worst_mm = 0;
+    Eigen::Vector3d worst_place = Eigen::Vector3d::Zero();  ///< moving frame, LPS mm
+};
+
 struct UpdateResult {
     Deformation deformation;
     Alignment alignment;
     std::vector<Round> rounds;
     std::string engine;  ///< description of the device that solved
     double min_jacobian = 1;
-    std::optional<SurfaceFit> surface;  ///< where points of a surface were given
+    std::optional<SurfaceFit> surface;      ///< where points of a surface were given
+    std::optional<PointFit> points;         ///< where pairs of points were given
+    std::optional<ExpectedError> expected;  ///< where neither labels nor an image show the organ as a whole
     std::vector<StageTime> times;
     std::vector<std::string> doubts;  ///< reasons not to trust the result, empty when there are none
 };
 
 /// Registers the prepared model to what was seen during the operation. Throws InvalidInput when there is nothing to
-/// register to, a bare volume without prepare_image, label maps that share no label or do not meet; SolverFailure when
+/// register to, a bare volume without prepare_image, label maps that share no label or do not meet, surface points or
+/// pairs of points that cannot be used or lie nowhere near the model; SolverFailure when
 /// no trustworthy equilibrium is found, GpuUnavailable when a GPU was demanded.
 UpdateResult update(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options = {},
                     Observer& observer = silent_observer());

@@ -6,8 +6,11 @@
 #include "imaging/labels.hpp"
 #include "registration/detail/doubts.hpp"
 #include "registration/detail/engine_choice.hpp"
+#include "registration/detail/expected_error.hpp"
+#include "registration/detail/ground.hpp"
 #include "registration/detail/image_evidence.hpp"
 #include "registration/detail/label_evidence.hpp"
+#include "registration/detail/point_evidence.hpp"
 #include "registration/detail/rigid_part.hpp"
 #include "registration/detail/stopwatch.hpp"
 #include "registration/detail/surface_evidence.hpp"
@@ -33,18 +36,24 @@ void require_common_labels(const PreparedModel& prepared, const imaging::Volume&
 }
 
 void require_usable(const PreparedModel& prepared, const Intraoperative& seen) {
-    if (!seen.labels && !seen.image && !seen.surface)
-        throw InvalidInput("nothing to register to; give labels, an image or points of a surface");
+    if (!seen.labels && !seen.image && !seen.surface && !seen.points)
+        throw InvalidInput("nothing to register to; give labels, an image, points of a surface or pairs of points");
     if (seen.image && !prepared.image)
         throw InvalidInput("a bare volume was given, but the model holds no preoperative image; call prepare_image");
     if (seen.labels) require_common_labels(prepared, *seen.labels);
 }
 
-/// The data that are there.
+/// The data that are there, and what holds tissue that only points show in part.
 struct Evidence {
     std::optional<detail::LabelEvidence> labels;
     std::optional<detail::ImageEvidence> image;
     std::optional<detail::SurfaceEvidence> surface;
+    std::optional<detail::PointEvidence> points;
+    double energy = 0;                 ///< mN mm that weighs as much as one standard deviation of a point
+    std::vector<tled::Spring> ground;  ///< moves with the placement
+
+    /// Labels say where every boundary is, and an image holds what it does not show.
+    [[nodiscard]] bool only_points() const { return !labels && !image; }
 
     /// Springs of all data together.
     [[nodiscard]] detail::Contribution contribution(const detail::RoundPlan& plan, const detail::State& state) {
@@ -52,6 +61,7 @@ struct Evidence {
         if (labels) detail::add(sum, labels->contribution(plan, state));
         if (image) detail::add(sum, image->contribution(plan, state));
         if (surface) detail::add(sum, surface->contribution(plan, state));
+        if (points) detail::add(sum, points->contribution(plan, state));
         return sum;
     }
 };
@@ -80,7 +90,7 @@ public:
             search_image(round);
             const Round record = attempt(round);
             result_.rounds.push_back(record);
-            if (evidence_.surface && options_.align) detail::give_rigid_part_to_placement(prepared_, state_);
+            if (evidence_.only_points() && options_.align) detail::give_rigid_part_to_placement(prepared_, state_);
             observer_.checkpoint("registration", double(round + 1) / options_.rematches);
             if (50 * record.held_back > record.matched) continue;  // more than 2 %: the same range once more
             const bool settled = record.largest_change_mm < options_.settled_mm;
@@ -89,7 +99,7 @@ public:
         result_.times.push_back({"correspondence", matching_seconds_});
         result_.times.push_back({"equilibrium", solving_seconds_});
         result_.alignment.placement = state_.placement;
-        if (evidence_.surface) result_.surface = evidence_.surface->fit(state_);
+        judge();
         return state_.displacement;
     }
 
@@ -147,6 +157,19 @@ private:
         }
     }
 
+    /// What the data say of the result.
+    void judge() {
+        if (evidence_.surface) result_.surface = evidence_.surface->fit(state_);
+        if (evidence_.points) result_.points = evidence_.points->fit(state_);
+        if (!evidence_.only_points()) return;
+        detail::Stopwatch stopwatch;
+        const int last = options_.rematches - 1;
+        const auto springs = evidence_.contribution(plan_of(last), state_).conditions.springs;
+        result_.expected =
+            detail::expected_error(prepared_, {springs, evidence_.ground, evidence_.energy, options_.align});
+        result_.times.push_back(stopwatch.lap("expected error"));
+    }
+
     [[nodiscard]] detail::RoundPlan plan_of(int round) const {
         const double range = range_of(options_, round);
         const double scale = round == 0 ? 1e6 : std::max(options_.residual_scale_mm, range / 3);
@@ -156,7 +179,8 @@ private:
     Round match_and_solve(int round) {
         detail::Stopwatch stopwatch;
         const detail::RoundPlan plan = plan_of(round);
-        const detail::Contribution data = evidence_.contribution(plan, state_);
+        detail::Contribution data = evidence_.contribution(plan, state_);
+        data.conditions.springs.insert(data.conditions.springs.end(), evidence_.ground.begin(), evidence_.ground.end());
         const auto conditions = tled::nodal_conditions(data.conditions, prepared_.rest.node_count);
         Round record;
         record.range_mm = plan.range_mm;
@@ -182,12 +206,14 @@ private:
     }
 };
 
-/// Where the model starts: by labels; or by points of its surface; or by the matches of a first search, from where the
-/// headers place the images.
+/// Where the model starts: by labels; or by pairs of points that show how it is turned; or by points of its surface; or
+/// by what pairs there are; or by the matches of a first search, from where the headers place the images.
 Alignment align(const PreparedModel& prepared, const Intraoperative& seen, Evidence& evidence,
                 const UpdateOptions& options, Observer& observer) {
     if (seen.labels) return align_labels(prepared.labels, *seen.labels, options.alignment, observer);
+    if (evidence.points && evidence.points->show_rotation()) return evidence.points->align();
     if (evidence.surface) return evidence.surface->align(options.alignment, observer);
+    if (evidence.points) return evidence.points->align();
     const detail::State start{Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, prepared.rest.node_count)};
     evidence.image->search(start, observer);
     return {evidence.image->rigid_motion(), 0};
@@ -202,7 +228,14 @@ UpdateResult update(const PreparedModel& prepared, const Intraoperative& seen, c
     UpdateResult result;
     Evidence evidence;
     if (seen.image) evidence.image.emplace(prepared, *seen.image, options.image);
-    if (seen.surface) evidence.surface.emplace(prepared, *seen.surface, options.surface);
+    const TissuePrior& tissue = options.tissue;
+    evidence.energy = detail::strain_energy_unit(prepared, tissue.expected_strain, tissue.strain_length_mm);
+    if (seen.surface) evidence.surface.emplace(prepared, *seen.surface, options.surface, evidence.energy);
+    if (seen.points) evidence.points.emplace(prepared, *seen.points, options.points, evidence.energy);
+    if (!seen.labels && !seen.image)
+        evidence.ground = detail::ground_springs(prepared, evidence.energy, [&](const InterfaceNode&) {
+            return options.align ? tissue.free_motion_mm : tissue.held_motion_mm;
+        });
     if (options.align) result.alignment = align(prepared, seen, evidence, options, observer);
     result.times.push_back(stopwatch.lap("rigid alignment"));
     if (seen.labels) evidence.labels.emplace(prepared, *seen.labels, options);

@@ -5,9 +5,6 @@
 
 namespace tissuewarp::registration::detail {
 
-namespace {
-
-/// argmin Σ w ‖R x + t − y‖².
 Eigen::Isometry3d closest_motion(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& y, const Eigen::VectorXd& weights) {
     const Eigen::Vector3d from = x * weights / weights.sum(), to = y * weights / weights.sum();
     const Eigen::Matrix3d covariance = (y.colwise() - to) * weights.asDiagonal() * (x.colwise() - from).transpose();
@@ -19,8 +16,6 @@ Eigen::Isometry3d closest_motion(const Eigen::Matrix3Xd& x, const Eigen::Matrix3
     motion.translation() = to - motion.linear() * from;
     return motion;
 }
-
-}  // namespace
 
 void give_rigid_part_to_placement(const PreparedModel& prepared, State& state) {
     const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;

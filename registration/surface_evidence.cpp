@@ -1,7 +1,6 @@
 #include "registration/detail/surface_evidence.hpp"
 
 #include "registration/detail/doubts.hpp"
-#include "registration/detail/ground.hpp"
 
 #include <tbb/parallel_for.h>
 
@@ -34,8 +33,8 @@ std::array<int, 3> sorted(std::array<int, 3> nodes) {
 }  // namespace
 
 SurfaceEvidence::SurfaceEvidence(const PreparedModel& prepared, const SurfacePoints& surface,
-                                 const SurfaceOptions& options)
-    : prepared_(prepared), options_(options), data_(surface_data(surface)), energy_(strain_energy_unit(prepared, options.expected_strain, options.patch_mm)) {
+                                 const SurfaceOptions& options, double energy)
+    : prepared_(prepared), options_(options), data_(surface_data(surface)), energy_(energy) {
     take_surface();
 }
 
@@ -163,9 +162,6 @@ Contribution SurfaceEvidence::contribution(const RoundPlan& plan, const State& s
     result.candidates = static_cast<int>(found.size());
     result.matched = static_cast<int>(pulls.size());
     result.conditions.springs = lumped_springs(prepared_.model.mesh, pulls, state.displacement);
-    const auto expected_motion = [&](const InterfaceNode&) { return options_.expected_motion_mm; };
-    for (const tled::Spring& spring : ground_springs(prepared_, energy_, expected_motion))
-        result.conditions.springs.push_back(spring);
     return result;
 }
 

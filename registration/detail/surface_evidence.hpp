@@ -13,14 +13,16 @@ namespace tissuewarp::registration::detail {
 
 class SurfaceEvidence {
 public:
-    /// Throws InvalidInput for points that cannot be used.
-    SurfaceEvidence(const PreparedModel& prepared, const SurfacePoints& surface, const SurfaceOptions& options);
+    /// `energy` is the strain energy (mN mm) that weighs as much as one standard deviation. Throws InvalidInput for
+    /// points that cannot be used.
+    SurfaceEvidence(const PreparedModel& prepared, const SurfacePoints& surface, const SurfaceOptions& options,
+                    double energy);
 
     /// The rigid placement, searched for all over the organ. Throws Cancelled.
     Alignment align(const AlignmentOptions& options, Observer& observer);
 
-    /// Pulls of the points on the surface of the deformed mesh, along the normals alone, and the weak ground. Throws
-    /// InvalidInput when no point lies near the model.
+    /// Pulls of the points on the surface of the deformed mesh, along the normals alone. Throws InvalidInput when no
+    /// point lies near the model.
     [[nodiscard]] Contribution contribution(const RoundPlan& plan, const State& state);
 
     /// How the surface of the model lies to the points.
