@@ -4,6 +4,7 @@
 #include "core/sha256.hpp"
 #include "imaging/filters.hpp"
 #include "imaging/labels.hpp"
+#include "registration/surface_points.hpp"
 
 #include <fmt/format.h>
 #include <tbb/task_group.h>
@@ -106,6 +107,14 @@ void match_grid(Volume& labels, const Volume& image, const fs::path& image_path,
     labels.geometry = image.geometry;  // headers that differ in a late digit are one grid
 }
 
+void validate_fixed_labels(RegistrationInputs& inputs, const RegisterOptions& options) {
+    match_grid(inputs.fixed_labels, inputs.fixed, options.fixed, options.fixed_labels, options.resample_labels);
+    require_millimetres(inputs.fixed_labels.geometry, options.fixed_labels);
+    imaging::require_labels(inputs.fixed_labels, {}, options.fixed_labels.string().c_str());
+    require_common_label(inputs.moving_labels, inputs.fixed_labels, options);
+    if (options.no_align) require_organs_meet(inputs);
+}
+
 }  // namespace
 
 void require_same_grid(const Geometry& image, const Geometry& labels, const std::string& image_name,
@@ -126,12 +135,22 @@ std::optional<registration::Landmarks> read_landmark_files(const LandmarkFiles& 
     return std::nullopt;
 }
 
+std::optional<registration::PointPairs> read_point_pairs(const PointPairFiles& files) {
+    if (files.fixed.empty()) return std::nullopt;
+    registration::Landmarks pairs = files.moving.empty() ? registration::read_landmarks(files.fixed)
+                                                         : registration::read_landmarks(files.moving, files.fixed);
+    return registration::PointPairs{std::move(pairs.moving), std::move(pairs.fixed), files.deviation};
+}
+
 RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observer) {
     RegistrationInputs inputs;
     const std::vector<std::pair<const char*, const fs::path*>> roles{{"moving", &options.moving},
                                                                      {"moving-labels", &options.moving_labels},
                                                                      {"fixed", &options.fixed},
                                                                      {"fixed-labels", &options.fixed_labels},
+                                                                     {"fixed-surface", &options.fixed_surface},
+                                                                     {"fixed-points", &options.point_pairs.fixed},
+                                                                     {"moving-points", &options.point_pairs.moving},
                                                                      {"materials", &options.materials},
                                                                      {"landmarks", &options.landmarks.csv},
                                                                      {"landmarks-moving", &options.landmarks.moving},
@@ -141,13 +160,17 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
     for (const auto& [role, path] : roles) add_file(inputs, role, *path);
     if (!options.materials.empty()) inputs.materials = read_materials(options.materials);
     inputs.landmarks = read_landmark_files(options.landmarks);
+    inputs.point_pairs = read_point_pairs(options.point_pairs);
+    if (!options.fixed_surface.empty())
+        inputs.fixed_surface = registration::read_surface_points(options.fixed_surface, options.surface_deviation);
     if (!options.points.empty()) inputs.points = read_points(options.points);
     observer.checkpoint("reading", 0.1);
 
     imaging::ReadResult moving, fixed;
     tbb::task_group tasks;
     tasks.run([&] { inputs.moving_labels = imaging::read_labels(options.moving_labels); });
-    tasks.run([&] { inputs.fixed_labels = imaging::read_labels(options.fixed_labels); });
+    if (!options.fixed_labels.empty())
+        tasks.run([&] { inputs.fixed_labels = imaging::read_labels(options.fixed_labels); });
     if (!options.moving.empty()) tasks.run([&] { moving = imaging::read_volume_with_notes(options.moving); });
     if (!options.fixed.empty()) tasks.run([&] { fixed = imaging::read_volume_with_notes(options.fixed); });
     tasks.run([&] {
@@ -169,20 +192,27 @@ void validate(RegistrationInputs& inputs, const RegisterOptions& options) {
             throw InvalidInput(
                 fmt::format("'{}' has {} components; give a grey image", path->string(), image->channels()));
     match_grid(inputs.moving_labels, inputs.moving, options.moving, options.moving_labels, options.resample_labels);
-    match_grid(inputs.fixed_labels, inputs.fixed, options.fixed, options.fixed_labels, options.resample_labels);
     require_millimetres(inputs.moving_labels.geometry, options.moving_labels);
-    require_millimetres(inputs.fixed_labels.geometry, options.fixed_labels);
     imaging::require_labels(inputs.moving_labels, {}, options.moving_labels.string().c_str());
-    imaging::require_labels(inputs.fixed_labels, {}, options.fixed_labels.string().c_str());
-    require_common_label(inputs.moving_labels, inputs.fixed_labels, options);
+    if (!inputs.fixed_labels.empty()) validate_fixed_labels(inputs, options);
     if (!options.materials.empty())
         require_materials(inputs.materials, imaging::labels_in(inputs.moving_labels), options.materials);
-    if (options.no_align) require_organs_meet(inputs);
+    const auto check_moving = [&](const Eigen::Matrix3Xd& points, const char* what) {
+        check_inside(points, inputs.moving_grid(), what, inputs.notes);
+    };
+    const auto check_fixed = [&](const Eigen::Matrix3Xd& points, const char* what) {
+        if (const Geometry* grid = inputs.fixed_grid()) check_inside(points, *grid, what, inputs.notes);
+    };
     if (inputs.landmarks) {
-        check_inside(inputs.landmarks->moving, inputs.moving_grid(), "moving landmarks", inputs.notes);
-        check_inside(inputs.landmarks->fixed, inputs.fixed_grid(), "fixed landmarks", inputs.notes);
+        check_moving(inputs.landmarks->moving, "moving landmarks");
+        check_fixed(inputs.landmarks->fixed, "fixed landmarks");
     }
-    if (inputs.points) check_inside(*inputs.points, inputs.moving_grid(), "points", inputs.notes);
+    if (inputs.point_pairs) {
+        check_moving(inputs.point_pairs->moving, "moving points");
+        check_fixed(inputs.point_pairs->fixed, "fixed points");
+    }
+    if (inputs.fixed_surface) check_fixed(inputs.fixed_surface->points, "points of the fixed surface");
+    if (inputs.points) check_moving(*inputs.points, "points");
 }
 
 }  // namespace tissuewarp::apps

@@ -6,6 +6,7 @@
 #include "core/observer.hpp"
 #include "imaging/image_io.hpp"
 #include "registration/evaluation.hpp"
+#include "registration/intraoperative.hpp"
 
 #include <map>
 #include <optional>
@@ -22,16 +23,20 @@ struct InputFile {
 };
 
 struct RegistrationInputs {
-    imaging::Volume moving, fixed;  ///< grey images; empty when not given
-    imaging::Volume moving_labels, fixed_labels;
+    imaging::Volume moving, fixed;                             ///< grey images; empty when not given
+    imaging::Volume moving_labels, fixed_labels;               ///< the latter empty when not given
+    std::optional<registration::SurfacePoints> fixed_surface;  ///< to register to, as the pairs
+    std::optional<registration::PointPairs> point_pairs;
     std::optional<registration::Landmarks> landmarks;
     std::optional<Eigen::Matrix3Xd> points;  ///< moving frame, LPS mm
     std::map<int, TissueEntry> materials;    ///< empty without a table
     std::vector<InputFile> files;
     std::vector<std::string> notes;  ///< what the readers had to decide
 
-    [[nodiscard]] const imaging::Geometry& fixed_grid() const {
-        return fixed.empty() ? fixed_labels.geometry : fixed.geometry;
+    /// Nothing where no fixed image and no fixed labels were given.
+    [[nodiscard]] const imaging::Geometry* fixed_grid() const {
+        if (!fixed.empty()) return &fixed.geometry;
+        return fixed_labels.empty() ? nullptr : &fixed_labels.geometry;
     }
     [[nodiscard]] const imaging::Geometry& moving_grid() const {
         return moving.empty() ? moving_labels.geometry : moving.geometry;
@@ -47,6 +52,9 @@ void validate(RegistrationInputs& inputs, const RegisterOptions& options);
 /// Throws InvalidInput unless both lie on one grid; says how far apart they are, in voxels.
 void require_same_grid(const imaging::Geometry& image, const imaging::Geometry& labels, const std::string& image_name,
                        const std::string& labels_name, const std::string& remedy);
+
+/// Reads the files of points to register to, if given.
+std::optional<registration::PointPairs> read_point_pairs(const PointPairFiles& files);
 
 /// Reads the landmark files that were given.
 std::optional<registration::Landmarks> read_landmark_files(const LandmarkFiles& files);

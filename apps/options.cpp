@@ -146,7 +146,7 @@ struct Parser {
     Parser() {
         app.require_subcommand(1);
         app.set_version_flag("--version", "tissuewarp " + program_version());
-        declare_register(verbs.emplace_back(app, "register", "Register a segmented volume to another"));
+        declare_register(verbs.emplace_back(app, "register", "Register a segmented volume to another, or to points"));
         declare_mesh(verbs.emplace_back(app, "mesh", "Turn a label map into tetrahedra"));
         declare_warp(verbs.emplace_back(app, "warp", "Carry an image, labels, points or a surface along"));
         declare_evaluate(verbs.emplace_back(app, "evaluate", "Score label maps, landmarks and fields"));
@@ -162,7 +162,19 @@ struct Parser {
         verb.path("--moving", o.moving, "Preoperative grey image; without it no warped image is written");
         verb.path("--moving-labels", o.moving_labels, "Preoperative label map: what is meshed")->required();
         verb.path("--fixed", o.fixed, "Intraoperative grey image: gives the output grid");
-        verb.path("--fixed-labels", o.fixed_labels, "Intraoperative label map: what is matched")->required();
+        verb.path("--fixed-labels", o.fixed_labels, "Intraoperative label map: what is matched");
+        verb.path("--fixed-surface", o.fixed_surface,
+                  "Intraoperative points of a part of the surface: .ply, .stl, .obj, .vtk, .csv, .xyz (mm, LPS)");
+        verb.number("--surface-sd", o.surface_deviation, "MM", 1e-3, 100.0,
+                    "Standard deviation of these points along the normal (mm)");
+        CLI::Option* fixed_points =
+            verb.path("--fixed-points", o.point_pairs.fixed,
+                      "Points to register to: CSV pre_x,pre_y,pre_z,intra_x,intra_y,intra_z (mm, LPS); with "
+                      "--moving-points, elastix or 3D Slicer points of the fixed image");
+        verb.path("--moving-points", o.point_pairs.moving, "The same points in the moving image, likewise")
+            ->needs(fixed_points);
+        verb.number("--points-sd", o.point_pairs.deviation, "MM", 1e-3, 100.0,
+                    "Standard deviation of a pair along each axis (mm)");
         verb.path("-o,--output", o.output, "Folder for the results")->required()->type_name("FOLDER");
         verb.landmarks(o.landmarks);
         verb.path("--points", o.points, "Moving points to carry along: CSV x,y,z (mm, LPS)");
@@ -295,6 +307,10 @@ struct Parser {
         const std::string verb = app.get_subcommands().front()->get_name();
         if (verb == "register") {
             registration.label_edge_length = label_lengths(register_lengths);
+            if (registration.fixed_labels.empty() && registration.fixed_surface.empty() &&
+                registration.point_pairs.fixed.empty())
+                throw InvalidInput(
+                    "nothing to register to; give --fixed-labels, --fixed-surface or --fixed-points, or several");
             registration.parameters = verbs.front().parameters({"save-parameters", "dry-run"});
             return registration;
         }

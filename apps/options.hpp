@@ -28,9 +28,18 @@ struct LandmarkFiles {
     [[nodiscard]] bool given() const { return !csv.empty() || !moving.empty(); }
 };
 
+/// Points of the tissue in both images, to register to: one CSV, or a pair of point files likewise.
+struct PointPairFiles {
+    std::filesystem::path moving, fixed;  ///< moving is empty with one CSV
+    double deviation = 1.0;               ///< mm
+};
+
 struct RegisterOptions {
     CommonOptions common;
     std::filesystem::path moving, moving_labels, fixed, fixed_labels, output;
+    std::filesystem::path fixed_surface;  ///< points of a part of the organ's surface
+    double surface_deviation = 1.0;       ///< mm
+    PointPairFiles point_pairs;
     LandmarkFiles landmarks;
     std::filesystem::path points, surface;    ///< of the moving frame, carried along
     double edge_length = 0.0;                 ///< mm; 0: from the volume of the organ

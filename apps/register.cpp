@@ -53,13 +53,31 @@ void print_plan(const RegistrationInputs& inputs, const RegisterOptions& options
         return fmt::format("{} x {} x {} voxels of {:g} x {:g} x {:g} mm", g.size[0], g.size[1], g.size[2],
                            g.spacing[0], g.spacing[1], g.spacing[2]);
     };
+    const imaging::Geometry* fixed = inputs.fixed_grid();
     fmt::print("moving grid   {}\nfixed grid    {}\nlabels        {}\n", grid(inputs.moving_grid()),
-               grid(inputs.fixed_grid()), fmt::join(imaging::labels_in(inputs.moving_labels), ", "));
+               fixed ? grid(*fixed) : "the moving one, carried along by the rigid alignment",
+               fmt::join(imaging::labels_in(inputs.moving_labels), ", "));
     const double edge = options.edge_length > 0 ? options.edge_length : suggested_edge_length(inputs.moving_labels);
     fmt::print("would mesh with edges of {:.3g} mm, {}, match in {} rounds on device '{}', and write to '{}':\n", edge,
                options.no_align ? "not align" : "align rigidly", options.rounds, options.device.name,
                options.output.string());
     for (const std::string& name : output_names(options)) fmt::print("  {}\n", name);
+}
+
+/// Where no fixed image gives a grid: the moving one, carried along by the rigid alignment.
+imaging::Geometry output_grid(const RegistrationRun& run) {
+    if (const imaging::Geometry* fixed = run.inputs.fixed_grid()) return *fixed;
+    const Eigen::Isometry3d& placement = run.result.deformation.placement;
+    imaging::Geometry grid = run.inputs.moving_grid();
+    grid.origin = placement * grid.origin;
+    grid.direction = placement.linear() * grid.direction;
+    return grid;
+}
+
+Intraoperative seen(const RegistrationInputs& inputs) {
+    Intraoperative seen{.surface = inputs.fixed_surface, .points = inputs.point_pairs};
+    if (!inputs.fixed_labels.empty()) seen.labels = inputs.fixed_labels;
+    return seen;
 }
 
 void make_fields(RegistrationRun& run, ProgressLine& progress) {
@@ -69,7 +87,7 @@ void make_fields(RegistrationRun& run, ProgressLine& progress) {
     progress.begin("field forward", 0.47, 0.52);
     products.moving_to_fixed = displacement_moving_to_fixed(deformation, run.inputs.moving_grid(), options, progress);
     progress.begin("field backward", 0.52, 0.57);
-    products.fixed_to_moving = displacement_fixed_to_moving(deformation, run.inputs.fixed_grid(), options, progress);
+    products.fixed_to_moving = displacement_fixed_to_moving(deformation, output_grid(run), options, progress);
 }
 
 void warp_everything(RegistrationRun& run) {
@@ -91,9 +109,10 @@ void warp_everything(RegistrationRun& run) {
 Scores score(const RegistrationRun& run) {
     Scores scores;
     const imaging::Volume &moving = run.inputs.moving_labels, &fixed = run.inputs.fixed_labels;
-    scores.moving_labels_by_header = imaging::resample(moving, fixed.geometry, imaging::Interpolation::Nearest);
-    scores.before = overlap(scores.moving_labels_by_header, fixed);
-    scores.after = overlap(run.products.warped_labels, fixed);
+    if (!fixed.empty()) {
+        scores.before = overlap(imaging::resample(moving, fixed.geometry, imaging::Interpolation::Nearest), fixed);
+        scores.after = overlap(run.products.warped_labels, fixed);
+    }
     scores.mesh = mesh_jacobians(run.result.deformation);
     const imaging::Volume organ = imaging::mask_of_all(moving);
     scores.organ = field_jacobians(run.products.moving_to_fixed, &organ);
@@ -133,7 +152,7 @@ void run_register(const RegisterOptions& options) {
     append(run.times, run.prepared->times);
 
     progress.begin("registering", 0.20, 0.47);
-    run.result = update(*run.prepared, {.labels = run.inputs.fixed_labels}, update_options(options), progress);
+    run.result = update(*run.prepared, seen(run.inputs), update_options(options), progress);
     append(run.times, run.result.times);
     clock.lap("");
 

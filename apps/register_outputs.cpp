@@ -125,7 +125,7 @@ void write_reports(const RegistrationRun& run, const nlohmann::json& report, con
     write_json(report, output.path("report.json"));
     report::write_report(
         {given(run.inputs.moving), given(run.inputs.fixed), given(products.warped), &run.inputs.moving_labels,
-         &run.inputs.fixed_labels, &products.warped_labels, &products.moving_to_fixed, report},
+         given(run.inputs.fixed_labels), &products.warped_labels, &products.moving_to_fixed, report},
         output.staging());
 }
 
@@ -139,7 +139,16 @@ std::string summary_text(const RegistrationRun& run, double total_seconds) {
         const std::string moved = fmt::format("moved > {:g} mm, ", error->moved_mm);
         text += summary_row(moved + "before", error->moved_before) + summary_row(moved + "after", error->moved_after);
     }
-    text += "Dice                      before   after\n";
+    if (const auto& fit = run.result.surface)
+        text += fmt::format("surface points: {:.0f} % on the model, {:.2f} mm from it (root mean square)\n",
+                            100 * fit->inlier_share, fit->residual_mm);
+    if (const auto& fit = run.result.points)
+        text += fmt::format("paired points: {} of {} fit, {:.2f} mm off (root mean square)\n",
+                            fit->used - fit->outliers, fit->used, fit->residual_mm);
+    if (const auto& expected = run.result.expected)
+        text += fmt::format("expected error of tissue: {:.1f} mm, at most {:.1f} mm\n", expected->mean_mm,
+                            expected->worst_mm);
+    if (!run.scores.after.empty()) text += "Dice                      before   after\n";
     for (const auto& [label, after] : run.scores.after)
         text += fmt::format("  {:<22}{:>8.3f}{:>8.3f}\n", label == 0 ? "all labels" : fmt::format("label {}", label),
                             run.scores.before.contains(label) ? run.scores.before.at(label).dice : 0.0, after.dice);

@@ -14,15 +14,14 @@ namespace tissuewarp::apps {
 /// Results on grids and at points.
 struct Products {
     imaging::Volume moving_to_fixed, fixed_to_moving;  ///< displacement fields, mm, LPS
-    imaging::Volume warped, warped_labels;             ///< on the fixed grid; warped is empty without --moving
+    imaging::Volume warped, warped_labels;             ///< on the output grid; warped is empty without --moving
     Eigen::Matrix3Xd landmarks, points;                ///< where moving landmarks and points went, mm, LPS
     std::optional<meshing::SurfaceMesh> surface;
 };
 
 /// How good the result is.
 struct Scores {
-    std::map<int, registration::Overlap> before, after;  ///< per label; 0 is their union
-    imaging::Volume moving_labels_by_header;             ///< on the fixed grid, as the headers place them
+    std::map<int, registration::Overlap> before, after;  ///< per label, 0 is their union; empty without fixed labels
     registration::JacobianReport mesh, organ, grid;      ///< of the elements, of labelled voxels, of all voxels
     std::optional<registration::TargetError> target_error;
 };

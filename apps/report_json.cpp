@@ -138,6 +138,21 @@ json mesh(const RegistrationRun& run) {
     return object;
 }
 
+/// How points agree with the model, and what is expected where they are all there is.
+void add_fits(json& report, const registration::UpdateResult& result) {
+    if (const auto& fit = result.surface)
+        report["surface"] = {{"inlier_share", number(fit->inlier_share)},
+                             {"residual_mm", number(fit->residual_mm)},
+                             {"coverage", number(fit->coverage)}};
+    if (const auto& fit = result.points)
+        report["points"] = {
+            {"used", fit->used}, {"outliers", fit->outliers}, {"residual_mm", number(fit->residual_mm)}};
+    if (const auto& expected = result.expected)
+        report["expected_error"] = {{"mean_mm", number(expected->mean_mm)},
+                                    {"worst_mm", number(expected->worst_mm)},
+                                    {"worst_place_mm", vector(expected->worst_place)}};
+}
+
 }  // namespace
 
 void write_json(const json& document, const std::filesystem::path& path) {
@@ -224,7 +239,6 @@ json report_json(const RegistrationRun& run, double total_seconds) {
         {"mesh", mesh(run)},
         {"alignment", alignment(run)},
         {"rounds", rounds(run)},
-        {"overlap", {{"before", to_json(scores.before)}, {"after", to_json(scores.after)}}},
         {"jacobian",
          {{"mesh", to_json(scores.mesh)}, {"field_in_organ", to_json(scores.organ)}, {"field", to_json(scores.grid)}}},
         {"doubts", run.result.doubts},
@@ -235,6 +249,9 @@ json report_json(const RegistrationRun& run, double total_seconds) {
         {"peak_memory_mb", static_cast<double>(peak_memory_bytes()) / 1e6}};
     report["estimated_error_mm"] =
         run.result.rounds.empty() ? json(nullptr) : number(run.result.rounds.back().estimated_error_mm);
+    if (!scores.after.empty())
+        report["overlap"] = {{"before", to_json(scores.before)}, {"after", to_json(scores.after)}};
+    add_fits(report, run.result);
     if (scores.target_error) report["target_registration_error"] = to_json(*scores.target_error);
     return report;
 }

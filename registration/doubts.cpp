@@ -19,20 +19,33 @@ std::string percent(double share) {
 }
 
 void doubt_surface(const SurfaceFit& fit, double deviation_mm, std::vector<std::string>& reasons) {
-    constexpr double least_inliers = 0.5, most_residual = 1.4, least_coverage = 0.08, most_rival_support = 0.95;
+    constexpr double least_inliers = 0.5, most_residual = 1.4, most_rival_support = 0.95;
     if (fit.inlier_share < least_inliers)
         reasons.push_back("only " + percent(fit.inlier_share) + " of the intraoperative surface lies on the model");
     if (fit.residual_mm > most_residual * std::max(deviation_mm, 0.3))
         reasons.push_back("points of the intraoperative surface lie " + to_text(fit.residual_mm) +
                           " mm from the model where " + to_text(deviation_mm) + " mm were stated");
     if (!fit.pose_searched) return;
-    if (fit.coverage < least_coverage)
-        reasons.push_back("the points show " + percent(fit.coverage) +
-                          " of the organ's surface, too little to tell where it lies; give images in one frame, or "
-                          "landmarks");
     if (fit.rival_support > most_rival_support)
         reasons.push_back("the points fit about as well with the organ placed " + to_text(fit.rival_mm) +
                           " mm elsewhere; give a wider patch, or landmarks");
+}
+
+/// Tissue 5 mm off is a registration that failed. The expected error is a root mean square over patients like this one:
+/// a third above it is not rare.
+void doubt_expectation(const ExpectedError& expected, std::vector<std::string>& reasons) {
+    constexpr double most_mm = 5.0 / 1.33;
+    if (expected.mean_mm > most_mm)
+        reasons.push_back("the data show too little of the organ: tissue is expected to lie " +
+                          to_text(expected.mean_mm) + " mm off, and " + to_text(expected.worst_mm) +
+                          " mm where least is known; show more of it, or give landmarks");
+}
+
+void doubt_points(const PointFit& fit, std::vector<std::string>& reasons) {
+    constexpr double most_outliers = 0.2;
+    if (fit.outliers > most_outliers * fit.used)
+        reasons.push_back(std::to_string(fit.outliers) + " of " + std::to_string(fit.used) +
+                          " pairs of points do not fit the tissue; check that they are the same places in both images");
 }
 
 }  // namespace
@@ -59,6 +72,8 @@ std::vector<std::string> doubts(const PreparedModel& prepared, const Intraoperat
     if (result.min_jacobian < 0.1)
         reasons.push_back("tissue is compressed to " + to_text(result.min_jacobian) + " of its volume in one element");
     if (result.surface) doubt_surface(*result.surface, seen.surface->deviation_mm, reasons);
+    if (result.points) doubt_points(*result.points, reasons);
+    if (result.expected) doubt_expectation(*result.expected, reasons);
     if (!seen.labels) return reasons;
     const double growth = labelled_volume(*seen.labels) / labelled_volume(prepared.labels);
     double poisson = 0;

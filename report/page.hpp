@@ -9,21 +9,21 @@
 
 namespace tissuewarp::report {
 
-/// Null where there is none; the two first label maps are needed, and a panel whose data is missing is left out.
+/// Null where there is none; a panel whose data is missing is left out.
 struct ReportInput {
     const imaging::Volume* moving = nullptr;         ///< preoperative image
     const imaging::Volume* fixed = nullptr;          ///< intraoperative image
     const imaging::Volume* warped = nullptr;         ///< preoperative image in the intraoperative frame
     const imaging::Volume* moving_labels = nullptr;  ///< needed
-    const imaging::Volume* fixed_labels = nullptr;   ///< needed
+    const imaging::Volume* fixed_labels = nullptr;   ///< needed, or the warped ones
     const imaging::Volume* warped_labels = nullptr;
     const imaging::Volume* moving_to_fixed = nullptr;  ///< displacement field of three channels, LPS mm, moving grid
     nlohmann::json report;  ///< report.json, docs/manual/register.md; missing keys leave sections out
 };
 
 /// Writes preview.png and report.html into an existing folder, each to a temporary name that is renamed.
-/// Throws InvalidInput without label maps, when they hold no label, or when a volume has the wrong number of channels;
-/// IoError when the files cannot be written.
+/// Throws InvalidInput without the label maps that are needed, when they hold no label, or when a volume has the wrong
+/// number of channels; IoError when the files cannot be written.
 void write_report(const ReportInput& input, const std::filesystem::path& folder);
 
 }  // namespace tissuewarp::report

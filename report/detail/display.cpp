@@ -1,5 +1,7 @@
 #include "report/detail/display.hpp"
 
+#include "core/errors.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -36,6 +38,12 @@ imaging::Geometry plane_grid(const Vector3d& point, const Box& box, const Vector
 }
 
 }  // namespace
+
+const imaging::Volume& organ_labels(const ReportInput& input) {
+    if (input.fixed_labels != nullptr) return *input.fixed_labels;
+    if (input.warped_labels != nullptr) return *input.warped_labels;
+    throw InvalidInput("report: the fixed or the warped label map is needed");
+}
 
 std::optional<Box> label_box(const imaging::Volume& labels) {
     const imaging::Volume integers = labels.as(CV_32S);

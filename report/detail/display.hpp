@@ -11,6 +11,10 @@
 
 namespace tissuewarp::report::detail {
 
+/// Where the organ lies in the fixed frame: the fixed labels or, where nobody drew them, the warped ones. Throws
+/// InvalidInput when there are neither.
+const imaging::Volume& organ_labels(const ReportInput& input);
+
 /// A box in LPS mm.
 struct Box {
     Eigen::Vector3d lower, upper;

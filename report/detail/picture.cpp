@@ -67,8 +67,9 @@ cv::Mat base(const Volume* image, const Window& window, const Volume& labels, co
 
 cv::Mat overlay(const Scene& scene, int row, const Volume& labels) {
     const Plane& plane = scene.fixed_planes[static_cast<std::size_t>(row)];
-    cv::Mat picture = base(scene.input.fixed, scene.fixed_window, *scene.input.fixed_labels, plane);
-    outline(picture, *scene.input.fixed_labels, plane, scene, fixed_colour, 2);
+    const Volume* fixed_labels = scene.input.fixed_labels;
+    cv::Mat picture = base(scene.input.fixed, scene.fixed_window, fixed_labels ? *fixed_labels : labels, plane);
+    if (fixed_labels != nullptr) outline(picture, *fixed_labels, plane, scene, fixed_colour, 2);
     outline(picture, labels, plane, scene, moving_colour, 1);
     return picture;
 }
@@ -82,10 +83,11 @@ cv::Mat difference(const Scene& scene, int row, const Volume& other, const Volum
     constexpr double kept = 0.3;
     const cv::Scalar white(247, 247, 247);
     cv::Mat picture = colours * kept + cv::Mat(colours.size(), colours.type(), white) * (1 - kept);
-    cv::Mat mask = label_slice(*scene.input.fixed_labels, plane) != 0;
+    const Volume& organ = organ_labels(scene.input);
+    cv::Mat mask = label_slice(organ, plane) != 0;
     if (other_labels != nullptr) mask |= label_slice(*other_labels, plane) != 0;
     colours.copyTo(picture, mask);
-    outline(picture, *scene.input.fixed_labels, plane, scene, cv::Scalar(60, 120, 40), 1);
+    outline(picture, organ, plane, scene, cv::Scalar(60, 120, 40), 1);
     return picture;
 }
 
@@ -180,7 +182,7 @@ void legend(cv::Mat& page, const std::vector<Column>& columns, const Scene& scen
         cv::line(page, {left_margin, y + row}, {left_margin + 30, y + row}, colour, thickness, cv::LINE_AA);
         text(page, words, {left_margin + 40, y + row}, 0.55, ink);
     };
-    sample(0, fixed_colour, 2, "intraoperative (fixed) labels");
+    if (scene.input.fixed_labels != nullptr) sample(0, fixed_colour, 2, "intraoperative (fixed) labels");
     sample(26, moving_colour, 1, "preoperative (moving) labels, as they lie and warped");
     text(page, "Radiological: the patient's right (R) is on the left. A front, P back,", {left_margin, y + 54}, 0.5,
          faint);
@@ -206,8 +208,7 @@ void require_channels(const Volume* volume, int channels, const char* name) {
 }
 
 void require_input(const ReportInput& input) {
-    if (input.moving_labels == nullptr || input.fixed_labels == nullptr)
-        throw InvalidInput("report: both the moving and the fixed label map are needed");
+    if (input.moving_labels == nullptr) throw InvalidInput("report: the moving label map is needed");
     require_channels(input.moving, 1, "the moving image");
     require_channels(input.fixed, 1, "the fixed image");
     require_channels(input.warped, 1, "the warped image");
@@ -218,7 +219,7 @@ void require_input(const ReportInput& input) {
 }
 
 Scene scene_of(const ReportInput& input) {
-    const std::optional<Box> fixed = label_box(*input.fixed_labels), moving = label_box(*input.moving_labels);
+    const std::optional<Box> fixed = label_box(organ_labels(input)), moving = label_box(*input.moving_labels);
     if (!fixed || !moving) throw InvalidInput("report: a label map holds no label");
     Scene scene{input, 1, {}, {}, {}, {}, {}, {}};
     if (input.moving_to_fixed != nullptr) {

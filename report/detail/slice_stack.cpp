@@ -25,18 +25,18 @@ std::string base64(const std::vector<unsigned char>& bytes) {
 nlohmann::json slice_stack(const ReportInput& input, int count) {
     nlohmann::json slices = nlohmann::json::array();
     if (input.fixed == nullptr || input.moving == nullptr || input.warped == nullptr) return slices;
-    const std::optional<Box> organ = label_box(*input.fixed_labels);
+    const std::optional<Box> organ = label_box(organ_labels(input));
     if (!organ) return slices;
     constexpr double margin_mm = 12.0, pixels = 260;
     const Box box = around(organ->centre(), organ->extent() + Eigen::Vector3d::Constant(2 * margin_mm));
     const double mm_per_pixel = box.extent().head<2>().maxCoeff() / pixels;
     const Window fixed_window = window_of(*input.fixed, *organ), moving_window = window_of(*input.moving, *organ);
-    const double sigma = 0.5 * input.fixed_labels->geometry.spacing.maxCoeff() / mm_per_pixel;
+    const double sigma = 0.5 * organ_labels(input).geometry.spacing.maxCoeff() / mm_per_pixel;
     for (int k = 0; k < count; ++k) {
         Eigen::Vector3d point = organ->centre();
         point[2] = organ->lower[2] + organ->extent()[2] * (k + 0.5) / count;
         const Plane plane = planes_through(point, box, mm_per_pixel)[0];
-        const cv::Mat outline = label_slice(*input.fixed_labels, plane);
+        const cv::Mat outline = label_slice(organ_labels(input), plane);
         const auto encoded = [&](const imaging::Volume& image, const Window& window) {
             cv::Mat picture = grey_to_colour(grey_slice(image, window, plane));
             outlines(picture, outline, cv::Scalar(90, 210, 70), 1, sigma);

@@ -12,7 +12,7 @@ namespace tissuewarp::report::detail {
 std::string base64(const std::vector<unsigned char>& bytes);
 
 /// [{"mm": "12.5", "fixed": base64, "moving": base64, "warped": base64}, …] from feet to head through the fixed labels,
-/// each with the outline of the fixed labels; empty unless all three images are there.
+/// each with the outline of the fixed labels (organ_labels); empty unless all three images are there.
 nlohmann::json slice_stack(const ReportInput& input, int count);
 
 }  // namespace tissuewarp::report::detail

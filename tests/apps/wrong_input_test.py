@@ -144,7 +144,7 @@ class WrongOptions(PhantomTest):
         self.assert_refused(run("regsiter"), INPUT, "'register'")
 
     def test_missing_required_option(self):
-        self.assert_refused(self.phantom.register(fixed_labels=None), INPUT, "--fixed-labels")
+        self.assert_refused(self.phantom.register(moving_labels=None), INPUT, "--moving-labels")
 
     def test_edge_length_below_zero(self):
         self.assert_refused(self.phantom.register("--edge-length", -1), INPUT, "--edge-length", "-1")

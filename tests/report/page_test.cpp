@@ -210,13 +210,16 @@ TEST_F(Pages, AreMadeOfLabelsAlone) {
     ReportInput input;
     input.moving_labels = input.fixed_labels = &example.labels;
     write_report(input, folder);
+    input.fixed_labels = nullptr;
+    input.warped_labels = &example.labels;  // of a registration to points
+    write_report(input, folder);
     EXPECT_FALSE(cv::imread((folder / "preview.png").string()).empty());
     EXPECT_EQ(python((folder / "report.html").string()), 0);
 }
 
 TEST_F(Pages, RefuseWhatCannotBeShown) {
     ReportInput input = example.input();
-    input.fixed_labels = nullptr;
+    input.fixed_labels = input.warped_labels = nullptr;
     EXPECT_THROW(write_report(input, folder), InvalidInput);
     const Volume empty(example.grid, CV_32SC1);
     input.fixed_labels = &empty;

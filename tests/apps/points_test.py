@@ -1,0 +1,116 @@
+"""Registration to points of a surface and to pairs of points, without fixed labels or image."""
+
+import json
+import unittest
+
+import nibabel
+import numpy
+
+from phantom import (CENTRE_LPS, FIXED_AXES, MOVING_AFFINE, MOVING_AXES, SHIFT_LPS, Phantom, PhantomTest,
+                     lps_of_voxels, run)
+
+INPUT = 2
+OUTPUTS = ["displacement_fixed_to_moving.nii.gz", "displacement_moving_to_fixed.nii.gz", "mesh.vtu", "preview.png",
+           "record.h5", "report.html", "report.json", "warped.nii.gz", "warped_labels.nii.gz"]
+
+
+def sphere(count):
+    """Unit vectors spread evenly."""
+    z = 1 - (2 * numpy.arange(count) + 1) / count
+    angle = numpy.pi * (3 - numpy.sqrt(5)) * numpy.arange(count)
+    return numpy.stack([numpy.sqrt(1 - z * z) * numpy.cos(angle), numpy.sqrt(1 - z * z) * numpy.sin(angle), z], axis=1)
+
+
+def save_points(points, path, header="x,y,z"):
+    numpy.savetxt(path, points, fmt="%.4f", delimiter=",", header=header, comments="")
+    return path
+
+
+def pairs_of(phantom):
+    """Where points of the moving organ lie in the fixed one: a CSV of landmarks."""
+    unit = numpy.concatenate([radius * sphere(20) for radius in (0.3, 0.6, 0.9)])
+    pairs = numpy.hstack([CENTRE_LPS + unit * MOVING_AXES, CENTRE_LPS + SHIFT_LPS + unit * FIXED_AXES])
+    return save_points(pairs, phantom.folder / "pairs.csv", "pre_x,pre_y,pre_z,intra_x,intra_y,intra_z")
+
+
+class FromASurface(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.phantom = phantom = Phantom()
+        cls.addClassCleanup(phantom.temporary.cleanup)
+        unit = sphere(900)
+        seen = CENTRE_LPS + SHIFT_LPS + unit[unit[:, 1] > -0.4] * FIXED_AXES
+        seen += numpy.random.default_rng(1).normal(scale=0.2, size=seen.shape)
+        cls.result = phantom.register("--fixed-surface", save_points(seen, phantom.folder / "seen.csv"),
+                                      "--surface-sd", 0.3, "--edge-length", 4, fixed=None, fixed_labels=None)
+        if cls.result.returncode == 0:
+            cls.report = json.loads((phantom.output / "report.json").read_text())
+
+    def setUp(self):
+        self.assertEqual(self.result.returncode, 0, self.result.stderr)
+
+    def test_outputs(self):
+        self.assertEqual(sorted(path.name for path in self.phantom.output.iterdir()), OUTPUTS)
+        self.assertIn("surface points", self.result.stdout)
+        self.assertNotIn("Dice", self.result.stdout)
+
+    def test_report(self):
+        self.assertNotIn("overlap", self.report)
+        self.assertGreater(self.report["surface"]["inlier_share"], 0.9)
+        self.assertLess(self.report["surface"]["residual_mm"], 0.5)
+        self.assertGreater(self.report["expected_error"]["worst_mm"], self.report["expected_error"]["mean_mm"])
+        self.assertEqual(len(self.report["inputs"]["fixed-surface"]["sha256"]), 64)
+        self.assertEqual(self.report["parameters"]["surface-sd"], 0.3)
+
+    def test_warped_organ_lies_where_the_points_are(self):
+        """On the moving grid as the rigid alignment carries it; the organ is then that of the fixed image."""
+        image = nibabel.load(str(self.phantom.output / "warped_labels.nii.gz"))
+        ras_to_lps = numpy.diag([-1, -1, 1, 1])
+        expected = ras_to_lps @ numpy.array(self.report["alignment"]["matrix"]) @ ras_to_lps @ MOVING_AFFINE
+        numpy.testing.assert_allclose(image.affine, expected, atol=1e-3)
+        warped = numpy.asarray(image.dataobj) > 0
+        lps = lps_of_voxels(image.affine)
+        truth = numpy.linalg.norm((lps - CENTRE_LPS - SHIFT_LPS) / FIXED_AXES, axis=-1) < 1
+        self.assertGreater(2 * numpy.count_nonzero(warped & truth) / (warped.sum() + truth.sum()), 0.93)
+        numpy.testing.assert_allclose(lps[warped].mean(axis=0), CENTRE_LPS + SHIFT_LPS, atol=0.7)
+
+    def test_warp_with_the_record_repeats_the_result(self):
+        target = self.phantom.folder / "again.nii.gz"
+        again = run("warp", self.phantom.moving, "--record", self.phantom.output / "record.h5", "--reference",
+                    self.phantom.output / "warped.nii.gz", "--output", target)
+        self.assertEqual(again.returncode, 0, again.stderr)
+        a, b = (numpy.asarray(nibabel.load(str(path)).dataobj) for path in (target, self.phantom.output / "warped.nii.gz"))
+        numpy.testing.assert_allclose(a, b, atol=1e-3)
+
+
+class FromPairs(PhantomTest):
+    def test_pairs_of_points_carry_the_organ(self):
+        pairs = pairs_of(self.phantom)
+        result = self.phantom.register("--fixed-points", pairs, "--points-sd", 0.3, "--landmarks", pairs,
+                                       "--edge-length", 4, fixed=None, fixed_labels=None)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("60 of 60 fit", result.stdout)
+        report = json.loads((self.phantom.output / "report.json").read_text())
+        self.assertEqual(report["points"]["outliers"], 0)
+        error = report["target_registration_error"]["all"]
+        self.assertGreater(error["before"]["mean"], 2.5)
+        self.assertLess(error["after"]["mean"], 0.4)
+
+    def test_nothing_to_register_to(self):
+        result = self.phantom.register(fixed_labels=None)
+        self.assert_refused(result, INPUT, "--fixed-labels", "--fixed-surface", "--fixed-points")
+
+    def test_surface_in_metres(self):
+        path = save_points(0.001 * sphere(50) * FIXED_AXES, self.phantom.folder / "metres.csv")
+        result = self.phantom.register("--fixed-surface", path, fixed=None, fixed_labels=None)
+        self.assert_refused(result, INPUT, "metres.csv", "mm")
+
+    def test_dry_run(self):
+        result = self.phantom.register("--fixed-points", pairs_of(self.phantom), "--dry-run", fixed=None,
+                                       fixed_labels=None)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("carried along", result.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()
