@@ -63,12 +63,12 @@ std::vector<std::string> doubts(const PreparedModel& prepared, const Intraoperat
     if (seen.labels && 2 * last.matched < last.interface_nodes)
         reasons.push_back("only " + std::to_string(last.matched) + " of " + std::to_string(last.interface_nodes) +
                           " boundary nodes found their boundary in the fixed labels");
-    if (last.mean_residual_mm > spacing)
+    if ((seen.labels || seen.image) && last.mean_residual_mm > spacing)
         reasons.push_back("the surfaces still differ by " + to_text(last.mean_residual_mm) +
                           " mm on average, more than a voxel");
     if (last.held_back > last.matched / 50)
         reasons.push_back(std::to_string(last.held_back) + " of " + std::to_string(last.matched) +
-                          " boundary nodes are still far from where they belong; allow more rounds");
+                          " matches are still far from where they belong; allow more rounds");
     if (result.min_jacobian < 0.1)
         reasons.push_back("tissue is compressed to " + to_text(result.min_jacobian) + " of its volume in one element");
     if (result.surface) doubt_surface(*result.surface, seen.surface->deviation_mm, reasons);

@@ -57,7 +57,7 @@ double mean_error(const UpdateResult& result, const PointPairs& truth) {
 // Pulls turned the wrong way, in the wrong frame, or without the wrong pairs weighed down leave 3 mm and more.
 TEST(PointEvidence, PairsCarryTheTissueAndWrongOnesDoNot) {
     const auto prepared = prepare(shapes::organ_labels({}), coarse());
-    PointPairs pairs = grid_pairs(20);
+    PointPairs pairs = grid_pairs(17);
     const Eigen::Index count = pairs.moving.cols();
     ASSERT_GT(count, 20);
     pairs.fixed.col(3) += Vector3d(25, -20, 10);
