@@ -31,6 +31,13 @@ double width(const Eigen::Matrix3Xd& points) {
     return std::sqrt(std::max(0.0, axes.eigenvalues()[1]));
 }
 
+double median(const Eigen::RowVectorXd& given) {
+    std::vector<double> values(given.begin(), given.end());
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
 }  // namespace
 
 PointEvidence::PointEvidence(const PreparedModel& prepared, const PointPairs& pairs, const PointOptions& options,
@@ -84,9 +91,12 @@ Eigen::Matrix3Xd PointEvidence::residuals(const State& state) const {
     return result;
 }
 
-Contribution PointEvidence::contribution(const RoundPlan& plan, const State& state) const {
+Contribution PointEvidence::contribution(const RoundPlan& plan, const State& state) {
+    constexpr double scale_ratio = 0.6;  // from round to round
     const Eigen::Matrix3Xd away = residuals(state);
-    const double scale = plan.last ? final_scale_mm() : std::max(plan.scale_mm, final_scale_mm());
+    if (plan.number == 0) first_scale_mm_ = 3 * median(away.colwise().norm());
+    const double scale =
+        plan.last ? final_scale_mm() : std::max(final_scale_mm(), first_scale_mm_ * std::pow(scale_ratio, plan.number));
     const double stiffness = energy_ / (deviation_mm_ * deviation_mm_);
     Contribution result;
     std::vector<Pull> pulls;

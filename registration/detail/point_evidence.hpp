@@ -21,8 +21,9 @@ public:
     /// rotation.
     [[nodiscard]] Alignment align() const;
 
-    /// Pulls on the tissue at the points, the same in all directions.
-    [[nodiscard]] Contribution contribution(const RoundPlan& plan, const State& state) const;
+    /// Pulls on the tissue at the points, the same in all directions. The scale of the robust weights falls from three
+    /// times the median distance in the first round.
+    [[nodiscard]] Contribution contribution(const RoundPlan& plan, const State& state);
 
     /// How the model agrees with the pairs.
     [[nodiscard]] PointFit fit(const State& state) const;
@@ -32,6 +33,7 @@ private:
     const PointOptions& options_;
     double energy_;  // mN mm
     double deviation_mm_;
+    double first_scale_mm_ = 0;  // of the robust weights
     Eigen::Matrix3Xd moving_, fixed_;  // of the pairs in the model
     std::vector<meshing::Location> places_;
 
