@@ -33,7 +33,7 @@ private:
     const PointOptions& options_;
     double energy_;  // mN mm
     double deviation_mm_;
-    double first_scale_mm_ = 0;  // of the robust weights
+    double first_scale_mm_ = 0;        // of the robust weights
     Eigen::Matrix3Xd moving_, fixed_;  // of the pairs in the model
     std::vector<meshing::Location> places_;
 
