@@ -190,7 +190,7 @@ private:
         record.mean_residual_mm = data.mean_residual_mm;
         matching_seconds_ += stopwatch.lap("").seconds;
 
-        if (!evidence_.labels && !metric_) metric_.emplace(prepared_.rest, conditions);
+        if ((evidence_.image || evidence_.only_points()) && !metric_) metric_.emplace(prepared_.rest, conditions);
         const tled::EquilibriumResult solved =
             tled::equilibrium(*engine_, metric_ ? *metric_ : prepared_.stiffness, conditions, equilibrium_,
                               &state_.displacement, observer_);
