@@ -161,7 +161,7 @@ struct Parser {
             "    --fixed intraop.nii.gz --fixed-labels intraop_labels.nii.gz --output out");
         verb.path("--moving", o.moving, "Preoperative grey image; without it no warped image is written");
         verb.path("--moving-labels", o.moving_labels, "Preoperative label map: what is meshed")->required();
-        verb.path("--fixed", o.fixed, "Intraoperative grey image: gives the output grid");
+        verb.path("--fixed", o.fixed, "Intraoperative grey image: gives the output grid; alone, it is what is matched");
         verb.path("--fixed-labels", o.fixed_labels, "Intraoperative label map: what is matched");
         verb.path("--fixed-surface", o.fixed_surface,
                   "Intraoperative points of a part of the surface: .ply, .stl, .obj, .vtk, .csv, .xyz (mm, LPS)");
@@ -196,6 +196,7 @@ struct Parser {
         verb.number("--data-stiffness", o.data_stiffness, "KPA/MM", 1e-6, 1e6,
                     "Pull of the matched boundary per area (kPa/mm)");
         verb.number("--fade", o.fade, "MM", 1.0, 1e4, "Distance from the organ where the field has become rigid (mm)");
+        verb.flag("--match-image", o.match_image, "Match blocks of the images besides the other data");
         verb.flag("--no-align", o.no_align, "Skip the rigid alignment: the images share one frame");
         verb.flag("--resample-labels", o.resample_labels, "Accept labels on another grid than their image");
         verb.text("--device", o.device.name, "auto, cpu, gpu or gpu:<index>")
@@ -309,8 +310,13 @@ struct Parser {
             registration.label_edge_length = label_lengths(register_lengths);
             if (registration.fixed_labels.empty() && registration.fixed_surface.empty() &&
                 registration.point_pairs.fixed.empty())
+                registration.match_image = true;
+            if (registration.match_image && (registration.fixed.empty() || registration.moving.empty()))
                 throw InvalidInput(
-                    "nothing to register to; give --fixed-labels, --fixed-surface or --fixed-points, or several");
+                    registration.fixed.empty()
+                        ? "nothing to register to; give --fixed, --fixed-labels, --fixed-surface or --fixed-points, or "
+                          "several"
+                        : "matching the fixed image takes the moving one; give --moving");
             registration.parameters = verbs.front().parameters({"save-parameters", "dry-run"});
             return registration;
         }

@@ -52,6 +52,7 @@ struct RegisterOptions {
     double tolerance = 0.05;      ///< mm
     double data_stiffness = 3.0;  ///< kPa/mm
     double fade = 60.0;           ///< mm
+    bool match_image = false;     ///< implied where the fixed image is all there is
     bool no_align = false;
     bool resample_labels = false;
     bool dry_run = false;

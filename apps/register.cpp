@@ -74,8 +74,9 @@ imaging::Geometry output_grid(const RegistrationRun& run) {
     return grid;
 }
 
-Intraoperative seen(const RegistrationInputs& inputs) {
+Intraoperative seen(const RegistrationInputs& inputs, const RegisterOptions& options) {
     Intraoperative seen{.surface = inputs.fixed_surface, .points = inputs.point_pairs};
+    if (options.match_image) seen.image = inputs.fixed;
     if (!inputs.fixed_labels.empty()) seen.labels = inputs.fixed_labels;
     return seen;
 }
@@ -149,10 +150,11 @@ void run_register(const RegisterOptions& options) {
     progress.begin("preparing the model", 0.02, 0.20);
     run.prepared = std::make_unique<PreparedModel>(
         prepare(run.inputs.moving_labels, prepare_options(options, run.inputs.materials), progress));
+    if (options.match_image) prepare_image(*run.prepared, run.inputs.moving, {}, progress);
     append(run.times, run.prepared->times);
 
     progress.begin("registering", 0.20, 0.47);
-    run.result = update(*run.prepared, seen(run.inputs), update_options(options), progress);
+    run.result = update(*run.prepared, seen(run.inputs, options), update_options(options), progress);
     append(run.times, run.result.times);
     clock.lap("");
 

@@ -140,6 +140,11 @@ json mesh(const RegistrationRun& run) {
 
 /// How points agree with the model, and what is expected where they are all there is.
 void add_fits(json& report, const registration::UpdateResult& result) {
+    if (const auto& fit = result.image)
+        report["image"] = {{"blocks", fit->blocks},
+                           {"matched", fit->matched},
+                           {"residual_mm", number(fit->residual_mm)},
+                           {"shown_share", number(fit->shown_share)}};
     if (const auto& fit = result.surface)
         report["surface"] = {{"inlier_share", number(fit->inlier_share)},
                              {"residual_mm", number(fit->residual_mm)},

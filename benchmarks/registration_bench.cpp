@@ -134,7 +134,6 @@ std::map<std::string, Setter> setters() {
             {"free-motion", [](UpdateOptions& o, double v) { o.tissue.free_motion_mm = v; }},
             {"held-motion", [](UpdateOptions& o, double v) { o.tissue.held_motion_mm = v; }},
             {"surface-outliers", [](UpdateOptions& o, double v) { o.surface.outlier_deviations = v; }},
-            {"expected-strain", [](UpdateOptions& o, double v) { o.image.expected_strain = v; }},
             {"expected-motion", [](UpdateOptions& o, double v) { o.image.expected_motion_mm = v; }},
             {"searches", [](UpdateOptions& o, double v) { o.image.searches = int(v); }},
             {"rounds", [](UpdateOptions& o, double v) { o.rematches = int(v); }},

@@ -41,6 +41,19 @@ void doubt_expectation(const ExpectedError& expected, std::vector<std::string>& 
                           " mm where least is known; show more of it, or give landmarks");
 }
 
+void doubt_image(const ImageFit& fit, std::vector<std::string>& reasons) {
+    constexpr double least_matched = 0.1, least_shown = 0.5, most_residual_mm = 1.0;
+    if (fit.matched < least_matched * fit.blocks)
+        reasons.push_back("only " + std::to_string(fit.matched) + " of " + std::to_string(fit.blocks) +
+                          " blocks of the moving image were found in the fixed one");
+    if (fit.shown_share < least_shown)
+        reasons.push_back("the fixed image shows only " + percent(fit.shown_share) +
+                          " of the organ; the rest is where mechanics alone put it");
+    if (fit.residual_mm > most_residual_mm)
+        reasons.push_back("blocks found in the fixed image lie " + to_text(fit.residual_mm) +
+                          " mm from where the tissue went");
+}
+
 void doubt_points(const PointFit& fit, std::vector<std::string>& reasons) {
     constexpr double most_outliers = 0.2;
     if (fit.outliers > most_outliers * fit.used)
@@ -63,7 +76,7 @@ std::vector<std::string> doubts(const PreparedModel& prepared, const Intraoperat
     if (seen.labels && 2 * last.matched < last.interface_nodes)
         reasons.push_back("only " + std::to_string(last.matched) + " of " + std::to_string(last.interface_nodes) +
                           " boundary nodes found their boundary in the fixed labels");
-    if ((seen.labels || seen.image) && last.mean_residual_mm > spacing)
+    if (seen.labels && last.mean_residual_mm > spacing)
         reasons.push_back("the surfaces still differ by " + to_text(last.mean_residual_mm) +
                           " mm on average, more than a voxel");
     if (last.held_back > last.matched / 50)
@@ -71,6 +84,7 @@ std::vector<std::string> doubts(const PreparedModel& prepared, const Intraoperat
                           " matches are still far from where they belong; allow more rounds");
     if (result.min_jacobian < 0.1)
         reasons.push_back("tissue is compressed to " + to_text(result.min_jacobian) + " of its volume in one element");
+    if (result.image) doubt_image(*result.image, reasons);
     if (result.surface) doubt_surface(*result.surface, seen.surface->deviation_mm, reasons);
     if (result.points) doubt_points(*result.points, reasons);
     if (result.expected) doubt_expectation(*result.expected, reasons);

@@ -4,7 +4,7 @@
 
 namespace tissuewarp::registration::detail {
 
-double strain_energy_unit(const PreparedModel& prepared, double expected_strain, double length_mm) {
+double strain_energy_unit(const PreparedModel& prepared, const TissuePrior& tissue) {
     const meshing::TetMesh& mesh = prepared.model.mesh;
     const Eigen::VectorXd volumes = meshing::tet_volumes(mesh);
     double energy = 0;
@@ -14,11 +14,7 @@ double strain_energy_unit(const PreparedModel& prepared, double expected_strain,
         energy += volumes[tet] * youngs_modulus;
     }
     const double modulus = energy / volumes.sum();
-    return modulus * expected_strain * expected_strain * std::pow(length_mm, 3);
-}
-
-double strain_energy_unit(const PreparedModel& prepared, const ImageOptions& options) {
-    return strain_energy_unit(prepared, options.expected_strain, options.strain_length_mm);
+    return modulus * tissue.expected_strain * tissue.expected_strain * std::pow(tissue.strain_length_mm, 3);
 }
 
 std::vector<tled::Spring> ground_springs(const PreparedModel& prepared, double energy,

@@ -23,13 +23,14 @@ double median_distance(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
 
 }  // namespace
 
-ImageEvidence::ImageEvidence(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options)
+ImageEvidence::ImageEvidence(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
+                             double energy)
     : prepared_(prepared),
       fixed_(fixed),
       options_(options),
       view_(fixed),
       locator_(prepared.model.mesh),
-      energy_(strain_energy_unit(prepared, options)) {}
+      energy_(energy) {}
 
 void ImageEvidence::search(const State& state, Observer& observer) {
     std::vector<BlockMatch> found = searches_ == 0 ? first_search(state, observer) : refined_search(state, observer);
@@ -116,31 +117,57 @@ double ImageEvidence::view_share() const {
     return all > 0 ? seen / all : 0;
 }
 
-Contribution ImageEvidence::contribution(const RoundPlan& plan, const State& state) const {
+ImageFit ImageEvidence::fit(const State& state) const {
+    constexpr double near_mm = 15;
+    const Eigen::Matrix3Xd& nodes = prepared_.model.mesh.nodes;
+    ImageFit fit{static_cast<int>(prepared_.image->blocks.points().cols()), static_cast<int>(matches_.size()), 0, 0};
+    Eigen::Index shown = 0;
+    for (Eigen::Index node = 0; node < nodes.cols(); ++node)
+        shown += std::any_of(matches_.begin(), matches_.end(), [&](const BlockMatch& match) {
+            return (match.moving - nodes.col(node)).squaredNorm() < near_mm * near_mm;
+        });
+    fit.shown_share = double(shown) / double(nodes.cols());
+    fit.residual_mm = mean_residual(pulled(state));
+    return fit;
+}
+
+std::vector<ImageEvidence::PulledMatch> ImageEvidence::pulled(const State& state) const {
     const Eigen::Isometry3d back = state.placement.inverse();
-    const meshing::TetMesh& mesh = prepared_.model.mesh;
-    std::vector<Pull> pulls(matches_.size());
-    std::vector<double> residuals(matches_.size());
+    std::vector<PulledMatch> result;
+    result.reserve(matches_.size());
     for (std::size_t n = 0; n < matches_.size(); ++n) {
         const BlockMatch& match = matches_[n];
         const Eigen::Matrix3d information = back.linear() * match.information * back.linear().transpose();
-        pulls[n] = {places_[n], back * match.fixed - match.moving, information};
-        const Eigen::Vector3d e = pulls[n].target - displacement_at(mesh, state.displacement, places_[n]);
+        const Pull pull{places_[n], back * match.fixed - match.moving, information};
+        const Eigen::Vector3d e = pull.target - displacement_at(prepared_.model.mesh, state.displacement, places_[n]);
         const double strongest =
             Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(information, Eigen::EigenvaluesOnly).eigenvalues()[2];
-        residuals[n] = std::sqrt(e.dot(information * e) / strongest);
-        pulls[n].stiffness *= energy_ * match.confidence * robust_weight(residuals[n], plan.scale_mm);
+        result.push_back({pull, match.confidence, std::sqrt(e.dot(information * e) / strongest)});
+    }
+    return result;
+}
+
+double ImageEvidence::mean_residual(const std::vector<PulledMatch>& matches) {
+    double sum = 0, weights = 0;
+    for (const PulledMatch& match : matches) {
+        sum += match.confidence * match.residual_mm;
+        weights += match.confidence;
+    }
+    return weights > 0 ? sum / weights : 0;
+}
+
+Contribution ImageEvidence::contribution(const RoundPlan& plan, const State& state) const {
+    const std::vector<PulledMatch> matches = pulled(state);
+    std::vector<Pull> pulls;
+    for (const PulledMatch& match : matches) {
+        pulls.push_back(match.pull);
+        pulls.back().stiffness *= energy_ * match.confidence * robust_weight(match.residual_mm, plan.scale_mm);
     }
     Contribution result;
     result.candidates = static_cast<int>(prepared_.image->blocks.points().cols());
-    result.matched = static_cast<int>(matches_.size());
-    double weights = 0;
-    for (std::size_t n = 0; n < matches_.size(); ++n) {
-        result.mean_residual_mm += matches_[n].confidence * residuals[n];
-        weights += matches_[n].confidence;
-    }
-    if (weights > 0) result.mean_residual_mm /= weights;
-    result.conditions.springs = lumped_springs(mesh, pulls, state.displacement);
+    result.matched = static_cast<int>(matches.size());
+    result.mean_residual_mm = mean_residual(matches);
+    result.conditions.springs = lumped_springs(prepared_.model.mesh, pulls, state.displacement);
     const auto expected_motion = [&](const InterfaceNode& node) {
         const bool seen = in_view(state.placement * Eigen::Vector3d(prepared_.model.mesh.nodes.col(node.node)));
         return seen ? options_.expected_motion_mm : options_.unseen_motion_mm;

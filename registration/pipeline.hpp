@@ -83,17 +83,15 @@ struct ImageOptions {
     int searches = 2;                 ///< the first about the rigid pose, the others with the image as then deformed
     int refinement_levels = 2;        ///< grids of the later searches, the finest ones
     double refinement_mm = 4.0;       ///< and their range
-    double expected_strain = 0.1;     ///< deviation of the strain of pieces of tissue …
-    double strain_length_mm = 10;     ///< … of this size: the weight of strain energy against matches
     double expected_motion_mm = 100;  ///< of the organ's surface in the field of view of the intraoperative image
     double unseen_motion_mm = 1;      ///< and out of it
     double headers_within_mm = 15;    ///< the headers place an organ, part of which is out of view, closer than this
 };
 
-/// What is expected of tissue before any surface or landmark is seen. It weighs strain energy against data and holds
+/// What is expected of tissue before anything is seen. It weighs strain energy against matches and points, and holds
 /// what no datum shows.
 struct TissuePrior {
-    double expected_strain = 0.15;  ///< deviation of the strain of pieces of tissue …
+    double expected_strain = 0.12;  ///< deviation of the strain of pieces of tissue …
     double strain_length_mm = 10;   ///< … of this size
     double free_motion_mm = 20;     ///< of the organ's surface, from where the organ lies as a whole
     double held_motion_mm = 5;      ///< the same where the images are in one frame: what is around holds the organ
@@ -153,6 +151,13 @@ struct SurfaceFit {
     double rival_support = 0;    ///< what that one explains of the points over what the chosen one explains
 };
 
+/// What was found of the preoperative image's blocks.
+struct ImageFit {
+    int blocks = 0, matched = 0;
+    double residual_mm = 0;  ///< of the last round, weighted by confidence
+    double shown_share = 0;  ///< of the model's nodes: no further than 15 mm from a match
+};
+
 /// How pairs of points agree with the registered model.
 struct PointFit {
     int used = 0;            ///< pairs whose moving point lies in the model
@@ -173,6 +178,7 @@ struct UpdateResult {
     std::vector<Round> rounds;
     std::string engine;  ///< description of the device that solved
     double min_jacobian = 1;
+    std::optional<ImageFit> image;          ///< where a bare volume was given
     std::optional<SurfaceFit> surface;      ///< where points of a surface were given
     std::optional<PointFit> points;         ///< where pairs of points were given
     std::optional<ExpectedError> expected;  ///< where neither labels nor an image show the organ as a whole

@@ -159,6 +159,7 @@ private:
 
     /// What the data say of the result.
     void judge() {
+        if (evidence_.image) result_.image = evidence_.image->fit(state_);
         if (evidence_.surface) result_.surface = evidence_.surface->fit(state_);
         if (evidence_.points) result_.points = evidence_.points->fit(state_);
         if (!evidence_.only_points()) return;
@@ -227,9 +228,9 @@ UpdateResult update(const PreparedModel& prepared, const Intraoperative& seen, c
     detail::Stopwatch stopwatch;
     UpdateResult result;
     Evidence evidence;
-    if (seen.image) evidence.image.emplace(prepared, *seen.image, options.image);
     const TissuePrior& tissue = options.tissue;
-    evidence.energy = detail::strain_energy_unit(prepared, tissue.expected_strain, tissue.strain_length_mm);
+    evidence.energy = detail::strain_energy_unit(prepared, tissue);
+    if (seen.image) evidence.image.emplace(prepared, *seen.image, options.image, evidence.energy);
     if (seen.surface) evidence.surface.emplace(prepared, *seen.surface, options.surface, evidence.energy);
     if (seen.points) evidence.points.emplace(prepared, *seen.points, options.points, evidence.energy);
     if (!seen.labels && !seen.image)

@@ -9,8 +9,9 @@ namespace tissuewarp::registration::detail {
 
 class ImageEvidence {
 public:
-    /// `prepared.image` is there.
-    ImageEvidence(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options);
+    /// `prepared.image` is there. `energy` (mN mm) weighs as much as one standard deviation of a match.
+    ImageEvidence(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
+                  double energy);
 
     /// Finds the blocks about where the model is.
     void search(const State& state, Observer& observer);
@@ -23,7 +24,8 @@ public:
     /// Pulls of the matches on the nodes.
     [[nodiscard]] Contribution contribution(const RoundPlan& plan, const State& state) const;
 
-    void mark() { searches_ = 1; }
+    /// How the matches agree with a model in this state.
+    [[nodiscard]] ImageFit fit(const State& state) const;
     [[nodiscard]] int searches_done() const { return searches_; }
 
 private:
@@ -41,6 +43,13 @@ private:
     [[nodiscard]] bool in_view(const Eigen::Vector3d& point) const;
     /// Of the organ's outer surface, where the headers place it.
     [[nodiscard]] double view_share() const;
+    struct PulledMatch {
+        Pull pull;  // its stiffness is the match's information
+        double confidence;
+        double residual_mm;  // along what the block shows best
+    };
+    [[nodiscard]] std::vector<PulledMatch> pulled(const State& state) const;
+    static double mean_residual(const std::vector<PulledMatch>& matches);
     [[nodiscard]] std::vector<BlockMatch> first_search(const State& state, Observer& observer) const;
     [[nodiscard]] std::vector<BlockMatch> refined_search(const State& state, Observer& observer) const;
     /// Where points of the moving image are in the fixed one.

@@ -5,9 +5,9 @@
 
 namespace tissuewarp::registration::detail {
 
-/// The rigid motion moving → fixed (3 × N each, mm) that minimises the sum of the smallest 70 % of the squared residuals:
-/// least trimmed squares by concentration steps (Rousseeuw and Van Driessen 2006) from the fit to all, each of them a
-/// fit by Umeyama 1991. Needs at least 10 points not on a line.
+/// The rigid motion moving → fixed (3 × N each, mm) that minimises the sum of the smallest 70 % of the squared
+/// residuals: least trimmed squares by concentration steps (Rousseeuw and Van Driessen 2006) from the fit to all, each
+/// of them a fit by Umeyama 1991. Needs at least 10 points not on a line.
 Eigen::Isometry3d least_trimmed_motion(const Eigen::Matrix3Xd& moving, const Eigen::Matrix3Xd& fixed);
 
 }  // namespace tissuewarp::registration::detail
