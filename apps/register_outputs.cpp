@@ -139,6 +139,9 @@ std::string summary_text(const RegistrationRun& run, double total_seconds) {
         const std::string moved = fmt::format("moved > {:g} mm, ", error->moved_mm);
         text += summary_row(moved + "before", error->moved_before) + summary_row(moved + "after", error->moved_after);
     }
+    if (const auto& fit = run.result.image)
+        text += fmt::format("image: {} of {} blocks found, {:.2f} mm from the tissue; near {:.0f} % of the organ\n",
+                            fit->matched, fit->blocks, fit->residual_mm, 100 * fit->shown_share);
     if (const auto& fit = run.result.surface)
         text += fmt::format("surface points: {:.0f} % on the model, {:.2f} mm from it (root mean square)\n",
                             100 * fit->inlier_share, fit->residual_mm);

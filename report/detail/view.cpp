@@ -37,6 +37,10 @@ std::string number(const json& value, int decimals) {
     return buffer;
 }
 
+std::string percent(const json& share) {
+    return is_finite(share) ? number(100 * share.get<double>(), 0) + " %" : "–";
+}
+
 std::string text(const json& value) {
     if (value.is_string()) return value.get<std::string>();
     if (value.is_null()) return "";
@@ -236,6 +240,32 @@ json materials_view(const json& materials) {
     return rows;
 }
 
+/// A sentence on each kind of data that pulled at the model.
+json data_view(const json& report) {
+    json lines = json::array();
+    if (at(report, "inputs").contains("fixed-labels"))
+        lines.push_back("Intraoperative labels: boundaries of the tissue were brought to theirs.");
+    if (const json& image = at(report, "image"); image.is_object())
+        lines.push_back("Intraoperative image: " + number(at(image, "matched"), 0) + " of " +
+                        number(at(image, "blocks"), 0) + " blocks of the preoperative image were found in it, " +
+                        number(at(image, "residual_mm"), 2) + " mm from where the tissue went. " +
+                        percent(at(image, "shown_share")) + " of the organ lies near one of them.");
+    if (const json& surface = at(report, "surface"); surface.is_object())
+        lines.push_back("Points of the intraoperative surface: " + percent(at(surface, "inlier_share")) +
+                        " of them lie on the model, " + number(at(surface, "residual_mm"), 2) +
+                        " mm from it (root mean square); they stand for " + percent(at(surface, "coverage")) +
+                        " of its surface.");
+    if (const json& points = at(report, "points"); points.is_object())
+        lines.push_back("Pairs of points: " + number(at(points, "used"), 0) + " in the model, " +
+                        number(at(points, "outliers"), 0) + " of them do not fit, the others by " +
+                        number(at(points, "residual_mm"), 2) + " mm (root mean square).");
+    if (const json& expected = at(report, "expected_error"); expected.is_object())
+        lines.push_back("By their deviations and the prior of the tissue alone, tissue is expected to lie " +
+                        number(at(expected, "mean_mm"), 1) + " mm off, and " + number(at(expected, "worst_mm"), 1) +
+                        " mm where least is known.");
+    return lines;
+}
+
 /// A list, and whether there is anything to head a table with.
 void put_table(json& view, const std::string& name, json rows) {
     view[name + "_table"] = !rows.empty();
@@ -249,6 +279,8 @@ json view_of(const json& report) {
     view["program"] = text(at(report, "program"));
     view["version"] = text(at(report, "version"));
     view["device"] = text(at(report, "device"));
+    view["fixed_labels"] = at(report, "inputs").contains("fixed-labels");
+    put_table(view, "data", data_view(report));
     put_table(view, "inputs", inputs_view(at(report, "inputs")));
     json parameters = json::array();
     if (at(report, "parameters").is_string())

@@ -64,8 +64,8 @@ TEST(ImageUpdate, FollowsADeformationThroughTheWholeOrgan) {
     const auto still = Eigen::Isometry3d::Identity();
     const auto result = update(prepared, {.image = after(prepared, still)}, quick());
     const Summary error = summarise(node_errors(result, still));
-    EXPECT_LT(error.mean, 0.3);
-    EXPECT_LT(error.percentile_95, 0.8);
+    EXPECT_LT(error.mean, 0.35);
+    EXPECT_LT(error.percentile_95, 0.9);
     EXPECT_TRUE(result.doubts.empty());
 }
 
