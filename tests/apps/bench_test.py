@@ -196,7 +196,8 @@ class BenchmarkOptions(PhantomTest):
 
 
 def tune(cache, *more):
-    return run("bench", "--tune", "--quick", "--elements", 384, "--repeats", 2, *more, TISSUEWARP_CACHE=str(cache))
+    return run("bench", "--tune", "--quick", "--elements", 384, "--repeats", 2, *more, timeout=250,
+               TISSUEWARP_CACHE=str(cache))
 
 
 class Tuning(unittest.TestCase):

@@ -67,9 +67,9 @@ class Phantom:
         return run(*arguments, *more)
 
 
-def run(*arguments, folder=None, **environment):
+def run(*arguments, folder=None, timeout=110, **environment):
     """The program with these arguments, in that folder, with these variables besides those of the test."""
-    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=110, cwd=folder,
+    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=timeout, cwd=folder,
                           env={**os.environ, **environment})
 
 

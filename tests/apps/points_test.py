@@ -97,7 +97,7 @@ class FromPairs(PhantomTest):
         self.assertLess(error["after"]["mean"], 0.4)
 
     def test_nothing_to_register_to(self):
-        result = self.phantom.register(fixed_labels=None)
+        result = self.phantom.register(fixed=None, fixed_labels=None)
         self.assert_refused(result, INPUT, "--fixed-labels", "--fixed-surface", "--fixed-points")
 
     def test_surface_in_metres(self):
