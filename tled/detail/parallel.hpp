@@ -1,6 +1,8 @@
 #pragma once
 /// The two loops that the solver runs on oneTBB's threads. Bodies write to places of their own, so results do not
-/// depend on the number of threads.
+/// depend on the number of threads. In them denormal numbers are zero.
+
+#include "tled/detail/denormals.hpp"
 
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>
@@ -53,6 +55,7 @@ void parallel_ranges(std::size_t first, std::size_t last, std::size_t grain, con
         tbb::blocked_range<std::size_t>(first, last, grain),
         [&](const tbb::blocked_range<std::size_t>& range) {
             order.enter();
+            const detail::DenormalsAsZero arithmetic;
             body(range.begin(), range.end());
             order.leave();
         },
@@ -67,6 +70,7 @@ void parallel_for(int first, int last, const Body& body) {
     const detail::ForkJoin order;
     tbb::parallel_for(tbb::blocked_range<int>(first, last), [&](const tbb::blocked_range<int>& range) {
         order.enter();
+        const detail::DenormalsAsZero arithmetic;
         for (int i = range.begin(); i != range.end(); ++i) body(i);
         order.leave();
     });
