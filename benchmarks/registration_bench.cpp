@@ -1,8 +1,10 @@
 // Registration from every kind of intraoperative data against known truth, with sweeps of one option:
 //     registration_bench DATA [--case PART] [--OPTION V1,V2,…] [--mesh-edge MM] [--poisson NU] [--count POINTS]
-//                        [--errors FOLDER]
+//                        [--errors FOLDER] [--repeats N]
 // DATA holds phantom-brainshift, phantom-brain-sag and lung-ct; PART selects cases whose name holds it. Errors are at
 // the landmarks or, where there is a true field, at its points in the mask; FOLDER gets them point by point, as CSV.
+// With --repeats every update runs N times, and a line per case tells the time from data in to displacement field and
+// warped image out, the model prepared.
 
 #include "core/errors.hpp"
 #include "imaging/image_io.hpp"
@@ -12,9 +14,13 @@
 #include "registration/field.hpp"
 #include "registration/pipeline.hpp"
 #include "registration/surface_points.hpp"
+#include "registration/warp.hpp"
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -154,6 +160,7 @@ struct Arguments {
     std::vector<double> values;
     double edge_length = 0, poissons_ratio = 0;
     int count = 5000;
+    int repeats = 0;
 };
 
 Arguments parse(int argc, char** argv) {
@@ -172,6 +179,8 @@ Arguments parse(int argc, char** argv) {
             result.errors = value;
         } else if (key == "--count") {
             result.count = std::stoi(value);
+        } else if (key == "--repeats") {
+            result.repeats = std::stoi(value);
         } else if (key.starts_with("--") && setters().contains(key.substr(2))) {
             result.option = key.substr(2);
             std::istringstream list(value);
@@ -219,6 +228,55 @@ void write_errors(const fs::path& file, const Deformation& deformation, const La
     }
 }
 
+/// Wall-clock and processor seconds since it was made.
+class Clocks {
+public:
+    [[nodiscard]] double wall() const {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_).count();
+    }
+    [[nodiscard]] double processor() const { return double(std::clock() - processor_) / CLOCKS_PER_SEC; }
+
+private:
+    std::chrono::steady_clock::time_point wall_ = std::chrono::steady_clock::now();
+    std::clock_t processor_ = std::clock();
+};
+
+/// The smallest value that a share of all values does not exceed.
+double percentile(std::vector<double> values, double share) {
+    std::sort(values.begin(), values.end());
+    const auto place = static_cast<std::size_t>(std::ceil(share * double(values.size())));
+    return values[std::max<std::size_t>(place, 1) - 1];
+}
+
+/// Data in, displacement field and warped image on the grid of the intraoperative image out, again and again.
+void time_updates(const std::string& name, const PreparedModel& prepared, const Case& study,
+                  const UpdateOptions& options, int repeats) {
+    const imaging::Volume& grid = study.seen.image ? *study.seen.image : study.moving;
+    std::vector<double> wall, processor;
+    std::map<std::string, std::vector<double>> stages;
+    for (int n = 0; n < repeats; ++n) {
+        const Clocks whole;
+        const UpdateResult result = update(prepared, study.seen, options);
+        const Clocks field_clock;
+        const imaging::Volume field = displacement_fixed_to_moving(result.deformation, grid.geometry);
+        stages["field"].push_back(field_clock.wall());
+        const Clocks warp_clock;
+        const imaging::Volume warped = warp_image(study.moving, field);
+        stages["warp"].push_back(warp_clock.wall());
+        wall.push_back(whole.wall());
+        processor.push_back(whole.processor());
+        for (const StageTime& time : result.times) stages[time.stage].push_back(time.seconds);
+    }
+    std::printf(
+        "%s, %d updates, s: least %.2f, median %.2f, 90th %.2f, most %.2f; processor: least %.2f, median %.2f\n",
+        name.c_str(), repeats, percentile(wall, 0), percentile(wall, 0.5), percentile(wall, 0.9), percentile(wall, 1),
+        percentile(processor, 0), percentile(processor, 0.5));
+    std::printf("  medians of stages, s:");
+    for (const auto& [stage, seconds] : stages) std::printf("  %s %.2f", stage.c_str(), percentile(seconds, 0.5));
+    std::printf("\n");
+    std::fflush(stdout);
+}
+
 void run(const Arguments& arguments) {
     std::printf(
         "| case | mean / median / 95th, mm | moved > 2 mm | rounds, evaluations | matched | residual, mm | min J | s "
@@ -244,10 +302,10 @@ void run(const Arguments& arguments) {
                 text << name << ", " << arguments.option << ' ' << value;
                 name = text.str();
             }
-            const auto start = std::chrono::steady_clock::now();
+            const Clocks clocks;
             const UpdateResult result = update(prepared, study.seen, update_options);
-            const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-            print_row(name, result, study.targets, seconds);
+            print_row(name, result, study.targets, clocks.wall());
+            if (arguments.repeats > 0) time_updates(name, prepared, study, update_options, arguments.repeats);
             if (!arguments.errors.empty())
                 write_errors(arguments.errors / (name + ".csv"), result.deformation, study.targets);
         }
