@@ -1,5 +1,7 @@
 #include "tled/rest_stiffness.hpp"
 
+#include <Eigen/Eigenvalues>
+
 #include <cmath>
 #include <limits>
 #include <mutex>
@@ -15,6 +17,7 @@ namespace tissuewarp::tled {
 
 using Eigen::Matrix3d;
 using Eigen::Matrix3Xd;
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
@@ -57,27 +60,7 @@ struct RestStiffness::Impl {
     [[nodiscard]] VectorXd conjugate_gradients(const VectorXd& force, const NodalConditions& present,
                                                double relative_tolerance) const;
 
-    /// Smallest λ of K x = λ D x for the diagonal D.
-    [[nodiscard]] double inverse_iteration(const Matrix3Xd& diagonal) const {
-        // Inverse iteration on K x = λ D x from a fixed vector without symmetry; the Rayleigh quotient errs by the
-        // square of the vector's error.
-        constexpr int max_iterations = 20;
-        constexpr double tolerance = 1e-4;  // damping presets and frequencies, its users, follow √λ
-        const VectorXd D = reduced(diagonal);
-        VectorXd x(free_count);
-        for (int i = 0; i < x.size(); ++i) x[i] = 1.0 + 0.5 * std::sin(0.7 * i);
-        double lambda = 0.0;
-        for (int iteration = 0; iteration < max_iterations; ++iteration) {
-            x /= std::sqrt(x.dot(D.cwiseProduct(x)));
-            const VectorXd Dx = D.cwiseProduct(x);
-            const VectorXd y = factor->solve(Dx);  // y = K⁻¹ D x, so y·K y = y·D x
-            const double next = y.dot(Dx) / y.dot(D.cwiseProduct(y));
-            x = y;
-            if (std::abs(next - lambda) <= tolerance * next) return next;
-            lambda = next;
-        }
-        return lambda;
-    }
+    [[nodiscard]] double lowest_by_lanczos(const Matrix3Xd& diagonal) const;
 
     std::once_flag lowest_known;
     double lowest = 0.0;
@@ -118,6 +101,38 @@ VectorXd RestStiffness::Impl::conjugate_gradients(const VectorXd& force, const N
         rz = next;
     }
     return x;
+}
+
+// Smallest λ of K x = λ D x for the diagonal D: Lanczos steps on K⁻¹ D, symmetric in the inner product of D, from a
+// fixed vector without symmetry (Parlett, The Symmetric Eigenvalue Problem (1998), section 13.2), with all directions
+// made orthogonal again. The largest Ritz value errs by the square of its vector's error.
+double RestStiffness::Impl::lowest_by_lanczos(const Matrix3Xd& diagonal) const {
+    constexpr int most_steps = 20;
+    constexpr double tolerance = 1e-4;  // damping presets and frequencies, its users, follow √λ
+    const VectorXd D = reduced(diagonal);
+    VectorXd q(free_count);
+    for (int i = 0; i < q.size(); ++i) q[i] = 1.0 + 0.5 * std::sin(0.7 * i);
+    q /= std::sqrt(q.dot(D.cwiseProduct(q)));
+    std::vector<VectorXd> basis;
+    MatrixXd projected = MatrixXd::Zero(most_steps + 1, most_steps + 1);  // of K⁻¹ D, tridiagonal
+    double largest = 0.0;
+    for (int step = 0; step < most_steps; ++step) {
+        basis.push_back(q);
+        VectorXd next = factor->solve(D.cwiseProduct(q));
+        projected(step, step) = next.dot(D.cwiseProduct(q));
+        for (int pass = 0; pass < 2; ++pass)
+            for (const VectorXd& other : basis) next -= next.dot(D.cwiseProduct(other)) * other;
+        const double length = std::sqrt(next.dot(D.cwiseProduct(next)));
+        const Eigen::SelfAdjointEigenSolver<MatrixXd> ritz(projected.topLeftCorner(step + 1, step + 1));
+        const double before = largest;
+        largest = ritz.eigenvalues()[step];
+        const double remainder = length * std::abs(ritz.eigenvectors()(step, step));
+        const bool settled = remainder <= std::sqrt(tolerance) * largest && largest - before <= tolerance * largest;
+        if (settled || remainder <= tolerance * largest) break;  // none remains once all directions are spanned
+        projected(step + 1, step) = projected(step, step + 1) = length;
+        q = next / length;
+    }
+    return 1.0 / largest;
 }
 
 // Factor of `elastic` + springs on the free degrees of freedom.
@@ -198,7 +213,7 @@ Matrix3Xd RestStiffness::diagonal(const NodalConditions& conditions) const {
 double RestStiffness::lowest_eigenvalue() const {
     if (impl_->free_count == 0) return std::numeric_limits<double>::infinity();
     std::call_once(impl_->lowest_known,
-                   [this] { impl_->lowest = impl_->inverse_iteration(diagonal(impl_->conditions)); });
+                   [this] { impl_->lowest = impl_->lowest_by_lanczos(diagonal(impl_->conditions)); });
     return impl_->lowest;
 }
 

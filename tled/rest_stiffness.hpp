@@ -38,7 +38,7 @@ public:
     /// Diagonal of K₀ + springs of `conditions`, 3 × N, mN/mm; ones where constrained.
     [[nodiscard]] Eigen::Matrix3Xd diagonal(const NodalConditions& conditions) const;
 
-    /// Smallest λ of K x = λ diag(K) x on the free degrees of freedom, by inverse iteration with the factor.
+    /// Smallest λ of K x = λ diag(K) x on the free degrees of freedom, by Lanczos steps with the factor.
     [[nodiscard]] double lowest_eigenvalue() const;
 
     /// Non-zeros of the factor, for reports.
