@@ -41,12 +41,11 @@ Columns times(const std::vector<tled::Spring>& springs, const Columns& vectors) 
     return result;
 }
 
-Columns solved(const tled::RestStiffness& stiffness, const Columns& right) {
-    Columns result(right.rows(), right.cols());
-    for (Eigen::Index k = 0; k < right.cols(); ++k)
-        result.col(k) =
-            flat(stiffness.solve(Eigen::Map<const Eigen::Matrix3Xd>(right.col(k).data(), 3, right.rows() / 3)));
-    return result;
+/// Unit forces at nodes along the axes, 3N × 3 per node.
+Columns unit_forces(const std::vector<int>& chosen, Eigen::Index rows) {
+    Columns forces = Columns::Zero(rows, 3 * static_cast<Eigen::Index>(chosen.size()));
+    for (Eigen::Index k = 0; k < forces.cols(); ++k) forces(3 * chosen[static_cast<std::size_t>(k / 3)] + k % 3, k) = 1;
+    return forces;
 }
 
 std::vector<int> spread_nodes(const Eigen::Matrix3Xd& nodes) {
@@ -70,24 +69,25 @@ ExpectedError expected_error(const PreparedModel& prepared, const WeighedSprings
     tled::Conditions all;
     all.springs = springs.data;
     all.springs.insert(all.springs.end(), springs.ground.begin(), springs.ground.end());
-    const tled::RestStiffness stiffness(prepared.rest, tled::nodal_conditions(all, static_cast<int>(nodes.cols())));
+    const tled::RestStiffness stiffness(prepared.rest, tled::nodal_conditions(all, static_cast<int>(nodes.cols())),
+                                        prepared.stiffness);
     // (K − G R A⁻¹ Rᵀ G)⁻¹ = K⁻¹ + K⁻¹ H (A − Hᵀ K⁻¹ H)⁻¹ Hᵀ K⁻¹ with H = G R, A = Rᵀ G R (Woodbury).
     Columns freed = Columns::Zero(nodes.size(), 0);
     Eigen::MatrixXd middle;
     if (springs.free_placement) {
         const Columns motions = rigid_motions(nodes), held = times(springs.ground, motions);
-        freed = solved(stiffness, held);
+        freed = stiffness.solve_columns(held);
         middle = (motions.transpose() * held - held.transpose() * freed).inverse();
     }
     ExpectedError result;
     double sum = 0;
     const std::vector<int> chosen = spread_nodes(nodes);
-    for (const int node : chosen) {
+    const Columns answers = stiffness.solve_columns(unit_forces(chosen, nodes.size()));
+    for (std::size_t place = 0; place < chosen.size(); ++place) {
+        const int node = chosen[place];
         double variance = 0;
         for (int axis = 0; axis < 3; ++axis) {
-            Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, nodes.cols());
-            force(axis, node) = 1;
-            variance += springs.energy * stiffness.solve(force)(axis, node);
+            variance += springs.energy * answers(3 * node + axis, 3 * static_cast<Eigen::Index>(place) + axis);
             if (!springs.free_placement) continue;
             const Eigen::VectorXd share = freed.row(3 * node + axis).transpose();
             variance += springs.energy * share.dot(middle * share);

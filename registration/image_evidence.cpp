@@ -1,7 +1,9 @@
 #include "registration/detail/image_evidence.hpp"
 
+#include "registration/detail/grid_samples.hpp"
 #include "registration/detail/ground.hpp"
 #include "registration/detail/least_trimmed_motion.hpp"
+#include "registration/detail/template_images.hpp"
 #include "registration/field.hpp"
 #include "registration/warp.hpp"
 
@@ -19,6 +21,32 @@ double median_distance(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
     const auto middle = distances.begin() + distances.size() / 2;
     std::nth_element(distances.begin(), middle, distances.end());
     return *middle;
+}
+
+/// The part of a grid within `margin_mm` of points (3 × N, LPS mm), at least one voxel.
+imaging::Geometry part_about(const imaging::Geometry& grid, const Eigen::Matrix3Xd& points, double margin_mm) {
+    const Eigen::Matrix3Xd index = grid.point_to_index() * (points.colwise() - grid.origin);
+    const Eigen::Array3d margin = margin_mm / grid.spacing.array();
+    const Eigen::Array3d lower = index.rowwise().minCoeff().array() - margin,
+                         upper = index.rowwise().maxCoeff().array() + margin;
+    imaging::Geometry part = grid;
+    Eigen::Vector3d first;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        const auto a = static_cast<Eigen::Index>(axis);
+        const double last = grid.size[axis] - 1;
+        first[a] = std::clamp(std::floor(lower[a]), 0.0, last);
+        part.size[axis] = static_cast<int>(std::clamp(std::ceil(upper[a]), first[a], last) - first[a]) + 1;
+    }
+    part.origin = grid.point(first);
+    return part;
+}
+
+/// What a template sees about its points: the blocks of its coarsest grid where they are searched, and what their
+/// descriptors and the smoothing before reach.
+double sight_mm(const TemplateOptions& options) {
+    constexpr int smoothing = 2;  // voxels, four deviations of the Gaussian
+    const double coarsest = options.grid_spacing_mm * std::pow(2, options.levels - 1);
+    return (search_margin(refinement_reach, options.block_radius) + GridSamples::rim + smoothing) * coarsest;
 }
 
 }  // namespace
@@ -49,12 +77,13 @@ std::vector<BlockMatch> ImageEvidence::first_search(const State& state, Observer
 // and a short search on the finest grids is left.
 std::vector<BlockMatch> ImageEvidence::refined_search(const State& state, Observer& observer) const {
     const ImageModel& model = *prepared_.image;
-    const Deformation deformation{prepared_.model.mesh, state.displacement, state.placement};
-    const imaging::Volume warped =
-        warp_image(model.image, displacement_fixed_to_moving(deformation, fixed_.geometry, {}, observer));
     const Eigen::Matrix3Xd here = deformed(model.blocks.points(), state);
     TemplateOptions blocks = model.blocks.options();
     blocks.levels = std::min(blocks.levels, options_.refinement_levels);
+    const Deformation deformation{prepared_.model.mesh, state.displacement, state.placement};
+    const imaging::Geometry part = part_about(fixed_.geometry, here, sight_mm(blocks));
+    const imaging::Volume warped =
+        warp_image(model.image, displacement_fixed_to_moving(deformation, part, {}, observer));
     BlockMatchingOptions matching = options_.matching;
     matching.search_mm = options_.refinement_mm;
     std::vector<BlockMatch> matches =

@@ -115,14 +115,15 @@ struct UpdateOptions {
     SurfaceOptions surface;
     PointOptions points;
     AlignmentOptions alignment;
-    bool align = true;               ///< false: the images are in one frame already
-    int rematches = 8;               ///< rounds of correspondence and equilibrium; up to twice as many when the
-                                     ///< step bound holds the surface back
-    double settled_mm = 0.15;        ///< a round that moves no node further is followed by the last one
-    double most_step_mm = 6.0;       ///< most that one round asks a surface node to move
-    double first_range_mm = 15.0;    ///< correspondence search range of the first round
-    double last_range_mm = 4.0;      ///< and of the last, geometric in between
-    double max_angle_deg = 50.0;     ///< between mesh normal and image boundary normal
+    bool align = true;             ///< false: the images are in one frame already
+    int rematches = 8;             ///< rounds of correspondence and equilibrium; up to twice as many when the
+                                   ///< step bound holds the surface back
+    double settled_mm = 0.15;      ///< a round that moves no node further is followed by the last one; before a search
+                                   ///< for blocks, a quarter of its range suffices
+    double most_step_mm = 6.0;     ///< most that one round asks a surface node to move
+    double first_range_mm = 15.0;  ///< correspondence search range of the first round
+    double last_range_mm = 4.0;    ///< and of the last, geometric in between
+    double max_angle_deg = 50.0;   ///< between mesh normal and image boundary normal
     double residual_scale_mm = 1.0;  ///< Geman–McClure scale of the last round for what the model cannot follow
     double trimmed_share = 0.02;     ///< of the matches, dropped in the last round: those the model did not follow
     tled::EquilibriumOptions equilibrium;

@@ -93,7 +93,8 @@ public:
             if (evidence_.only_points() && options_.align) detail::give_rigid_part_to_placement(prepared_, state_);
             observer_.checkpoint("registration", double(round + 1) / options_.rematches);
             if (50 * record.held_back > record.matched) continue;  // more than 2 %: the same range once more
-            const bool settled = record.largest_change_mm < options_.settled_mm;
+            const bool settled =
+                record.largest_change_mm < (searches_left() ? settled_for_search_mm() : options_.settled_mm);
             round = settled ? std::max(round + 1, next_milestone(round)) : round + 1;
         }
         result_.times.push_back({"correspondence", matching_seconds_});
@@ -124,6 +125,11 @@ private:
     }
     [[nodiscard]] bool searches_left() const {
         return evidence_.image && evidence_.image->searches_done() < options_.image.searches;
+    }
+
+    /// A search looks farther than what is left to settle before it.
+    [[nodiscard]] double settled_for_search_mm() const {
+        return std::max(options_.settled_mm, 0.25 * options_.image.refinement_mm);
     }
 
     /// Where rounds that change nothing any more go on: the next search, or the last round.
@@ -177,6 +183,14 @@ private:
         return {round, round == options_.rematches - 1, range, scale, step_mm_};
     }
 
+    /// With a factor of the data's own springs L-BFGS takes a handful of solves: fewer than it costs to find the lowest
+    /// frequency, which dynamic relaxation is tuned by.
+    void choose_method() {
+        const bool free = equilibrium_.method == tled::EquilibriumMethod::Automatic;
+        if (free && metric_ && engine_->processor() == tled::Processor::Cpu)
+            equilibrium_.method = tled::EquilibriumMethod::Lbfgs;
+    }
+
     Round match_and_solve(int round) {
         detail::Stopwatch stopwatch;
         const detail::RoundPlan plan = plan_of(round);
@@ -191,7 +205,9 @@ private:
         record.mean_residual_mm = data.mean_residual_mm;
         matching_seconds_ += stopwatch.lap("").seconds;
 
-        if ((evidence_.image || evidence_.only_points()) && !metric_) metric_.emplace(prepared_.rest, conditions);
+        if ((evidence_.image || evidence_.only_points()) && !metric_)
+            metric_.emplace(prepared_.rest, conditions, prepared_.stiffness);
+        choose_method();
         const tled::EquilibriumResult solved =
             tled::equilibrium(*engine_, metric_ ? *metric_ : prepared_.stiffness, conditions, equilibrium_,
                               &state_.displacement, observer_);

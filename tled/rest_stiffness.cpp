@@ -30,8 +30,8 @@ bool same_springs(const NodalConditions& a, const NodalConditions& b) {
 }  // namespace
 
 struct RestStiffness::Impl {
-    NodalConditions conditions;  // those factorised
-    detail::Stiffness elastic;   // K₀ without springs, all degrees of freedom
+    NodalConditions conditions;                        // those factorised
+    std::shared_ptr<const detail::Stiffness> elastic;  // K₀ without springs, all degrees of freedom
     std::unique_ptr<detail::CholmodFactor> factor;
     std::vector<int> index;  // degree of freedom 3·node + component → free number or −1
     int free_count = 0;
@@ -51,11 +51,12 @@ struct RestStiffness::Impl {
         return result;
     }
     [[nodiscard]] Matrix3Xd multiply(const Matrix3Xd& x, const NodalConditions& present) const {
-        Matrix3Xd y = elastic.multiply(x);
+        Matrix3Xd y = elastic->multiply(x);
         detail::add_spring_resistance(present, x, y);
         return y;
     }
-    void factorise(const NodalConditions& present);
+    void number_free(const NodalConditions& present);
+    void factorise(const detail::CholmodFactor* analysed);
     void require_compatible(const NodalConditions& present) const;
     [[nodiscard]] VectorXd conjugate_gradients(const VectorXd& force, const NodalConditions& present,
                                                double relative_tolerance) const;
@@ -135,25 +136,29 @@ double RestStiffness::Impl::lowest_by_lanczos(const Matrix3Xd& diagonal) const {
     return 1.0 / largest;
 }
 
-// Factor of `elastic` + springs on the free degrees of freedom.
-void RestStiffness::Impl::factorise(const NodalConditions& present) {
+void RestStiffness::Impl::number_free(const NodalConditions& present) {
     conditions = present;
-    std::vector<int> node_of;
     index.assign(static_cast<std::size_t>(present.constrained.size()), -1);
-    for (int d = 0; d < static_cast<int>(index.size()); ++d) {
-        if (present.constrained.data()[d]) continue;
-        index[static_cast<std::size_t>(d)] = free_count++;
-        node_of.push_back(d / 3);
-    }
-    if (free_count == 0) return;
+    for (int d = 0; d < static_cast<int>(index.size()); ++d)
+        if (!present.constrained.data()[d]) index[static_cast<std::size_t>(d)] = free_count++;
+}
 
-    detail::BlockRows K = detail::assembled(elastic, detail::Triangle::Lower);
-    for (std::size_t s = 0; s < present.spring_node.size(); ++s) {
-        K.diagonal(present.spring_node[s]) += detail::spring_matrix(present, static_cast<int>(s));
-    }
+// Factor of `elastic` + springs on the free degrees of freedom; with the analysis of `analysed`, where there is one.
+void RestStiffness::Impl::factorise(const detail::CholmodFactor* analysed) {
+    if (free_count == 0) return;
+    detail::BlockRows K = detail::assembled(*elastic, detail::Triangle::Lower);
+    for (std::size_t s = 0; s < conditions.spring_node.size(); ++s)
+        K.diagonal(conditions.spring_node[s]) += detail::spring_matrix(conditions, static_cast<int>(s));
     const Eigen::SparseMatrix<double> lower = detail::scalar_matrix(K, index, detail::Triangle::Lower);
     K = {};
-    factor = std::make_unique<detail::CholmodFactor>(lower, node_of);
+    if (analysed != nullptr) {
+        factor = std::make_unique<detail::CholmodFactor>(analysed->analysis());
+    } else {
+        std::vector<int> node_of;
+        for (std::size_t d = 0; d < index.size(); ++d)
+            if (index[d] >= 0) node_of.push_back(static_cast<int>(d) / 3);
+        factor = std::make_unique<detail::CholmodFactor>(lower, node_of);
+    }
     if (factor->factorize(lower)) return;
     throw InvalidInput(
         "the stiffness at rest is not positive definite: a node without tetrahedra, or tissue that the springs and "
@@ -163,17 +168,29 @@ void RestStiffness::Impl::factorise(const NodalConditions& present) {
 RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& conditions)
     : impl_(std::make_unique<Impl>()) {
     detail::require_held(rest, conditions);
-    impl_->elastic = detail::stiffness(rest, Matrix3Xd::Zero(3, rest.node_count));
-    impl_->factorise(conditions);
+    impl_->elastic = std::make_shared<detail::Stiffness>(detail::stiffness(rest, Matrix3Xd::Zero(3, rest.node_count)));
+    impl_->number_free(conditions);
+    impl_->factorise(nullptr);
 }
 
 RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& conditions, const Matrix3Xd& displacement)
     : impl_(std::make_unique<Impl>()) {
     detail::require_held(rest, conditions);
-    impl_->elastic = detail::stiffness(rest, displacement);
-    impl_->elastic.elements = detail::stiffness(rest, Matrix3Xd::Zero(3, rest.node_count)).elements;
-    impl_->elastic.pressure.stiffness = impl_->elastic.pressure.stiffness.cwiseMax(0.0);
-    impl_->factorise(conditions);
+    detail::Stiffness metric = detail::stiffness(rest, displacement);
+    metric.elements = detail::stiffness(rest, Matrix3Xd::Zero(3, rest.node_count)).elements;
+    metric.pressure.stiffness = metric.pressure.stiffness.cwiseMax(0.0);
+    impl_->elastic = std::make_shared<detail::Stiffness>(std::move(metric));
+    impl_->number_free(conditions);
+    impl_->factorise(nullptr);
+}
+
+RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& conditions, const RestStiffness& other)
+    : impl_(std::make_unique<Impl>()) {
+    detail::require_held(rest, conditions);
+    other.impl_->require_compatible(conditions);
+    impl_->elastic = other.impl_->elastic;
+    impl_->number_free(conditions);
+    impl_->factorise(other.impl_->factor.get());
 }
 
 RestStiffness::~RestStiffness() = default;
@@ -192,6 +209,18 @@ Matrix3Xd RestStiffness::solve(const Matrix3Xd& force, const NodalConditions& co
     return impl_->expanded(impl_->conjugate_gradients(impl_->reduced(force), conditions, relative_tolerance));
 }
 
+MatrixXd RestStiffness::solve_columns(const MatrixXd& forces) const {
+    MatrixXd free(impl_->free_count, forces.cols()), result = MatrixXd::Zero(forces.rows(), forces.cols());
+    if (impl_->free_count == 0) return result;
+    const auto& index = impl_->index;
+    for (std::size_t d = 0; d < index.size(); ++d)
+        if (index[d] >= 0) free.row(index[d]) = forces.row(static_cast<Eigen::Index>(d));
+    const MatrixXd solved = impl_->factor->solve_columns(free);
+    for (std::size_t d = 0; d < index.size(); ++d)
+        if (index[d] >= 0) result.row(static_cast<Eigen::Index>(d)) = solved.row(index[d]);
+    return result;
+}
+
 Matrix3Xd RestStiffness::linear_solution(const NodalConditions& conditions) const {
     // K_ff u_f = f_f + springs' targets − K_fc u_c: the imposed values enter with the residual of u = (0, u_c).
     constexpr double tolerance = 1e-10;
@@ -201,7 +230,7 @@ Matrix3Xd RestStiffness::linear_solution(const NodalConditions& conditions) cons
 
 Matrix3Xd RestStiffness::diagonal(const NodalConditions& conditions) const {
     impl_->require_compatible(conditions);
-    std::vector<Matrix3d> blocks = impl_->elastic.diagonal_blocks();
+    std::vector<Matrix3d> blocks = impl_->elastic->diagonal_blocks();
     for (std::size_t s = 0; s < conditions.spring_node.size(); ++s) {
         blocks[conditions.spring_node[s]] += detail::spring_matrix(conditions, static_cast<int>(s));
     }

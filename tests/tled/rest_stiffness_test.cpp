@@ -97,6 +97,35 @@ TEST_P(RestStiffnessTest, OtherSpringsAreSolvedToTheToleranceAsked) {
     EXPECT_LT((stiffness.solve(force, other, 1e-3) - expected).norm(), 1e-2 * expected.norm());
 }
 
+TEST_P(RestStiffnessTest, WithOtherSpringsIsTheSameAsMadeAnew) {
+    const NodalConditions soft = nodal_conditions(held_with_springs(2.0), rest.node_count);
+    const NodalConditions stiff = nodal_conditions(held_with_springs(200.0), rest.node_count);
+    const RestStiffness before(rest, soft), after(rest, stiff, before);
+    const Matrix3Xd force = random_forces(rest.node_count);
+    const Matrix3Xd expected = by_sparse_lu(stiff, force);
+    EXPECT_LT((after.solve(force) - expected).norm(), 1e-9 * expected.norm());
+    // Neither the factor that lent its analysis nor one that borrowed from a borrower has changed.
+    const RestStiffness again(rest, soft, after);
+    EXPECT_LT((before.solve(force) - by_sparse_lu(soft, force)).norm(), 1e-9 * by_sparse_lu(soft, force).norm());
+    EXPECT_LT((again.solve(force) - before.solve(force)).norm(), 1e-9 * before.solve(force).norm());
+    Conditions other = held_with_springs(2.0);
+    other.prescribed.pop_back();
+    EXPECT_THROW(RestStiffness(rest, nodal_conditions(other, rest.node_count), before), InvalidInput);
+}
+
+TEST_P(RestStiffnessTest, SolvesColumnsAsOneByOne) {
+    const NodalConditions c = nodal_conditions(held_with_springs(2.0), rest.node_count);
+    const RestStiffness stiffness(rest, c);
+    Eigen::MatrixXd forces(3 * rest.node_count, 3);
+    for (int k = 0; k < 3; ++k) forces.col(k) = (k + 1) * random_forces(rest.node_count).reshaped();
+    forces(7, 1) += 1;
+    const Eigen::MatrixXd solved = stiffness.solve_columns(forces);
+    for (int k = 0; k < 3; ++k) {
+        const Matrix3Xd single = stiffness.solve(forces.col(k).reshaped(3, rest.node_count));
+        EXPECT_LT((solved.col(k) - single.reshaped()).norm(), 1e-12 * single.norm()) << k;
+    }
+}
+
 TEST_P(RestStiffnessTest, OtherConstraintsAreRefused) {
     const RestStiffness stiffness(rest, nodal_conditions(held_with_springs(2.0), rest.node_count));
     Conditions other = held_with_springs(2.0);

@@ -78,6 +78,7 @@ Eigen::SparseMatrix<double> node_graph(const Eigen::SparseMatrix<double>& lower,
 
 struct CholmodFactor::Impl {
     mutable cholmod_common common{};
+    cholmod_factor* symbolic = nullptr;
     cholmod_factor* L = nullptr;
     mutable cholmod_dense *x = nullptr, *y = nullptr, *e = nullptr;  // workspaces of cholmod_solve2
     bool small = false;                                              // too little work for two BLAS threads
@@ -97,6 +98,7 @@ struct CholmodFactor::Impl {
         cholmod_free_dense(&y, &common);
         cholmod_free_dense(&e, &common);
         cholmod_free_factor(&L, &common);
+        cholmod_free_factor(&symbolic, &common);
         cholmod_finish(&common);
     }
     Impl(const Impl&) = delete;
@@ -145,19 +147,31 @@ CholmodFactor::CholmodFactor(const Eigen::SparseMatrix<double>& lower, const std
     common.method[0].ordering = CHOLMOD_GIVEN;
     common.postorder = 1;
     cholmod_sparse matrix = view(lower);
-    impl_->L = cholmod_analyze_p(&matrix, order.data(), nullptr, 0, &common);
+    impl_->symbolic = cholmod_analyze_p(&matrix, order.data(), nullptr, 0, &common);
     impl_->require_success("analyse");
     constexpr double small_flops = 1e11;  // some seconds on one core; on busy cores spinning costs twenty times that
     impl_->small = common.fl < small_flops;
 }
 
+CholmodFactor::CholmodFactor(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 CholmodFactor::~CholmodFactor() = default;
 CholmodFactor::CholmodFactor(CholmodFactor&&) noexcept = default;
 CholmodFactor& CholmodFactor::operator=(CholmodFactor&&) noexcept = default;
 
+CholmodFactor CholmodFactor::analysis() const {
+    auto copy = std::make_unique<Impl>();
+    copy->symbolic = cholmod_copy_factor(impl_->symbolic, &copy->common);
+    copy->require_success("copy the analysis of");
+    copy->small = impl_->small;
+    return CholmodFactor(std::move(copy));
+}
+
 bool CholmodFactor::factorize(const Eigen::SparseMatrix<double>& lower) {
     cholmod_sparse matrix = view(lower);
+    cholmod_free_factor(&impl_->L, &impl_->common);
     impl_->common.status = CHOLMOD_OK;
+    impl_->L = cholmod_copy_factor(impl_->symbolic, &impl_->common);
+    impl_->require_success("copy the analysis of");
     const SingleBlasThread single(impl_->small);
     cholmod_factorize(&matrix, impl_->L, &impl_->common);
     impl_->require_success("factorise");
@@ -165,16 +179,21 @@ bool CholmodFactor::factorize(const Eigen::SparseMatrix<double>& lower) {
 }
 
 Eigen::VectorXd CholmodFactor::solve(const Eigen::VectorXd& b) const {
+    return solve_columns(b);
+}
+
+Eigen::MatrixXd CholmodFactor::solve_columns(const Eigen::MatrixXd& b) const {
     cholmod_dense right{};
-    right.nrow = right.nzmax = right.d = b.size();
-    right.ncol = 1;
+    right.nrow = right.d = b.rows();
+    right.ncol = b.cols();
+    right.nzmax = b.size();
     right.x = const_cast<double*>(b.data());
     right.xtype = CHOLMOD_REAL;
     right.dtype = CHOLMOD_DOUBLE;
     const SingleBlasThread single(true);  // a triangular solve is bound by memory
     cholmod_solve2(CHOLMOD_A, impl_->L, &right, nullptr, &impl_->x, nullptr, &impl_->y, &impl_->e, &impl_->common);
     impl_->require_success("solve with");
-    return Eigen::Map<const Eigen::VectorXd>(static_cast<const double*>(impl_->x->x), b.size());
+    return Eigen::Map<const Eigen::MatrixXd>(static_cast<const double*>(impl_->x->x), b.rows(), b.cols());
 }
 
 long long CholmodFactor::nonzeros() const {

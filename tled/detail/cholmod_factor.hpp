@@ -20,17 +20,23 @@ public:
     CholmodFactor(CholmodFactor&&) noexcept;
     CholmodFactor& operator=(CholmodFactor&&) noexcept;
 
+    /// The same analysis for another matrix of the pattern, not factorised yet.
+    [[nodiscard]] CholmodFactor analysis() const;
+
     /// False when the matrix is not positive definite. The pattern must be the one analysed.
     [[nodiscard]] bool factorize(const Eigen::SparseMatrix<double>& lower);
 
     /// x with A x = b. Precondition: the last factorize() returned true. Uses workspaces: one thread at a time.
     [[nodiscard]] Eigen::VectorXd solve(const Eigen::VectorXd& b) const;
+    /// The same for every column at once: the factor is read once for all.
+    [[nodiscard]] Eigen::MatrixXd solve_columns(const Eigen::MatrixXd& b) const;
 
     /// Entries of L.
     [[nodiscard]] long long nonzeros() const;
 
 private:
     struct Impl;
+    explicit CholmodFactor(std::unique_ptr<Impl> impl);
     std::unique_ptr<Impl> impl_;
 };
 
