@@ -1,0 +1,217 @@
+"""What is compared: for each case the targets with known motion, the organ, and each tool with what it is given.
+
+A case is a function of the data folder and of a folder for inputs made here; it returns None when its data are missing.
+To add an option of tissuewarp to the comparison, add one line to a case's `tools`.
+"""
+
+import dataclasses
+import pathlib
+
+import numpy
+from scipy import ndimage
+
+from . import degrade, fields, scoring
+from .tools import Elastix, Plastimatch, RigidIcp, Tissuewarp
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+DISTANCE_CAP = 20.0  # mm
+
+
+@dataclasses.dataclass
+class Case:
+    targets: dict  # name -> preoperative and intraoperative points, LPS mm, n x 3 each
+    fixed_organ: pathlib.Path  # intraoperative mask or label map; folds inside it are counted apart
+    moving_organ: pathlib.Path  # preoperative
+    tools: dict  # name in the table -> tool
+
+
+def made(path, make):
+    """A file made once: `make` gets the path to write."""
+    if not path.exists():
+        unfinished = path.with_name("unfinished-" + path.name)
+        make(unfinished)
+        unfinished.rename(path)
+    return path
+
+
+def distance_map(labels_path, folder):
+    """Labels as the grey image that intensity-based programs follow best.
+
+    Signed distance from the boundary of all labels together, plus that from the boundary of every label but the first,
+    each cut off at 20 mm.
+    """
+    def make(path):
+        labels, affine = fields.read_image(labels_path)
+        spacing = numpy.linalg.norm(affine[:3, :3], axis=0)
+        signed = lambda mask: numpy.clip(ndimage.distance_transform_edt(~mask, sampling=spacing)
+                                         - ndimage.distance_transform_edt(mask, sampling=spacing), -DISTANCE_CAP, DISTANCE_CAP)
+        inner = [value for value in numpy.unique(labels) if value > 0][1:]
+        total = signed(labels > 0) + sum(signed(labels == value) for value in inner)
+        fields.write_image(path, total.astype(numpy.float32), affine)
+    name = labels_path.name.split(".")[0]
+    return made(folder / f"{labels_path.parent.name}-{name}-distance.nii.gz", make)
+
+
+def brain_shift_folder(data):
+    shared = data / "phantom-brainshift"
+    return shared if shared.exists() else ROOT / "data" / "brainshift"
+
+
+def brain_shift(data, tools):
+    moving, fixed = scoring.read_csv_landmarks(data / "landmarks.csv")
+    moved = scoring.distances(moving, fixed) > 2.0
+    return Case(targets={"landmarks moved > 2 mm": (moving[moved], fixed[moved]),
+                         "whole brain": scoring.truth_targets(data / "truth_forward.nii.gz", data / "truth_mask.nii.gz")},
+                fixed_organ=data / "intraop_labels.nii.gz", moving_organ=data / "preop_labels.nii.gz", tools=tools)
+
+
+def brain_shift_volume(data, inputs):
+    data = brain_shift_folder(data)
+    pair = data / "intraop.nii.gz", data / "preop.nii.gz"
+    return brain_shift(data, {
+        "elastix": Elastix(*pair, ["elastix-bspline-correlation.txt"]),
+        "plastimatch": Plastimatch(*pair, "plastimatch-mean-squares.txt"),
+    })
+
+
+def brain_shift_labels(data, inputs):
+    data = brain_shift_folder(data)
+    pair = [distance_map(data / f"{when}_labels.nii.gz", inputs) for when in ("intraop", "preop")]
+    return brain_shift(data, {
+        "tissuewarp": Tissuewarp(["--moving", data / "preop.nii.gz", "--moving-labels", data / "preop_labels.nii.gz",
+                                  "--fixed", data / "intraop.nii.gz", "--fixed-labels", data / "intraop_labels.nii.gz"]),
+        "elastix": Elastix(*pair, ["elastix-bspline-mean-squares.txt"]),
+        "plastimatch": Plastimatch(*pair, "plastimatch-mean-squares.txt"),
+    })
+
+
+def brain_shift_degraded(data, inputs):
+    data = brain_shift_folder(data)
+    image, view = inputs / "brain-shift-degraded.nii.gz", inputs / "brain-shift-degraded-view.nii.gz"
+    if not (image.exists() and view.exists()):
+        degrade.degrade_files(data / "intraop.nii.gz", data / "intraop_labels.nii.gz", data / "intraop_surface.ply", image, view)
+    preop = data / "preop.nii.gz"
+    return brain_shift(data, {
+        "elastix, told the view": Elastix(image, preop, ["elastix-bspline-mutual-information.txt"], view),
+        "elastix": Elastix(image, preop, ["elastix-bspline-mutual-information.txt"]),
+        "plastimatch, told the view": Plastimatch(image, preop, "plastimatch-mutual-information.txt", view),
+        "plastimatch": Plastimatch(image, preop, "plastimatch-mutual-information.txt"),
+    })
+
+
+def brain_shift_surface(data, inputs):
+    data = brain_shift_folder(data)
+    return brain_shift(data, {
+        "rigid ICP": RigidIcp(data / "intraop_surface.ply", data / "preop_labels.nii.gz", data / "intraop.nii.gz"),
+    })
+
+
+def brain_sag(data, tools):
+    targets = scoring.truth_targets(data / "truth_forward.nii.gz", data / "preop_mask.nii.gz")
+    return Case(targets={"whole brain": targets}, fixed_organ=data / "intraop_mask.nii.gz",
+                moving_organ=data / "preop_mask.nii.gz", tools=tools)
+
+
+def brain_sag_volume(data, inputs):
+    data = data / "phantom-brain-sag"
+    pair = data / "intraop.nii.gz", data / "preop.nii.gz"
+    return brain_sag(data, {
+        "elastix": Elastix(*pair, ["elastix-bspline-correlation.txt"]),
+        "plastimatch": Plastimatch(*pair, "plastimatch-mean-squares.txt"),
+    })
+
+
+def brain_sag_degraded(data, inputs):
+    data = data / "phantom-brain-sag"
+    pair, view = (data / "intraop_degraded.nii.gz", data / "preop.nii.gz"), data / "intraop_fov_mask.nii.gz"
+    return brain_sag(data, {
+        "elastix, told the view": Elastix(*pair, ["elastix-bspline-mutual-information.txt"], view),
+        "elastix": Elastix(*pair, ["elastix-bspline-mutual-information.txt"]),
+        "plastimatch, told the view": Plastimatch(*pair, "plastimatch-mutual-information.txt", view),
+        "plastimatch": Plastimatch(*pair, "plastimatch-mutual-information.txt"),
+    })
+
+
+def brain_sag_masks(data, inputs):
+    data = data / "phantom-brain-sag"
+    pair = [distance_map(data / f"{when}_mask.nii.gz", inputs) for when in ("intraop", "preop")]
+    return brain_sag(data, {
+        "tissuewarp": Tissuewarp(["--moving", data / "preop.nii.gz", "--moving-labels", data / "preop_mask.nii.gz",
+                                  "--fixed", data / "intraop.nii.gz", "--fixed-labels", data / "intraop_mask.nii.gz"]),
+        "elastix": Elastix(*pair, ["elastix-bspline-mean-squares.txt"]),
+        "plastimatch": Plastimatch(*pair, "plastimatch-mean-squares.txt"),
+    })
+
+
+def lung(data, tools):
+    targets = scoring.read_elastix_points(data / "moving_pts.txt"), scoring.read_elastix_points(data / "fixed_pts.txt")
+    return Case(targets={"landmarks": targets}, fixed_organ=data / "fixed_mask.mha", moving_organ=data / "moving_mask.mha",
+                tools=tools)
+
+
+def lung_volume(data, inputs):
+    data = data / "lung-ct"
+    pair = data / "fixed.mha", data / "moving.mha"
+    return lung(data, {
+        "elastix": Elastix(*pair, ["elastix-rigid.txt", "elastix-affine.txt", "elastix-bspline-correlation.txt"]),
+        "plastimatch": Plastimatch(*pair, "plastimatch-lung.txt"),
+    })
+
+
+def lung_masks(data, inputs):
+    data = data / "lung-ct"
+    pair = [distance_map(data / f"{when}_mask.mha", inputs) for when in ("fixed", "moving")]
+    ours = ["--moving", data / "moving.mha", "--moving-labels", data / "moving_mask.mha",
+            "--fixed", data / "fixed.mha", "--fixed-labels", data / "fixed_mask.mha", "--resample-labels"]
+    return lung(data, {
+        "tissuewarp": Tissuewarp(ours),
+        "tissuewarp, Poisson's ratio 0.3": Tissuewarp([*ours, "--default-poissons-ratio", "0.3"]),
+        "elastix": Elastix(*pair, ["elastix-rigid.txt", "elastix-bspline-mean-squares.txt"]),
+        "plastimatch": Plastimatch(*pair, "plastimatch-rigid-mean-squares.txt"),
+    })
+
+
+def liver(data, tools):
+    return Case(targets={"landmarks": scoring.read_csv_landmarks(data / "landmarks.csv")},
+                fixed_organ=data / "intraop_labels.nii.gz", moving_organ=data / "preop_labels.nii.gz", tools=tools)
+
+
+def liver_labels(data, inputs):
+    data = data / "phantom-liver"
+    pair = [distance_map(data / f"{when}_labels.nii.gz", inputs) for when in ("intraop", "preop")]
+    return liver(data, {
+        "tissuewarp": Tissuewarp(["--moving", data / "preop.nii.gz", "--moving-labels", data / "preop_labels.nii.gz",
+                                  "--fixed", data / "intraop.nii.gz", "--fixed-labels", data / "intraop_labels.nii.gz"]),
+        "elastix": Elastix(*pair, ["elastix-rigid.txt", "elastix-bspline-mean-squares.txt"]),
+        "plastimatch": Plastimatch(*pair, "plastimatch-rigid-mean-squares.txt"),
+    })
+
+
+def liver_surface(data, inputs):
+    data = data / "phantom-liver"
+    return liver(data, {
+        "rigid ICP": RigidIcp(data / "intraop_surface.ply", data / "preop_labels.nii.gz", data / "intraop.nii.gz"),
+    })
+
+
+# Case in the table -> what builds it and the folder that it needs.
+CASES = {
+    "brain shift, complete volume": (brain_shift_volume, "phantom-brainshift"),
+    "brain shift, labels": (brain_shift_labels, "phantom-brainshift"),
+    "brain shift, degraded volume": (brain_shift_degraded, "phantom-brainshift"),
+    "brain shift, surface patch": (brain_shift_surface, "phantom-brainshift"),
+    "brain sag, complete volume": (brain_sag_volume, "phantom-brain-sag"),
+    "brain sag, degraded volume": (brain_sag_degraded, "phantom-brain-sag"),
+    "brain sag, masks": (brain_sag_masks, "phantom-brain-sag"),
+    "lung, volume": (lung_volume, "lung-ct"),
+    "lung, masks": (lung_masks, "lung-ct"),
+    "liver, labels": (liver_labels, "phantom-liver"),
+    "liver, partial surface": (liver_surface, "phantom-liver"),
+}
+
+
+def build(name, data, inputs):
+    """The case of a name, or None without its data."""
+    function, folder = CASES[name]
+    present = (data / folder).exists() or folder == "phantom-brainshift"
+    return function(data, inputs) if present else None
