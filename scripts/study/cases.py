@@ -5,6 +5,7 @@ To add an option of tissuewarp to the comparison, add one line to a case's `tool
 """
 
 import dataclasses
+import os
 import pathlib
 
 import numpy
@@ -28,7 +29,7 @@ class Case:
 def made(path, make):
     """A file made once: `make` gets the path to write."""
     if not path.exists():
-        unfinished = path.with_name("unfinished-" + path.name)
+        unfinished = path.with_name(f"unfinished-{os.getpid()}-{path.name}")
         make(unfinished)
         unfinished.rename(path)
     return path

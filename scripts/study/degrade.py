@@ -11,7 +11,7 @@ NOISE_SHARE = 0.10  # of the brain's mean
 
 
 def head(voxels):
-    """Everything that is not air: half the mean of the bright half separates, holes are filled."""
+    """Everything that is not air: more than a quarter of the mean of what is bright, smoothed; one piece, holes filled."""
     smooth = ndimage.gaussian_filter(voxels.astype(numpy.float32), 1.5)
     rough = smooth > smooth.mean()
     parts, _ = ndimage.label(smooth > 0.25 * smooth[rough].mean())

@@ -1,7 +1,8 @@
 """The programs that are compared: which commands make each of them register, and where it leaves its fields.
 
-A tool has `commands(folder, machine)`, the commands in order with their environment, `settings`, the files that steer it,
-`backward(folder)`, its displacement field from fixed to moving, and `forward(folder)`, the one from moving to fixed or None.
+A tool has `package`, the Debian package of its program or None, `settings`, the files that steer it,
+`commands(folder, machine)`, the commands in order with their environment, `backward(folder)`, its displacement field from
+fixed to moving, and `forward(folder)`, the one from moving to fixed or None.
 """
 
 import dataclasses
@@ -21,6 +22,7 @@ class Machine:
 @dataclasses.dataclass
 class Tissuewarp:
     arguments: list
+    package = None
     settings = ()
 
     def commands(self, folder, machine):
@@ -39,6 +41,7 @@ class Elastix:
     moving: pathlib.Path
     stages: list  # files of scripts/peers, in order
     view: pathlib.Path = None  # mask of the fixed image
+    package = "elastix"
 
     @property
     def settings(self):
@@ -65,6 +68,7 @@ class Plastimatch:
     moving: pathlib.Path
     stages: str  # file of scripts/peers
     view: pathlib.Path = None  # mask of the fixed image
+    package = "plastimatch"
 
     @property
     def settings(self):
@@ -89,6 +93,7 @@ class RigidIcp:
     surface: pathlib.Path  # intraoperative points, .ply
     labels: pathlib.Path  # preoperative label map
     like: pathlib.Path  # whose grid the field takes
+    package = None
     settings = (SCRIPTS / "study" / "rigid_icp.py",)
 
     def commands(self, folder, machine):
