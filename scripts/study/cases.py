@@ -153,8 +153,10 @@ def lung(data, tools):
 def lung_volume(data, inputs):
     data = data / "lung-ct"
     pair = data / "fixed.mha", data / "moving.mha"
+    stages = ["elastix-rigid.txt", "elastix-affine.txt", "elastix-bspline-correlation.txt"]
     return lung(data, {
-        "elastix": Elastix(*pair, ["elastix-rigid.txt", "elastix-affine.txt", "elastix-bspline-correlation.txt"]),
+        "elastix, told the lung": Elastix(*pair, stages, data / "fixed_mask.mha"),
+        "elastix": Elastix(*pair, stages),
         "plastimatch": Plastimatch(*pair, "plastimatch-lung.txt"),
     })
 

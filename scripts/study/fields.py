@@ -115,12 +115,15 @@ def invert_at(field, affine, points, tolerance=0.01, iterations=200):
 
 def jacobian_determinants(field, affine):
     """det of the gradient of y -> y + field(y) at every voxel, by central differences, one-sided on the grid's rim."""
-    to_axis = numpy.linalg.inv(affine[:3, :3])
+    to_axis = numpy.linalg.inv(affine[:3, :3]).astype(numpy.float32)
     determinants = numpy.empty(field.shape[:3], numpy.float32)
     for first in range(0, field.shape[0], 16):  # slabs, because the gradient is nine times the grid
         begin, end = max(first - 1, 0), min(first + 17, field.shape[0])
-        gradient = numpy.stack(numpy.gradient(field[begin:end].astype(float), axis=(0, 1, 2)), axis=-1) @ to_axis
-        slab = numpy.linalg.det(gradient + numpy.eye(3))
+        slopes = numpy.gradient(field[begin:end], axis=(0, 1, 2))
+        f = [sum(slope * to_axis[i, axis] for i, slope in enumerate(slopes)) for axis in range(3)]
+        for axis in range(3):
+            f[axis][..., axis] += 1.0
+        slab = (f[0] * numpy.cross(f[1], f[2])).sum(axis=-1)  # columns of the gradient of the map
         determinants[first:first + 16] = slab[first - begin:first - begin + 16]
     return determinants
 
