@@ -53,6 +53,15 @@ def distance_map(labels_path, folder):
     return made(folder / f"{labels_path.parent.name}-{name}-distance.nii.gz", make)
 
 
+def preop(data, labels="preop_labels"):
+    """Arguments of `tissuewarp register` for what is known before the operation."""
+    return ["--moving", data / "preop.nii.gz", "--moving-labels", data / f"{labels}.nii.gz"]
+
+
+def intraop_labels(data, labels="intraop_labels"):
+    return ["--fixed", data / "intraop.nii.gz", "--fixed-labels", data / f"{labels}.nii.gz"]
+
+
 def brain_shift_folder(data):
     shared = data / "phantom-brainshift"
     return shared if shared.exists() else ROOT / "data" / "brainshift"
@@ -79,8 +88,7 @@ def brain_shift_labels(data, inputs):
     data = brain_shift_folder(data)
     pair = [distance_map(data / f"{when}_labels.nii.gz", inputs) for when in ("intraop", "preop")]
     return brain_shift(data, {
-        "tissuewarp": Tissuewarp(["--moving", data / "preop.nii.gz", "--moving-labels", data / "preop_labels.nii.gz",
-                                  "--fixed", data / "intraop.nii.gz", "--fixed-labels", data / "intraop_labels.nii.gz"]),
+        "tissuewarp": Tissuewarp(preop(data) + intraop_labels(data)),
         "elastix": Elastix(*pair, ["elastix-bspline-mean-squares.txt"]),
         "plastimatch": Plastimatch(*pair, "plastimatch-mean-squares.txt"),
     })
@@ -137,8 +145,7 @@ def brain_sag_masks(data, inputs):
     data = data / "phantom-brain-sag"
     pair = [distance_map(data / f"{when}_mask.nii.gz", inputs) for when in ("intraop", "preop")]
     return brain_sag(data, {
-        "tissuewarp": Tissuewarp(["--moving", data / "preop.nii.gz", "--moving-labels", data / "preop_mask.nii.gz",
-                                  "--fixed", data / "intraop.nii.gz", "--fixed-labels", data / "intraop_mask.nii.gz"]),
+        "tissuewarp": Tissuewarp(preop(data, "preop_mask") + intraop_labels(data, "intraop_mask")),
         "elastix": Elastix(*pair, ["elastix-bspline-mean-squares.txt"]),
         "plastimatch": Plastimatch(*pair, "plastimatch-mean-squares.txt"),
     })
@@ -183,8 +190,7 @@ def liver_labels(data, inputs):
     data = data / "phantom-liver"
     pair = [distance_map(data / f"{when}_labels.nii.gz", inputs) for when in ("intraop", "preop")]
     return liver(data, {
-        "tissuewarp": Tissuewarp(["--moving", data / "preop.nii.gz", "--moving-labels", data / "preop_labels.nii.gz",
-                                  "--fixed", data / "intraop.nii.gz", "--fixed-labels", data / "intraop_labels.nii.gz"]),
+        "tissuewarp": Tissuewarp(preop(data) + intraop_labels(data)),
         "elastix": Elastix(*pair, ["elastix-rigid.txt", "elastix-bspline-mean-squares.txt"]),
         "plastimatch": Plastimatch(*pair, "plastimatch-rigid-mean-squares.txt"),
     })
