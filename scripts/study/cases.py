@@ -15,7 +15,7 @@ from . import degrade, fields, scoring
 from .tools import Elastix, Plastimatch, RigidIcp, Tissuewarp
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
-DISTANCE_CAP = 20.0  # mm
+DEPTH_CAP = 20.0  # mm
 
 
 @dataclasses.dataclass
@@ -35,22 +35,23 @@ def made(path, make):
     return path
 
 
-def distance_map(labels_path, folder):
+def depth_map(labels_path, folder):
     """Labels as the grey image that intensity-based programs follow best.
 
-    Signed distance from the boundary of all labels together, plus that from the boundary of every label but the first,
-    each cut off at 20 mm.
+    20 mm plus the depth under the boundary of all labels together (outside: less the distance), between 0 and 40 mm, plus the
+    same for every label but the first. Far outside it is 0, what those programs take for everything beyond the image, and its
+    centre of gravity is the organ's.
     """
     def make(path):
         labels, affine = fields.read_image(labels_path)
         spacing = numpy.linalg.norm(affine[:3, :3], axis=0)
-        signed = lambda mask: numpy.clip(ndimage.distance_transform_edt(~mask, sampling=spacing)
-                                         - ndimage.distance_transform_edt(mask, sampling=spacing), -DISTANCE_CAP, DISTANCE_CAP)
+        depth = lambda mask: DEPTH_CAP + numpy.clip(ndimage.distance_transform_edt(mask, sampling=spacing)
+                                                    - ndimage.distance_transform_edt(~mask, sampling=spacing), -DEPTH_CAP, DEPTH_CAP)
         inner = [value for value in numpy.unique(labels) if value > 0][1:]
-        total = signed(labels > 0) + sum(signed(labels == value) for value in inner)
+        total = depth(labels > 0) + sum(depth(labels == value) for value in inner)
         fields.write_image(path, total.astype(numpy.float32), affine)
     name = labels_path.name.split(".")[0]
-    return made(folder / f"{labels_path.parent.name}-{name}-distance.nii.gz", make)
+    return made(folder / f"{labels_path.parent.name}-{name}-depth.nii.gz", make)
 
 
 def preop(data, labels="preop_labels"):
@@ -86,7 +87,7 @@ def brain_shift_volume(data, inputs):
 
 def brain_shift_labels(data, inputs):
     data = brain_shift_folder(data)
-    pair = [distance_map(data / f"{when}_labels.nii.gz", inputs) for when in ("intraop", "preop")]
+    pair = [depth_map(data / f"{when}_labels.nii.gz", inputs) for when in ("intraop", "preop")]
     return brain_shift(data, {
         "tissuewarp": Tissuewarp(preop(data) + intraop_labels(data)),
         "elastix": Elastix(*pair, ["elastix-bspline-mean-squares.txt"]),
@@ -143,7 +144,7 @@ def brain_sag_degraded(data, inputs):
 
 def brain_sag_masks(data, inputs):
     data = data / "phantom-brain-sag"
-    pair = [distance_map(data / f"{when}_mask.nii.gz", inputs) for when in ("intraop", "preop")]
+    pair = [depth_map(data / f"{when}_mask.nii.gz", inputs) for when in ("intraop", "preop")]
     return brain_sag(data, {
         "tissuewarp": Tissuewarp(preop(data, "preop_mask") + intraop_labels(data, "intraop_mask")),
         "elastix": Elastix(*pair, ["elastix-bspline-mean-squares.txt"]),
@@ -170,7 +171,7 @@ def lung_volume(data, inputs):
 
 def lung_masks(data, inputs):
     data = data / "lung-ct"
-    pair = [distance_map(data / f"{when}_mask.mha", inputs) for when in ("fixed", "moving")]
+    pair = [depth_map(data / f"{when}_mask.mha", inputs) for when in ("fixed", "moving")]
     ours = ["--moving", data / "moving.mha", "--moving-labels", data / "moving_mask.mha",
             "--fixed", data / "fixed.mha", "--fixed-labels", data / "fixed_mask.mha", "--resample-labels"]
     return lung(data, {
@@ -188,7 +189,7 @@ def liver(data, tools):
 
 def liver_labels(data, inputs):
     data = data / "phantom-liver"
-    pair = [distance_map(data / f"{when}_labels.nii.gz", inputs) for when in ("intraop", "preop")]
+    pair = [depth_map(data / f"{when}_labels.nii.gz", inputs) for when in ("intraop", "preop")]
     return liver(data, {
         "tissuewarp": Tissuewarp(preop(data) + intraop_labels(data)),
         "elastix": Elastix(*pair, ["elastix-rigid.txt", "elastix-bspline-mean-squares.txt"]),
