@@ -17,6 +17,10 @@ from .tools import Elastix, Plastimatch, RigidIcp, Tissuewarp
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 DEPTH_CAP = 20.0  # mm
 
+# Options of `tissuewarp register`: one set for all pairs of an organ, of what its user knows before seeing a result.
+HEAD = ["--no-align"]  # navigation holds both images in one frame
+LUNG = ["--resample-labels", "--default-poissons-ratio", "0.3"]  # the masks lie on grids of their own; air leaves the tissue
+
 
 @dataclasses.dataclass
 class Case:
@@ -63,6 +67,11 @@ def intraop_labels(data, labels="intraop_labels"):
     return ["--fixed", data / "intraop.nii.gz", "--fixed-labels", data / f"{labels}.nii.gz"]
 
 
+def intraop_surface(data, deviation_mm):
+    """Points of the surface with the deviation that their maker states."""
+    return ["--fixed-surface", data / "intraop_surface.ply", "--surface-sd", deviation_mm]
+
+
 def brain_shift_folder(data):
     shared = data / "phantom-brainshift"
     return shared if shared.exists() else ROOT / "data" / "brainshift"
@@ -80,6 +89,7 @@ def brain_shift_volume(data, inputs):
     data = brain_shift_folder(data)
     pair = data / "intraop.nii.gz", data / "preop.nii.gz"
     return brain_shift(data, {
+        "tissuewarp": Tissuewarp([*HEAD, *preop(data), "--fixed", data / "intraop.nii.gz"]),
         "elastix": Elastix(*pair, ["elastix-bspline-correlation.txt"]),
         "plastimatch": Plastimatch(*pair, "plastimatch-mean-squares.txt"),
     })
@@ -89,7 +99,7 @@ def brain_shift_labels(data, inputs):
     data = brain_shift_folder(data)
     pair = [depth_map(data / f"{when}_labels.nii.gz", inputs) for when in ("intraop", "preop")]
     return brain_shift(data, {
-        "tissuewarp": Tissuewarp(preop(data) + intraop_labels(data)),
+        "tissuewarp": Tissuewarp([*HEAD, *preop(data), *intraop_labels(data)]),
         "elastix": Elastix(*pair, ["elastix-bspline-mean-squares.txt"]),
         "plastimatch": Plastimatch(*pair, "plastimatch-mean-squares.txt"),
     })
@@ -100,18 +110,20 @@ def brain_shift_degraded(data, inputs):
     image, view = inputs / "brain-shift-degraded.nii.gz", inputs / "brain-shift-degraded-view.nii.gz"
     if not (image.exists() and view.exists()):
         degrade.degrade_files(data / "intraop.nii.gz", data / "intraop_labels.nii.gz", data / "intraop_surface.ply", image, view)
-    preop = data / "preop.nii.gz"
+    pair = image, data / "preop.nii.gz"
     return brain_shift(data, {
-        "elastix, told the view": Elastix(image, preop, ["elastix-bspline-mutual-information.txt"], view),
-        "elastix": Elastix(image, preop, ["elastix-bspline-mutual-information.txt"]),
-        "plastimatch, told the view": Plastimatch(image, preop, "plastimatch-mutual-information.txt", view),
-        "plastimatch": Plastimatch(image, preop, "plastimatch-mutual-information.txt"),
+        "tissuewarp": Tissuewarp([*HEAD, *preop(data), "--fixed", image]),
+        "elastix, told the view": Elastix(*pair, ["elastix-bspline-mutual-information.txt"], view),
+        "elastix": Elastix(*pair, ["elastix-bspline-mutual-information.txt"]),
+        "plastimatch, told the view": Plastimatch(*pair, "plastimatch-mutual-information.txt", view),
+        "plastimatch": Plastimatch(*pair, "plastimatch-mutual-information.txt"),
     })
 
 
 def brain_shift_surface(data, inputs):
     data = brain_shift_folder(data)
     return brain_shift(data, {
+        "tissuewarp": Tissuewarp([*HEAD, *preop(data), *intraop_surface(data, 0.3)]),
         "rigid ICP": RigidIcp(data / "intraop_surface.ply", data / "preop_labels.nii.gz", data / "intraop.nii.gz"),
     })
 
@@ -126,6 +138,7 @@ def brain_sag_volume(data, inputs):
     data = data / "phantom-brain-sag"
     pair = data / "intraop.nii.gz", data / "preop.nii.gz"
     return brain_sag(data, {
+        "tissuewarp": Tissuewarp([*HEAD, *preop(data, "preop_mask"), "--fixed", data / "intraop.nii.gz"]),
         "elastix": Elastix(*pair, ["elastix-bspline-correlation.txt"]),
         "plastimatch": Plastimatch(*pair, "plastimatch-mean-squares.txt"),
     })
@@ -135,6 +148,7 @@ def brain_sag_degraded(data, inputs):
     data = data / "phantom-brain-sag"
     pair, view = (data / "intraop_degraded.nii.gz", data / "preop.nii.gz"), data / "intraop_fov_mask.nii.gz"
     return brain_sag(data, {
+        "tissuewarp": Tissuewarp([*HEAD, *preop(data, "preop_mask"), "--fixed", data / "intraop_degraded.nii.gz"]),
         "elastix, told the view": Elastix(*pair, ["elastix-bspline-mutual-information.txt"], view),
         "elastix": Elastix(*pair, ["elastix-bspline-mutual-information.txt"]),
         "plastimatch, told the view": Plastimatch(*pair, "plastimatch-mutual-information.txt", view),
@@ -146,7 +160,7 @@ def brain_sag_masks(data, inputs):
     data = data / "phantom-brain-sag"
     pair = [depth_map(data / f"{when}_mask.nii.gz", inputs) for when in ("intraop", "preop")]
     return brain_sag(data, {
-        "tissuewarp": Tissuewarp(preop(data, "preop_mask") + intraop_labels(data, "intraop_mask")),
+        "tissuewarp": Tissuewarp([*HEAD, *preop(data, "preop_mask"), *intraop_labels(data, "intraop_mask")]),
         "elastix": Elastix(*pair, ["elastix-bspline-mean-squares.txt"]),
         "plastimatch": Plastimatch(*pair, "plastimatch-mean-squares.txt"),
     })
@@ -158,11 +172,18 @@ def lung(data, tools):
                 tools=tools)
 
 
+def lung_preop(data):
+    return ["--moving", data / "moving.mha", "--moving-labels", data / "moving_mask.mha", "--fixed", data / "fixed.mha"]
+
+
 def lung_volume(data, inputs):
     data = data / "lung-ct"
+    masks = ["--fixed-labels", data / "fixed_mask.mha", "--match-image"]
     pair = data / "fixed.mha", data / "moving.mha"
     stages = ["elastix-rigid.txt", "elastix-affine.txt", "elastix-bspline-correlation.txt"]
     return lung(data, {
+        "tissuewarp, told the lung": Tissuewarp([*LUNG, *lung_preop(data), *masks]),
+        "tissuewarp": Tissuewarp([*LUNG, *lung_preop(data)]),
         "elastix, told the lung": Elastix(*pair, stages, data / "fixed_mask.mha"),
         "elastix": Elastix(*pair, stages),
         "plastimatch": Plastimatch(*pair, "plastimatch-lung.txt"),
@@ -172,11 +193,8 @@ def lung_volume(data, inputs):
 def lung_masks(data, inputs):
     data = data / "lung-ct"
     pair = [depth_map(data / f"{when}_mask.mha", inputs) for when in ("fixed", "moving")]
-    ours = ["--moving", data / "moving.mha", "--moving-labels", data / "moving_mask.mha",
-            "--fixed", data / "fixed.mha", "--fixed-labels", data / "fixed_mask.mha", "--resample-labels"]
     return lung(data, {
-        "tissuewarp": Tissuewarp(ours),
-        "tissuewarp, Poisson's ratio 0.3": Tissuewarp([*ours, "--default-poissons-ratio", "0.3"]),
+        "tissuewarp": Tissuewarp([*LUNG, *lung_preop(data), "--fixed-labels", data / "fixed_mask.mha"]),
         "elastix": Elastix(*pair, ["elastix-rigid.txt", "elastix-bspline-mean-squares.txt"]),
         "plastimatch": Plastimatch(*pair, "plastimatch-rigid-mean-squares.txt"),
     })
@@ -191,7 +209,7 @@ def liver_labels(data, inputs):
     data = data / "phantom-liver"
     pair = [depth_map(data / f"{when}_labels.nii.gz", inputs) for when in ("intraop", "preop")]
     return liver(data, {
-        "tissuewarp": Tissuewarp(preop(data) + intraop_labels(data)),
+        "tissuewarp": Tissuewarp([*preop(data), *intraop_labels(data)]),
         "elastix": Elastix(*pair, ["elastix-rigid.txt", "elastix-bspline-mean-squares.txt"]),
         "plastimatch": Plastimatch(*pair, "plastimatch-rigid-mean-squares.txt"),
     })
@@ -200,6 +218,7 @@ def liver_labels(data, inputs):
 def liver_surface(data, inputs):
     data = data / "phantom-liver"
     return liver(data, {
+        "tissuewarp": Tissuewarp([*preop(data), *intraop_surface(data, 0.7)]),
         "rigid ICP": RigidIcp(data / "intraop_surface.ply", data / "preop_labels.nii.gz", data / "intraop.nii.gz"),
     })
 
