@@ -196,7 +196,7 @@ def lung_masks(data, inputs):
     return lung(data, {
         "tissuewarp": Tissuewarp([*LUNG, *lung_preop(data), "--fixed-labels", data / "fixed_mask.mha"]),
         "elastix": Elastix(*pair, ["elastix-rigid.txt", "elastix-bspline-mean-squares.txt"]),
-        "plastimatch": Plastimatch(*pair, "plastimatch-rigid-mean-squares.txt"),
+        "plastimatch": Plastimatch(*pair, "plastimatch-labels.txt"),
     })
 
 
@@ -211,7 +211,7 @@ def liver_labels(data, inputs):
     return liver(data, {
         "tissuewarp": Tissuewarp([*preop(data), *intraop_labels(data)]),
         "elastix": Elastix(*pair, ["elastix-rigid.txt", "elastix-bspline-mean-squares.txt"]),
-        "plastimatch": Plastimatch(*pair, "plastimatch-rigid-mean-squares.txt"),
+        "plastimatch": Plastimatch(*pair, "plastimatch-labels.txt"),
     })
 
 
