@@ -100,7 +100,7 @@ def brain_shift_labels(data, inputs):
     pair = [depth_map(data / f"{when}_labels.nii.gz", inputs) for when in ("intraop", "preop")]
     return brain_shift(data, {
         "tissuewarp": Tissuewarp([*HEAD, *preop(data), *intraop_labels(data)]),
-        "elastix": Elastix(*pair, ["elastix-bspline-mean-squares.txt"]),
+        "elastix": Elastix(*pair, ["elastix-labels.txt"]),
         "plastimatch": Plastimatch(*pair, "plastimatch-mean-squares.txt"),
     })
 
@@ -161,7 +161,7 @@ def brain_sag_masks(data, inputs):
     pair = [depth_map(data / f"{when}_mask.nii.gz", inputs) for when in ("intraop", "preop")]
     return brain_sag(data, {
         "tissuewarp": Tissuewarp([*HEAD, *preop(data, "preop_mask"), *intraop_labels(data, "intraop_mask")]),
-        "elastix": Elastix(*pair, ["elastix-bspline-mean-squares.txt"]),
+        "elastix": Elastix(*pair, ["elastix-labels.txt"]),
         "plastimatch": Plastimatch(*pair, "plastimatch-mean-squares.txt"),
     })
 
@@ -195,7 +195,7 @@ def lung_masks(data, inputs):
     pair = [depth_map(data / f"{when}_mask.mha", inputs) for when in ("fixed", "moving")]
     return lung(data, {
         "tissuewarp": Tissuewarp([*LUNG, *lung_preop(data), "--fixed-labels", data / "fixed_mask.mha"]),
-        "elastix": Elastix(*pair, ["elastix-rigid.txt", "elastix-bspline-mean-squares.txt"]),
+        "elastix": Elastix(*pair, ["elastix-rigid.txt", "elastix-affine.txt", "elastix-labels.txt"]),
         "plastimatch": Plastimatch(*pair, "plastimatch-labels.txt"),
     })
 
@@ -210,7 +210,7 @@ def liver_labels(data, inputs):
     pair = [depth_map(data / f"{when}_labels.nii.gz", inputs) for when in ("intraop", "preop")]
     return liver(data, {
         "tissuewarp": Tissuewarp([*preop(data), *intraop_labels(data)]),
-        "elastix": Elastix(*pair, ["elastix-rigid.txt", "elastix-bspline-mean-squares.txt"]),
+        "elastix": Elastix(*pair, ["elastix-rigid.txt", "elastix-affine.txt", "elastix-labels.txt"]),
         "plastimatch": Plastimatch(*pair, "plastimatch-labels.txt"),
     })
 
