@@ -7,10 +7,8 @@
 #include "registration/detail/uninitialised.hpp"
 
 #include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <mutex>
 #include <optional>
 #include <string>
 
@@ -137,42 +135,17 @@ Inverse inverted(const detail::Continuation& forward, const Eigen::Vector3d& z, 
     return {w - inverse_gradient * residual, true};  // the next step, not worth its evaluation
 }
 
-/// The continued inverse field, made when it is first asked for: few fields need it.
-class BackwardContinuation {
-public:
-    BackwardContinuation(const Deformation& deformation, const meshing::BoundarySurface& boundary, double fade_mm)
-        : deformation_(deformation), boundary_(boundary), fade_mm_(fade_mm) {}
-
-    /// Thread-safe.
-    Eigen::Vector3d operator()(const Eigen::Vector3d& z) {
-        std::call_once(made_, [this] {
-            tbb::this_task_arena::isolate([this] {  // a thread that waits inside must not take up another row
-                continuation_.emplace(deformation_.mesh.nodes + deformation_.displacement, deformation_.mesh.tets,
-                                      boundary_, -deformation_.displacement, fade_mm_);
-            });
-        });
-        return (*continuation_)(z);
-    }
-
-private:
-    const Deformation& deformation_;
-    const meshing::BoundarySurface& boundary_;
-    double fade_mm_;
-    std::once_flag made_;
-    std::optional<detail::Continuation> continuation_;
-};
-
-/// The inverse at consecutive voxels of a row. A voxel is guessed from those before it: from their line, from one where
-/// one is known, at first from the forward field, which is exact where that is constant. Where this leads nowhere the
-/// continued inverse helps.
+/// The inverse at consecutive voxels of a row: where two are known the next is guessed from their line, which needs one
+/// evaluation in most places; at first, and where that leads nowhere, from the continued inverse.
 class RowInverse {
 public:
-    RowInverse(const detail::Continuation& forward, BackwardContinuation& backward)
+    RowInverse(const detail::Continuation& forward, const detail::Continuation& backward)
         : forward_(forward), backward_(backward) {}
 
     Eigen::Vector3d operator()(int i, const Eigen::Vector3d& z) {
         known_ = i == last_ + 1 ? std::min(known_ + 1, 2) : 0;
-        Inverse found = inverted(forward_, z, guess(z));
+        Inverse found{Eigen::Vector3d::Zero(), false};
+        if (known_ == 2) found = inverted(forward_, z, 2.0 * before_ - two_before_);
         if (!found.converged) found = inverted(forward_, z, backward_(z));
         if (!found.converged) known_ = -1;
         two_before_ = before_;
@@ -182,16 +155,9 @@ public:
     }
 
 private:
-    const detail::Continuation& forward_;
-    BackwardContinuation& backward_;
+    const detail::Continuation &forward_, &backward_;
     Eigen::Vector3d before_ = Eigen::Vector3d::Zero(), two_before_ = Eigen::Vector3d::Zero();
     int last_ = -2, known_ = 0;
-
-    [[nodiscard]] Eigen::Vector3d guess(const Eigen::Vector3d& z) const {
-        if (known_ == 2) return 2.0 * before_ - two_before_;
-        if (known_ == 1) return before_;
-        return -forward_(z);
-    }
 };
 
 }  // namespace
@@ -235,16 +201,16 @@ Volume displacement_fixed_to_moving(const Deformation& deformation, const Geomet
         observer.note("field fixed to moving: " + std::to_string(raster.count.inverted) + " inverted and " +
                       std::to_string(raster.count.flat) + " flat tetrahedra; the field folds there");
     observer.checkpoint(stage, 0.15);
-    std::optional<detail::Continuation> forward;
-    meshing::BoundarySurface boundary;
+    std::optional<detail::Continuation> forward, backward;
     if (!raster.full()) {
-        boundary = meshing::boundary_surface(mesh);
+        const meshing::BoundarySurface boundary = meshing::boundary_surface(mesh);
         forward.emplace(mesh.nodes, mesh.tets, boundary, deformation.displacement, options.fade_mm);
+        observer.checkpoint(stage, 0.4);
+        backward.emplace(deformed, mesh.tets, boundary, inverse, options.fade_mm);
     }
     observer.checkpoint(stage, 0.6);
-    BackwardContinuation backward(deformation, boundary, options.fade_mm);
     complete(raster, fixed_grid, Eigen::Matrix3d::Identity(), to_moving.linear() - Eigen::Matrix3d::Identity(),
-             to_moving.translation(), [&] { return RowInverse(*forward, backward); });
+             to_moving.translation(), [&] { return RowInverse(*forward, *backward); });
     observer.progress(stage, 1.0);
     return raster.values;
 }
