@@ -25,7 +25,8 @@ public:
 private:
     unsigned before_;
 #else
-    DenormalsAsZero() = default;
+    DenormalsAsZero() {}
+    ~DenormalsAsZero() {}
 #endif
 };
 
