@@ -125,7 +125,12 @@ public:
         if (results_.device)
             results_.ceilings[tled::Processor::Gpu] =
                 shaders::measured_ceilings(shaders::Device(results_.device->index), options_.quick ? 0.0 : 1.0);
-        for (const PlannedStudy& study : studies_) run(study);
+        show([&] { print_head(results_); });
+        for (const PlannedStudy& study : studies_) {
+            results_.studies.push_back(measured(study));
+            show([&] { print_study(results_, results_.studies.back()); });
+        }
+        show([&] { print_limits(results_); });
         return std::move(results_);
     }
 
@@ -136,8 +141,14 @@ private:
         return std::any_of(studies_.begin(), studies_.end(), [&](const auto& each) { return each.study == study; });
     }
 
-    void run(const PlannedStudy& study) {
-        StudyResults measured{study.study, {}};
+    template <class Print>
+    void show(const Print& print) {
+        progress_.clear();
+        if (!options_.common.quiet) print();
+    }
+
+    StudyResults measured(const PlannedStudy& study) {
+        StudyResults results{study.study, {}};
         std::vector<BenchEngine> engines = engines_;
         for (const int elements : study.elements) {
             const double from = 0.02 + 0.98 * done_work_ / all_work_, share = 0.98 * work_of(elements) / all_work_;
@@ -147,11 +158,11 @@ private:
                                          ? indented_brain(brain_mesh(labels_, options_.only, elements, progress_))
                                          : stretched_cube(cells_for(elements));
             MeshTimings mesh = run(scene, study.timing, engines, name, from + 0.2 * share, from + share);
-            if (!mesh.engines.empty()) measured.meshes.push_back(std::move(mesh));
+            if (!mesh.engines.empty()) results.meshes.push_back(std::move(mesh));
             done_work_ += work_of(elements);
             if (engines.empty()) break;
         }
-        results_.studies.push_back(std::move(measured));
+        return results;
     }
 
     /// Takes engines that are too slow for the mesh, or whose device is too small, from the list.
@@ -233,8 +244,6 @@ void run_bench(const BenchOptions& options) {
     if (!options.output.empty()) output.emplace(options.output);
     const BenchResults results = benchmark.run();
     if (output) write_results(results, *output);
-    progress.clear();
-    if (!options.common.quiet) print_results(results);
     require_correct(results);
 }
 

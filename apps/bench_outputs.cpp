@@ -57,14 +57,6 @@ void print_row(const BenchResults& results, const MeshTimings& mesh, const Engin
         mesh.critical_step * 1e6, mesh.real_time_factor(engine), difference_text(engine), shape_text(engine));
 }
 
-void print_study(const BenchResults& results, const StudyResults& study) {
-    fmt::print("\n{}\n{:>9}  {:<14}{:>11}{:>11}{:>8}{:>10}{:>7}{:>7}{:>8}{:>8}{:>12}{:>10}  {}\n", name_of(study.study),
-               "elements", "engine", "mean us", "median us", "ratio", "ns/el", "B/el", "op/el", "copy %", "fma %",
-               "critical us", "real time", "difference");
-    for (const MeshTimings& mesh : study.meshes)
-        for (const EngineTiming& engine : mesh.engines) print_row(results, mesh, engine);
-}
-
 std::string limit_text(const RealTimeLimit& limit) {
     const char* how = limit.kind == RealTimeLimit::Kind::Below   ? "less than "
                       : limit.kind == RealTimeLimit::Kind::Above ? "more than "
@@ -114,11 +106,23 @@ nlohmann::json to_json(const BenchResults& results, const StudyResults& study) {
 
 }  // namespace
 
-void print_results(const BenchResults& results) {
+void print_head(const BenchResults& results) {
     fmt::print("time per step: mean and median of {} runs; ratio: median of the scalar loops over the engine's\n",
                results.repeats);
     print_ceilings(results);
-    for (const StudyResults& study : results.studies) print_study(results, study);
+    std::fflush(stdout);
+}
+
+void print_study(const BenchResults& results, const StudyResults& study) {
+    fmt::print("\n{}\n{:>9}  {:<14}{:>11}{:>11}{:>8}{:>10}{:>7}{:>7}{:>8}{:>8}{:>12}{:>10}  {}\n", name_of(study.study),
+               "elements", "engine", "mean us", "median us", "ratio", "ns/el", "B/el", "op/el", "copy %", "fma %",
+               "critical us", "real time", "difference");
+    for (const MeshTimings& mesh : study.meshes)
+        for (const EngineTiming& engine : mesh.engines) print_row(results, mesh, engine);
+    std::fflush(stdout);
+}
+
+void print_limits(const BenchResults& results) {
     fmt::print("\n");
     for (const BenchEngine engine : every_bench_engine)
         if (const auto limit = real_time_limit(results.studies, engine))

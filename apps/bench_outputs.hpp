@@ -10,7 +10,10 @@
 
 namespace tissuewarp::apps {
 
-void print_results(const BenchResults& results);
+/// A long benchmark shows each study as soon as it is measured: an interrupt then costs the study at hand alone.
+void print_head(const BenchResults& results);
+void print_study(const BenchResults& results, const StudyResults& study);
+void print_limits(const BenchResults& results);
 
 /// Times in s; the keys are listed in docs/manual/bench.md.
 nlohmann::json bench_json(const BenchResults& results);

@@ -180,7 +180,7 @@ struct Parser {
         verb.path("--points", o.points, "Moving points to carry along: CSV x,y,z (mm, LPS)");
         verb.path("--surface", o.surface, "Moving surface to carry along: .ply, .stl, .obj, .vtk (mm, LPS)");
         verb.number("--edge-length", o.edge_length, "MM", 0.0, 100.0,
-                    "Target edge of the tetrahedra (mm); 0: so that the organ takes about 50 000 of them");
+                    "Target edge of the tetrahedra (mm); 0: about 50 000 of them with fixed labels, 15 000 without");
         verb.list("--label-edge-length", register_lengths, "LABEL=MM", "Target edge in one label (mm); repeatable");
         verb.path("--materials", o.materials,
                   "Material table (TOML): [label.1] youngs_modulus_kpa, poissons_ratio, law, name");

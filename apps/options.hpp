@@ -42,7 +42,7 @@ struct RegisterOptions {
     PointPairFiles point_pairs;
     LandmarkFiles landmarks;
     std::filesystem::path points, surface;    ///< of the moving frame, carried along
-    double edge_length = 0.0;                 ///< mm; 0: from the volume of the organ
+    double edge_length = 0.0;                 ///< mm; 0: from the volume of the organ and what is given
     std::map<int, double> label_edge_length;  ///< mm
     std::filesystem::path materials;
     double default_youngs_modulus = 3.0;  ///< kPa

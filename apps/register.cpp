@@ -24,11 +24,17 @@ namespace {
 
 using namespace registration;
 
-PrepareOptions prepare_options(const RegisterOptions& options, const std::map<int, TissueEntry>& tissues) {
+double edge_length(const RegisterOptions& options, const RegistrationInputs& inputs) {
+    if (options.edge_length > 0) return options.edge_length;
+    return inputs.fixed_labels.empty() ? suggested_edge_length_without_labels(inputs.moving_labels)
+                                       : suggested_edge_length(inputs.moving_labels);
+}
+
+PrepareOptions prepare_options(const RegisterOptions& options, const RegistrationInputs& inputs) {
     PrepareOptions result;
-    result.meshing.edge_length = options.edge_length;
+    result.meshing.edge_length = edge_length(options, inputs);
     result.meshing.label_edge_length = options.label_edge_length;
-    for (const auto& [label, tissue] : tissues) result.materials[label] = material_of(tissue);
+    for (const auto& [label, tissue] : inputs.materials) result.materials[label] = material_of(tissue);
     result.default_material = tled::neo_hookean_lnj(options.default_youngs_modulus, options.default_poissons_ratio);
     if (options.element == "t4") result.element = tled::Element::T4;
     if (options.element == "averaged-pressure") result.element = tled::Element::AveragedPressureT4;
@@ -57,10 +63,9 @@ void print_plan(const RegistrationInputs& inputs, const RegisterOptions& options
     fmt::print("moving grid   {}\nfixed grid    {}\nlabels        {}\n", grid(inputs.moving_grid()),
                fixed ? grid(*fixed) : "the moving one, carried along by the rigid alignment",
                fmt::join(imaging::labels_in(inputs.moving_labels), ", "));
-    const double edge = options.edge_length > 0 ? options.edge_length : suggested_edge_length(inputs.moving_labels);
-    fmt::print("would mesh with edges of {:.3g} mm, {}, match in {} rounds on device '{}', and write to '{}':\n", edge,
-               options.no_align ? "not align" : "align rigidly", options.rounds, options.device.name,
-               options.output.string());
+    fmt::print("would mesh with edges of {:.3g} mm, {}, match in {} rounds on device '{}', and write to '{}':\n",
+               edge_length(options, inputs), options.no_align ? "not align" : "align rigidly", options.rounds,
+               options.device.name, options.output.string());
     for (const std::string& name : output_names(options)) fmt::print("  {}\n", name);
 }
 
@@ -149,7 +154,7 @@ void run_register(const RegisterOptions& options) {
 
     progress.begin("preparing the model", 0.02, 0.20);
     run.prepared = std::make_unique<PreparedModel>(
-        prepare(run.inputs.moving_labels, prepare_options(options, run.inputs.materials), progress));
+        prepare(run.inputs.moving_labels, prepare_options(options, run.inputs), progress));
     if (options.match_image) prepare_image(*run.prepared, run.inputs.moving, {}, progress);
     append(run.times, run.prepared->times);
 

@@ -285,6 +285,8 @@ void run(const Arguments& arguments) {
         const Case study = make();
         PrepareOptions options;
         options.meshing.edge_length = arguments.edge_length;
+        if (arguments.edge_length == 0 && !study.seen.labels)
+            options.meshing.edge_length = suggested_edge_length_without_labels(study.labels);
         options.default_material =
             tled::neo_hookean_lnj(3.0, arguments.poissons_ratio > 0 ? arguments.poissons_ratio : study.poissons_ratio);
         PreparedModel prepared = prepare(study.labels, options);

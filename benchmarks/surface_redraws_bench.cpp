@@ -151,7 +151,9 @@ void run(const Arguments& arguments) {
     const fs::path folder = arguments.data / arguments.folder;
     PrepareOptions prepare_options;
     prepare_options.meshing.edge_length = arguments.edge_length;
-    const PreparedModel prepared = prepare(imaging::read_labels(folder / "preop_labels.nii.gz"), prepare_options);
+    const imaging::Volume labels = imaging::read_labels(folder / "preop_labels.nii.gz");
+    if (arguments.edge_length == 0) prepare_options.meshing.edge_length = suggested_edge_length_without_labels(labels);
+    const PreparedModel prepared = prepare(labels, prepare_options);
     const meshing::SurfaceMesh model = meshing::boundary_surface(prepared.model.mesh).surface;
     meshing::MeshingOptions fine;
     fine.edge_length = 6;

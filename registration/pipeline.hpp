@@ -26,8 +26,12 @@ struct StageTime {
 };
 
 /// Edge length (mm) that cuts an organ of the map's volume into about 50 000 tetrahedra: a cube root of the volume
-/// over 18.
+/// over 18. Boundaries of a label map pull at every node of the surface, which should lie on it.
 double suggested_edge_length(const imaging::Volume& labels);
+
+/// The same into about 15 000, over 12: where an image or points pull, without labels. Finer tetrahedra cost three to
+/// ten times the seconds and are no more accurate (docs/results.md, "How fine a mesh").
+double suggested_edge_length_without_labels(const imaging::Volume& labels);
 
 struct PrepareOptions {
     meshing::MeshingOptions meshing{.edge_length = 0};  ///< edge length 0: suggested_edge_length

@@ -153,7 +153,8 @@ GpuStepShape suggested_gpu_step_shape(int element_count, Element element, int mu
     // as long as their nodes fit into shared memory, of which a regular mesh has more than others; patches that do not
     // are made smaller. One workgroup of 640 always fits on a multiprocessor; two smaller ones may be faster, but
     // whether they fit depends on how many registers the compiler takes. From a few patches each on, memory is what
-    // limits, and going round and round in one dispatch gains nothing: 2 were measured to be the faster, 6 the slower.
+    // limits, and going round and round in one dispatch gains nothing: 2 were measured to be the faster, 4 and 6 the
+    // slower. There averaged pressure takes patches that fit whole: of those that are split some workgroups get two.
     constexpr int largest_patch = detail::largest_patch_tets(Element::T4), few_each = 3;
     if (multiprocessors <= 0) multiprocessors = detail::default_multiprocessors;
     const int of_each = element_count / multiprocessors;
@@ -166,7 +167,7 @@ GpuStepShape suggested_gpu_step_shape(int element_count, Element element, int mu
     if (of_each < detail::largest_patch_tets(element)) return {shared_out(multiprocessors), 5, 640, multiprocessors};
     const int patches = multiple(multiprocessors, largest_patch);
     if (patches <= few_each * multiprocessors) return {shared_out(patches), 5, 640, multiprocessors};
-    return {shared_out(patches), 5, 768, 0};
+    return {shared_out(multiple(multiprocessors, detail::largest_patch_tets(element))), 5, 768, 0};
 }
 
 std::vector<GpuStepShape> candidate_gpu_step_shapes(int element_count, Element element, int multiprocessors) {
