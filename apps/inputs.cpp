@@ -27,19 +27,6 @@ void add_file(RegistrationInputs& inputs, const char* role, const fs::path& path
     inputs.files.push_back({role, path, ""});
 }
 
-/// Geometry whose extent is no part of a body is in other units than millimetres.
-void require_millimetres(const Geometry& grid, const fs::path& path) {
-    double extent = 0;
-    for (int axis = 0; axis < 3; ++axis)
-        extent = std::max(extent, grid.spacing[axis] * grid.size[static_cast<std::size_t>(axis)]);
-    constexpr double least_mm = 10.0, most_mm = 3000.0;
-    if (extent >= least_mm && extent <= most_mm) return;
-    throw InvalidInput(
-        fmt::format("'{}' spans {:g} mm, outside {:g} to {:g} mm; its spacing is probably in other units: write it in "
-                    "millimetres",
-                    path.string(), extent, least_mm, most_mm));
-}
-
 void require_common_label(const Volume& moving, const Volume& fixed, const RegisterOptions& options) {
     const std::vector<int> a = imaging::labels_in(moving), b = imaging::labels_in(fixed);
     std::vector<int> common;
@@ -77,24 +64,6 @@ void require_organs_meet(const RegistrationInputs& inputs) {
         "the labelled organs lie {:.1f} mm apart, beyond the search of {:g} mm; drop --no-align", gap, search_mm));
 }
 
-/// Points outside of their image are mostly RAS taken for LPS, or of another image: some are worth a note, most an
-/// error.
-void check_inside(const Eigen::Matrix3Xd& points, const Geometry& grid, const std::string& what,
-                  std::vector<std::string>& notes) {
-    Eigen::Index outside = 0;
-    for (Eigen::Index p = 0; p < points.cols(); ++p) {
-        const Eigen::Vector3d index = grid.index(points.col(p));
-        bool inside = true;
-        for (int axis = 0; axis < 3; ++axis)
-            inside &= index[axis] >= -0.5 && index[axis] <= grid.size[static_cast<std::size_t>(axis)] - 0.5;
-        outside += !inside;
-    }
-    if (outside == 0) return;
-    const std::string text = fmt::format("{} of {} {} lie outside the image", outside, points.cols(), what);
-    if (2 * outside > points.cols()) throw InvalidInput(text + "; coordinates must be LPS mm: for RAS, negate x and y");
-    notes.push_back(text);
-}
-
 void match_grid(Volume& labels, const Volume& image, const fs::path& image_path, const fs::path& labels_path,
                 bool resample) {
     if (image.empty()) return;
@@ -116,6 +85,34 @@ void validate_fixed_labels(RegistrationInputs& inputs, const RegisterOptions& op
 }
 
 }  // namespace
+
+void require_millimetres(const Geometry& grid, const fs::path& path) {
+    double extent = 0;
+    for (int axis = 0; axis < 3; ++axis)
+        extent = std::max(extent, grid.spacing[axis] * grid.size[static_cast<std::size_t>(axis)]);
+    constexpr double least_mm = 10.0, most_mm = 3000.0;
+    if (extent >= least_mm && extent <= most_mm) return;
+    throw InvalidInput(
+        fmt::format("'{}' spans {:g} mm, outside {:g} to {:g} mm; its spacing is probably in other units: write it in "
+                    "millimetres",
+                    path.string(), extent, least_mm, most_mm));
+}
+
+void check_inside(const Eigen::Matrix3Xd& points, const Geometry& grid, const std::string& what,
+                  std::vector<std::string>& notes) {
+    Eigen::Index outside = 0;
+    for (Eigen::Index p = 0; p < points.cols(); ++p) {
+        const Eigen::Vector3d index = grid.index(points.col(p));
+        bool inside = true;
+        for (int axis = 0; axis < 3; ++axis)
+            inside &= index[axis] >= -0.5 && index[axis] <= grid.size[static_cast<std::size_t>(axis)] - 0.5;
+        outside += !inside;
+    }
+    if (outside == 0) return;
+    const std::string text = fmt::format("{} of {} {} lie outside the image", outside, points.cols(), what);
+    if (2 * outside > points.cols()) throw InvalidInput(text + "; coordinates must be LPS mm: for RAS, negate x and y");
+    notes.push_back(text);
+}
 
 void require_same_grid(const Geometry& image, const Geometry& labels, const std::string& image_name,
                        const std::string& labels_name, const std::string& remedy) {

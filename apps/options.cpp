@@ -254,10 +254,33 @@ struct Parser {
         labels->needs(reference);
         reference->needs(labels);
         verb.landmarks(o.landmarks);
-        verb.path("--displacement", o.displacement, "Field moving_to_fixed (mm, LPS): maps the landmarks, gives det J");
-        verb.path("--mask", o.mask, "Only voxels other than 0 of this image count for det J");
+        CLI::Option* field = verb.path("--displacement", o.displacement,
+                                       "Field moving_to_fixed (mm, LPS): maps the landmarks, gives det J");
+        verb.path("--inverse", o.inverse, "Field fixed_to_moving (mm, LPS): how far the two do not undo each other")
+            ->needs(field);
+        verb.path(
+                "--mask", o.mask,
+                "Only voxels other than 0 of this image, on the grid of --displacement, count for det J and --inverse")
+            ->needs(field);
         verb.number("--moved", o.moved, "MM", 0.0, 1e3,
                     "Landmarks that moved by more than this are also summed up apart (mm)");
+        CLI::Option* organ =
+            verb.path("--moving-labels", o.moving_labels,
+                      "Preoperative label map: sums up landmarks by depth below its surface; --held-out takes it too");
+        verb.path("--data-surface", o.data_surface,
+                  "Surface points that were registered to: sums up landmarks by distance to them (mm, LPS)");
+        verb.path("--data-points", o.data_points,
+                  "Points that were registered to, likewise: the file that register took as --fixed-points");
+        verb.app()
+            .add_option("--bin-edges", o.bin_edges, "Edges of the bins of depth and distance to data (mm)")
+            ->type_name("MM")
+            ->delimiter(',')
+            ->capture_default_str();
+        verb.path("--held-out", o.held_out,
+                  "Intraoperative surface points that were not registered to: their distance to the warped surface of "
+                  "--moving-labels; .ply, .stl, .obj, .vtk, .csv, .xyz (mm, LPS)")
+            ->needs(field)
+            ->needs(organ);
         verb.path("--json", o.json, "Also write the scores as JSON");
         verb.common(o.common);
     }
