@@ -36,7 +36,14 @@ struct PrepareOptions {
     std::optional<tled::Element> element;  ///< default: tled::suggested_element
     double data_stiffness = 3.0;           ///< kPa/mm along the normal per interface area, at full weight
     double tangential_ratio = 0.02;        ///< stiffness along the surface over stiffness along the normal
+    std::vector<int> anchors;              ///< labels of tissue that stays where the rigid placement has it
+    std::vector<int> rigid_neighbours;     ///< labels of bodies that move with the placement and are not meshed; the
+                                           ///< organ slides along them and comes off, but does not enter them
 };
+
+/// Throws InvalidInput, naming the label and those present, unless the map holds every anchor and rigid neighbour, none
+/// is both or 0, and something else is left to register.
+void require_surroundings(const imaging::Volume& moving_labels, const PrepareOptions& options);
 
 /// What the preoperative image shows of the tissue, to be found again in a bare intraoperative volume.
 struct ImageModel {
@@ -49,16 +56,23 @@ struct ImageModelOptions {
     TemplateOptions blocks;
 };
 
+/// Bone and the like about the organ, on the grid of the preoperative label map.
+struct RigidNeighbours {
+    imaging::Volume labels;    ///< theirs alone
+    imaging::Volume distance;  ///< mm to the nearest of them, negative within; float32
+};
+
 /// Everything that does not depend on intraoperative data.
 struct PreparedModel {
     tled::Model model;       ///< mesh in LPS mm of the preoperative image
-    imaging::Volume labels;  ///< the preoperative label map it came from
+    imaging::Volume labels;  ///< the preoperative label map it came from, without rigid neighbours
     PrepareOptions options;
     Interfaces interfaces;
     tled::RestState rest;
     tled::RestStiffness stiffness;  ///< K₀ with all interface springs at full weight
     std::vector<StageTime> times;
     std::optional<ImageModel> image;  ///< see prepare_image
+    std::optional<RigidNeighbours> neighbours;
 };
 
 /// Label map → mesh → rest state → factor. Throws InvalidInput, Cancelled.
@@ -166,6 +180,18 @@ struct PointFit {
     double residual_mm = 0;  ///< root mean square of the others
 };
 
+/// How the organ lies to its rigid neighbours.
+struct ContactFit {
+    int touching = 0;       ///< surface nodes that a neighbour holds back
+    double deepest_mm = 0;  ///< that a surface node lies in a neighbour, beyond where it lay at rest
+};
+
+/// How anchored tissue stayed where it was.
+struct AnchorFit {
+    int nodes = 0;
+    double largest_mm = 0;  ///< displacement of one of them
+};
+
 /// How far off tissue is expected to lie, from the deviations of the data and the prior alone: root mean square over
 /// places all over the organ, and the place that is known least.
 struct ExpectedError {
@@ -182,6 +208,8 @@ struct UpdateResult {
     std::optional<ImageFit> image;          ///< where a bare volume was given
     std::optional<SurfaceFit> surface;      ///< where points of a surface were given
     std::optional<PointFit> points;         ///< where pairs of points were given
+    std::optional<ContactFit> contact;      ///< where the model has rigid neighbours
+    std::optional<AnchorFit> anchors;       ///< and anchors
     std::optional<ExpectedError> expected;  ///< where neither labels nor an image show the organ as a whole
     std::vector<StageTime> times;
     std::vector<std::string> doubts;  ///< reasons not to trust the result, empty when there are none
