@@ -4,6 +4,7 @@
 #include "core/sha256.hpp"
 #include "imaging/filters.hpp"
 #include "imaging/labels.hpp"
+#include "registration/pipeline.hpp"
 #include "registration/surface_points.hpp"
 
 #include <fmt/format.h>
@@ -74,6 +75,18 @@ void match_grid(Volume& labels, const Volume& image, const fs::path& image_path,
         labels = imaging::resample(labels, image.geometry, imaging::Interpolation::Nearest);
     }
     labels.geometry = image.geometry;  // headers that differ in a late digit are one grid
+}
+
+void require_known_surroundings(const Volume& moving_labels, const RegisterOptions& options) {
+    registration::PrepareOptions named;
+    named.anchors = options.anchors;
+    named.rigid_neighbours = options.rigid_neighbours;
+    try {
+        registration::require_surroundings(moving_labels, named);
+    } catch (const InvalidInput& problem) {
+        throw InvalidInput(
+            fmt::format("'{}', --anchor and --rigid-neighbour: {}", options.moving_labels.string(), problem.what()));
+    }
 }
 
 void validate_fixed_labels(RegistrationInputs& inputs, const RegisterOptions& options) {
@@ -192,8 +205,9 @@ void validate(RegistrationInputs& inputs, const RegisterOptions& options) {
     require_millimetres(inputs.moving_labels.geometry, options.moving_labels);
     imaging::require_labels(inputs.moving_labels, {}, options.moving_labels.string().c_str());
     if (!inputs.fixed_labels.empty()) validate_fixed_labels(inputs, options);
-    if (!options.materials.empty())
-        require_materials(inputs.materials, imaging::labels_in(inputs.moving_labels), options.materials);
+    require_known_surroundings(inputs.moving_labels, options);
+    const Volume organ = imaging::without_labels(inputs.moving_labels, options.rigid_neighbours);
+    if (!options.materials.empty()) require_materials(inputs.materials, imaging::labels_in(organ), options.materials);
     const auto check_moving = [&](const Eigen::Matrix3Xd& points, const char* what) {
         check_inside(points, inputs.moving_grid(), what, inputs.notes);
     };

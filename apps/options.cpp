@@ -128,6 +128,19 @@ std::map<int, double> label_lengths(const std::vector<std::string>& entries) {
     return lengths;
 }
 
+std::vector<int> label_list(const std::string& option, const std::vector<std::string>& entries) {
+    std::vector<int> labels;
+    for (const std::string& entry : entries) {
+        int label = 0;
+        const char* end = entry.data() + entry.size();
+        const auto [stop, error] = std::from_chars(entry.data(), end, label);
+        if (stop != end || error != std::errc() || label <= 0)
+            throw InvalidInput(option + " '" + entry + "' is no label; give whole numbers above 0, for instance 3,4");
+        labels.push_back(label);
+    }
+    return labels;
+}
+
 /// All verbs with the structs that they fill.
 struct Parser {
     CLI::App app{
@@ -140,7 +153,7 @@ struct Parser {
     InfoOptions info;
     BenchOptions bench;
     std::filesystem::path config;
-    std::vector<std::string> register_lengths, mesh_lengths, info_files;
+    std::vector<std::string> register_lengths, mesh_lengths, info_files, anchors, rigid_neighbours;
     std::deque<Verb> verbs;
 
     Parser() {
@@ -191,6 +204,11 @@ struct Parser {
         verb.text("--element", o.element,
                   "auto, t4 or averaged-pressure; auto: the latter from a Poisson's ratio of 0.45")
             ->check(CLI::IsMember({"auto", "t4", "averaged-pressure"}).description(""));
+        verb.list("--anchor", anchors, "LABEL", "Labels of tissue that stays where the rigid placement has it")
+            ->delimiter(',');
+        verb.list("--rigid-neighbour", rigid_neighbours, "LABEL",
+                  "Labels of bone and the like: not meshed, and the organ slides along them without entering")
+            ->delimiter(',');
         verb.number("--rounds", o.rounds, "COUNT", 1, 1000, "Rounds of matching and equilibrium");
         verb.number("--tolerance", o.tolerance, "MM", 1e-6, 10.0, "Accepted error of each equilibrium (mm)");
         verb.number("--data-stiffness", o.data_stiffness, "KPA/MM", 1e-6, 1e6,
@@ -331,6 +349,8 @@ struct Parser {
         const std::string verb = app.get_subcommands().front()->get_name();
         if (verb == "register") {
             registration.label_edge_length = label_lengths(register_lengths);
+            registration.anchors = label_list("--anchor", anchors);
+            registration.rigid_neighbours = label_list("--rigid-neighbour", rigid_neighbours);
             if (registration.fixed_labels.empty() && registration.fixed_surface.empty() &&
                 registration.point_pairs.fixed.empty())
                 registration.match_image = true;

@@ -49,10 +49,11 @@ struct RegisterOptions {
     double default_poissons_ratio = 0.45;
     std::string element = "auto";  ///< "auto", "t4" or "averaged-pressure"
     int rounds = 8;
-    double tolerance = 0.05;      ///< mm
-    double data_stiffness = 3.0;  ///< kPa/mm
-    double fade = 60.0;           ///< mm
-    bool match_image = false;     ///< implied where the fixed image is all there is
+    double tolerance = 0.05;                     ///< mm
+    double data_stiffness = 3.0;                 ///< kPa/mm
+    double fade = 60.0;                          ///< mm
+    std::vector<int> anchors, rigid_neighbours;  ///< labels of the preoperative map
+    bool match_image = false;                    ///< implied where the fixed image is all there is
     bool no_align = false;
     bool resample_labels = false;
     bool dry_run = false;

@@ -33,6 +33,8 @@ PrepareOptions prepare_options(const RegisterOptions& options, const std::map<in
     if (options.element == "t4") result.element = tled::Element::T4;
     if (options.element == "averaged-pressure") result.element = tled::Element::AveragedPressureT4;
     result.data_stiffness = options.data_stiffness;
+    result.anchors = options.anchors;
+    result.rigid_neighbours = options.rigid_neighbours;
     return result;
 }
 
@@ -57,7 +59,10 @@ void print_plan(const RegistrationInputs& inputs, const RegisterOptions& options
     fmt::print("moving grid   {}\nfixed grid    {}\nlabels        {}\n", grid(inputs.moving_grid()),
                fixed ? grid(*fixed) : "the moving one, carried along by the rigid alignment",
                fmt::join(imaging::labels_in(inputs.moving_labels), ", "));
-    const double edge = options.edge_length > 0 ? options.edge_length : suggested_edge_length(inputs.moving_labels);
+    const imaging::Volume organ = imaging::without_labels(inputs.moving_labels, options.rigid_neighbours);
+    const double edge = options.edge_length > 0 ? options.edge_length : suggested_edge_length(organ);
+    if (!options.anchors.empty()) fmt::print("stay          {}\n", fmt::join(options.anchors, ", "));
+    if (!options.rigid_neighbours.empty()) fmt::print("rigid         {}\n", fmt::join(options.rigid_neighbours, ", "));
     fmt::print("would mesh with edges of {:.3g} mm, {}, match in {} rounds on device '{}', and write to '{}':\n", edge,
                options.no_align ? "not align" : "align rigidly", options.rounds, options.device.name,
                options.output.string());
@@ -109,10 +114,14 @@ void warp_everything(RegistrationRun& run) {
 
 Scores score(const RegistrationRun& run) {
     Scores scores;
-    const imaging::Volume &moving = run.inputs.moving_labels, &fixed = run.inputs.fixed_labels;
-    if (!fixed.empty()) {
+    const auto without_neighbours = [&](const imaging::Volume& labels) {
+        return imaging::without_labels(labels, run.options.rigid_neighbours);
+    };
+    const imaging::Volume moving = without_neighbours(run.inputs.moving_labels);
+    if (!run.inputs.fixed_labels.empty()) {
+        const imaging::Volume fixed = without_neighbours(run.inputs.fixed_labels);
         scores.before = overlap(imaging::resample(moving, fixed.geometry, imaging::Interpolation::Nearest), fixed);
-        scores.after = overlap(run.products.warped_labels, fixed);
+        scores.after = overlap(without_neighbours(run.products.warped_labels), fixed);
     }
     scores.mesh = mesh_jacobians(run.result.deformation);
     const imaging::Volume organ = imaging::mask_of_all(moving);

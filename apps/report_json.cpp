@@ -152,6 +152,10 @@ void add_fits(json& report, const registration::UpdateResult& result) {
     if (const auto& fit = result.points)
         report["points"] = {
             {"used", fit->used}, {"outliers", fit->outliers}, {"residual_mm", number(fit->residual_mm)}};
+    if (const auto& fit = result.contact)
+        report["contact"] = {{"touching", fit->touching}, {"deepest_mm", number(fit->deepest_mm)}};
+    if (const auto& fit = result.anchors)
+        report["anchors"] = {{"nodes", fit->nodes}, {"largest_mm", number(fit->largest_mm)}};
     if (const auto& expected = result.expected)
         report["expected_error"] = {{"mean_mm", number(expected->mean_mm)},
                                     {"worst_mm", number(expected->worst_mm)},

@@ -44,7 +44,7 @@ double suggested_edge_length(const imaging::Volume& labels) {
 PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions& given, Observer& observer) {
     PrepareOptions options = given;
     require_surroundings(moving_labels, options);
-    const imaging::Volume organ = detail::without_labels(moving_labels, options.rigid_neighbours);
+    const imaging::Volume organ = imaging::without_labels(moving_labels, options.rigid_neighbours);
     if (options.meshing.edge_length == 0) options.meshing.edge_length = suggested_edge_length(organ);
     detail::Stopwatch stopwatch;
     meshing::TetMesh mesh = meshing::mesh_labels(organ, options.meshing, observer);
@@ -59,7 +59,7 @@ PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_label
     require_surroundings(moving_labels, options);
     detail::Stopwatch stopwatch;
     std::vector<StageTime> times;
-    imaging::Volume organ = detail::without_labels(moving_labels, options.rigid_neighbours);
+    imaging::Volume organ = imaging::without_labels(moving_labels, options.rigid_neighbours);
     std::optional<RigidNeighbours> neighbours = detail::rigid_neighbours(moving_labels, options.rigid_neighbours);
     tled::Model model = model_of(std::move(mesh), options);
     tled::RestState rest = tled::rest_state(model);

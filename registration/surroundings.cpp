@@ -15,16 +15,6 @@ bool is_one_of(int label, const std::vector<int>& labels) {
     return std::find(labels.begin(), labels.end(), label) != labels.end();
 }
 
-/// The map with every voxel that `drop(label)` names turned to background, int32.
-template <class Drop>
-imaging::Volume filtered(const imaging::Volume& map, const Drop& drop) {
-    imaging::Volume result = map.as(CV_32S).clone();
-    auto* voxels = result.data<std::int32_t>();
-    for (std::int64_t n = 0; n < result.geometry.voxel_count(); ++n)
-        if (drop(voxels[n])) voxels[n] = 0;
-    return result;
-}
-
 /// The distance to midpoints between voxels is rough where the boundary is oblique to the grid: normals would be, too.
 imaging::Volume smooth_distance(const imaging::Volume& neighbours) {
     constexpr double smoothing_voxels = 0.7;
@@ -56,14 +46,12 @@ void require_surroundings(const imaging::Volume& moving_labels, const PrepareOpt
 
 namespace detail {
 
-imaging::Volume without_labels(const imaging::Volume& map, const std::vector<int>& labels) {
-    if (labels.empty()) return map;
-    return filtered(map, [&](int label) { return is_one_of(label, labels); });
-}
-
 std::optional<RigidNeighbours> rigid_neighbours(const imaging::Volume& map, const std::vector<int>& labels) {
     if (labels.empty()) return std::nullopt;
-    RigidNeighbours result{filtered(map, [&](int label) { return !is_one_of(label, labels); }), {}};
+    std::vector<int> others;
+    for (const int label : imaging::labels_in(map))
+        if (!is_one_of(label, labels)) others.push_back(label);
+    RigidNeighbours result{imaging::without_labels(map, others), {}};
     result.distance = smooth_distance(result.labels);
     return result;
 }
@@ -71,13 +59,13 @@ std::optional<RigidNeighbours> rigid_neighbours(const imaging::Volume& map, cons
 imaging::Volume with_neighbours(const PreparedModel& prepared) {
     if (!prepared.neighbours) return prepared.labels;
     imaging::Volume map = prepared.labels.as(CV_32S).clone();
-    map.voxels += prepared.neighbours->labels.voxels;
+    map.voxels += prepared.neighbours->labels.as(CV_32S).voxels;
     return map;
 }
 
 Intraoperative without_neighbours(const Intraoperative& seen, const std::vector<int>& labels) {
     Intraoperative result = seen;
-    if (result.labels) result.labels = without_labels(*result.labels, labels);
+    if (result.labels) result.labels = imaging::without_labels(*result.labels, labels);
     return result;
 }
 

@@ -5,9 +5,6 @@
 
 namespace tissuewarp::registration::detail {
 
-/// The map with these labels turned to background; the map itself, not a copy, where there are none.
-imaging::Volume without_labels(const imaging::Volume& map, const std::vector<int>& labels);
-
 /// The bodies of these labels, none where no label is given. Precondition: require_surroundings.
 std::optional<RigidNeighbours> rigid_neighbours(const imaging::Volume& map, const std::vector<int>& labels);
 
