@@ -93,6 +93,12 @@ void evaluate_landmarks(const EvaluateOptions& options, const Volume& field, con
     if (!organ.empty()) {
         check_inside(landmarks.moving, organ.geometry, "moving landmarks", notes);
         const Eigen::VectorXd depths = depth_below_surface(organ, landmarks.moving);
+        const Eigen::Index outside = (depths.array() < 0).count();
+        if (10 * outside > depths.size())
+            notes.push_back(
+                fmt::format("{} of {} moving landmarks lie outside the organ; coordinates must be LPS mm: for "
+                            "RAS, negate x and y",
+                            outside, depths.size()));
         sheet.add(targets.binned("depth", "by_depth", depths, options.bin_edges));
     }
     const Eigen::Matrix3Xd data = read_data(options);

@@ -223,6 +223,7 @@ class SmallVerbs(PhantomTest):
         self.assertAlmostEqual(errors["by_depth"][3]["after"]["mean"], 0.5, delta=1e-4)
         self.assertIsNone(errors["by_depth"][2]["after"]["mean"])
         self.assertRegex(result.stdout, "depth outside the organ +1 ")
+        self.assertIn("1 of 3 moving landmarks lie outside the organ", values["notes"][0])
         self.assertRegex(result.stdout, "depth 5–10 mm +0 +– +– +– +–")
         # Distances to the circle of 13 mm: about 13, 3.1 and 2.2 mm.
         self.assertEqual([bin["after"]["count"] for bin in errors["by_distance_to_data"]], [2, 0, 1, 0])
