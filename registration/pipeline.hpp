@@ -29,9 +29,17 @@ struct StageTime {
 /// over 18.
 double suggested_edge_length(const imaging::Volume& labels);
 
+/// Edge length 0: that of suggested_edge_length. A function, because GCC 12 warns of uninitialised members where a
+/// designated initialiser stands in its place.
+inline meshing::MeshingOptions automatic_edge_length() {
+    meshing::MeshingOptions options;
+    options.edge_length = 0;
+    return options;
+}
+
 struct PrepareOptions {
-    meshing::MeshingOptions meshing{.edge_length = 0};  ///< edge length 0: suggested_edge_length
-    tled::MaterialTable materials;                      ///< labels without an entry take `default_material`
+    meshing::MeshingOptions meshing = automatic_edge_length();
+    tled::MaterialTable materials;  ///< labels without an entry take `default_material`
     tled::Material default_material = tled::neo_hookean_lnj(3.0, 0.45);
     std::optional<tled::Element> element;  ///< default: tled::suggested_element
     double data_stiffness = 3.0;           ///< kPa/mm along the normal per interface area, at full weight
