@@ -1,14 +1,17 @@
-// tissuewarp evaluate: scores label maps, landmarks and a displacement field, whoever made them.
+// tissuewarp evaluate: scores label maps, landmarks and displacement fields, whoever made them.
 
-#include "registration/evaluation.hpp"
-
+#include "apps/file_kind.hpp"
 #include "apps/inputs.hpp"
 #include "apps/output_folder.hpp"
 #include "apps/point_files.hpp"
 #include "apps/progress.hpp"
 #include "apps/report_json.hpp"
+#include "apps/score_sheet.hpp"
 #include "apps/verbs.hpp"
 #include "core/errors.hpp"
+#include "imaging/labels.hpp"
+#include "registration/label_surface.hpp"
+#include "registration/surface_points.hpp"
 
 #include <fmt/format.h>
 
@@ -16,84 +19,150 @@ namespace tissuewarp::apps {
 
 namespace {
 
-using nlohmann::json;
 using namespace registration;
+namespace fs = std::filesystem;
+using imaging::Volume;
 
-void evaluate_labels(const EvaluateOptions& options, json& report, std::string& text) {
-    const imaging::Volume labels = imaging::read_labels(options.labels);
-    imaging::Volume reference = imaging::read_labels(options.reference_labels);
+void evaluate_labels(const EvaluateOptions& options, ScoreSheet& sheet) {
+    const Volume labels = imaging::read_labels(options.labels);
+    Volume reference = imaging::read_labels(options.reference_labels);
     require_same_grid(reference.geometry, labels.geometry, options.reference_labels.string(), options.labels.string(),
                       "resample one onto the other");
     reference.geometry = labels.geometry;
-    const auto overlaps = overlap(labels, reference);
-    report["overlap"] = to_json(overlaps);
-    text += fmt::format("{:<16}{:>8}{:>12}{:>12}\n", "overlap", "Dice", "HD95 (mm)", "mean (mm)");
-    for (const auto& [label, o] : overlaps)
-        text += fmt::format("  {:<14}{:>8.4f}{:>12.3f}{:>12.3f}\n",
-                            label == 0 ? "all labels" : fmt::format("label {}", label), o.dice, o.hausdorff_95_mm,
-                            o.mean_surface_distance_mm);
+    sheet.add(overlap(labels, reference));
 }
 
-void evaluate_landmarks(const EvaluateOptions& options, const imaging::Volume& field, json& report, std::string& text) {
-    const Landmarks landmarks = *read_landmark_files(options.landmarks);
-    const Eigen::Matrix3Xd mapped = field.empty() ? landmarks.moving : displaced(landmarks.moving, field);
-    const TargetError error = target_error(landmarks, mapped, options.moved);
-    json& errors = report["target_registration_error"] = to_json(error);
-    if (field.empty())  // nothing was mapped
-        for (const char* which : {"all", "moved"}) errors[which].erase("after");
-    text +=
-        fmt::format("{:<24}{:>6}{:>8}{:>8}{:>8}{:>8}\n", "target error (mm)", "count", "mean", "median", "95th", "max");
-    const auto row = [&](const std::string& name, const Summary& s) {
-        text += fmt::format("  {:<22}{:>6}{:>8.3f}{:>8.3f}{:>8.3f}{:>8.3f}\n", name, s.count, s.mean, s.median,
-                            s.percentile_95, s.maximum);
+Volume read_field(const fs::path& path) {
+    if (path.empty()) return {};
+    const Volume field = imaging::read_volume(path);
+    if (field.channels() != 3)
+        throw InvalidInput(
+            fmt::format("'{}' has {} components; give a displacement field of three", path.string(), field.channels()));
+    require_millimetres(field.geometry, path);
+    return field.as(CV_32F);
+}
+
+Volume read_organ(const fs::path& path) {
+    if (path.empty()) return {};
+    const Volume labels = imaging::read_labels(path);
+    require_millimetres(labels.geometry, path);
+    imaging::require_labels(labels, {}, path.string().c_str());
+    return labels;
+}
+
+/// Fixed points of what register takes as --fixed-points: a CSV of pairs, or a file of points.
+Eigen::Matrix3Xd read_data_points(const fs::path& path) {
+    return file_kind(path) == FileKind::Points ? read_landmarks(path).fixed : read_landmarks(path, path).fixed;
+}
+
+Eigen::Matrix3Xd read_data(const EvaluateOptions& options) {
+    Eigen::Matrix3Xd data(3, 0);
+    const auto append = [&](const Eigen::Matrix3Xd& more) {
+        const Eigen::Index before = data.cols();
+        data.conservativeResize(3, before + more.cols());
+        data.rightCols(more.cols()) = more;
     };
-    row("before", error.before);
-    if (!field.empty()) row("after", error.after);
-    row(fmt::format("moved > {:g} mm, before", options.moved), error.moved_before);
-    if (!field.empty()) row(fmt::format("moved > {:g} mm, after", options.moved), error.moved_after);
+    if (!options.data_surface.empty()) append(read_surface_points(options.data_surface).points);
+    if (!options.data_points.empty()) append(read_data_points(options.data_points));
+    return data;
 }
 
-void evaluate_field(const EvaluateOptions& options, const imaging::Volume& field, json& report, std::string& text) {
-    imaging::Volume mask;
+/// Landmarks, where the field takes them, and how far that is from where they belong.
+struct Targets {
+    Landmarks landmarks;
+    Eigen::Matrix3Xd mapped;
+    bool is_mapped;
+
+    [[nodiscard]] BinnedErrors binned(const std::string& coordinate, const std::string& key,
+                                      const Eigen::VectorXd& values, const std::vector<double>& edges) const {
+        const auto bins = [&](const Eigen::Matrix3Xd& where) {
+            return bin_errors((where - landmarks.fixed).colwise().norm().transpose(), values, edges);
+        };
+        BinnedErrors errors{coordinate, key, bins(landmarks.moving), std::nullopt};
+        if (is_mapped) errors.after = bins(mapped);
+        return errors;
+    }
+};
+
+void evaluate_landmarks(const EvaluateOptions& options, const Volume& field, const Volume& organ,
+                        std::vector<std::string>& notes, ScoreSheet& sheet) {
+    Targets targets{*read_landmark_files(options.landmarks), {}, !field.empty()};
+    const Landmarks& landmarks = targets.landmarks;
+    targets.mapped = targets.is_mapped ? displaced(landmarks.moving, field) : landmarks.moving;
+    sheet.add(target_error(landmarks, targets.mapped, options.moved), targets.is_mapped);
+    if (!organ.empty()) {
+        check_inside(landmarks.moving, organ.geometry, "moving landmarks", notes);
+        const Eigen::VectorXd depths = depth_below_surface(organ, landmarks.moving);
+        const Eigen::Index outside = (depths.array() < 0).count();
+        if (10 * outside > depths.size())
+            notes.push_back(
+                fmt::format("{} of {} moving landmarks lie outside the organ; coordinates must be LPS mm: for "
+                            "RAS, negate x and y",
+                            outside, depths.size()));
+        sheet.add(targets.binned("depth", "by_depth", depths, options.bin_edges));
+    }
+    const Eigen::Matrix3Xd data = read_data(options);
+    if (data.cols() == 0) return;
+    const Eigen::VectorXd distances = distance_to_data(landmarks.fixed, data);
+    constexpr double farthest_mm = 500;  // larger than an organ
+    if (distances.minCoeff() > farthest_mm)
+        throw InvalidInput(
+            fmt::format("the fixed landmarks lie {:.0f} mm or more from the data; both must be LPS mm of "
+                        "the fixed image: for RAS, negate x and y",
+                        distances.minCoeff()));
+    sheet.add(targets.binned("data at", "by_distance_to_data", distances, options.bin_edges));
+}
+
+void evaluate_field(const EvaluateOptions& options, const Volume& field, ScoreSheet& sheet) {
+    Volume mask;
     if (!options.mask.empty()) {
         mask = imaging::read_labels(options.mask);
         require_same_grid(field.geometry, mask.geometry, options.displacement.string(), options.mask.string(),
                           "resample the mask onto the field's grid");
         mask = {field.geometry, cv::Mat(mask.voxels != 0)};
     }
-    const JacobianReport jacobian = field_jacobians(field, mask.empty() ? nullptr : &mask);
-    report["jacobian"] = to_json(jacobian);
-    text += fmt::format(
-        "det J: minimum {:.4f}, 1st percentile {:.4f}, median {:.4f}, 99th {:.4f}, maximum {:.4f}; folded {}\n",
-        jacobian.minimum, jacobian.percentile_1, jacobian.median, jacobian.percentile_99, jacobian.maximum,
-        jacobian.folded);
+    const Volume* chosen = mask.empty() ? nullptr : &mask;
+    sheet.add(field_jacobians(field, chosen));
+    if (!options.inverse.empty()) sheet.add(inverse_consistency(field, read_field(options.inverse), chosen));
+}
+
+void evaluate_held_out(const EvaluateOptions& options, const Volume& field, const Volume& organ, ScoreSheet& sheet) {
+    const SurfacePoints points = read_surface_points(options.held_out);
+    meshing::SurfaceMesh surface = label_surface(organ);
+    surface.nodes = displaced(surface.nodes, field);
+    sheet.add(surface_residual(surface, points.points));
+}
+
+void require_something(const EvaluateOptions& options) {
+    if (options.labels.empty() && !options.landmarks.given() && options.displacement.empty())
+        throw InvalidInput(
+            "nothing to evaluate; give --labels with --reference-labels, --landmarks, or --displacement");
+    if (options.landmarks.given()) return;
+    const char* unused = !options.data_surface.empty()  ? "--data-surface"
+                         : !options.data_points.empty() ? "--data-points"
+                                                        : nullptr;
+    if (!options.moving_labels.empty() && options.held_out.empty()) unused = "--moving-labels";
+    if (unused) throw InvalidInput(fmt::format("{} sums up landmarks; give --landmarks", unused));
 }
 
 }  // namespace
 
 void run_evaluate(const EvaluateOptions& options) {
     ProgressLine progress(options.common.quiet);
-    if (options.labels.empty() && !options.landmarks.given() && options.displacement.empty())
-        throw InvalidInput(
-            "nothing to evaluate; give --labels with --reference-labels, --landmarks, or --displacement");
-    json report{{"schema", "tissuewarp.evaluation"}, {"schema_version", 1}};
-    std::string text;
+    require_something(options);
     if (!options.json.empty()) require_could_write_file(options.json);
     progress.begin("evaluating", 0.0, 1.0);
-    if (!options.labels.empty()) evaluate_labels(options, report, text);
-    imaging::Volume field;
-    if (!options.displacement.empty()) {
-        field = imaging::read_volume(options.displacement);
-        if (field.channels() != 3)
-            throw InvalidInput(fmt::format("'{}' has {} components; give a displacement field of three",
-                                           options.displacement.string(), field.channels()));
-        field = field.as(CV_32F);
-    }
-    if (options.landmarks.given()) evaluate_landmarks(options, field, report, text);
-    if (!field.empty()) evaluate_field(options, field, report, text);
-    if (!options.json.empty()) write_json(report, options.json);
+    ScoreSheet sheet;
+    std::vector<std::string> notes;
+    if (!options.labels.empty()) evaluate_labels(options, sheet);
+    const Volume field = read_field(options.displacement), organ = read_organ(options.moving_labels);
+    if (options.landmarks.given()) evaluate_landmarks(options, field, organ, notes, sheet);
+    if (!field.empty()) evaluate_field(options, field, sheet);
+    if (!options.held_out.empty()) evaluate_held_out(options, field, organ, sheet);
+    sheet.add_notes(notes);
+    if (!options.json.empty()) write_json(sheet.json(), options.json);
     progress.clear();
-    if (!options.common.quiet) fmt::print("{}", text);
+    if (!options.common.quiet) fmt::print("{}", sheet.text());
 }
 
 }  // namespace tissuewarp::apps

@@ -4,6 +4,7 @@
 #include "core/sha256.hpp"
 #include "imaging/filters.hpp"
 #include "imaging/labels.hpp"
+#include "registration/pipeline.hpp"
 #include "registration/surface_points.hpp"
 
 #include <fmt/format.h>
@@ -25,19 +26,6 @@ void add_file(RegistrationInputs& inputs, const char* role, const fs::path& path
     std::error_code failure;
     if (!fs::exists(path, failure)) throw IoError(fmt::format("--{} '{}': no such file", role, path.string()));
     inputs.files.push_back({role, path, ""});
-}
-
-/// Geometry whose extent is no part of a body is in other units than millimetres.
-void require_millimetres(const Geometry& grid, const fs::path& path) {
-    double extent = 0;
-    for (int axis = 0; axis < 3; ++axis)
-        extent = std::max(extent, grid.spacing[axis] * grid.size[static_cast<std::size_t>(axis)]);
-    constexpr double least_mm = 10.0, most_mm = 3000.0;
-    if (extent >= least_mm && extent <= most_mm) return;
-    throw InvalidInput(
-        fmt::format("'{}' spans {:g} mm, outside {:g} to {:g} mm; its spacing is probably in other units: write it in "
-                    "millimetres",
-                    path.string(), extent, least_mm, most_mm));
 }
 
 void require_common_label(const Volume& moving, const Volume& fixed, const RegisterOptions& options) {
@@ -77,8 +65,52 @@ void require_organs_meet(const RegistrationInputs& inputs) {
         "the labelled organs lie {:.1f} mm apart, beyond the search of {:g} mm; drop --no-align", gap, search_mm));
 }
 
-/// Points outside of their image are mostly RAS taken for LPS, or of another image: some are worth a note, most an
-/// error.
+void match_grid(Volume& labels, const Volume& image, const fs::path& image_path, const fs::path& labels_path,
+                bool resample) {
+    if (image.empty()) return;
+    if (!imaging::same_grid(image.geometry, labels.geometry)) {
+        if (!resample)
+            require_same_grid(image.geometry, labels.geometry, image_path.string(), labels_path.string(),
+                              "give labels drawn on that image, or add --resample-labels");
+        labels = imaging::resample(labels, image.geometry, imaging::Interpolation::Nearest);
+    }
+    labels.geometry = image.geometry;  // headers that differ in a late digit are one grid
+}
+
+void require_known_surroundings(const Volume& moving_labels, const RegisterOptions& options) {
+    registration::PrepareOptions named;
+    named.anchors = options.anchors;
+    named.rigid_neighbours = options.rigid_neighbours;
+    try {
+        registration::require_surroundings(moving_labels, named);
+    } catch (const InvalidInput& problem) {
+        throw InvalidInput(
+            fmt::format("'{}', --anchor and --rigid-neighbour: {}", options.moving_labels.string(), problem.what()));
+    }
+}
+
+void validate_fixed_labels(RegistrationInputs& inputs, const RegisterOptions& options) {
+    match_grid(inputs.fixed_labels, inputs.fixed, options.fixed, options.fixed_labels, options.resample_labels);
+    require_millimetres(inputs.fixed_labels.geometry, options.fixed_labels);
+    imaging::require_labels(inputs.fixed_labels, {}, options.fixed_labels.string().c_str());
+    require_common_label(inputs.moving_labels, inputs.fixed_labels, options);
+    if (options.no_align) require_organs_meet(inputs);
+}
+
+}  // namespace
+
+void require_millimetres(const Geometry& grid, const fs::path& path) {
+    double extent = 0;
+    for (int axis = 0; axis < 3; ++axis)
+        extent = std::max(extent, grid.spacing[axis] * grid.size[static_cast<std::size_t>(axis)]);
+    constexpr double least_mm = 10.0, most_mm = 3000.0;
+    if (extent >= least_mm && extent <= most_mm) return;
+    throw InvalidInput(
+        fmt::format("'{}' spans {:g} mm, outside {:g} to {:g} mm; its spacing is probably in other units: write it in "
+                    "millimetres",
+                    path.string(), extent, least_mm, most_mm));
+}
+
 void check_inside(const Eigen::Matrix3Xd& points, const Geometry& grid, const std::string& what,
                   std::vector<std::string>& notes) {
     Eigen::Index outside = 0;
@@ -94,28 +126,6 @@ void check_inside(const Eigen::Matrix3Xd& points, const Geometry& grid, const st
     if (2 * outside > points.cols()) throw InvalidInput(text + "; coordinates must be LPS mm: for RAS, negate x and y");
     notes.push_back(text);
 }
-
-void match_grid(Volume& labels, const Volume& image, const fs::path& image_path, const fs::path& labels_path,
-                bool resample) {
-    if (image.empty()) return;
-    if (!imaging::same_grid(image.geometry, labels.geometry)) {
-        if (!resample)
-            require_same_grid(image.geometry, labels.geometry, image_path.string(), labels_path.string(),
-                              "give labels drawn on that image, or add --resample-labels");
-        labels = imaging::resample(labels, image.geometry, imaging::Interpolation::Nearest);
-    }
-    labels.geometry = image.geometry;  // headers that differ in a late digit are one grid
-}
-
-void validate_fixed_labels(RegistrationInputs& inputs, const RegisterOptions& options) {
-    match_grid(inputs.fixed_labels, inputs.fixed, options.fixed, options.fixed_labels, options.resample_labels);
-    require_millimetres(inputs.fixed_labels.geometry, options.fixed_labels);
-    imaging::require_labels(inputs.fixed_labels, {}, options.fixed_labels.string().c_str());
-    require_common_label(inputs.moving_labels, inputs.fixed_labels, options);
-    if (options.no_align) require_organs_meet(inputs);
-}
-
-}  // namespace
 
 void require_same_grid(const Geometry& image, const Geometry& labels, const std::string& image_name,
                        const std::string& labels_name, const std::string& remedy) {
@@ -195,8 +205,9 @@ void validate(RegistrationInputs& inputs, const RegisterOptions& options) {
     require_millimetres(inputs.moving_labels.geometry, options.moving_labels);
     imaging::require_labels(inputs.moving_labels, {}, options.moving_labels.string().c_str());
     if (!inputs.fixed_labels.empty()) validate_fixed_labels(inputs, options);
-    if (!options.materials.empty())
-        require_materials(inputs.materials, imaging::labels_in(inputs.moving_labels), options.materials);
+    require_known_surroundings(inputs.moving_labels, options);
+    const Volume organ = imaging::without_labels(inputs.moving_labels, options.rigid_neighbours);
+    if (!options.materials.empty()) require_materials(inputs.materials, imaging::labels_in(organ), options.materials);
     const auto check_moving = [&](const Eigen::Matrix3Xd& points, const char* what) {
         check_inside(points, inputs.moving_grid(), what, inputs.notes);
     };

@@ -53,6 +53,14 @@ void validate(RegistrationInputs& inputs, const RegisterOptions& options);
 void require_same_grid(const imaging::Geometry& image, const imaging::Geometry& labels, const std::string& image_name,
                        const std::string& labels_name, const std::string& remedy);
 
+/// Throws InvalidInput where the extent of a grid is no part of a body: other units than millimetres.
+void require_millimetres(const imaging::Geometry& grid, const std::filesystem::path& path);
+
+/// Points (3 × P, LPS mm) outside of their image are mostly RAS taken for LPS, or of another image: some are worth a
+/// note, most throw InvalidInput. `what` names them.
+void check_inside(const Eigen::Matrix3Xd& points, const imaging::Geometry& grid, const std::string& what,
+                  std::vector<std::string>& notes);
+
 /// Reads the files of points to register to, if given.
 std::optional<registration::PointPairs> read_point_pairs(const PointPairFiles& files);
 

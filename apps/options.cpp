@@ -128,6 +128,19 @@ std::map<int, double> label_lengths(const std::vector<std::string>& entries) {
     return lengths;
 }
 
+std::vector<int> label_list(const std::string& option, const std::vector<std::string>& entries) {
+    std::vector<int> labels;
+    for (const std::string& entry : entries) {
+        int label = 0;
+        const char* end = entry.data() + entry.size();
+        const auto [stop, error] = std::from_chars(entry.data(), end, label);
+        if (stop != end || error != std::errc() || label <= 0)
+            throw InvalidInput(option + " '" + entry + "' is no label; give whole numbers above 0, for instance 3,4");
+        labels.push_back(label);
+    }
+    return labels;
+}
+
 /// All verbs with the structs that they fill.
 struct Parser {
     CLI::App app{
@@ -140,7 +153,7 @@ struct Parser {
     InfoOptions info;
     BenchOptions bench;
     std::filesystem::path config;
-    std::vector<std::string> register_lengths, mesh_lengths, info_files;
+    std::vector<std::string> register_lengths, mesh_lengths, info_files, anchors, rigid_neighbours;
     std::deque<Verb> verbs;
 
     Parser() {
@@ -191,6 +204,11 @@ struct Parser {
         verb.text("--element", o.element,
                   "auto, t4 or averaged-pressure; auto: the latter from a Poisson's ratio of 0.45")
             ->check(CLI::IsMember({"auto", "t4", "averaged-pressure"}).description(""));
+        verb.list("--anchor", anchors, "LABEL", "Labels of tissue that stays where the rigid placement has it")
+            ->delimiter(',');
+        verb.list("--rigid-neighbour", rigid_neighbours, "LABEL",
+                  "Labels of bone and the like: not meshed, and the organ slides along them without entering")
+            ->delimiter(',');
         verb.number("--rounds", o.rounds, "COUNT", 1, 1000, "Rounds of matching and equilibrium");
         verb.number("--tolerance", o.tolerance, "MM", 1e-6, 10.0, "Accepted error of each equilibrium (mm)");
         verb.number("--data-stiffness", o.data_stiffness, "KPA/MM", 1e-6, 1e6,
@@ -254,10 +272,33 @@ struct Parser {
         labels->needs(reference);
         reference->needs(labels);
         verb.landmarks(o.landmarks);
-        verb.path("--displacement", o.displacement, "Field moving_to_fixed (mm, LPS): maps the landmarks, gives det J");
-        verb.path("--mask", o.mask, "Only voxels other than 0 of this image count for det J");
+        CLI::Option* field = verb.path("--displacement", o.displacement,
+                                       "Field moving_to_fixed (mm, LPS): maps the landmarks, gives det J");
+        verb.path("--inverse", o.inverse, "Field fixed_to_moving (mm, LPS): how far the two do not undo each other")
+            ->needs(field);
+        verb.path(
+                "--mask", o.mask,
+                "Only voxels other than 0 of this image, on the grid of --displacement, count for det J and --inverse")
+            ->needs(field);
         verb.number("--moved", o.moved, "MM", 0.0, 1e3,
                     "Landmarks that moved by more than this are also summed up apart (mm)");
+        CLI::Option* organ =
+            verb.path("--moving-labels", o.moving_labels,
+                      "Preoperative label map: sums up landmarks by depth below its surface; --held-out takes it too");
+        verb.path("--data-surface", o.data_surface,
+                  "Surface points that were registered to: sums up landmarks by distance to them (mm, LPS)");
+        verb.path("--data-points", o.data_points,
+                  "Points that were registered to, likewise: the file that register took as --fixed-points");
+        verb.app()
+            .add_option("--bin-edges", o.bin_edges, "Edges of the bins of depth and distance to data (mm)")
+            ->type_name("MM")
+            ->delimiter(',')
+            ->capture_default_str();
+        verb.path("--held-out", o.held_out,
+                  "Intraoperative surface points that were not registered to: their distance to the warped surface of "
+                  "--moving-labels; .ply, .stl, .obj, .vtk, .csv, .xyz (mm, LPS)")
+            ->needs(field)
+            ->needs(organ);
         verb.path("--json", o.json, "Also write the scores as JSON");
         verb.common(o.common);
     }
@@ -308,6 +349,8 @@ struct Parser {
         const std::string verb = app.get_subcommands().front()->get_name();
         if (verb == "register") {
             registration.label_edge_length = label_lengths(register_lengths);
+            registration.anchors = label_list("--anchor", anchors);
+            registration.rigid_neighbours = label_list("--rigid-neighbour", rigid_neighbours);
             if (registration.fixed_labels.empty() && registration.fixed_surface.empty() &&
                 registration.point_pairs.fixed.empty())
                 registration.match_image = true;

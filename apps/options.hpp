@@ -49,10 +49,11 @@ struct RegisterOptions {
     double default_poissons_ratio = 0.45;
     std::string element = "auto";  ///< "auto", "t4" or "averaged-pressure"
     int rounds = 8;
-    double tolerance = 0.05;      ///< mm
-    double data_stiffness = 3.0;  ///< kPa/mm
-    double fade = 60.0;           ///< mm
-    bool match_image = false;     ///< implied where the fixed image is all there is
+    double tolerance = 0.05;                     ///< mm
+    double data_stiffness = 3.0;                 ///< kPa/mm
+    double fade = 60.0;                          ///< mm
+    std::vector<int> anchors, rigid_neighbours;  ///< labels of the preoperative map
+    bool match_image = false;                    ///< implied where the fixed image is all there is
     bool no_align = false;
     bool resample_labels = false;
     bool dry_run = false;
@@ -82,9 +83,13 @@ struct WarpOptions {
 
 struct EvaluateOptions {
     CommonOptions common;
-    std::filesystem::path labels, reference_labels, displacement, mask, json;
+    std::filesystem::path labels, reference_labels, displacement, inverse, mask, json;
     LandmarkFiles landmarks;
-    double moved = 2.0;  ///< mm
+    double moved = 2.0;                               ///< mm
+    std::filesystem::path moving_labels;              ///< where the organ's surface is, moving frame
+    std::filesystem::path data_surface, data_points;  ///< what was registered to, fixed frame
+    std::filesystem::path held_out;                   ///< surface points that were not registered to, fixed frame
+    std::vector<double> bin_edges{5, 10, 20};         ///< mm, of depths and distances to data
 };
 
 struct InfoOptions {

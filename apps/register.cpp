@@ -26,8 +26,8 @@ using namespace registration;
 
 double edge_length(const RegisterOptions& options, const RegistrationInputs& inputs) {
     if (options.edge_length > 0) return options.edge_length;
-    return inputs.fixed_labels.empty() ? suggested_edge_length_without_labels(inputs.moving_labels)
-                                       : suggested_edge_length(inputs.moving_labels);
+    const imaging::Volume organ = imaging::without_labels(inputs.moving_labels, options.rigid_neighbours);
+    return inputs.fixed_labels.empty() ? suggested_edge_length_without_labels(organ) : suggested_edge_length(organ);
 }
 
 PrepareOptions prepare_options(const RegisterOptions& options, const RegistrationInputs& inputs) {
@@ -39,6 +39,8 @@ PrepareOptions prepare_options(const RegisterOptions& options, const Registratio
     if (options.element == "t4") result.element = tled::Element::T4;
     if (options.element == "averaged-pressure") result.element = tled::Element::AveragedPressureT4;
     result.data_stiffness = options.data_stiffness;
+    result.anchors = options.anchors;
+    result.rigid_neighbours = options.rigid_neighbours;
     return result;
 }
 
@@ -63,6 +65,8 @@ void print_plan(const RegistrationInputs& inputs, const RegisterOptions& options
     fmt::print("moving grid   {}\nfixed grid    {}\nlabels        {}\n", grid(inputs.moving_grid()),
                fixed ? grid(*fixed) : "the moving one, carried along by the rigid alignment",
                fmt::join(imaging::labels_in(inputs.moving_labels), ", "));
+    if (!options.anchors.empty()) fmt::print("stay          {}\n", fmt::join(options.anchors, ", "));
+    if (!options.rigid_neighbours.empty()) fmt::print("rigid         {}\n", fmt::join(options.rigid_neighbours, ", "));
     fmt::print("would mesh with edges of {:.3g} mm, {}, match in {} rounds on device '{}', and write to '{}':\n",
                edge_length(options, inputs), options.no_align ? "not align" : "align rigidly", options.rounds,
                options.device.name, options.output.string());
@@ -114,10 +118,14 @@ void warp_everything(RegistrationRun& run) {
 
 Scores score(const RegistrationRun& run) {
     Scores scores;
-    const imaging::Volume &moving = run.inputs.moving_labels, &fixed = run.inputs.fixed_labels;
-    if (!fixed.empty()) {
+    const auto without_neighbours = [&](const imaging::Volume& labels) {
+        return imaging::without_labels(labels, run.options.rigid_neighbours);
+    };
+    const imaging::Volume moving = without_neighbours(run.inputs.moving_labels);
+    if (!run.inputs.fixed_labels.empty()) {
+        const imaging::Volume fixed = without_neighbours(run.inputs.fixed_labels);
         scores.before = overlap(imaging::resample(moving, fixed.geometry, imaging::Interpolation::Nearest), fixed);
-        scores.after = overlap(run.products.warped_labels, fixed);
+        scores.after = overlap(without_neighbours(run.products.warped_labels), fixed);
     }
     scores.mesh = mesh_jacobians(run.result.deformation);
     const imaging::Volume organ = imaging::mask_of_all(moving);

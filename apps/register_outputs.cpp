@@ -148,6 +148,11 @@ std::string summary_text(const RegistrationRun& run, double total_seconds) {
     if (const auto& fit = run.result.points)
         text += fmt::format("paired points: {} of {} fit, {:.2f} mm off (root mean square)\n",
                             fit->used - fit->outliers, fit->used, fit->residual_mm);
+    if (const auto& fit = run.result.contact)
+        text += fmt::format("rigid neighbours: {} surface nodes touch, at most {:.2f} mm deep\n", fit->touching,
+                            fit->deepest_mm);
+    if (const auto& fit = run.result.anchors)
+        text += fmt::format("anchors: {} nodes, moved by at most {:.2f} mm\n", fit->nodes, fit->largest_mm);
     if (const auto& expected = run.result.expected)
         text += fmt::format("expected error of tissue: {:.1f} mm, at most {:.1f} mm\n", expected->mean_mm,
                             expected->worst_mm);

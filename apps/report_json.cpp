@@ -152,6 +152,10 @@ void add_fits(json& report, const registration::UpdateResult& result) {
     if (const auto& fit = result.points)
         report["points"] = {
             {"used", fit->used}, {"outliers", fit->outliers}, {"residual_mm", number(fit->residual_mm)}};
+    if (const auto& fit = result.contact)
+        report["contact"] = {{"touching", fit->touching}, {"deepest_mm", number(fit->deepest_mm)}};
+    if (const auto& fit = result.anchors)
+        report["anchors"] = {{"nodes", fit->nodes}, {"largest_mm", number(fit->largest_mm)}};
     if (const auto& expected = result.expected)
         report["expected_error"] = {{"mean_mm", number(expected->mean_mm)},
                                     {"worst_mm", number(expected->worst_mm)},
@@ -165,6 +169,8 @@ void write_json(const json& document, const std::filesystem::path& path) {
 }
 
 json to_json(const registration::Summary& s) {
+    if (s.count == 0)
+        return {{"count", 0}, {"mean", nullptr}, {"median", nullptr}, {"percentile_95", nullptr}, {"maximum", nullptr}};
     return {{"count", s.count},
             {"mean", number(s.mean)},
             {"median", number(s.median)},
@@ -183,10 +189,17 @@ json to_json(const registration::TargetError& error) {
 json to_json(const registration::JacobianReport& report) {
     json places = json::array();
     for (const Eigen::Vector3d& place : report.folded_places) places.push_back(vector(place));
-    return {{"minimum", number(report.minimum)},       {"percentile_1", number(report.percentile_1)},
-            {"median", number(report.median)},         {"percentile_99", number(report.percentile_99)},
-            {"maximum", number(report.maximum)},       {"folded", report.folded},
-            {"folded_mm3", number(report.folded_mm3)}, {"folded_places_mm", places}};
+    return {{"minimum", number(report.minimum)},
+            {"percentile_1", number(report.percentile_1)},
+            {"percentile_5", number(report.percentile_5)},
+            {"median", number(report.median)},
+            {"percentile_95", number(report.percentile_95)},
+            {"percentile_99", number(report.percentile_99)},
+            {"maximum", number(report.maximum)},
+            {"folded", report.folded},
+            {"folded_share", number(report.folded_share)},
+            {"folded_mm3", number(report.folded_mm3)},
+            {"folded_places_mm", places}};
 }
 
 json to_json(const std::map<int, registration::Overlap>& overlaps) {

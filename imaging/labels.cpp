@@ -147,6 +147,15 @@ Volume largest_component(const Volume& mask) {
     return mask_of(connected_components(mask), 1);
 }
 
+Volume without_labels(const Volume& labels, const std::vector<int>& which) {
+    if (which.empty()) return labels;
+    Volume result = labels.as(CV_32S).clone();
+    auto* voxels = result.data<std::int32_t>();
+    for (std::int64_t n = 0; n < result.geometry.voxel_count(); ++n)
+        if (std::find(which.begin(), which.end(), voxels[n]) != which.end()) voxels[n] = 0;
+    return result;
+}
+
 void require_labels(const Volume& labels, const std::vector<int>& required, const char* name) {
     const std::vector<int> present = labels_in(labels);
     if (present.empty())

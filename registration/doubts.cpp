@@ -61,6 +61,16 @@ void doubt_points(const PointFit& fit, std::vector<std::string>& reasons) {
                           " pairs of points do not fit the tissue; check that they are the same places in both images");
 }
 
+void doubt_surroundings(const UpdateResult& result, std::vector<std::string>& reasons) {
+    constexpr double most_mm = 0.5;
+    if (result.contact && result.contact->deepest_mm > most_mm)
+        reasons.push_back("the organ lies up to " + to_text(result.contact->deepest_mm) +
+                          " mm in a rigid neighbour; check its label and the rigid placement");
+    if (result.anchors && result.anchors->largest_mm > most_mm)
+        reasons.push_back("anchored tissue was pulled by up to " + to_text(result.anchors->largest_mm) +
+                          " mm; check which tissue stays, and the rigid placement");
+}
+
 }  // namespace
 
 std::string to_text(double value) {
@@ -87,6 +97,7 @@ std::vector<std::string> doubts(const PreparedModel& prepared, const Intraoperat
     if (result.image) doubt_image(*result.image, reasons);
     if (result.surface) doubt_surface(*result.surface, seen.surface->deviation_mm, reasons);
     if (result.points) doubt_points(*result.points, reasons);
+    doubt_surroundings(result, reasons);
     if (result.expected) doubt_expectation(*result.expected, reasons);
     if (!seen.labels) return reasons;
     const double growth = labelled_volume(*seen.labels) / labelled_volume(prepared.labels);

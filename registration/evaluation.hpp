@@ -52,7 +52,9 @@ struct Overlap {
 std::map<int, Overlap> overlap(const imaging::Volume& labels, const imaging::Volume& reference);
 
 struct JacobianReport {
-    double minimum = 1, percentile_1 = 1, median = 1, percentile_99 = 1, maximum = 1;
+    double minimum = 1, percentile_1 = 1, percentile_5 = 1, median = 1;
+    double percentile_95 = 1, percentile_99 = 1, maximum = 1;
+    double folded_share = 0;                     ///< of the rest volume: det J ≤ 0
     double folded_mm3 = 0;                       ///< rest volume with det J ≤ 0
     long long folded = 0;                        ///< tetrahedra or voxels with det J ≤ 0
     std::vector<Eigen::Vector3d> folded_places;  ///< up to 20 of them, LPS mm

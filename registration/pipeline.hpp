@@ -33,14 +33,29 @@ double suggested_edge_length(const imaging::Volume& labels);
 /// ten times the seconds and are no more accurate (docs/results.md, "How fine a mesh").
 double suggested_edge_length_without_labels(const imaging::Volume& labels);
 
+/// Edge length 0: that of suggested_edge_length. A function, because GCC 12 warns of uninitialised members where a
+/// designated initialiser stands in its place.
+inline meshing::MeshingOptions automatic_edge_length() {
+    meshing::MeshingOptions options;
+    options.edge_length = 0;
+    return options;
+}
+
 struct PrepareOptions {
-    meshing::MeshingOptions meshing{.edge_length = 0};  ///< edge length 0: suggested_edge_length
-    tled::MaterialTable materials;                      ///< labels without an entry take `default_material`
+    meshing::MeshingOptions meshing = automatic_edge_length();
+    tled::MaterialTable materials;  ///< labels without an entry take `default_material`
     tled::Material default_material = tled::neo_hookean_lnj(3.0, 0.45);
     std::optional<tled::Element> element;  ///< default: tled::suggested_element
     double data_stiffness = 3.0;           ///< kPa/mm along the normal per interface area, at full weight
     double tangential_ratio = 0.02;        ///< stiffness along the surface over stiffness along the normal
+    std::vector<int> anchors;              ///< labels of tissue that stays where the rigid placement has it
+    std::vector<int> rigid_neighbours;     ///< labels of bodies that move with the placement and are not meshed; the
+                                           ///< organ slides along them and comes off, but does not enter them
 };
+
+/// Throws InvalidInput, naming the label and those present, unless the map holds every anchor and rigid neighbour, none
+/// is both or 0, and something else is left to register.
+void require_surroundings(const imaging::Volume& moving_labels, const PrepareOptions& options);
 
 /// What the preoperative image shows of the tissue, to be found again in a bare intraoperative volume.
 struct ImageModel {
@@ -53,16 +68,23 @@ struct ImageModelOptions {
     TemplateOptions blocks;
 };
 
+/// Bone and the like about the organ, on the grid of the preoperative label map.
+struct RigidNeighbours {
+    imaging::Volume labels;    ///< theirs alone
+    imaging::Volume distance;  ///< mm to the nearest of them, negative within; float32
+};
+
 /// Everything that does not depend on intraoperative data.
 struct PreparedModel {
     tled::Model model;       ///< mesh in LPS mm of the preoperative image
-    imaging::Volume labels;  ///< the preoperative label map it came from
+    imaging::Volume labels;  ///< the preoperative label map it came from, without rigid neighbours
     PrepareOptions options;
     Interfaces interfaces;
     tled::RestState rest;
     tled::RestStiffness stiffness;  ///< K₀ with all interface springs at full weight
     std::vector<StageTime> times;
     std::optional<ImageModel> image;  ///< see prepare_image
+    std::optional<RigidNeighbours> neighbours;
 };
 
 /// Label map → mesh → rest state → factor. Throws InvalidInput, Cancelled.
@@ -170,6 +192,18 @@ struct PointFit {
     double residual_mm = 0;  ///< root mean square of the others
 };
 
+/// How the organ lies to its rigid neighbours.
+struct ContactFit {
+    int touching = 0;       ///< surface nodes that a neighbour holds back
+    double deepest_mm = 0;  ///< that a surface node lies in a neighbour, beyond where it lay at rest
+};
+
+/// How anchored tissue stayed where it was.
+struct AnchorFit {
+    int nodes = 0;
+    double largest_mm = 0;  ///< displacement of one of them
+};
+
 /// How far off tissue is expected to lie, from the deviations of the data and the prior alone: root mean square over
 /// places all over the organ, and the place that is known least.
 struct ExpectedError {
@@ -186,6 +220,8 @@ struct UpdateResult {
     std::optional<ImageFit> image;          ///< where a bare volume was given
     std::optional<SurfaceFit> surface;      ///< where points of a surface were given
     std::optional<PointFit> points;         ///< where pairs of points were given
+    std::optional<ContactFit> contact;      ///< where the model has rigid neighbours
+    std::optional<AnchorFit> anchors;       ///< and anchors
     std::optional<ExpectedError> expected;  ///< where neither labels nor an image show the organ as a whole
     std::vector<StageTime> times;
     std::vector<std::string> doubts;  ///< reasons not to trust the result, empty when there are none

@@ -2,6 +2,7 @@
 
 #include "registration/detail/stopwatch.hpp"
 #include "registration/detail/surface_springs.hpp"
+#include "registration/detail/surroundings.hpp"
 #include "registration/pipeline.hpp"
 
 #include "imaging/labels.hpp"
@@ -50,9 +51,11 @@ double suggested_edge_length_without_labels(const imaging::Volume& labels) {
 
 PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions& given, Observer& observer) {
     PrepareOptions options = given;
-    if (options.meshing.edge_length == 0) options.meshing.edge_length = suggested_edge_length(moving_labels);
+    require_surroundings(moving_labels, options);
+    const imaging::Volume organ = imaging::without_labels(moving_labels, options.rigid_neighbours);
+    if (options.meshing.edge_length == 0) options.meshing.edge_length = suggested_edge_length(organ);
     detail::Stopwatch stopwatch;
-    meshing::TetMesh mesh = meshing::mesh_labels(moving_labels, options.meshing, observer);
+    meshing::TetMesh mesh = meshing::mesh_labels(organ, options.meshing, observer);
     const StageTime meshing_time = stopwatch.lap("meshing");
     PreparedModel prepared = prepare(std::move(mesh), moving_labels, options, observer);
     prepared.times.insert(prepared.times.begin(), meshing_time);
@@ -61,20 +64,23 @@ PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions
 
 PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_labels, const PrepareOptions& options,
                       Observer& observer) {
+    require_surroundings(moving_labels, options);
     detail::Stopwatch stopwatch;
     std::vector<StageTime> times;
+    imaging::Volume organ = imaging::without_labels(moving_labels, options.rigid_neighbours);
+    std::optional<RigidNeighbours> neighbours = detail::rigid_neighbours(moving_labels, options.rigid_neighbours);
     tled::Model model = model_of(std::move(mesh), options);
     tled::RestState rest = tled::rest_state(model);
     const std::set<int> labels(model.mesh.labels.begin(), model.mesh.labels.end());
     Interfaces interfaces(model.mesh);
-    measure_offsets(interfaces, model.mesh, LabelBoundaryField(moving_labels, {labels.begin(), labels.end()}));
+    measure_offsets(interfaces, model.mesh, LabelBoundaryField(organ, {labels.begin(), labels.end()}));
     times.push_back(stopwatch.lap("rest state"));
     observer.checkpoint("factor of the rest stiffness", 0.0);
     const auto springs = tled::nodal_conditions(detail::full_weight_springs(interfaces, options), rest.node_count);
     tled::RestStiffness stiffness(rest, springs);
     times.push_back(stopwatch.lap("factor"));
-    return {std::move(model), moving_labels,        options,          std::move(interfaces),
-            std::move(rest),  std::move(stiffness), std::move(times), std::nullopt};
+    return {std::move(model),     std::move(organ), options,      std::move(interfaces), std::move(rest),
+            std::move(stiffness), std::move(times), std::nullopt, std::move(neighbours)};
 }
 
 void prepare_image(PreparedModel& prepared, const imaging::Volume& moving, const ImageModelOptions& options,

@@ -1,6 +1,7 @@
 #include "registration/prepared_io.hpp"
 
 #include "registration/detail/stored_model.hpp"
+#include "registration/detail/surroundings.hpp"
 
 #include "core/atomic_file.hpp"
 
@@ -9,7 +10,7 @@ namespace tissuewarp::registration {
 namespace {
 
 constexpr const char* format = "tissuewarp prepared model";
-constexpr int version = 2;
+constexpr int version = 3;
 
 std::vector<hsize_t> voxel_shape(const imaging::Geometry& grid) {
     return {static_cast<hsize_t>(grid.size[2]), static_cast<hsize_t>(grid.size[1]), static_cast<hsize_t>(grid.size[0])};
@@ -31,6 +32,15 @@ imaging::Volume read_label_map(const detail::Hdf5Input& file) {
     return labels;
 }
 
+void write_list(detail::Hdf5Output& file, const std::string& name, const std::vector<int>& list) {
+    file.vector<int>(name, Eigen::VectorXi::Map(list.data(), static_cast<Eigen::Index>(list.size())), "1");
+}
+
+std::vector<int> read_list(const detail::Hdf5Input& file, const std::string& name) {
+    const Eigen::VectorXi list = file.vector<int>(name);
+    return {list.begin(), list.end()};
+}
+
 void write_meshing(detail::Hdf5Output& file, const meshing::MeshingOptions& options) {
     file.scalar<double>("options/meshing/edge_length", options.edge_length, "mm");
     Eigen::VectorXi label(static_cast<Eigen::Index>(options.label_edge_length.size()));
@@ -49,9 +59,7 @@ void write_meshing(detail::Hdf5Output& file, const meshing::MeshingOptions& opti
     file.scalar<double>("options/meshing/min_dihedral_deg", options.min_dihedral_deg, "degree");
     file.scalar<double>("options/meshing/perturb_seconds", options.perturb_seconds, "s");
     file.scalar<double>("options/meshing/exude_seconds", options.exude_seconds, "s");
-    file.vector<int>("options/meshing/labels",
-                     Eigen::VectorXi::Map(options.labels.data(), static_cast<Eigen::Index>(options.labels.size())),
-                     "1");
+    write_list(file, "options/meshing/labels", options.labels);
 }
 
 meshing::MeshingOptions read_meshing(const detail::Hdf5Input& file) {
@@ -67,8 +75,7 @@ meshing::MeshingOptions read_meshing(const detail::Hdf5Input& file) {
     options.min_dihedral_deg = file.scalar<double>("options/meshing/min_dihedral_deg");
     options.perturb_seconds = file.scalar<double>("options/meshing/perturb_seconds");
     options.exude_seconds = file.scalar<double>("options/meshing/exude_seconds");
-    const Eigen::VectorXi labels = file.vector<int>("options/meshing/labels");
-    options.labels.assign(labels.begin(), labels.end());
+    options.labels = read_list(file, "options/meshing/labels");
     return options;
 }
 
@@ -85,11 +92,13 @@ void write_prepared(const PreparedModel& prepared, const std::filesystem::path& 
     AtomicFile target(path);
     detail::Hdf5Output file(target.path(), format, version);
     detail::write_model(file, prepared.model);
-    write_labels(file, prepared.labels);
+    write_labels(file, detail::with_neighbours(prepared));
     write_meshing(file, prepared.options.meshing);
     detail::write_materials(file, "options/default_material", {{0, prepared.options.default_material}});
     file.scalar<double>("options/data_stiffness", prepared.options.data_stiffness, "kPa/mm");
     file.scalar<double>("options/tangential_ratio", prepared.options.tangential_ratio, "1");
+    write_list(file, "options/anchors", prepared.options.anchors);
+    write_list(file, "options/rigid_neighbours", prepared.options.rigid_neighbours);
     detail::write_stages(file, "stages/prepare", prepared.times);
     file.close();
     target.commit();
@@ -105,6 +114,8 @@ PreparedModel read_prepared(const std::filesystem::path& path, Observer& observe
     options.element = model.element;
     options.data_stiffness = file.scalar<double>("options/data_stiffness");
     options.tangential_ratio = file.scalar<double>("options/tangential_ratio");
+    options.anchors = read_list(file, "options/anchors");
+    options.rigid_neighbours = read_list(file, "options/rigid_neighbours");
     if (!(options.data_stiffness > 0) || !(options.tangential_ratio > 0))
         throw InvalidInput("'" + path.string() + "': the stiffness of the data must be positive");
     return prepare(std::move(model.mesh), read_label_map(file), options, observer);

@@ -79,6 +79,14 @@ void write_result(detail::Hdf5Output& file, const UpdateResult& result) {
     write_rounds(file, result.rounds);
     if (!result.rounds.empty())
         file.scalar<double>("estimated_error_mm", result.rounds.back().estimated_error_mm, "mm");
+    if (result.contact) {
+        file.scalar<int>("contact/touching", result.contact->touching, "1");
+        file.scalar<double>("contact/deepest_mm", result.contact->deepest_mm, "mm");
+    }
+    if (result.anchors) {
+        file.scalar<int>("anchors/nodes", result.anchors->nodes, "1");
+        file.scalar<double>("anchors/largest_mm", result.anchors->largest_mm, "mm");
+    }
     file.texts("engine", {result.engine});
     file.texts("doubts", result.doubts);
 }

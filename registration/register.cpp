@@ -4,6 +4,7 @@
 #include "registration/pipeline.hpp"
 
 #include "imaging/labels.hpp"
+#include "registration/detail/contact_evidence.hpp"
 #include "registration/detail/doubts.hpp"
 #include "registration/detail/engine_choice.hpp"
 #include "registration/detail/expected_error.hpp"
@@ -14,6 +15,7 @@
 #include "registration/detail/rigid_part.hpp"
 #include "registration/detail/stopwatch.hpp"
 #include "registration/detail/surface_evidence.hpp"
+#include "registration/detail/surroundings.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -49,8 +51,10 @@ struct Evidence {
     std::optional<detail::ImageEvidence> image;
     std::optional<detail::SurfaceEvidence> surface;
     std::optional<detail::PointEvidence> points;
+    std::optional<detail::ContactEvidence> contact;
     double energy = 0;                 ///< mN mm that weighs as much as one standard deviation of a point
     std::vector<tled::Spring> ground;  ///< moves with the placement
+    bool placed = false;               ///< anchors or rigid neighbours say where the organ lies as a whole
 
     /// Labels say where every boundary is, and an image holds what it does not show.
     [[nodiscard]] bool only_points() const { return !labels && !image; }
@@ -62,6 +66,7 @@ struct Evidence {
         if (image) detail::add(sum, image->contribution(plan, state));
         if (surface) detail::add(sum, surface->contribution(plan, state));
         if (points) detail::add(sum, points->contribution(plan, state));
+        if (contact) detail::add(sum, contact->contribution(plan, state));
         return sum;
     }
 };
@@ -90,13 +95,14 @@ public:
             search_image(round);
             const Round record = attempt(round);
             result_.rounds.push_back(record);
-            if (evidence_.only_points() && options_.align) detail::give_rigid_part_to_placement(prepared_, state_);
+            if (placement_is_free()) detail::give_rigid_part_to_placement(prepared_, state_);
             observer_.checkpoint("registration", double(round + 1) / options_.rematches);
             if (50 * record.held_back > record.matched) continue;  // more than 2 %: the same range once more
             const bool settled =
                 record.largest_change_mm < (searches_left() ? settled_for_search_mm() : options_.settled_mm);
             round = settled ? std::max(round + 1, next_milestone(round)) : round + 1;
         }
+        settle_contact();
         result_.times.push_back({"correspondence", matching_seconds_});
         result_.times.push_back({"equilibrium", solving_seconds_});
         result_.alignment.placement = state_.placement;
@@ -119,6 +125,14 @@ private:
     std::optional<tled::RestStiffness> metric_;
     double matching_seconds_ = 0, solving_seconds_ = 0;
 
+    /// Points show the organ wherever it lies, and nothing says where that is.
+    [[nodiscard]] bool placement_is_free() const {
+        return evidence_.only_points() && options_.align && !evidence_.placed;
+    }
+
+    /// Springs that differ from those the model was prepared with, or few of which are the same.
+    [[nodiscard]] bool needs_metric() const { return evidence_.image || evidence_.only_points() || evidence_.placed; }
+
     /// The searches for blocks are spread over the rounds: those between only weigh the matches anew.
     [[nodiscard]] int round_of_search(int search) const {
         return search * options_.rematches / std::max(1, options_.image.searches);
@@ -137,6 +151,13 @@ private:
         const int last = options_.rematches - 1;
         if (searches_left()) return std::min(last, round_of_search(evidence_.image->searches_done()));
         return round < last ? last : options_.rematches;
+    }
+
+    /// Rounds that change the contact alone, until it is in balance.
+    void settle_contact() {
+        constexpr int most_rounds = 10;
+        for (int done = 0; evidence_.contact && !evidence_.contact->settled(state_) && done < most_rounds; ++done)
+            result_.rounds.push_back(attempt(options_.rematches - 1));
     }
 
     void search_image(int round) {
@@ -168,12 +189,14 @@ private:
         if (evidence_.image) result_.image = evidence_.image->fit(state_);
         if (evidence_.surface) result_.surface = evidence_.surface->fit(state_);
         if (evidence_.points) result_.points = evidence_.points->fit(state_);
+        if (evidence_.contact) result_.contact = evidence_.contact->fit(state_);
+        if (!prepared_.options.anchors.empty()) result_.anchors = detail::anchor_fit(prepared_, state_);
         if (!evidence_.only_points()) return;
         detail::Stopwatch stopwatch;
         const int last = options_.rematches - 1;
         const auto springs = evidence_.contribution(plan_of(last), state_).conditions.springs;
         result_.expected =
-            detail::expected_error(prepared_, {springs, evidence_.ground, evidence_.energy, options_.align});
+            detail::expected_error(prepared_, {springs, evidence_.ground, evidence_.energy, placement_is_free()});
         result_.times.push_back(stopwatch.lap("expected error"));
     }
 
@@ -191,7 +214,8 @@ private:
             equilibrium_.method = tled::EquilibriumMethod::Lbfgs;
     }
 
-    Round match_and_solve(int round) {
+    /// Nodes that entered a rigid neighbour touch it from then on: the round is solved again, with their springs.
+    Round match_and_solve(int round, int most_passes = 4) {
         detail::Stopwatch stopwatch;
         const detail::RoundPlan plan = plan_of(round);
         detail::Contribution data = evidence_.contribution(plan, state_);
@@ -205,8 +229,7 @@ private:
         record.mean_residual_mm = data.mean_residual_mm;
         matching_seconds_ += stopwatch.lap("").seconds;
 
-        if ((evidence_.image || evidence_.only_points()) && !metric_)
-            metric_.emplace(prepared_.rest, conditions, prepared_.stiffness);
+        if (needs_metric() && !metric_) metric_.emplace(prepared_.rest, conditions, prepared_.stiffness);
         choose_method();
         const tled::EquilibriumResult solved =
             tled::equilibrium(*engine_, metric_ ? *metric_ : prepared_.stiffness, conditions, equilibrium_,
@@ -216,6 +239,14 @@ private:
             std::sqrt((solved.displacement - state_.displacement).colwise().squaredNorm().maxCoeff());
         record.force_evaluations = solved.force_evaluations;
         record.estimated_error_mm = solved.estimated_error_mm;
+        if (evidence_.contact && evidence_.contact->follow({state_.placement, solved.displacement}) &&
+            most_passes > 1) {
+            metric_.reset();
+            solving_seconds_ += stopwatch.lap("").seconds;
+            Round again = match_and_solve(round, most_passes - 1);
+            again.force_evaluations += record.force_evaluations;
+            return again;
+        }
         state_.displacement = solved.displacement;
         result_.min_jacobian = solved.min_jacobian;
         solving_seconds_ += stopwatch.lap("").seconds;
@@ -238,8 +269,9 @@ Alignment align(const PreparedModel& prepared, const Intraoperative& seen, Evide
 
 }  // namespace
 
-UpdateResult update(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options,
+UpdateResult update(const PreparedModel& prepared, const Intraoperative& given, const UpdateOptions& options,
                     Observer& observer) {
+    const Intraoperative seen = detail::without_neighbours(given, prepared.options.rigid_neighbours);
     require_usable(prepared, seen);
     detail::Stopwatch stopwatch;
     UpdateResult result;
@@ -253,6 +285,10 @@ UpdateResult update(const PreparedModel& prepared, const Intraoperative& seen, c
         evidence.ground = detail::ground_springs(prepared, evidence.energy, [&](const InterfaceNode&) {
             return options.align ? tissue.free_motion_mm : tissue.held_motion_mm;
         });
+    if (prepared.neighbours) evidence.contact.emplace(prepared, evidence.energy);
+    const std::vector<tled::Spring> anchors = detail::anchor_springs(prepared, evidence.energy);
+    evidence.ground.insert(evidence.ground.end(), anchors.begin(), anchors.end());
+    evidence.placed = evidence.contact || !anchors.empty();
     if (options.align) result.alignment = align(prepared, seen, evidence, options, observer);
     result.times.push_back(stopwatch.lap("rigid alignment"));
     if (seen.labels) evidence.labels.emplace(prepared, *seen.labels, options);

@@ -186,6 +186,76 @@ class SmallVerbs(PhantomTest):
         self.assertAlmostEqual(values["target_registration_error"]["all"]["after"]["mean"], 0.5, delta=1e-5)
         self.assertAlmostEqual(values["jacobian"]["minimum"], 1.0, delta=1e-5)
         self.assertEqual(values["overlap"]["all"]["dice"], 1.0)
+        for name in ("minimum", "percentile_5", "percentile_95"):
+            self.assertAlmostEqual(values["jacobian"][name], 1.0, delta=1e-5)
+        self.assertEqual(values["jacobian"]["folded_share"], 0)
+
+    def evaluate_places(self, *more):
+        """The phantom carried by 3 mm to the left: landmarks in it, near its rim and outside, and a fixed surface."""
+        vector, folder = numpy.array([3.0, 0.0, 0.0]), self.phantom.folder
+        for name, sign in (("field", 1), ("inverse", -1)):
+            image = nibabel.Nifti1Image(
+                numpy.broadcast_to((sign * vector).astype(numpy.float32), (48, 48, 48, 1, 3)), MOVING_AFFINE)
+            image.header.set_intent(1007)
+            nibabel.save(image, str(folder / f"{name}.nii.gz"))
+        rows = [CENTRE_LPS, CENTRE_LPS + [0, 10, 0], CENTRE_LPS + [0, 14, 0]]  # 12, 2 and -2 mm deep
+        (folder / "landmarks.csv").write_text("pre_x,pre_y,pre_z,intra_x,intra_y,intra_z\n" + "".join(
+            ",".join(map(str, [*row, *(row + vector + [0, 0, error])])) + "\n"
+            for row, error in zip(rows, (0.5, 1.0, 2.0))))
+        angles = numpy.linspace(0, 2 * numpy.pi, 40, endpoint=False)
+        circle = numpy.stack([0 * angles, numpy.cos(angles), numpy.sin(angles)], axis=1)
+        numpy.savetxt(folder / "surface.csv", CENTRE_LPS + vector + 13.0 * circle, delimiter=",", header="x,y,z",
+                      comments="")
+        scores = folder / "scores.json"
+        result = run("evaluate", "--landmarks", folder / "landmarks.csv", "--displacement", folder / "field.nii.gz",
+                     "--json", scores, *more)
+        return result, json.loads(scores.read_text()) if scores.exists() else None
+
+    def test_evaluate_by_place(self):
+        folder = self.phantom.folder
+        result, values = self.evaluate_places(
+            "--inverse", folder / "inverse.nii.gz", "--mask", self.phantom.moving_labels, "--moving-labels",
+            self.phantom.moving_labels, "--data-surface", folder / "surface.csv", "--held-out", folder / "surface.csv")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        errors = values["target_registration_error"]
+        self.assertEqual([bin["after"]["count"] for bin in errors["by_depth"]], [1, 1, 0, 1, 0])
+        self.assertAlmostEqual(errors["by_depth"][0]["after"]["mean"], 2.0, delta=1e-4)
+        self.assertAlmostEqual(errors["by_depth"][3]["after"]["mean"], 0.5, delta=1e-4)
+        self.assertIsNone(errors["by_depth"][2]["after"]["mean"])
+        self.assertRegex(result.stdout, "depth outside the organ +1 ")
+        self.assertIn("1 of 3 moving landmarks lie outside the organ", values["notes"][0])
+        self.assertRegex(result.stdout, "depth 5–10 mm +0 +– +– +– +–")
+        # Distances to the circle of 13 mm: about 13, 3.1 and 2.2 mm.
+        self.assertEqual([bin["after"]["count"] for bin in errors["by_distance_to_data"]], [2, 0, 1, 0])
+        self.assertEqual(values["inverse_consistency"]["left_the_grid"], 0)
+        self.assertLess(values["inverse_consistency"]["error_mm"]["maximum"], 1e-5)
+        # The organ's radius is 12 mm there, less a quarter of a voxel (its axes end on voxel centres that are left out).
+        self.assertAlmostEqual(values["held_out_surface"]["distance_mm"]["mean"], 1.2, delta=0.15)
+        self.assertAlmostEqual(values["held_out_surface"]["mean_signed_mm"], 1.2, delta=0.15)
+
+    def test_evaluate_refuses_data_in_other_frames_and_units(self):
+        folder, labels = self.phantom.folder, self.phantom.moving_labels
+        _, _ = self.evaluate_places()
+        (folder / "scores.json").unlink()
+        points = numpy.loadtxt(folder / "surface.csv", delimiter=",", skiprows=1)
+        for name, changed in (("metres", points / 1000), ("far", points + 2000)):
+            numpy.savetxt(folder / f"{name}.csv", changed, delimiter=",", header="x,y,z", comments="")
+        for more, words in (
+                (("--moving-labels", labels, "--held-out", folder / "metres.csv"), ("metres.csv", "metres?")),
+                (("--moving-labels", labels, "--held-out", folder / "far.csv"), ("LPS",)),
+                (("--data-surface", folder / "far.csv"), ("LPS",)),
+                (("--data-surface", folder / "surface.csv", "--bin-edges", "5,3"), ("ascending",)),
+                (("--held-out", folder / "surface.csv"), ("--moving-labels",)),
+                (("--inverse", labels), ("three",)),
+                (("--data-points", folder / "none.csv"), ("none.csv",))):
+            result, _ = self.evaluate_places(*more)
+            self.assertIn(result.returncode, (2, 3), result.stderr)
+            self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
+            for word in words:
+                self.assertIn(word, result.stderr)
+        for option, file in (("--moving-labels", labels), ("--data-surface", folder / "surface.csv")):
+            result = run("evaluate", "--displacement", folder / "field.nii.gz", option, file)
+            self.assert_refused(result, 2, option, "--landmarks")
 
     def test_warp_refuses_without_anything_to_warp_with(self):
         result = run("warp", self.phantom.moving, "-o", self.phantom.folder / "w.nii.gz")

@@ -3,6 +3,7 @@
 import json
 import unittest
 
+import h5py
 import nibabel
 import numpy
 
@@ -110,6 +111,59 @@ class FromPairs(PhantomTest):
                                        fixed_labels=None)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("carried along", result.stdout)
+
+
+class WithSurroundings(PhantomTest):
+    """A slab of bone, label 3, a millimetre below the organ; pairs that say that the organ moved 5 mm towards it."""
+
+    def setUp(self):
+        super().setUp()
+        labels = self.phantom.moving_labels_array.copy()
+        self.bone_top = CENTRE_LPS[2] - 12.5  # between two slices
+        labels[lps_of_voxels(MOVING_AFFINE)[..., 2] < self.bone_top] = 3
+        image = nibabel.Nifti1Image(labels, MOVING_AFFINE)
+        image.header.set_xyzt_units("mm")
+        self.labels = self.phantom.folder / "with_bone.nii.gz"
+        nibabel.save(image, str(self.labels))
+        unit = numpy.concatenate([radius * sphere(20) for radius in (0.3, 0.6, 0.9)])
+        moving = CENTRE_LPS + unit * MOVING_AXES
+        self.pairs = save_points(numpy.hstack([moving, moving - [0, 0, 5]]), self.phantom.folder / "down.csv",
+                                 "pre_x,pre_y,pre_z,intra_x,intra_y,intra_z")
+
+    def register(self, *more):
+        return self.phantom.register("--fixed-points", self.pairs, "--no-align", "--edge-length", 4, *more,
+                                     moving_labels=self.labels, fixed=None, fixed_labels=None)
+
+    def test_the_organ_does_not_enter_bone(self):
+        result = self.register("--rigid-neighbour", 3, "--anchor", "2")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("rigid neighbours: ", result.stdout)
+        report = json.loads((self.phantom.output / "report.json").read_text())
+        self.assertEqual(report["parameters"]["rigid-neighbour"], ["3"])
+        self.assertGreater(report["contact"]["touching"], 0)
+        self.assertLess(report["contact"]["deepest_mm"], 0.2)
+        self.assertLess(report["anchors"]["largest_mm"], 0.5)
+        self.assertNotIn("3", report["materials"])
+        with h5py.File(self.phantom.output / "record.h5") as record:
+            nodes = record["mesh/nodes"][:] + record["displacement"][:]
+            self.assertGreater(nodes[:, 2].min(), self.bone_top - 0.2)
+            self.assertEqual(record["contact/touching"][()], report["contact"]["touching"])
+
+    def test_labels_that_cannot_be_surroundings(self):
+        for options, words in ((("--rigid-neighbour", "3,7"), ("with_bone.nii.gz", "label 7 is absent", "1, 2, 3")),
+                               (("--anchor", 9), ("label 9 is absent",)),
+                               (("--anchor", 3, "--rigid-neighbour", 3), ("choose one",)),
+                               (("--rigid-neighbour", "bone"), ("--rigid-neighbour 'bone'",)),
+                               (("--rigid-neighbour", "1,2,3"), ("nothing is left",))):
+            self.assert_refused(self.register(*options, "--dry-run"), INPUT, *words)
+
+    def test_a_material_is_not_asked_of_bone(self):
+        table = self.phantom.folder / "materials.toml"
+        table.write_text("".join(f"[label.{label}]\nyoungs_modulus_kpa = 3.0\npoissons_ratio = 0.45\n"
+                                 for label in (1, 2)))
+        result = self.register("--rigid-neighbour", 3, "--materials", table, "--dry-run")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assert_refused(self.register("--materials", table, "--dry-run"), INPUT, "3")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 #include "imaging/sampling.hpp"
 #include "core/errors.hpp"
 #include "imaging/filters.hpp"
+#include "imaging/vector_sampling.hpp"
 #include "test_volumes.hpp"
 
 #include <limits>
@@ -105,6 +106,24 @@ TEST(NearestValue, TakesTheVoxelThatHoldsThePoint) {
     EXPECT_EQ(nearest_value<std::uint8_t>(labels, labels.geometry.point({2.4, 3.6, 4.4})),
               labels.data<std::uint8_t>()[labels.offset(2, 4, 4)]);
     EXPECT_EQ(nearest_value<std::uint8_t>(labels, labels.geometry.point({-0.6, 3, 4}), 255), 255);
+}
+
+TEST(VectorSampler, AgreesWithTheScalarSamplerOnEachComponentAndBeyondTheBorder) {
+    const Volume field = test::random_volume(oblique_grid(), CV_32FC3);
+    std::array<cv::Mat, 3> parts;
+    for (std::size_t c = 0; c < 3; ++c) {
+        parts[c] = cv::Mat(3, field.voxels.size.p, CV_32FC1);
+        for (std::int64_t n = 0; n < field.geometry.voxel_count(); ++n)
+            parts[c].ptr<float>()[n] = field.data<cv::Vec3f>()[n][static_cast<int>(c)];
+    }
+    const VectorSampler sampler(field);
+    for (const Eigen::Vector3d& point : random_points(field.geometry, 2.0, 300))
+        for (std::size_t c = 0; c < 3; ++c) {
+            const LinearSampler one(Volume(field.geometry, parts[c]));
+            EXPECT_NEAR(sampler.value(point)[static_cast<int>(c)], one.value(point), 1e-4);
+            EXPECT_EQ(sampler.contains(point), one.contains(point));
+        }
+    EXPECT_THROW(VectorSampler(Volume(field.geometry, CV_32FC1)), InvalidInput);
 }
 
 }  // namespace
