@@ -141,15 +141,13 @@ std::map<std::string, Setter> setters() {
             {"held-motion", [](UpdateOptions& o, double v) { o.tissue.held_motion_mm = v; }},
             {"surface-outliers", [](UpdateOptions& o, double v) { o.surface.outlier_deviations = v; }},
             {"expected-motion", [](UpdateOptions& o, double v) { o.image.expected_motion_mm = v; }},
-            {"searches", [](UpdateOptions& o, double v) { o.image.searches = int(v); }},
+            {"dense-searches", [](UpdateOptions& o, double v) { o.image.dense_coarsening.resize(std::size_t(v)); }},
             {"rounds", [](UpdateOptions& o, double v) { o.rematches = int(v); }},
             {"residual-scale", [](UpdateOptions& o, double v) { o.residual_scale_mm = v; }},
             {"least-share", [](UpdateOptions& o, double v) { o.image.matching.least_share = v; }},
             {"search-mm", [](UpdateOptions& o, double v) { o.image.matching.search_mm = v; }},
-            {"refinement-mm", [](UpdateOptions& o, double v) { o.image.refinement_mm = v; }},
             {"tolerance", [](UpdateOptions& o, double v) { o.equilibrium.tolerance_mm = v; }},
             {"unseen-motion", [](UpdateOptions& o, double v) { o.image.unseen_motion_mm = v; }},
-            {"refinement-levels", [](UpdateOptions& o, double v) { o.image.refinement_levels = int(v); }},
             {"least-confidence", [](UpdateOptions& o, double v) { o.image.consistency.least_confidence = v; }},
             {"consistent-mm", [](UpdateOptions& o, double v) { o.image.consistency.most_residual_mm = v; }}};
 }

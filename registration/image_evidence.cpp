@@ -1,11 +1,7 @@
 #include "registration/detail/image_evidence.hpp"
 
-#include "registration/detail/grid_samples.hpp"
 #include "registration/detail/ground.hpp"
 #include "registration/detail/least_trimmed_motion.hpp"
-#include "registration/detail/template_images.hpp"
-#include "registration/field.hpp"
-#include "registration/warp.hpp"
 
 #include <Eigen/Eigenvalues>
 
@@ -23,32 +19,6 @@ double median_distance(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
     return *middle;
 }
 
-/// The part of a grid within `margin_mm` of points (3 × N, LPS mm), at least one voxel.
-imaging::Geometry part_about(const imaging::Geometry& grid, const Eigen::Matrix3Xd& points, double margin_mm) {
-    const Eigen::Matrix3Xd index = grid.point_to_index() * (points.colwise() - grid.origin);
-    const Eigen::Array3d margin = margin_mm / grid.spacing.array();
-    const Eigen::Array3d lower = index.rowwise().minCoeff().array() - margin,
-                         upper = index.rowwise().maxCoeff().array() + margin;
-    imaging::Geometry part = grid;
-    Eigen::Vector3d first;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-        const auto a = static_cast<Eigen::Index>(axis);
-        const double last = grid.size[axis] - 1;
-        first[a] = std::clamp(std::floor(lower[a]), 0.0, last);
-        part.size[axis] = static_cast<int>(std::clamp(std::ceil(upper[a]), first[a], last) - first[a]) + 1;
-    }
-    part.origin = grid.point(first);
-    return part;
-}
-
-/// What a template sees about its points: the blocks of its coarsest grid where they are searched, and what their
-/// descriptors and the smoothing before reach.
-double sight_mm(const TemplateOptions& options) {
-    constexpr int smoothing = 2;  // voxels, four deviations of the Gaussian
-    const double coarsest = options.grid_spacing_mm * std::pow(2, options.levels - 1);
-    return (search_margin(refinement_reach, options.block_radius) + GridSamples::rim + smoothing) * coarsest;
-}
-
 }  // namespace
 
 ImageEvidence::ImageEvidence(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
@@ -58,41 +28,31 @@ ImageEvidence::ImageEvidence(const PreparedModel& prepared, const imaging::Volum
       options_(options),
       view_(fixed),
       locator_(prepared.model.mesh),
-      energy_(energy) {}
-
-void ImageEvidence::search(const State& state, Observer& observer) {
-    std::vector<BlockMatch> found = searches_ == 0 ? first_search(state, observer) : refined_search(state, observer);
-    use(consistent_matches(found, options_.consistency));
-    ++searches_;
+      energy_(energy) {
+    if (prepared.image->blocks.options().similarity == Similarity::SelfSimilarityContext)
+        dense_.emplace(prepared, fixed);
 }
 
-std::vector<BlockMatch> ImageEvidence::first_search(const State& state, Observer& observer) const {
+int ImageEvidence::searches() const {
+    return 1 + (dense_ ? static_cast<int>(options_.dense_coarsening.size()) : 0);
+}
+
+void ImageEvidence::search(const State& state, Observer& observer) {
+    if (searches_done_ == 0) {
+        blocks_ = consistent_matches(block_search(state, observer), options_.consistency);
+        use(blocks_);
+    } else {
+        const int coarsening = options_.dense_coarsening.at(static_cast<std::size_t>(searches_done_ - 1));
+        use(dense_->matches(state, coarsening, blocks_, locator_, observer));
+    }
+    ++searches_done_;
+}
+
+std::vector<BlockMatch> ImageEvidence::block_search(const State& state, Observer& observer) const {
     const MatchingTemplate& blocks = prepared_.image->blocks;
     BlockMatchingOptions matching = options_.matching;
     matching.rotation = state.placement.linear();
     return match_blocks(blocks, fixed_, deformed(blocks.points(), state), matching, observer);
-}
-
-// The image as the model deforms it differs from the fixed one by little: what changes within a block is taken out,
-// and a short search on the finest grids is left.
-std::vector<BlockMatch> ImageEvidence::refined_search(const State& state, Observer& observer) const {
-    const ImageModel& model = *prepared_.image;
-    const Eigen::Matrix3Xd here = deformed(model.blocks.points(), state);
-    TemplateOptions blocks = model.blocks.options();
-    blocks.levels = std::min(blocks.levels, options_.refinement_levels);
-    const Deformation deformation{prepared_.model.mesh, state.displacement, state.placement};
-    const imaging::Geometry part = part_about(fixed_.geometry, here, sight_mm(blocks));
-    const imaging::Volume warped =
-        warp_image(model.image, displacement_fixed_to_moving(deformation, part, {}, observer));
-    BlockMatchingOptions matching = options_.matching;
-    matching.search_mm = options_.refinement_mm;
-    std::vector<BlockMatch> matches =
-        match_blocks(MatchingTemplate(warped, here, blocks), fixed_, here, matching, observer);
-    for (BlockMatch& match : matches) {  // centres of blocks are voxels near the points: back to the tissue
-        const Eigen::Vector3d shift = match.moving - here.col(match.point);
-        match.moving = model.blocks.points().col(match.point) + state.placement.linear().transpose() * shift;
-    }
-    return matches;
 }
 
 Eigen::Matrix3Xd ImageEvidence::deformed(const Eigen::Matrix3Xd& points, const State& state) const {
@@ -149,7 +109,7 @@ double ImageEvidence::view_share() const {
 ImageFit ImageEvidence::fit(const State& state) const {
     constexpr double near_mm = 15;
     const Eigen::Matrix3Xd& nodes = prepared_.model.mesh.nodes;
-    ImageFit fit{static_cast<int>(prepared_.image->blocks.points().cols()), static_cast<int>(matches_.size()), 0, 0};
+    ImageFit fit{static_cast<int>(prepared_.image->blocks.points().cols()), static_cast<int>(blocks_.size()), 0, 0};
     Eigen::Index shown = 0;
     for (Eigen::Index node = 0; node < nodes.cols(); ++node)
         shown += std::any_of(matches_.begin(), matches_.end(), [&](const BlockMatch& match) {
@@ -193,7 +153,8 @@ Contribution ImageEvidence::contribution(const RoundPlan& plan, const State& sta
         pulls.back().stiffness *= energy_ * match.confidence * robust_weight(match.residual_mm, plan.scale_mm);
     }
     Contribution result;
-    result.candidates = static_cast<int>(prepared_.image->blocks.points().cols());
+    result.candidates =
+        std::max(static_cast<int>(prepared_.image->blocks.points().cols()), static_cast<int>(matches.size()));
     result.matched = static_cast<int>(matches.size());
     result.mean_residual_mm = mean_residual(matches);
     result.conditions.springs = lumped_springs(prepared_.model.mesh, pulls, state.displacement);

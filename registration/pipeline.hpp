@@ -106,9 +106,9 @@ enum class Device { Auto, Cpu, Gpu };
 struct ImageOptions {
     BlockMatchingOptions matching;
     ConsistencyOptions consistency;
-    int searches = 2;                 ///< the first about the rigid pose, the others with the image as then deformed
-    int refinement_levels = 2;        ///< grids of the later searches, the finest ones
-    double refinement_mm = 4.0;       ///< and their range
+    /// After the search for blocks, dense searches on grids so many times doubled from the blocks' finest. Templates of
+    /// grey values have none.
+    std::vector<int> dense_coarsening{1, 1, 0};
     double expected_motion_mm = 100;  ///< of the organ's surface in the field of view of the intraoperative image
     double unseen_motion_mm = 1;      ///< and out of it
     double headers_within_mm = 15;    ///< the headers place an organ, part of which is out of view, closer than this

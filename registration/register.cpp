@@ -133,18 +133,16 @@ private:
     /// Springs that differ from those the model was prepared with, or few of which are the same.
     [[nodiscard]] bool needs_metric() const { return evidence_.image || evidence_.only_points() || evidence_.placed; }
 
-    /// The searches for blocks are spread over the rounds: those between only weigh the matches anew.
+    /// The searches of an image are spread over the rounds: those between only weigh the matches anew.
     [[nodiscard]] int round_of_search(int search) const {
-        return search * options_.rematches / std::max(1, options_.image.searches);
+        return search * options_.rematches / evidence_.image->searches();
     }
     [[nodiscard]] bool searches_left() const {
-        return evidence_.image && evidence_.image->searches_done() < options_.image.searches;
+        return evidence_.image && evidence_.image->searches_done() < evidence_.image->searches();
     }
 
     /// A search looks farther than what is left to settle before it.
-    [[nodiscard]] double settled_for_search_mm() const {
-        return std::max(options_.settled_mm, 0.25 * options_.image.refinement_mm);
-    }
+    [[nodiscard]] double settled_for_search_mm() const { return std::max(options_.settled_mm, 1.0); }
 
     /// Where rounds that change nothing any more go on: the next search, or the last round.
     [[nodiscard]] int next_milestone(int round) const {

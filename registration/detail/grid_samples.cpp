@@ -53,12 +53,22 @@ private:
 
 }  // namespace
 
-GridSamples::GridSamples(const imaging::Volume& image, const imaging::Volume& seen, const imaging::Geometry& grid,
-                         const SearchRegion& region)
-    : size_{grid.size[0] + 2 * rim, grid.size[1] + 2 * rim, grid.size[2] + 2 * rim} {
+imaging::Geometry GridSamples::with_rim(const imaging::Geometry& grid) {
+    imaging::Geometry result = grid;
+    for (int& size : result.size) size += 2 * rim;
+    result.origin = grid.point(Eigen::Vector3d::Constant(-rim));
+    return result;
+}
+
+GridSamples::GridSamples(const imaging::Geometry& grid) : size_(with_rim(grid).size) {
     const auto count = static_cast<std::size_t>(offset(size_[0] - rim, size_[1] - rim - 1, size_[2] - rim - 1));
     value_ = std::make_unique_for_overwrite<float[]>(count);
     seen_ = std::make_unique_for_overwrite<std::uint8_t[]>(count);
+}
+
+GridSamples::GridSamples(const imaging::Volume& image, const imaging::Volume& seen, const imaging::Geometry& grid,
+                         const SearchRegion& region)
+    : GridSamples(grid) {
     const Reader reader(image, seen);
     const Eigen::Matrix3d matrix = image.geometry.point_to_index() * grid.index_to_point();
     const Eigen::Vector3d start = image.geometry.index(grid.origin);
@@ -69,6 +79,27 @@ GridSamples::GridSamples(const imaging::Volume& image, const imaging::Volume& se
             for (int i = range.first; i < range.last; ++i) {
                 const auto n = static_cast<std::size_t>(offset(i, j, k));
                 reader.read(row + matrix.col(0) * i, value_[n], seen_[n]);
+            }
+        }
+    });
+}
+
+GridSamples::GridSamples(const imaging::Volume& image, const imaging::Volume& seen, const imaging::Geometry& grid,
+                         const SearchRegion& region, const imaging::Volume& displacement)
+    : GridSamples(grid) {
+    const Reader reader(image, seen);
+    const Eigen::Matrix3d to_index = image.geometry.point_to_index(), matrix = to_index * grid.index_to_point();
+    const Eigen::Vector3d start = image.geometry.index(grid.origin);
+    const auto* shift = displacement.data<cv::Vec3f>();
+    tbb::parallel_for(-rim, grid.size[2] + rim, [&](int k) {
+        for (int j = -rim; j < grid.size[1] + rim; ++j) {
+            const Eigen::Vector3d row = start + matrix.col(1) * j + matrix.col(2) * k;
+            const Range range = region.row(j, k, rim);
+            for (int i = range.first; i < range.last; ++i) {
+                const auto n = static_cast<std::size_t>(offset(i, j, k));
+                const cv::Vec3f& u = shift[n];
+                reader.read(row + matrix.col(0) * i + to_index * Eigen::Vector3d(u[0], u[1], u[2]), value_[n],
+                            seen_[n]);
             }
         }
     });

@@ -17,6 +17,13 @@ public:
     GridSamples(const imaging::Volume& image, const imaging::Volume& seen, const imaging::Geometry& grid,
                 const SearchRegion& region);
 
+    /// The same at voxels moved by `displacement` (three channels float32, LPS mm), a field on the grid with its rim.
+    GridSamples(const imaging::Volume& image, const imaging::Volume& seen, const imaging::Geometry& grid,
+                const SearchRegion& region, const imaging::Volume& displacement);
+
+    /// The grid and its rim.
+    static imaging::Geometry with_rim(const imaging::Geometry& grid);
+
     /// The voxel (i, j, k) of the grid, −rim ≤ i < size + rim.
     [[nodiscard]] const float* value(int i, int j, int k) const { return value_.get() + offset(i, j, k); }
     [[nodiscard]] const std::uint8_t* seen(int i, int j, int k) const { return seen_.get() + offset(i, j, k); }
@@ -28,6 +35,8 @@ private:
     std::array<int, 3> size_;  // rim included
     std::unique_ptr<float[]> value_;
     std::unique_ptr<std::uint8_t[]> seen_;
+
+    explicit GridSamples(const imaging::Geometry& grid);
 };
 
 }  // namespace tissuewarp::registration::detail

@@ -1,6 +1,7 @@
 #pragma once
-/// A bare intraoperative volume: blocks of the preoperative image belong where they were found.
+/// A bare intraoperative volume: blocks of the preoperative image, then all of it, belong where they were found.
 
+#include "registration/detail/dense_search.hpp"
 #include "registration/detail/evidence.hpp"
 #include "registration/detail/field_of_view.hpp"
 #include "registration/detail/pull.hpp"
@@ -13,7 +14,7 @@ public:
     ImageEvidence(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
                   double energy);
 
-    /// Finds the blocks about where the model is.
+    /// Finds the blocks about where the model is; the later times, how all of the image is to shift there.
     void search(const State& state, Observer& observer);
     /// Takes matches that were found before.
     void use(std::vector<BlockMatch> matches);
@@ -26,7 +27,9 @@ public:
 
     /// How the matches agree with a model in this state.
     [[nodiscard]] ImageFit fit(const State& state) const;
-    [[nodiscard]] int searches_done() const { return searches_; }
+    [[nodiscard]] int searches_done() const { return searches_done_; }
+    /// How many there are to be.
+    [[nodiscard]] int searches() const;
 
 private:
     const PreparedModel& prepared_;
@@ -34,10 +37,11 @@ private:
     const ImageOptions& options_;
     FieldOfView view_;  // of `fixed_`
     meshing::PointLocator locator_;
-    double energy_;  // mN mm that one standard deviation of a match weighs
-    int searches_ = 0;
-    std::vector<BlockMatch> matches_;
-    std::vector<meshing::Location> places_;  // of the matches, in the mesh
+    double energy_;                     // mN mm that one standard deviation of a match weighs
+    std::optional<DenseSearch> dense_;  // where the template has descriptors of self-similarity
+    int searches_done_ = 0;
+    std::vector<BlockMatch> blocks_, matches_;  // of the first search, and of the last
+    std::vector<meshing::Location> places_;     // of the matches, in the mesh
 
     /// Whether the fixed image could show tissue at a point of its frame.
     [[nodiscard]] bool in_view(const Eigen::Vector3d& point) const;
@@ -50,8 +54,7 @@ private:
     };
     [[nodiscard]] std::vector<PulledMatch> pulled(const State& state) const;
     static double mean_residual(const std::vector<PulledMatch>& matches);
-    [[nodiscard]] std::vector<BlockMatch> first_search(const State& state, Observer& observer) const;
-    [[nodiscard]] std::vector<BlockMatch> refined_search(const State& state, Observer& observer) const;
+    [[nodiscard]] std::vector<BlockMatch> block_search(const State& state, Observer& observer) const;
     /// Where points of the moving image are in the fixed one.
     [[nodiscard]] Eigen::Matrix3Xd deformed(const Eigen::Matrix3Xd& points, const State& state) const;
 };

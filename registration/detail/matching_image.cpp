@@ -59,22 +59,30 @@ void take_values(const GridSamples& samples, const SearchRegion& region, Matchin
     for (float& value : result.values) value -= mean;
 }
 
+constexpr double smoothing = 0.4;  // voxels of the working grid
+
+MatchingImage described(const GridSamples& samples, const imaging::Geometry& grid, const SearchRegion& region) {
+    Descriptors descriptors = self_similarity_context(samples, grid, region);
+    return {grid, std::move(descriptors.channels), {}, std::move(descriptors.seen)};
+}
+
 }  // namespace
 
 MatchingImage matching_image(const Volume& image, const Volume& seen, const imaging::Geometry& grid,
                              const SearchRegion& region, Similarity similarity) {
-    const double sigma = 0.4 * grid.spacing[0];
+    const double sigma = smoothing * grid.spacing[0];
     const Cut cut(image, seen, grid, GridSamples::rim * grid.spacing[0] + 4 * sigma);
     const GridSamples samples(imaging::smooth(cut.image, sigma), cut.seen, grid, region);
+    if (similarity == Similarity::SelfSimilarityContext) return described(samples, grid, region);
     MatchingImage result{grid, {}, {}, {}};
-    if (similarity == Similarity::SelfSimilarityContext) {
-        Descriptors descriptors = self_similarity_context(samples, grid, region);
-        result.descriptors = std::move(descriptors.channels);
-        result.seen = std::move(descriptors.seen);
-    } else {
-        take_values(samples, region, result);
-    }
+    take_values(samples, region, result);
     return result;
+}
+
+MatchingImage pulled_back_image(const Volume& image, const Volume& seen, const imaging::Geometry& grid,
+                                const SearchRegion& region, const Volume& displacement) {
+    const Volume smooth = imaging::smooth(image, smoothing * grid.spacing[0]);
+    return described(GridSamples(smooth, seen, grid, region, displacement), grid, region);
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -24,6 +24,12 @@ struct MatchingImage {
 MatchingImage matching_image(const imaging::Volume& image, const imaging::Volume& seen, const imaging::Geometry& grid,
                              const SearchRegion& region, Similarity similarity);
 
+/// Descriptors of self-similarity of the image that has at each voxel of `grid` what `image` shows where a deformation
+/// takes that voxel: `displacement` (three channels float32, LPS mm) lies on GridSamples::with_rim(grid).
+MatchingImage pulled_back_image(const imaging::Volume& image, const imaging::Volume& seen,
+                                const imaging::Geometry& grid, const SearchRegion& region,
+                                const imaging::Volume& displacement);
+
 /// uint8 mask of what an image (float32) shows: 0 in and next to neighbourhoods of 3 × 3 × 3 voxels of one value, as
 /// padding beyond a field of view leaves them.
 imaging::Volume seen_region(const imaging::Volume& image);

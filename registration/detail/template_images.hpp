@@ -19,6 +19,11 @@ struct TemplateImages {
     Eigen::Matrix3Xd points;            ///< LPS mm
     imaging::Geometry image;            ///< the moving image's own grid
     std::vector<MatchingImage> levels;  ///< coarse to fine
+
+    /// What of a level's grid is described.
+    [[nodiscard]] SearchRegion region(const imaging::Geometry& grid) const {
+        return {grid, points, search_margin(refinement_reach, options.block_radius)};
+    }
 };
 
 }  // namespace tissuewarp::registration::detail

@@ -1,0 +1,27 @@
+#pragma once
+/// Dense forces of a bare intraoperative volume on a model in some state.
+
+#include "meshing/point_location.hpp"
+#include "registration/detail/evidence.hpp"
+
+namespace tissuewarp::registration::detail {
+
+class DenseSearch {
+public:
+    /// `prepared.image` is there, its template made of self-similarity descriptors.
+    DenseSearch(const PreparedModel& prepared, const imaging::Volume& fixed);
+
+    /// What `known`, found before, and the whole image say about where tissue belongs, on the grid that is `coarsening`
+    /// times doubled from the template's finest (or its coarsest): a match for each cell of voxels that has a force,
+    /// and those known ones in whose cell the images say nothing. The fixed image is pulled back by the model to the
+    /// moving grid, so that descriptors are compared which turned and stretched with the tissue.
+    [[nodiscard]] std::vector<BlockMatch> matches(const State& state, int coarsening,
+                                                  const std::vector<BlockMatch>& known,
+                                                  const meshing::PointLocator& locator, Observer& observer) const;
+
+private:
+    const PreparedModel& prepared_;
+    imaging::Volume fixed_, seen_;
+};
+
+}  // namespace tissuewarp::registration::detail
