@@ -13,7 +13,7 @@ namespace tissuewarp::registration::detail {
 namespace {
 
 constexpr int cell_side = 4;               // voxels
-constexpr int window_passes = 4;           // of (¼, ½, ¼) along each axis: a window of 1.4 cells' deviation
+constexpr int window_passes = 2;           // of (¼, ½, ¼) along each axis: a window of one cell's deviation
 constexpr double independent_share = 0.2;  // of the voxels: descriptors and what they miss agree with those beside them
 constexpr double least_square = 1.0;       // of a channel's residual, steps of its eight bits
 constexpr double least_deviation = 0.05;   // voxels
