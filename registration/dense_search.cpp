@@ -54,13 +54,14 @@ DenseSearch::DenseSearch(const PreparedModel& prepared, const imaging::Volume& f
     : prepared_(prepared), fixed_(fixed.as(CV_32F)), seen_(seen_region(fixed_)) {}
 
 std::vector<BlockMatch> DenseSearch::matches(const State& state, int coarsening, const std::vector<BlockMatch>& known,
-                                             const meshing::PointLocator& locator, Observer& observer) const {
+                                             const meshing::PointLocator& locator) const {
     const meshing::TetMesh& mesh = prepared_.model.mesh;
     const TemplateImages& images = prepared_.image->blocks.images();
     const int finest = images.options.levels - 1;
     const MatchingImage& moving = images.levels[static_cast<std::size_t>(std::max(0, finest - coarsening))];
-    const imaging::Volume field = displacement_moving_to_fixed({mesh, state.displacement, state.placement},
-                                                               GridSamples::with_rim(moving.grid), {}, observer);
+    constexpr int reach = 8;  // voxels: those of the patches that the descriptors of a voxel on the surface compare
+    const imaging::Volume field =
+        displacement_near_mesh({mesh, state.displacement, state.placement}, GridSamples::with_rim(moving.grid), reach);
     const MatchingImage pulled_back = pulled_back_image(fixed_, seen_, moving.grid, images.region(moving.grid), field);
     const DenseForces dense = dense_forces(moving, pulled_back, voxels_in(mesh, moving.grid));
     std::vector<BlockMatch> result;

@@ -9,6 +9,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <string>
 
@@ -72,6 +73,49 @@ Raster rasterise_mesh(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tet
     if (to_index.determinant() < 0.0)
         raster.count.inverted = static_cast<int>(tets.cols()) - raster.count.flat - raster.count.inverted;
     return raster;
+}
+
+/// Gives the voxels around the mesh the mean of those next to them that have a value, `layers` times.
+void grow(Raster& raster, int layers) {
+    const Geometry& grid = raster.values.geometry;
+    const std::array<std::int64_t, 3> stride{1, grid.size[0], std::int64_t{grid.size[0]} * grid.size[1]};
+    constexpr std::uint8_t waits = 2;
+    const auto for_each_neighbour = [&](std::int64_t voxel, const auto& visit) {
+        for (int axis = 0; axis < 3; ++axis) {
+            const std::int64_t n = voxel / stride[axis] % grid.size[axis];
+            if (n > 0) visit(voxel - stride[axis]);
+            if (n + 1 < grid.size[axis]) visit(voxel + stride[axis]);
+        }
+    };
+    std::vector<std::int64_t> front, next;
+    const auto find_next = [&](std::int64_t voxel) {
+        for_each_neighbour(voxel, [&](std::int64_t other) {
+            auto& state = raster.inside[static_cast<std::size_t>(other)];
+            if (state != 0) return;
+            state = waits;
+            next.push_back(other);
+        });
+    };
+    for (std::int64_t voxel = 0; voxel < grid.voxel_count(); ++voxel)
+        if (raster.inside[static_cast<std::size_t>(voxel)] == 1) find_next(voxel);
+    auto* values = raster.values.data<cv::Vec3f>();
+    for (int layer = 0; layer < layers; ++layer) {
+        front.swap(next);
+        next.clear();
+        for (const std::int64_t voxel : front) {
+            cv::Vec3f sum(0, 0, 0);
+            int count = 0;
+            for_each_neighbour(voxel, [&](std::int64_t other) {
+                if (raster.inside[static_cast<std::size_t>(other)] != 1) return;
+                sum += values[other];
+                ++count;
+            });
+            values[voxel] = sum / float(count);
+        }
+        for (const std::int64_t voxel : front) raster.inside[static_cast<std::size_t>(voxel)] = 1;
+        for (const std::int64_t voxel : front) find_next(voxel);
+    }
+    for (const std::int64_t voxel : next) raster.inside[static_cast<std::size_t>(voxel)] = 0;
 }
 
 /// Replaces v by `rotation` v + `linear` p + `constant` at every voxel centre p of `grid`, in double precision; voxels
@@ -180,6 +224,18 @@ Volume displacement_moving_to_fixed(const Deformation& deformation, const Geomet
     complete(raster, moving_grid, rotation, rotation - Eigen::Matrix3d::Identity(), deformation.placement.translation(),
              [&] { return [&](int, const Eigen::Vector3d& X) { return (*continuation)(X); }; });
     observer.progress(stage, 1.0);
+    return raster.values;
+}
+
+Volume displacement_near_mesh(const Deformation& deformation, const Geometry& moving_grid, int reach) {
+    imaging::require_valid(moving_grid, "moving grid");
+    require_usable(deformation, {});
+    const auto& mesh = deformation.mesh;
+    Raster raster = rasterise_mesh(mesh.nodes, mesh.tets, deformation.displacement, moving_grid);
+    grow(raster, reach);
+    const Eigen::Matrix3d rotation = deformation.placement.linear();
+    complete(raster, moving_grid, rotation, rotation - Eigen::Matrix3d::Identity(), deformation.placement.translation(),
+             [] { return [](int, const Eigen::Vector3d&) -> Eigen::Vector3d { return Eigen::Vector3d::Zero(); }; });
     return raster.values;
 }
 

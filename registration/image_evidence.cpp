@@ -43,7 +43,7 @@ void ImageEvidence::search(const State& state, Observer& observer) {
         use(blocks_);
     } else {
         const int coarsening = options_.dense_coarsening.at(static_cast<std::size_t>(searches_done_ - 1));
-        use(dense_->matches(state, coarsening, blocks_, locator_, observer));
+        use(dense_->matches(state, coarsening, blocks_, locator_));
     }
     ++searches_done_;
 }

@@ -17,7 +17,7 @@ public:
     /// moving grid, so that descriptors are compared which turned and stretched with the tissue.
     [[nodiscard]] std::vector<BlockMatch> matches(const State& state, int coarsening,
                                                   const std::vector<BlockMatch>& known,
-                                                  const meshing::PointLocator& locator, Observer& observer) const;
+                                                  const meshing::PointLocator& locator) const;
 
 private:
     const PreparedModel& prepared_;

@@ -52,6 +52,38 @@ TEST(ForwardField, ReproducesAnAffineDisplacementAtEveryVoxelInside) {
     EXPECT_NEAR(inside * grid.voxel_volume(), 40.0 * 30.0 * 20.0, 0.02 * 24000.0);
 }
 
+// A layer too many or too few, or values taken from outside, would show beyond the reach or at its edge.
+TEST(FieldNearTheMesh, IsTheForwardFieldInsideContinuedAsFarAsAsked) {
+    Deformation deformation =
+        test::deformed_by(test::box_at({-20, -15, -10}, {40, 30, 20}, {8, 6, 4}, 0.15), affine_displacement);
+    deformation.placement = test::motion(12.0, {0.2, 1.0, 0.4}, {5.0, -3.0, 8.0});
+    const Geometry grid = test::oblique_grid({0.3, -0.2, 0.1}, {61, 57, 49}, {1.1, 0.9, 1.4});
+    constexpr int reach = 3;
+    const Volume near = displacement_near_mesh(deformation, grid, reach);
+    const Volume whole = displacement_moving_to_fixed(deformation, grid);
+    int inside = 0, beside = 0, beyond = 0;
+    for_each_voxel(near, [&](const Eigen::Vector3d& index, std::int64_t n) {
+        const Eigen::Vector3d X = grid.point(index);
+        const double outside = (X.cwiseAbs() - Eigen::Vector3d(20, 15, 10)).maxCoeff();  // mm, of the farthest axis
+        const Eigen::Vector3d rigid = deformation.placement * X - X;
+        if (outside < 0) {
+            ++inside;
+            ASSERT_LT((vector_at(near, n) - vector_at(whole, n)).norm(), 1e-5) << X.transpose();
+        } else if (outside > 1e-6 && outside < 0.9) {  // one step away at most where no edge is near
+            const Eigen::Vector3d expected = deformation.placement * (X + affine_displacement(X)) - X;
+            if ((X.cwiseAbs() - Eigen::Vector3d(20, 15, 10)).cwiseMax(0.0).norm() > outside + 1e-9) return;
+            ++beside;
+            ASSERT_LT((vector_at(near, n) - expected).norm(), 1.0) << X.transpose();
+        } else if (outside > 1.4 * std::sqrt(3.0) * (reach + 1)) {
+            ++beyond;
+            ASSERT_LT((vector_at(near, n) - rigid).norm(), 1e-4) << X.transpose();
+        }
+    });
+    EXPECT_GT(inside, 10000);
+    EXPECT_GT(beside, 1000);
+    EXPECT_GT(beyond, 10000);
+}
+
 TEST(BackwardField, IsTheExactInverseOfAnAffineMap) {
     Deformation deformation =
         test::deformed_by(test::box_at({-20, -15, -10}, {40, 30, 20}, {8, 6, 4}, 0.15), affine_displacement);
