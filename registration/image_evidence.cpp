@@ -2,6 +2,7 @@
 
 #include "registration/detail/ground.hpp"
 #include "registration/detail/least_trimmed_motion.hpp"
+#include "registration/detail/point_tree.hpp"
 
 #include <Eigen/Eigenvalues>
 
@@ -110,11 +111,11 @@ ImageFit ImageEvidence::fit(const State& state) const {
     constexpr double near_mm = 15;
     const Eigen::Matrix3Xd& nodes = prepared_.model.mesh.nodes;
     ImageFit fit{static_cast<int>(prepared_.image->blocks.points().cols()), static_cast<int>(blocks_.size()), 0, 0};
+    std::vector<Eigen::Vector3d> places;
+    for (const BlockMatch& match : matches_) places.push_back(match.moving);
+    const PointTree tree(std::move(places));
     Eigen::Index shown = 0;
-    for (Eigen::Index node = 0; node < nodes.cols(); ++node)
-        shown += std::any_of(matches_.begin(), matches_.end(), [&](const BlockMatch& match) {
-            return (match.moving - nodes.col(node)).squaredNorm() < near_mm * near_mm;
-        });
+    for (Eigen::Index node = 0; node < nodes.cols(); ++node) shown += tree.distance(nodes.col(node)) < near_mm;
     fit.shown_share = double(shown) / double(nodes.cols());
     fit.residual_mm = mean_residual(pulled(state));
     return fit;
