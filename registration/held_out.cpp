@@ -13,6 +13,8 @@ namespace {
 
 using Block = std::array<int, 3>;
 
+constexpr double ground_share = 0.01;
+
 double mean_edge(const meshing::TetMesh& mesh) {
     double sum = 0;
     for (int tet = 0; tet < mesh.tet_count(); ++tet)
@@ -58,6 +60,17 @@ std::vector<bool> with_neighbours(const meshing::TetMesh& mesh, const std::vecto
     return reached;
 }
 
+/// Without those that hardly pull: of data that no tissue follows, or at the far corners of elements.
+std::vector<tled::Spring> strong(std::vector<tled::Spring> springs) {
+    constexpr double least_share = 0.02;
+    double strongest = 0;
+    for (const tled::Spring& spring : springs) strongest = std::max(strongest, spring.stiffness.trace());
+    std::erase_if(springs, [&](const tled::Spring& spring) {
+        return spring.stiffness.trace() < least_share * strongest;
+    });
+    return springs;
+}
+
 Eigen::Matrix3d square_root(const Eigen::Matrix3d& stiffness) {
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(stiffness);
     return axes.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() * axes.eigenvectors().transpose();
@@ -68,10 +81,12 @@ Eigen::Matrix3d square_root(const Eigen::Matrix3d& stiffness) {
 HeldOut::HeldOut(const PreparedModel& prepared, const UpdateResult& result, const FitOptions& options)
     : prepared_(prepared), tolerance_mm_(options.tolerance_mm), start_(result.deformation.displacement) {
     const meshing::TetMesh& mesh = prepared.model.mesh;
-    const std::vector<Block> blocks = blocks_of(mesh, std::max(options.block_mm, 3 * mean_edge(mesh)));
+    const double edge = std::max(options.cube_mm, 3 * mean_edge(mesh));
+    const std::vector<Block> blocks = blocks_of(mesh, edge), parts = blocks_of(mesh, edge / 2);
     const Eigen::Isometry3d motion = result.deformation.placement.inverse() * result.pulls.placement;
-    const std::vector<tled::Spring> data = carried_along(result.pulls.data, mesh, motion);
+    const std::vector<tled::Spring> data = carried_along(strong(result.pulls.data), mesh, motion);
     std::map<Block, int> numbers;
+    std::vector<double> weights;  // of blocks
     for (int half = 0; half < 2; ++half) {
         Fold& fold = folds_[std::size_t(half)];
         std::vector<bool> pulled(std::size_t(mesh.node_count()), false);
@@ -85,13 +100,20 @@ HeldOut::HeldOut(const PreparedModel& prepared, const UpdateResult& result, cons
             if (near[std::size_t(spring.node)]) continue;
             fold.judged.push_back(spring);
             fold.root.push_back(square_root(spring.stiffness));
-            const auto number = numbers.try_emplace(blocks[std::size_t(spring.node)], int(numbers.size())).first;
+            const auto [number, first] = numbers.try_emplace(parts[std::size_t(spring.node)], int(numbers.size()));
+            if (first) weights.push_back(0);
+            weights[std::size_t(number->second)] += fold.root.back().rowwise().squaredNorm().maxCoeff();
             block_of_.push_back(number->second);
         }
-        const auto& ground = result.pulls.ground;
-        fold.training.springs.insert(fold.training.springs.end(), ground.begin(), ground.end());
+        for (tled::Spring spring : result.pulls.ground) {
+            spring.stiffness *= ground_share;
+            fold.training.springs.push_back(spring);
+        }
     }
     block_count_ = int(numbers.size());
+    auto block = block_of_.begin();
+    for (Fold& fold : folds_)
+        for (Eigen::Matrix3d& root : fold.root) root /= std::sqrt(weights[std::size_t(*block++)]);
 }
 
 void HeldOut::take(const tled::MaterialTable& materials) {

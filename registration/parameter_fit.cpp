@@ -3,6 +3,7 @@
 #include "registration/parameter_fit.hpp"
 
 #include "registration/detail/doubts.hpp"
+#include "registration/detail/evidence.hpp"
 #include "registration/detail/fit_scalars.hpp"
 #include "registration/detail/held_out.hpp"
 #include "registration/detail/stopwatch.hpp"
@@ -39,13 +40,26 @@ double significance(std::size_t scalars) {
 /// The search over scalars, of which some are held at their given values.
 class Search {
 public:
-    Search(detail::HeldOut& held_out, const std::vector<FitScalar>& scalars, detail::Tissue given, Observer& observer)
-        : held_out_(held_out), scalars_(scalars), given_(std::move(given)), observer_(observer) {
-        misfit_given_ = misfit(VectorXd::Zero(Eigen::Index(scalars.size())));
+    Search(detail::HeldOut& held_out, const std::vector<FitScalar>& scalars, detail::Tissue given, double scale_mm,
+           Observer& observer)
+        : held_out_(held_out), scalars_(scalars), given_(std::move(given)), scale_mm_(scale_mm), observer_(observer) {
+        misfit_given_ = misfit(residuals(VectorXd::Zero(Eigen::Index(scalars.size()))));
     }
 
     [[nodiscard]] double misfit_given() const { return misfit_given_; }
-    [[nodiscard]] double misfit(const VectorXd& x) { return 0.5 * residuals(x).squaredNorm(); }
+    /// Squared misfit of each block, mm².
+    [[nodiscard]] VectorXd squared(const Eigen::Matrix3Xd& residuals) const {
+        VectorXd sums = VectorXd::Zero(held_out_.block_count());
+        for (std::size_t s = 0; s < held_out_.block_of().size(); ++s)
+            sums[held_out_.block_of()[s]] += residuals.col(Eigen::Index(s)).squaredNorm();
+        return sums;
+    }
+    /// ½ Σ s² d²/(s² + d²) over the blocks, mm²: support and other forces that no model knows act on some of them.
+    [[nodiscard]] double misfit(const Eigen::Matrix3Xd& residuals) const {
+        const Eigen::ArrayXd d2 = squared(residuals).array(), s2 = Eigen::ArrayXd::Constant(d2.size(), scale_mm_ * scale_mm_);
+        return 0.5 * (s2 * d2 / (s2 + d2)).sum();
+    }
+    [[nodiscard]] double scale_mm() const { return scale_mm_; }
     [[nodiscard]] detail::Tissue tissue(const VectorXd& x) const {
         detail::Tissue tissue = given_;
         for (std::size_t k = 0; k < scalars_.size(); ++k)
@@ -63,6 +77,7 @@ private:
     detail::HeldOut& held_out_;
     const std::vector<FitScalar>& scalars_;
     detail::Tissue given_;
+    double scale_mm_;
     Observer& observer_;
     double misfit_given_ = 0;
     std::exception_ptr stopped_;
@@ -81,7 +96,7 @@ double Search::cost(const VectorXd& x) {
     constexpr double of_failure = 1e3;
     observer_.checkpoint("parameter fit", std::min(1.0, double(evaluations_++) / most_evaluations_));
     try {
-        const double ratio = std::max(1e-12, misfit(x) / misfit_given_);
+        const double ratio = std::max(1e-12, misfit(residuals(x)) / misfit_given_);
         return 0.5 * held_out_.block_count() * std::log(ratio) + 0.5 * x.squaredNorm();
     } catch (const SolverFailure&) {
         return of_failure + x.squaredNorm();  // tissue that finds no rest under these loads
@@ -145,22 +160,27 @@ VectorXd derivative(Search& search, const FitScalar& scalar, VectorXd x, Eigen::
     return Eigen::Map<const VectorXd>(difference.data(), difference.size());
 }
 
-/// With the sensitivities S of the residuals r, φ the misfit per block, H = SᵀS/φ and G = Σ g gᵀ/φ² over the blocks'
-/// own slopes g = Sᵀr, the estimate scatters by (H + 1)⁻¹ (G + 1) (H + 1)⁻¹ (Liang and Zeger 1986; 1 is the prior):
-/// data of one block may err together, and by whatever size.
-MatrixXd covariance(const MatrixXd& sensitivity, const VectorXd& residuals, const detail::HeldOut& held_out) {
+/// With the sensitivities S of the residuals r, the weights w of the blocks, φ the misfit per block, H = SᵀwS/φ and
+/// G = Σ g gᵀ/φ² over the blocks' own slopes g = Sᵀwr, the estimate scatters by (H + 1)⁻¹ (G + 1) (H + 1)⁻¹ (Liang and
+/// Zeger 1986; 1 is the prior): data of one block may err together, and by whatever size.
+MatrixXd covariance(const Search& search, const detail::HeldOut& held_out, const MatrixXd& sensitivity,
+                    const Eigen::Matrix3Xd& residuals) {
     const Eigen::Index count = sensitivity.cols();
     const int blocks = held_out.block_count();
-    const double per_block = residuals.squaredNorm() / blocks;
-    MatrixXd slopes = MatrixXd::Zero(count, blocks);
+    const double per_block = 2 * search.misfit(residuals) / blocks;
+    const VectorXd squared = search.squared(residuals);
+    MatrixXd slopes = MatrixXd::Zero(count, blocks), curvature = MatrixXd::Zero(count, count);
     for (std::size_t s = 0; s < held_out.block_of().size(); ++s) {
-        const auto row = 3 * Eigen::Index(s);
-        slopes.col(held_out.block_of()[s]) += sensitivity.middleRows<3>(row).transpose() * residuals.segment<3>(row);
+        const int block = held_out.block_of()[s];
+        const double weight = detail::robust_weight(std::sqrt(squared[block]), search.scale_mm());
+        const auto rows = sensitivity.middleRows<3>(3 * Eigen::Index(s));
+        slopes.col(block) += weight * rows.transpose() * residuals.col(Eigen::Index(s));
+        curvature += weight * rows.transpose() * rows;
     }
     const MatrixXd one = MatrixXd::Identity(count, count);
     const double few = double(blocks) / std::max<double>(1, double(blocks - count));
     const MatrixXd scatter = few * slopes * slopes.transpose() / (per_block * per_block);
-    const MatrixXd inverse = (sensitivity.transpose() * sensitivity / per_block + one).inverse();
+    const MatrixXd inverse = (curvature / per_block + one).inverse();
     return inverse * (scatter + one) * inverse;
 }
 
@@ -173,10 +193,9 @@ Estimate estimate(Search& search, const detail::HeldOut& held_out, const std::ve
     for (std::size_t k = 0; k < active.size(); ++k)
         sensitivity.col(Eigen::Index(k)) =
             derivative(search, scalars[active[k]], result.x, Eigen::Index(active[k]));
-    result.covariance =
-        covariance(sensitivity, Eigen::Map<const VectorXd>(residuals.data(), residuals.size()), held_out);
+    result.covariance = covariance(search, held_out, sensitivity, residuals);
     result.improvement = 0.5 * held_out.block_count() *
-                         std::log(search.misfit_given() / std::max(1e-300, 0.5 * residuals.squaredNorm()));
+                         std::log(search.misfit_given() / std::max(1e-300, search.misfit(residuals)));
     return result;
 }
 
@@ -280,6 +299,12 @@ std::vector<FittedParameter> unfitted(const std::vector<FitScalar>& scalars, con
     return results;
 }
 
+double scale_of(const FitOptions& options, const UpdateResult& result) {
+    constexpr double deviations = 3, least_deviation_mm = 0.05;
+    if (options.scale_mm > 0) return options.scale_mm;
+    return deviations * std::max(least_deviation_mm, result.rounds.back().mean_residual_mm);
+}
+
 int label_in(const std::string& name, std::size_t colon) {
     int label = 0;
     const char *first = name.data() + colon + 1, *end = name.data() + name.size();
@@ -338,7 +363,7 @@ ParameterFit fit_parameters(const PreparedModel& prepared, const UpdateResult& r
                                            std::to_string(least_blocks) + " are needed to hold some out");
     if (fit.blocks < least_blocks || scalars.empty()) return fit;
 
-    Search search(held_out, scalars, {fit.materials, fit.loads}, observer);
+    Search search(held_out, scalars, {fit.materials, fit.loads}, scale_of(options, result), observer);
     std::vector<std::size_t> active(scalars.size());
     for (std::size_t k = 0; k < active.size(); ++k) active[k] = k;
     while (!active.empty()) {

@@ -14,7 +14,7 @@ namespace tissuewarp::registration::detail {
 
 /// The springs of the last round in two halves: cubes of space in the order of a chess board. Each half is left out in
 /// turn, and judged at those of its nodes that share no element with a node that pulls (a datum within an element pulls
-/// at all of its corners).
+/// at all of its corners). Blocks, by which the misfits are counted, have half the edge of the cubes.
 class HeldOut {
 public:
     HeldOut(const PreparedModel& prepared, const UpdateResult& result, const FitOptions& options);
@@ -24,8 +24,8 @@ public:
     /// Block of each judged spring.
     [[nodiscard]] const std::vector<int>& block_of() const { return block_of_; }
 
-    /// K^½ (u − target) of the judged springs, 3 × S, √(mN mm): half its squared norm is the misfit. Throws
-    /// SolverFailure, Cancelled.
+    /// Misfits u − target of the judged springs along what they pull, 3 × S, mm, weighed so that the squares of a block
+    /// add up to the mean over its springs by stiffness. Throws SolverFailure, Cancelled.
     [[nodiscard]] Eigen::Matrix3Xd residuals(const Tissue& tissue, Observer& observer);
 
     [[nodiscard]] int equilibria() const { return equilibria_; }
@@ -36,7 +36,7 @@ private:
     struct Fold {
         tled::Conditions training;          // without loads
         std::vector<tled::Spring> judged;
-        std::vector<Eigen::Matrix3d> root;  // K^½ of the judged
+        std::vector<Eigen::Matrix3d> root;  // what weighs the misfits of the judged
         std::optional<tled::RestStiffness> factor;
     };
     /// The materials that engine and factors are of.

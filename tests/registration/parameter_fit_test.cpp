@@ -41,7 +41,7 @@ imaging::Volume labels() {
 
 PrepareOptions coarse(double poissons_ratio, double ratio_of_ball = 1) {
     PrepareOptions options;
-    options.meshing.edge_length = 9;
+    options.meshing.edge_length = 7.5;
     options.materials[1] = tled::neo_hookean_lnj(3, poissons_ratio);
     options.materials[2] = tled::neo_hookean_lnj(3 * ratio_of_ball, poissons_ratio);
     return options;
@@ -49,9 +49,9 @@ PrepareOptions coarse(double poissons_ratio, double ratio_of_ball = 1) {
 
 /// What becomes of tissue whose nodes are held or moved at some places, under loads.
 struct Experiment {
-    Chosen held = [](const Vector3d& x) { return x[2] < -18; };
-    Chosen pressed = [](const Vector3d& x) { return x[2] > 18; };
-    Vector3d press{0, 0, -7};
+    Chosen held = [](const Vector3d& x) { return x[0] < -38; };
+    Chosen moved = [](const Vector3d& x) { return x[0] > 38; };
+    Vector3d motion{8, 0, -5};
     Matrix3Xd force;
 };
 
@@ -60,8 +60,8 @@ Matrix3Xd truth(const PreparedModel& tissue, const Experiment& experiment) {
     const Matrix3Xd& nodes = tissue.model.mesh.nodes;
     for (int n = 0; n < nodes.cols(); ++n) {
         if (experiment.held(nodes.col(n))) conditions.prescribed.push_back({n});
-        if (experiment.pressed(nodes.col(n)))
-            conditions.prescribed.push_back({n, {true, true, true}, experiment.press});
+        if (experiment.moved(nodes.col(n)))
+            conditions.prescribed.push_back({n, {true, true, true}, experiment.motion});
     }
     conditions.external_force = experiment.force;
     const auto nodal = tled::nodal_conditions(conditions, tissue.rest.node_count);
@@ -78,7 +78,7 @@ PointPairs pairs(const PreparedModel& tissue, const Matrix3Xd& displacement, con
     std::vector<int> chosen;
     for (int n = 0; n < tissue.rest.node_count; ++n)
         if (seen(tissue.model.mesh.nodes.col(n))) chosen.push_back(n);
-    PointPairs result{tissue.model.mesh.nodes(Eigen::all, chosen), {}, 0.1};
+    PointPairs result{tissue.model.mesh.nodes(Eigen::all, chosen), {}, 0.2};
     result.fixed = result.moving + displacement(Eigen::all, chosen);
     for (double& value : result.fixed.reshaped()) value += noise(random);
     return result;
@@ -122,7 +122,8 @@ TEST(ParameterFit, Stiffness) {
 TEST(ParameterFit, Gravity) {
     const auto prepared = prepare(labels(), coarse(0.45));
     Experiment sag;
-    sag.pressed = [](const Vector3d&) { return false; };
+    sag.held = [](const Vector3d& x) { return x[2] < -25; };
+    sag.moved = [](const Vector3d&) { return false; };
     const Vector3d gravity(0.4, -0.3, -0.6);
     sag.force = 9.80665e-3 * gravity * (prepared.rest.lumped_mass / prepared.model.density).transpose();
     const Matrix3Xd u = truth(prepared, sag);
