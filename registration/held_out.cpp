@@ -65,9 +65,8 @@ std::vector<tled::Spring> strong(std::vector<tled::Spring> springs) {
     constexpr double least_share = 0.02;
     double strongest = 0;
     for (const tled::Spring& spring : springs) strongest = std::max(strongest, spring.stiffness.trace());
-    std::erase_if(springs, [&](const tled::Spring& spring) {
-        return spring.stiffness.trace() < least_share * strongest;
-    });
+    std::erase_if(springs,
+                  [&](const tled::Spring& spring) { return spring.stiffness.trace() < least_share * strongest; });
     return springs;
 }
 
@@ -144,9 +143,9 @@ Eigen::Matrix3Xd HeldOut::displacement(Fold& fold, const Eigen::Matrix3Xd& loads
     tled::EquilibriumOptions options;
     options.tolerance_mm = tolerance_mm_;
     options.method = tled::EquilibriumMethod::Lbfgs;
-    const auto solved = tled::equilibrium(*current_.engine, *fold.factor,
-                                          tled::nodal_conditions(conditions, prepared_.rest.node_count), options,
-                                          &start_, observer);
+    const auto solved =
+        tled::equilibrium(*current_.engine, *fold.factor, tled::nodal_conditions(conditions, prepared_.rest.node_count),
+                          options, &start_, observer);
     ++equilibria_;
     force_evaluations_ += solved.force_evaluations;
     return solved.displacement;

@@ -26,13 +26,13 @@ using detail::FitScalar;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int least_blocks = 8;             // fewer say nothing of their own scatter
-constexpr double most_of_prior = 0.5;       // deviation that a parameter seen by the data keeps
+constexpr int least_blocks = 8;        // fewer say nothing of their own scatter
+constexpr double most_of_prior = 0.5;  // deviation that a parameter seen by the data keeps
 constexpr double most_correlation = 0.95;
-constexpr double least_improvement = 2;     // of the logarithm of the likelihood
-constexpr double derivative_step = 0.1;     // prior deviations
+constexpr double least_improvement = 1.645;  // of the held-out misfit, in deviations of its scatter over blocks
+constexpr double derivative_step = 0.1;      // prior deviations
 
-/// log χ² quantiles of 95 % for one and three scalars.
+/// χ² quantiles of 95 % for one and three scalars.
 double significance(std::size_t scalars) {
     return scalars == 1 ? 3.84 : 7.81;
 }
@@ -43,10 +43,9 @@ public:
     Search(detail::HeldOut& held_out, const std::vector<FitScalar>& scalars, detail::Tissue given, double scale_mm,
            Observer& observer)
         : held_out_(held_out), scalars_(scalars), given_(std::move(given)), scale_mm_(scale_mm), observer_(observer) {
-        misfit_given_ = misfit(residuals(VectorXd::Zero(Eigen::Index(scalars.size()))));
+        given_by_block_ = misfits(residuals(VectorXd::Zero(Eigen::Index(scalars.size()))));
     }
 
-    [[nodiscard]] double misfit_given() const { return misfit_given_; }
     /// Squared misfit of each block, mm².
     [[nodiscard]] VectorXd squared(const Eigen::Matrix3Xd& residuals) const {
         VectorXd sums = VectorXd::Zero(held_out_.block_count());
@@ -54,11 +53,12 @@ public:
             sums[held_out_.block_of()[s]] += residuals.col(Eigen::Index(s)).squaredNorm();
         return sums;
     }
-    /// ½ Σ s² d²/(s² + d²) over the blocks, mm²: support and other forces that no model knows act on some of them.
-    [[nodiscard]] double misfit(const Eigen::Matrix3Xd& residuals) const {
-        const Eigen::ArrayXd d2 = squared(residuals).array(), s2 = Eigen::ArrayXd::Constant(d2.size(), scale_mm_ * scale_mm_);
-        return 0.5 * (s2 * d2 / (s2 + d2)).sum();
+    /// ½ s² d²/(s² + d²) of each block, mm²: support and other forces that no model knows act on some of them.
+    [[nodiscard]] VectorXd misfits(const Eigen::Matrix3Xd& residuals) const {
+        const double s2 = scale_mm_ * scale_mm_;
+        return squared(residuals).unaryExpr([s2](double d2) { return 0.5 * s2 * d2 / (s2 + d2); });
     }
+    [[nodiscard]] const VectorXd& given_by_block() const { return given_by_block_; }
     [[nodiscard]] double scale_mm() const { return scale_mm_; }
     [[nodiscard]] detail::Tissue tissue(const VectorXd& x) const {
         detail::Tissue tissue = given_;
@@ -66,9 +66,7 @@ public:
             if (x[Eigen::Index(k)] != 0) scalars_[k].apply(x[Eigen::Index(k)], tissue);
         return tissue;
     }
-    [[nodiscard]] Eigen::Matrix3Xd residuals(const VectorXd& x) {
-        return held_out_.residuals(tissue(x), observer_);
-    }
+    [[nodiscard]] Eigen::Matrix3Xd residuals(const VectorXd& x) { return held_out_.residuals(tissue(x), observer_); }
 
     /// The best values of the active scalars, the others at 0.
     VectorXd minimise(const std::vector<std::size_t>& active);
@@ -79,7 +77,7 @@ private:
     detail::Tissue given_;
     double scale_mm_;
     Observer& observer_;
-    double misfit_given_ = 0;
+    VectorXd given_by_block_;
     std::exception_ptr stopped_;
     int evaluations_ = 0, most_evaluations_ = 0;
 
@@ -96,7 +94,7 @@ double Search::cost(const VectorXd& x) {
     constexpr double of_failure = 1e3;
     observer_.checkpoint("parameter fit", std::min(1.0, double(evaluations_++) / most_evaluations_));
     try {
-        const double ratio = std::max(1e-12, misfit(residuals(x)) / misfit_given_);
+        const double ratio = std::max(1e-12, misfits(residuals(x)).sum() / given_by_block_.sum());
         return 0.5 * held_out_.block_count() * std::log(ratio) + 0.5 * x.squaredNorm();
     } catch (const SolverFailure&) {
         return of_failure + x.squaredNorm();  // tissue that finds no rest under these loads
@@ -144,9 +142,10 @@ VectorXd Search::minimise(const std::vector<std::size_t>& active) {
 
 /// Estimates of the active scalars with their covariance, in prior deviations.
 struct Estimate {
-    VectorXd x;           // of all scalars
-    MatrixXd covariance;  // of the active ones
-    double improvement = 0;  // of the logarithm of the likelihood
+    VectorXd x;               // of all scalars
+    MatrixXd covariance;      // of the active ones
+    double misfit_ratio = 1;  // of the held-out data, over that with the given values
+    double improvement = 0;   // of this misfit, in deviations of its scatter over blocks
 };
 
 /// ∂ residuals / ∂ x_k by differences that stay within the bounds.
@@ -167,7 +166,7 @@ MatrixXd covariance(const Search& search, const detail::HeldOut& held_out, const
                     const Eigen::Matrix3Xd& residuals) {
     const Eigen::Index count = sensitivity.cols();
     const int blocks = held_out.block_count();
-    const double per_block = 2 * search.misfit(residuals) / blocks;
+    const double per_block = 2 * search.misfits(residuals).sum() / blocks;
     const VectorXd squared = search.squared(residuals);
     MatrixXd slopes = MatrixXd::Zero(count, blocks), curvature = MatrixXd::Zero(count, count);
     for (std::size_t s = 0; s < held_out.block_of().size(); ++s) {
@@ -191,11 +190,13 @@ Estimate estimate(Search& search, const detail::HeldOut& held_out, const std::ve
     const Eigen::Matrix3Xd residuals = search.residuals(result.x);
     MatrixXd sensitivity(residuals.size(), Eigen::Index(active.size()));
     for (std::size_t k = 0; k < active.size(); ++k)
-        sensitivity.col(Eigen::Index(k)) =
-            derivative(search, scalars[active[k]], result.x, Eigen::Index(active[k]));
+        sensitivity.col(Eigen::Index(k)) = derivative(search, scalars[active[k]], result.x, Eigen::Index(active[k]));
     result.covariance = covariance(search, held_out, sensitivity, residuals);
-    result.improvement = 0.5 * held_out.block_count() *
-                         std::log(search.misfit_given() / std::max(1e-300, search.misfit(residuals)));
+    const VectorXd after = search.misfits(residuals), gain = search.given_by_block() - after;
+    const double scatter =
+        std::sqrt(double(gain.size()) / double(gain.size() - 1)) * (gain.array() - gain.mean()).matrix().norm();
+    result.misfit_ratio = after.sum() / search.given_by_block().sum();
+    result.improvement = scatter > 0 ? gain.sum() / scatter : 0;
     return result;
 }
 
@@ -273,7 +274,8 @@ private:
         for (std::size_t k = 0; k < active_.size(); ++k) {
             const FitScalar& scalar = scalars_[active_[k]];
             if (std::min(x(k) - scalar.least, scalar.most - x(k)) < at_end)
-                reject(k, FitOutcome::AtBound, "the data ask for more than is admitted; the model lacks something else");
+                reject(k, FitOutcome::AtBound,
+                       "the data ask for more than is admitted; the model lacks something else");
         }
     }
     /// Scalars of one parameter together: a vector's direction is not bent by dropping what is small of it.
@@ -295,7 +297,8 @@ private:
 std::vector<FittedParameter> unfitted(const std::vector<FitScalar>& scalars, const std::string& reason) {
     std::vector<FittedParameter> results;
     for (const FitScalar& scalar : scalars)
-        results.push_back({scalar.name, scalar.unit, scalar.given, scalar.given, scalar.slope(0), FitOutcome::NotSeen, reason});
+        results.push_back(
+            {scalar.name, scalar.unit, scalar.given, scalar.given, scalar.slope(0), FitOutcome::NotSeen, reason});
     return results;
 }
 
@@ -354,14 +357,15 @@ ParameterFit fit_parameters(const PreparedModel& prepared, const UpdateResult& r
                             const FitOptions& options, Observer& observer) {
     detail::Stopwatch stopwatch;
     const std::vector<FitScalar> scalars = detail::fit_scalars(prepared, update.loads, options);
-    detail::HeldOut held_out(prepared, result, options);
     ParameterFit fit;
     fit.materials = prepared.model.materials;
     fit.loads = update.loads;
+    if (scalars.empty()) return fit;
+    detail::HeldOut held_out(prepared, result, options);
     fit.blocks = held_out.block_count();
     fit.parameters = unfitted(scalars, "the data lie in " + std::to_string(fit.blocks) + " blocks of space; " +
                                            std::to_string(least_blocks) + " are needed to hold some out");
-    if (fit.blocks < least_blocks || scalars.empty()) return fit;
+    if (fit.blocks < least_blocks) return fit;
 
     Search search(held_out, scalars, {fit.materials, fit.loads}, scale_of(options, result), observer);
     std::vector<std::size_t> active(scalars.size());
@@ -373,7 +377,7 @@ ParameterFit fit_parameters(const PreparedModel& prepared, const UpdateResult& r
             const detail::Tissue tissue = search.tissue(found.x);
             fit.materials = tissue.materials;
             fit.loads = tissue.loads;
-            fit.misfit_ratio = std::exp(-2 * found.improvement / fit.blocks);
+            fit.misfit_ratio = found.misfit_ratio;
             break;
         }
         active = kept;
@@ -386,6 +390,7 @@ ParameterFit fit_parameters(const PreparedModel& prepared, const UpdateResult& r
 
 FittedUpdate update_and_fit(PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options,
                             const FitOptions& fit_options, Observer& observer) {
+    static_cast<void>(detail::fit_scalars(prepared, options.loads, fit_options));  // throws before the work
     FittedUpdate fitted{update(prepared, seen, options, observer), {}};
     fitted.fit = fit_parameters(prepared, fitted.result, options, fit_options, observer);
     if (!fitted.fit.any_identified()) return fitted;

@@ -29,9 +29,9 @@ std::string name_of(const FitParameter& parameter);
 
 struct FitOptions {
     std::vector<FitParameter> parameters;
-    double cube_mm = 25;     ///< edge of the cubes of space that are held out; three edges of the mesh where longer
-    double scale_mm = 0;     ///< Geman–McClure scale of a block's misfit; 0: three times what the data differ from the
-                             ///< registered model, at least 0.15 mm
+    double cube_mm = 25;  ///< edge of the cubes of space that are held out; three edges of the mesh where longer
+    double scale_mm = 0;  ///< Geman–McClure scale of a block's misfit; 0: three times what the data differ from the
+                          ///< registered model, at least 0.15 mm
     double tolerance_mm = 0.002;  ///< of the equilibria; differences between them are what is fitted
 };
 
@@ -69,7 +69,7 @@ struct ParameterFit {
 
 /// Fits after `update`, whose `result` it takes: minimises what data of one half of the cubes miss of the tissue that
 /// the other half pulls (cross-validation over blocks of space: Roberts et al. 2017), and says of each parameter
-/// whether the data tell it. docs/method.md, section 10.
+/// whether the data tell it. docs/method.md, section 12.
 ///
 /// Throws InvalidInput for a label or a law that cannot be fitted, Cancelled.
 ParameterFit fit_parameters(const PreparedModel& prepared, const UpdateResult& result, const UpdateOptions& update,

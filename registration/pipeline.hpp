@@ -130,8 +130,9 @@ struct TissuePrior {
 /// What acts on the tissue in the operating room and did not when the preoperative image was taken. Only its size
 /// relative to Young's modulus tells in a displacement.
 struct TissueLoads {
-    Eigen::Vector3d body_force = Eigen::Vector3d::Zero();  ///< ρ times the change of gravity, mN/mm³ in the moving frame
-    double pressure_kpa = 0;  ///< on the model's outer surface at rest; above 0 it presses inward
+    Eigen::Vector3d body_force =
+        Eigen::Vector3d::Zero();  ///< ρ times the change of gravity, mN/mm³ in the moving frame
+    double pressure_kpa = 0;      ///< on the model's outer surface at rest; above 0 it presses inward
 };
 
 /// How points of a surface are weighed.

@@ -17,10 +17,10 @@ struct FitScalar {
     std::string name, unit;
     TissueParameter kind = TissueParameter::PoissonsRatio;
     int label = 0, axis = 0;
-    double given = 0;            ///< in `unit`
-    double deviation = 1;        ///< of the prior: of the logarithm for a stiffness ratio, otherwise in `unit`
+    double given = 0;             ///< in `unit`
+    double deviation = 1;         ///< of the prior: of the logarithm for a stiffness ratio, otherwise in `unit`
     double least = -4, most = 4;  ///< of x
-    double to_load = 1;          ///< from `unit` to mN/mm³ or kPa, for loads
+    double to_load = 1;           ///< from `unit` to mN/mm³ or kPa, for loads
 
     /// In `unit`.
     [[nodiscard]] double value(double x) const;

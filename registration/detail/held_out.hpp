@@ -34,7 +34,7 @@ public:
 private:
     /// One half of the data left out.
     struct Fold {
-        tled::Conditions training;          // without loads
+        tled::Conditions training;  // without loads
         std::vector<tled::Spring> judged;
         std::vector<Eigen::Matrix3d> root;  // what weighs the misfits of the judged
         std::optional<tled::RestStiffness> factor;
