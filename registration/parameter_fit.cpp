@@ -308,6 +308,26 @@ double scale_of(const FitOptions& options, const UpdateResult& result) {
     return deviations * std::max(least_deviation_mm, result.rounds.back().mean_residual_mm);
 }
 
+/// Fits all, then without those that the data do not tell, until the data tell the rest. Throws SolverFailure.
+void fit_active(detail::HeldOut& held_out, const std::vector<FitScalar>& scalars, double scale_mm, ParameterFit& fit,
+                Observer& observer) {
+    Search search(held_out, scalars, {fit.materials, fit.loads}, scale_mm, observer);
+    std::vector<std::size_t> active(scalars.size());
+    for (std::size_t k = 0; k < active.size(); ++k) active[k] = k;
+    while (!active.empty()) {
+        const Estimate found = estimate(search, held_out, scalars, active);
+        const std::vector<std::size_t> kept = Judgement(scalars, active, found, fit.parameters).kept();
+        if (kept.size() == active.size()) {
+            const detail::Tissue tissue = search.tissue(found.x);
+            fit.materials = tissue.materials;
+            fit.loads = tissue.loads;
+            fit.misfit_ratio = found.misfit_ratio;
+            break;
+        }
+        active = kept;
+    }
+}
+
 int label_in(const std::string& name, std::size_t colon) {
     int label = 0;
     const char *first = name.data() + colon + 1, *end = name.data() + name.size();
@@ -367,20 +387,10 @@ ParameterFit fit_parameters(const PreparedModel& prepared, const UpdateResult& r
                                            std::to_string(least_blocks) + " are needed to hold some out");
     if (fit.blocks < least_blocks) return fit;
 
-    Search search(held_out, scalars, {fit.materials, fit.loads}, scale_of(options, result), observer);
-    std::vector<std::size_t> active(scalars.size());
-    for (std::size_t k = 0; k < active.size(); ++k) active[k] = k;
-    while (!active.empty()) {
-        const Estimate found = estimate(search, held_out, scalars, active);
-        const std::vector<std::size_t> kept = Judgement(scalars, active, found, fit.parameters).kept();
-        if (kept.size() == active.size()) {
-            const detail::Tissue tissue = search.tissue(found.x);
-            fit.materials = tissue.materials;
-            fit.loads = tissue.loads;
-            fit.misfit_ratio = found.misfit_ratio;
-            break;
-        }
-        active = kept;
+    try {
+        fit_active(held_out, scalars, scale_of(options, result), fit, observer);
+    } catch (const SolverFailure&) {
+        fit.parameters = unfitted(scalars, "tissue finds no equilibrium while part of the data is held out");
     }
     fit.equilibria = held_out.equilibria();
     fit.force_evaluations = held_out.force_evaluations();
