@@ -90,6 +90,25 @@ Intraoperative seen(const RegistrationInputs& inputs, const RegisterOptions& opt
     return seen;
 }
 
+FitOptions fit_options(const RegisterOptions& options) {
+    FitOptions result;
+    for (const std::string& name : options.fit) result.parameters.push_back(fit_parameter(name));
+    return result;
+}
+
+void append(std::vector<StageTime>& times, const std::vector<StageTime>& more) {
+    times.insert(times.end(), more.begin(), more.end());
+}
+
+void register_model(RegistrationRun& run, const FitOptions& to_fit, ProgressLine& progress) {
+    FittedUpdate fitted =
+        update_and_fit(*run.prepared, seen(run.inputs, run.options), update_options(run.options), to_fit, progress);
+    run.result = std::move(fitted.result);
+    run.fit = std::move(fitted.fit);
+    append(run.times, run.result.times);
+    if (!to_fit.parameters.empty()) run.times.push_back({"parameter fit", run.fit.seconds});
+}
+
 void make_fields(RegistrationRun& run, ProgressLine& progress) {
     const FieldOptions options{run.options.fade};
     const Deformation& deformation = run.result.deformation;
@@ -135,16 +154,13 @@ Scores score(const RegistrationRun& run) {
     return scores;
 }
 
-void append(std::vector<StageTime>& times, const std::vector<StageTime>& more) {
-    times.insert(times.end(), more.begin(), more.end());
-}
-
 }  // namespace
 
 void run_register(const RegisterOptions& options) {
     StageClock clock;
     ProgressLine progress(options.common.quiet);
-    RegistrationRun run{options, utc_now(), {}, {}, {}, {}, {}, {}, {}};
+    const FitOptions to_fit = fit_options(options);
+    RegistrationRun run{options, utc_now(), {}, {}, {}, {}, {}, {}, {}, {}};
 
     if (options.dry_run) require_could_write(options.output);
     if (!options.save_parameters.empty()) require_could_write_file(options.save_parameters);
@@ -167,8 +183,7 @@ void run_register(const RegisterOptions& options) {
     append(run.times, run.prepared->times);
 
     progress.begin("registering", 0.20, 0.47);
-    run.result = update(*run.prepared, seen(run.inputs, options), update_options(options), progress);
-    append(run.times, run.result.times);
+    register_model(run, to_fit, progress);
     clock.lap("");
 
     make_fields(run, progress);

@@ -76,6 +76,18 @@ std::string summary_row(const std::string& name, const registration::Summary& s)
                        s.percentile_95, s.maximum);
 }
 
+std::string fit_table(const registration::ParameterFit& fit) {
+    if (fit.parameters.empty()) return "";
+    std::string text = "fitted parameters         given  fitted     +/-\n";
+    for (const registration::FittedParameter& each : fit.parameters) {
+        const std::string unit = each.unit.empty() ? "" : " (" + each.unit + ")";
+        const double used = each.identified() ? each.fitted : each.given;
+        text += fmt::format("  {:<22}{:>8.3g}{:>8.3g}{:>8.2g}  {}: {}{}\n", each.name, each.given, used, each.deviation,
+                            each.identified() ? "fitted" : "left alone", each.reason, unit);
+    }
+    return text;
+}
+
 }  // namespace
 
 std::vector<std::string> output_names(const RegisterOptions& options) {
@@ -156,6 +168,7 @@ std::string summary_text(const RegistrationRun& run, double total_seconds) {
     if (const auto& expected = run.result.expected)
         text += fmt::format("expected error of tissue: {:.1f} mm, at most {:.1f} mm\n", expected->mean_mm,
                             expected->worst_mm);
+    text += fit_table(run.fit);
     if (!run.scores.after.empty()) text += "Dice                      before   after\n";
     for (const auto& [label, after] : run.scores.after)
         text += fmt::format("  {:<22}{:>8.3f}{:>8.3f}\n", label == 0 ? "all labels" : fmt::format("label {}", label),

@@ -3,7 +3,7 @@
 
 #include "apps/inputs.hpp"
 #include "meshing/quality.hpp"
-#include "registration/pipeline.hpp"
+#include "registration/parameter_fit.hpp"
 
 #include <chrono>
 #include <memory>
@@ -32,6 +32,7 @@ struct RegistrationRun {
     RegistrationInputs inputs;
     std::unique_ptr<registration::PreparedModel> prepared;
     registration::UpdateResult result;
+    registration::ParameterFit fit;  ///< without parameters where none was asked for
     Products products;
     Scores scores;
     std::vector<registration::StageTime> times;

@@ -162,6 +162,24 @@ void add_fits(json& report, const registration::UpdateResult& result) {
                                     {"worst_place_mm", vector(expected->worst_place)}};
 }
 
+json fitted(const registration::ParameterFit& fit) {
+    json list = json::array();
+    for (const registration::FittedParameter& each : fit.parameters)
+        list.push_back({{"name", each.name},
+                        {"unit", each.unit},
+                        {"given", number(each.given)},
+                        {"best", number(each.fitted)},
+                        {"used", number(each.identified() ? each.fitted : each.given)},
+                        {"deviation", number(each.deviation)},
+                        {"identified", each.identified()},
+                        {"reason", each.reason}});
+    return {{"parameters", list},
+            {"held_out_misfit_ratio", number(fit.misfit_ratio)},
+            {"blocks", fit.blocks},
+            {"equilibria", fit.equilibria},
+            {"seconds", number(fit.seconds)}};
+}
+
 }  // namespace
 
 void write_json(const json& document, const std::filesystem::path& path) {
@@ -270,6 +288,7 @@ json report_json(const RegistrationRun& run, double total_seconds) {
     if (!scores.after.empty())
         report["overlap"] = {{"before", to_json(scores.before)}, {"after", to_json(scores.after)}};
     add_fits(report, run.result);
+    if (!run.fit.parameters.empty()) report["fit"] = fitted(run.fit);
     if (scores.target_error) report["target_registration_error"] = to_json(*scores.target_error);
     return report;
 }

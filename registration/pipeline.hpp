@@ -95,6 +95,10 @@ PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions
 PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_labels, const PrepareOptions& options = {},
                       Observer& observer = silent_observer());
 
+/// The same model of other tissue: rest state and factor are made anew. Throws InvalidInput for materials that do not
+/// fit the model.
+PreparedModel with_materials(PreparedModel prepared, const tled::MaterialTable& materials);
+
 /// Adds what registering to a bare intraoperative volume takes: blocks of the preoperative image about feature points
 /// in and near the labels. Throws InvalidInput, Cancelled.
 void prepare_image(PreparedModel& prepared, const imaging::Volume& moving, const ImageModelOptions& options = {},
@@ -123,6 +127,14 @@ struct TissuePrior {
     double held_motion_mm = 5;      ///< the same where the images are in one frame: what is around holds the organ
 };
 
+/// What acts on the tissue in the operating room and did not when the preoperative image was taken. Only its size
+/// relative to Young's modulus tells in a displacement.
+struct TissueLoads {
+    Eigen::Vector3d body_force =
+        Eigen::Vector3d::Zero();  ///< ρ times the change of gravity, mN/mm³ in the moving frame
+    double pressure_kpa = 0;      ///< on the model's outer surface at rest; above 0 it presses inward
+};
+
 /// How points of a surface are weighed.
 struct SurfaceOptions {
     double patch_mm = 10;           ///< size of a piece of surface whose points say one thing together
@@ -138,6 +150,7 @@ struct PointOptions {
 struct UpdateOptions {
     ImageOptions image;
     TissuePrior tissue;
+    TissueLoads loads;
     SurfaceOptions surface;
     PointOptions points;
     AlignmentOptions alignment;
@@ -211,10 +224,17 @@ struct ExpectedError {
     Eigen::Vector3d worst_place = Eigen::Vector3d::Zero();  ///< moving frame, LPS mm
 };
 
+/// What pulled at the tissue in the last round.
+struct LastPulls {
+    std::vector<tled::Spring> data, ground;
+    Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();  ///< moving → fixed, as it was in that round
+};
+
 struct UpdateResult {
     Deformation deformation;
     Alignment alignment;
     std::vector<Round> rounds;
+    LastPulls pulls;
     std::string engine;  ///< description of the device that solved
     double min_jacobian = 1;
     std::optional<ImageFit> image;          ///< where a bare volume was given

@@ -83,6 +83,14 @@ PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_label
             std::move(stiffness), std::move(times), std::nullopt, std::move(neighbours)};
 }
 
+PreparedModel with_materials(PreparedModel prepared, const tled::MaterialTable& materials) {
+    prepared.model.materials = prepared.options.materials = materials;
+    prepared.rest = tled::rest_state(prepared.model);
+    const auto springs = detail::full_weight_springs(prepared.interfaces, prepared.options);
+    prepared.stiffness = tled::RestStiffness(prepared.rest, tled::nodal_conditions(springs, prepared.rest.node_count));
+    return prepared;
+}
+
 void prepare_image(PreparedModel& prepared, const imaging::Volume& moving, const ImageModelOptions& options,
                    Observer& observer) {
     detail::Stopwatch stopwatch;

@@ -11,6 +11,7 @@
 #include "registration/detail/ground.hpp"
 #include "registration/detail/image_evidence.hpp"
 #include "registration/detail/label_evidence.hpp"
+#include "registration/detail/loads.hpp"
 #include "registration/detail/point_evidence.hpp"
 #include "registration/detail/rigid_part.hpp"
 #include "registration/detail/stopwatch.hpp"
@@ -83,6 +84,7 @@ public:
           observer_(observer),
           engine_(detail::make_engine(prepared, options, observer)),
           equilibrium_(options.equilibrium),
+          loads_(detail::nodal_forces(prepared, options.loads)),
           step_mm_(options.most_step_mm),
           state_{result.alignment.placement, Eigen::Matrix3Xd::Zero(3, prepared.rest.node_count)} {
         result_.engine = engine_->description();
@@ -118,6 +120,7 @@ private:
     Observer& observer_;
     std::unique_ptr<tled::Engine> engine_;
     tled::EquilibriumOptions equilibrium_;
+    Eigen::Matrix3Xd loads_;  // mN, 3 × N
     double step_mm_;
     detail::State state_;
     /// Data other than labels pull with other springs than those that the model was prepared with: a factor made with
@@ -217,6 +220,8 @@ private:
         detail::Stopwatch stopwatch;
         const detail::RoundPlan plan = plan_of(round);
         detail::Contribution data = evidence_.contribution(plan, state_);
+        result_.pulls = {data.conditions.springs, evidence_.ground, state_.placement};
+        data.conditions.external_force = loads_;
         data.conditions.springs.insert(data.conditions.springs.end(), evidence_.ground.begin(), evidence_.ground.end());
         const auto conditions = tled::nodal_conditions(data.conditions, prepared_.rest.node_count);
         Round record;
