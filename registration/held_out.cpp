@@ -104,6 +104,7 @@ HeldOut::HeldOut(const PreparedModel& prepared, const UpdateResult& result, cons
             weights[std::size_t(number->second)] += fold.root.back().rowwise().squaredNorm().maxCoeff();
             block_of_.push_back(number->second);
         }
+        for (const tled::Spring& spring : result.pulls.supports) fold.training.springs.push_back(spring);
         for (tled::Spring spring : result.pulls.ground) {
             spring.stiffness *= ground_share;
             fold.training.springs.push_back(spring);

@@ -2,297 +2,20 @@
 
 #include "registration/parameter_fit.hpp"
 
-#include "registration/detail/doubts.hpp"
-#include "registration/detail/evidence.hpp"
-#include "registration/detail/fit_scalars.hpp"
-#include "registration/detail/held_out.hpp"
+#include "registration/detail/fit_judgement.hpp"
 #include "registration/detail/stopwatch.hpp"
-
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
-#include <nlopt.hpp>
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <exception>
-#include <map>
 
 namespace tissuewarp::registration {
 
 namespace {
 
+constexpr int least_blocks = 8;  // fewer say nothing of their own scatter
+
 using detail::FitScalar;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
-constexpr int least_blocks = 8;        // fewer say nothing of their own scatter
-constexpr double most_of_prior = 0.5;  // deviation that a parameter seen by the data keeps
-constexpr double most_correlation = 0.95;
-constexpr double least_improvement = 1.645;  // of the held-out misfit, in deviations of its scatter over blocks
-constexpr double derivative_step = 0.1;      // prior deviations
-
-/// χ² quantiles of 95 % for one and three scalars.
-double significance(std::size_t scalars) {
-    return scalars == 1 ? 3.84 : 7.81;
-}
-
-/// The search over scalars, of which some are held at their given values.
-class Search {
-public:
-    Search(detail::HeldOut& held_out, const std::vector<FitScalar>& scalars, detail::Tissue given, double scale_mm,
-           Observer& observer)
-        : held_out_(held_out), scalars_(scalars), given_(std::move(given)), scale_mm_(scale_mm), observer_(observer) {
-        given_by_block_ = misfits(residuals(VectorXd::Zero(Eigen::Index(scalars.size()))));
-    }
-
-    /// Squared misfit of each block, mm².
-    [[nodiscard]] VectorXd squared(const Eigen::Matrix3Xd& residuals) const {
-        VectorXd sums = VectorXd::Zero(held_out_.block_count());
-        for (std::size_t s = 0; s < held_out_.block_of().size(); ++s)
-            sums[held_out_.block_of()[s]] += residuals.col(Eigen::Index(s)).squaredNorm();
-        return sums;
-    }
-    /// ½ s² d²/(s² + d²) of each block, mm²: support and other forces that no model knows act on some of them.
-    [[nodiscard]] VectorXd misfits(const Eigen::Matrix3Xd& residuals) const {
-        const double s2 = scale_mm_ * scale_mm_;
-        return squared(residuals).unaryExpr([s2](double d2) { return 0.5 * s2 * d2 / (s2 + d2); });
-    }
-    [[nodiscard]] const VectorXd& given_by_block() const { return given_by_block_; }
-    [[nodiscard]] double scale_mm() const { return scale_mm_; }
-    [[nodiscard]] detail::Tissue tissue(const VectorXd& x) const {
-        detail::Tissue tissue = given_;
-        for (std::size_t k = 0; k < scalars_.size(); ++k)
-            if (x[Eigen::Index(k)] != 0) scalars_[k].apply(x[Eigen::Index(k)], tissue);
-        return tissue;
-    }
-    [[nodiscard]] Eigen::Matrix3Xd residuals(const VectorXd& x) { return held_out_.residuals(tissue(x), observer_); }
-
-    /// The best values of the active scalars, the others at 0.
-    VectorXd minimise(const std::vector<std::size_t>& active);
-
-private:
-    detail::HeldOut& held_out_;
-    const std::vector<FitScalar>& scalars_;
-    detail::Tissue given_;
-    double scale_mm_;
-    Observer& observer_;
-    VectorXd given_by_block_;
-    std::exception_ptr stopped_;
-    int evaluations_ = 0, most_evaluations_ = 0;
-
-    [[nodiscard]] VectorXd spread(const std::vector<std::size_t>& active, const double* values) const {
-        VectorXd x = VectorXd::Zero(Eigen::Index(scalars_.size()));
-        for (std::size_t k = 0; k < active.size(); ++k) x[Eigen::Index(active[k])] = values[k];
-        return x;
-    }
-    double cost(const VectorXd& x);
-};
-
-/// ½ n log J + ½ ‖x‖²: the likelihood of n normal misfits of unknown variance, at its best variance J/n.
-double Search::cost(const VectorXd& x) {
-    constexpr double of_failure = 1e3;
-    observer_.checkpoint("parameter fit", std::min(1.0, double(evaluations_++) / most_evaluations_));
-    try {
-        const double ratio = std::max(1e-12, misfits(residuals(x)).sum() / given_by_block_.sum());
-        return 0.5 * held_out_.block_count() * std::log(ratio) + 0.5 * x.squaredNorm();
-    } catch (const SolverFailure&) {
-        return of_failure + x.squaredNorm();  // tissue that finds no rest under these loads
-    }
-}
-
-VectorXd Search::minimise(const std::vector<std::size_t>& active) {
-    struct Call {
-        Search& search;
-        const std::vector<std::size_t>& active;
-    } call{*this, active};
-    const auto objective = [](unsigned, const double* values, double*, void* data) {
-        const Call& self = *static_cast<Call*>(data);
-        try {
-            return self.search.cost(self.search.spread(self.active, values));
-        } catch (...) {
-            self.search.stopped_ = std::current_exception();
-            throw nlopt::forced_stop();
-        }
-    };
-    nlopt::opt optimiser(nlopt::LN_BOBYQA, unsigned(active.size()));
-    optimiser.set_min_objective(objective, &call);
-    std::vector<double> least, most, x(active.size(), 0.0);
-    for (const std::size_t k : active) {
-        least.push_back(scalars_[k].least);
-        most.push_back(scalars_[k].most);
-    }
-    optimiser.set_lower_bounds(least);
-    optimiser.set_upper_bounds(most);
-    optimiser.set_initial_step(0.5);
-    optimiser.set_xtol_abs(0.01);
-    evaluations_ = 0;
-    most_evaluations_ = 20 + 20 * int(active.size());
-    optimiser.set_maxeval(most_evaluations_);
-    double value = 0;
-    try {
-        optimiser.optimize(x, value);
-    } catch (const nlopt::roundoff_limited&) {
-        // The best point so far is in x: as good as this cost can be resolved.
-    } catch (const nlopt::forced_stop&) {
-        std::rethrow_exception(stopped_);
-    }
-    return spread(active, x.data());
-}
-
-/// Estimates of the active scalars with their covariance, in prior deviations.
-struct Estimate {
-    VectorXd x;               // of all scalars
-    MatrixXd covariance;      // of the active ones
-    double misfit_ratio = 1;  // of the held-out data, over that with the given values
-    double improvement = 0;   // of this misfit, in deviations of its scatter over blocks
-};
-
-/// ∂ residuals / ∂ x_k by differences that stay within the bounds.
-VectorXd derivative(Search& search, const FitScalar& scalar, VectorXd x, Eigen::Index k) {
-    const double at = x[k], above = std::min(scalar.most, at + derivative_step),
-                 below = std::max(scalar.least, at - derivative_step);
-    x[k] = above;
-    const Eigen::Matrix3Xd high = search.residuals(x);
-    x[k] = below;
-    const Eigen::Matrix3Xd difference = (high - search.residuals(x)) / (above - below);
-    return Eigen::Map<const VectorXd>(difference.data(), difference.size());
-}
-
-/// With the sensitivities S of the residuals r, the weights w of the blocks, φ the misfit per block, H = SᵀwS/φ and
-/// G = Σ g gᵀ/φ² over the blocks' own slopes g = Sᵀwr, the estimate scatters by (H + 1)⁻¹ (G + 1) (H + 1)⁻¹ (Liang and
-/// Zeger 1986; 1 is the prior): data of one block may err together, and by whatever size.
-MatrixXd covariance(const Search& search, const detail::HeldOut& held_out, const MatrixXd& sensitivity,
-                    const Eigen::Matrix3Xd& residuals) {
-    const Eigen::Index count = sensitivity.cols();
-    const int blocks = held_out.block_count();
-    const double per_block = 2 * search.misfits(residuals).sum() / blocks;
-    const VectorXd squared = search.squared(residuals);
-    MatrixXd slopes = MatrixXd::Zero(count, blocks), curvature = MatrixXd::Zero(count, count);
-    for (std::size_t s = 0; s < held_out.block_of().size(); ++s) {
-        const int block = held_out.block_of()[s];
-        const double weight = detail::robust_weight(std::sqrt(squared[block]), search.scale_mm());
-        const auto rows = sensitivity.middleRows<3>(3 * Eigen::Index(s));
-        slopes.col(block) += weight * rows.transpose() * residuals.col(Eigen::Index(s));
-        curvature += weight * rows.transpose() * rows;
-    }
-    const MatrixXd one = MatrixXd::Identity(count, count);
-    const double few = double(blocks) / std::max<double>(1, double(blocks - count));
-    const MatrixXd scatter = few * slopes * slopes.transpose() / (per_block * per_block);
-    const MatrixXd inverse = (curvature / per_block + one).inverse();
-    return inverse * (scatter + one) * inverse;
-}
-
-Estimate estimate(Search& search, const detail::HeldOut& held_out, const std::vector<FitScalar>& scalars,
-                  const std::vector<std::size_t>& active) {
-    Estimate result;
-    result.x = search.minimise(active);
-    const Eigen::Matrix3Xd residuals = search.residuals(result.x);
-    MatrixXd sensitivity(residuals.size(), Eigen::Index(active.size()));
-    for (std::size_t k = 0; k < active.size(); ++k)
-        sensitivity.col(Eigen::Index(k)) = derivative(search, scalars[active[k]], result.x, Eigen::Index(active[k]));
-    result.covariance = covariance(search, held_out, sensitivity, residuals);
-    const VectorXd after = search.misfits(residuals), gain = search.given_by_block() - after;
-    const double scatter =
-        std::sqrt(double(gain.size()) / double(gain.size() - 1)) * (gain.array() - gain.mean()).matrix().norm();
-    result.misfit_ratio = after.sum() / search.given_by_block().sum();
-    result.improvement = scatter > 0 ? gain.sum() / scatter : 0;
-    return result;
-}
-
-std::string percent(double share) {
-    return std::to_string(std::lround(100 * share)) + " %";
-}
-
-/// The verdicts on an estimate.
-class Judgement {
-public:
-    Judgement(const std::vector<FitScalar>& scalars, const std::vector<std::size_t>& active, const Estimate& estimate,
-              std::vector<FittedParameter>& results)
-        : scalars_(scalars), active_(active), estimate_(estimate), results_(results) {}
-
-    /// Takes those that the data do not tell out of the active ones; true when some were. What several reasons speak
-    /// against is left for one of them: without it the others are estimated anew.
-    std::vector<std::size_t> kept() {
-        for (std::size_t k = 0; k < active_.size(); ++k) record(k);
-        find_confounded();
-        if (rejected_.empty()) find_unseen();
-        if (rejected_.empty()) find_bounded();
-        if (rejected_.empty()) find_agreeing();
-        std::vector<std::size_t> kept;
-        for (const std::size_t k : active_)
-            if (std::find(rejected_.begin(), rejected_.end(), k) == rejected_.end()) kept.push_back(k);
-        return kept;
-    }
-
-private:
-    const std::vector<FitScalar>& scalars_;
-    const std::vector<std::size_t>& active_;
-    const Estimate& estimate_;
-    std::vector<FittedParameter>& results_;
-    std::vector<std::size_t> rejected_;
-
-    [[nodiscard]] double x(std::size_t k) const { return estimate_.x[Eigen::Index(active_[k])]; }
-    [[nodiscard]] double deviation(std::size_t k) const {
-        return std::sqrt(estimate_.covariance(Eigen::Index(k), Eigen::Index(k)));
-    }
-    void record(std::size_t k) {
-        const FitScalar& scalar = scalars_[active_[k]];
-        FittedParameter& result = results_[active_[k]];
-        result.fitted = scalar.value(x(k));
-        result.deviation = deviation(k) * scalar.slope(x(k));
-        result.outcome = FitOutcome::Fitted;
-        result.reason = "the data tell it";
-    }
-    void reject(std::size_t k, FitOutcome outcome, const std::string& reason) {
-        results_[active_[k]].outcome = outcome;
-        results_[active_[k]].reason = reason;
-        rejected_.push_back(active_[k]);
-    }
-    void find_confounded() {
-        for (std::size_t a = 0; a < active_.size(); ++a)
-            for (std::size_t b = 0; b < active_.size(); ++b) {
-                if (a == b) continue;
-                const double correlation =
-                    estimate_.covariance(Eigen::Index(a), Eigen::Index(b)) / (deviation(a) * deviation(b));
-                const bool wide = std::max(deviation(a), deviation(b)) > most_of_prior;
-                if (!wide || std::abs(correlation) <= most_correlation) continue;
-                reject(a, FitOutcome::Confounded,
-                       "the data cannot tell it from " + scalars_[active_[b]].name + " (correlation " +
-                           detail::to_text(correlation) + ")");
-                break;
-            }
-    }
-    void find_unseen() {
-        for (std::size_t k = 0; k < active_.size(); ++k)
-            if (deviation(k) > most_of_prior)
-                reject(k, FitOutcome::NotSeen,
-                       "the data leave it " + percent(deviation(k)) + " of what was uncertain before");
-    }
-    void find_bounded() {
-        constexpr double at_end = 0.03;
-        for (std::size_t k = 0; k < active_.size(); ++k) {
-            const FitScalar& scalar = scalars_[active_[k]];
-            if (std::min(x(k) - scalar.least, scalar.most - x(k)) < at_end)
-                reject(k, FitOutcome::AtBound,
-                       "the data ask for more than is admitted; the model lacks something else");
-        }
-    }
-    /// Scalars of one parameter together: a vector's direction is not bent by dropping what is small of it.
-    void find_agreeing() {
-        std::map<std::size_t, std::vector<std::size_t>> groups;
-        for (std::size_t k = 0; k < active_.size(); ++k) groups[scalars_[active_[k]].parameter].push_back(k);
-        for (const auto& [parameter, members] : groups) {
-            VectorXd at(Eigen::Index(members.size()));
-            for (std::size_t m = 0; m < members.size(); ++m) at[Eigen::Index(m)] = x(members[m]);
-            const MatrixXd block = estimate_.covariance(members, members);
-            const double distance = at.dot(block.ldlt().solve(at));
-            if (distance > significance(members.size()) && estimate_.improvement > least_improvement) continue;
-            for (const std::size_t k : members)
-                reject(k, FitOutcome::Agrees, "the given value predicts the held-out data as well");
-        }
-    }
-};
 
 std::vector<FittedParameter> unfitted(const std::vector<FitScalar>& scalars, const std::string& reason) {
     std::vector<FittedParameter> results;
@@ -311,12 +34,12 @@ double scale_of(const FitOptions& options, const UpdateResult& result) {
 /// Fits all, then without those that the data do not tell, until the data tell the rest. Throws SolverFailure.
 void fit_active(detail::HeldOut& held_out, const std::vector<FitScalar>& scalars, double scale_mm, ParameterFit& fit,
                 Observer& observer) {
-    Search search(held_out, scalars, {fit.materials, fit.loads}, scale_mm, observer);
+    detail::FitSearch search(held_out, scalars, {fit.materials, fit.loads}, scale_mm, observer);
     std::vector<std::size_t> active(scalars.size());
     for (std::size_t k = 0; k < active.size(); ++k) active[k] = k;
     while (!active.empty()) {
-        const Estimate found = estimate(search, held_out, scalars, active);
-        const std::vector<std::size_t> kept = Judgement(scalars, active, found, fit.parameters).kept();
+        const detail::FitEstimate found = detail::estimate(search, held_out, scalars, active);
+        const std::vector<std::size_t> kept = detail::told_by_data(scalars, active, found, fit.parameters);
         if (kept.size() == active.size()) {
             const detail::Tissue tissue = search.tissue(found.x);
             fit.materials = tissue.materials;

@@ -227,6 +227,7 @@ struct ExpectedError {
 /// What pulled at the tissue in the last round.
 struct LastPulls {
     std::vector<tled::Spring> data, ground;
+    std::vector<tled::Spring> supports;                           ///< anchors, and contact with rigid neighbours
     Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();  ///< moving → fixed, as it was in that round
 };
 

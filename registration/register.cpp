@@ -46,6 +46,10 @@ void require_usable(const PreparedModel& prepared, const Intraoperative& seen) {
     if (seen.labels) require_common_labels(prepared, *seen.labels);
 }
 
+void append(std::vector<tled::Spring>& springs, const std::vector<tled::Spring>& others) {
+    springs.insert(springs.end(), others.begin(), others.end());
+}
+
 /// The data that are there, and what holds tissue that only points show in part.
 struct Evidence {
     std::optional<detail::LabelEvidence> labels;
@@ -55,7 +59,8 @@ struct Evidence {
     std::optional<detail::ContactEvidence> contact;
     double energy = 0;                 ///< mN mm that weighs as much as one standard deviation of a point
     std::vector<tled::Spring> ground;  ///< moves with the placement
-    bool placed = false;               ///< anchors or rigid neighbours say where the organ lies as a whole
+    std::vector<tled::Spring> anchors;
+    bool placed = false;  ///< anchors or rigid neighbours say where the organ lies as a whole
 
     /// Labels say where every boundary is, and an image holds what it does not show.
     [[nodiscard]] bool only_points() const { return !labels && !image; }
@@ -67,8 +72,16 @@ struct Evidence {
         if (image) detail::add(sum, image->contribution(plan, state));
         if (surface) detail::add(sum, surface->contribution(plan, state));
         if (points) detail::add(sum, points->contribution(plan, state));
-        if (contact) detail::add(sum, contact->contribution(plan, state));
         return sum;
+    }
+
+    /// What holds tissue and is no datum: anchors, and rigid neighbours where tissue touches them.
+    [[nodiscard]] std::vector<tled::Spring> supports(const detail::RoundPlan& plan, const detail::State& state) const {
+        std::vector<tled::Spring> springs = anchors;
+        if (!contact) return springs;
+        const detail::Contribution touching = contact->contribution(plan, state);
+        append(springs, touching.conditions.springs);
+        return springs;
     }
 };
 
@@ -195,7 +208,8 @@ private:
         if (!evidence_.only_points()) return;
         detail::Stopwatch stopwatch;
         const int last = options_.rematches - 1;
-        const auto springs = evidence_.contribution(plan_of(last), state_).conditions.springs;
+        auto springs = evidence_.contribution(plan_of(last), state_).conditions.springs;
+        append(springs, evidence_.supports(plan_of(last), state_));
         result_.expected =
             detail::expected_error(prepared_, {springs, evidence_.ground, evidence_.energy, placement_is_free()});
         result_.times.push_back(stopwatch.lap("expected error"));
@@ -220,9 +234,10 @@ private:
         detail::Stopwatch stopwatch;
         const detail::RoundPlan plan = plan_of(round);
         detail::Contribution data = evidence_.contribution(plan, state_);
-        result_.pulls = {data.conditions.springs, evidence_.ground, state_.placement};
+        result_.pulls = {data.conditions.springs, evidence_.ground, evidence_.supports(plan, state_), state_.placement};
         data.conditions.external_force = loads_;
-        data.conditions.springs.insert(data.conditions.springs.end(), evidence_.ground.begin(), evidence_.ground.end());
+        append(data.conditions.springs, result_.pulls.ground);
+        append(data.conditions.springs, result_.pulls.supports);
         const auto conditions = tled::nodal_conditions(data.conditions, prepared_.rest.node_count);
         Round record;
         record.range_mm = plan.range_mm;
@@ -289,9 +304,8 @@ UpdateResult update(const PreparedModel& prepared, const Intraoperative& given, 
             return options.align ? tissue.free_motion_mm : tissue.held_motion_mm;
         });
     if (prepared.neighbours) evidence.contact.emplace(prepared, evidence.energy);
-    const std::vector<tled::Spring> anchors = detail::anchor_springs(prepared, evidence.energy);
-    evidence.ground.insert(evidence.ground.end(), anchors.begin(), anchors.end());
-    evidence.placed = evidence.contact || !anchors.empty();
+    evidence.anchors = detail::anchor_springs(prepared, evidence.energy);
+    evidence.placed = evidence.contact || !evidence.anchors.empty();
     if (options.align) result.alignment = align(prepared, seen, evidence, options, observer);
     result.times.push_back(stopwatch.lap("rigid alignment"));
     if (seen.labels) evidence.labels.emplace(prepared, *seen.labels, options);
