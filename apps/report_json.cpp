@@ -144,6 +144,7 @@ void add_fits(json& report, const registration::UpdateResult& result) {
         report["image"] = {{"blocks", fit->blocks},
                            {"matched", fit->matched},
                            {"residual_mm", number(fit->residual_mm)},
+                           {"agreement", fit->agreement ? number(*fit->agreement) : json()},
                            {"shown_share", number(fit->shown_share)}};
     if (const auto& fit = result.surface)
         report["surface"] = {{"inlier_share", number(fit->inlier_share)},

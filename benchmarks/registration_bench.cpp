@@ -200,6 +200,8 @@ void print_row(const std::string& name, const UpdateResult& result, const Landma
                 name.c_str(), error.after.mean, error.after.median, error.after.percentile_95, error.moved_after.mean,
                 error.moved_after.median, error.moved_after.percentile_95, result.rounds.size(), evaluations,
                 last.matched, last.interface_nodes, last.mean_residual_mm, result.min_jacobian, seconds);
+    if (result.image && result.image->agreement)
+        std::fprintf(stderr, "  agreement of the images %.3f", *result.image->agreement);
     if (result.expected)
         std::fprintf(stderr, "  expected error %.2f mm, worst %.2f mm", result.expected->mean_mm,
                      result.expected->worst_mm);

@@ -53,8 +53,8 @@ BlockMatch as_match(const DenseForce& force, const meshing::TetMesh& mesh, const
 DenseSearch::DenseSearch(const PreparedModel& prepared, const imaging::Volume& fixed)
     : prepared_(prepared), fixed_(fixed.as(CV_32F)), seen_(seen_region(fixed_)) {}
 
-std::vector<BlockMatch> DenseSearch::matches(const State& state, int coarsening, const std::vector<BlockMatch>& known,
-                                             const meshing::PointLocator& locator) const {
+DenseMatches DenseSearch::matches(const State& state, int coarsening, const std::vector<BlockMatch>& known,
+                                  const meshing::PointLocator& locator) const {
     const meshing::TetMesh& mesh = prepared_.model.mesh;
     const TemplateImages& images = prepared_.image->blocks.images();
     const int finest = images.options.levels - 1;
@@ -64,10 +64,11 @@ std::vector<BlockMatch> DenseSearch::matches(const State& state, int coarsening,
         displacement_near_mesh({mesh, state.displacement, state.placement}, GridSamples::with_rim(moving.grid), reach);
     const MatchingImage pulled_back = pulled_back_image(fixed_, seen_, moving.grid, images.region(moving.grid), field);
     const DenseForces dense = dense_forces(moving, pulled_back, voxels_in(mesh, moving.grid));
-    std::vector<BlockMatch> result;
+    DenseMatches result{{}, dense.agreement};
     for (const DenseForce& force : dense.forces)
-        if (const auto at = locate_near(locator, force.place)) result.push_back(as_match(force, mesh, state, *at));
-    std::copy_if(known.begin(), known.end(), std::back_inserter(result),
+        if (const auto at = locate_near(locator, force.place))
+            result.matches.push_back(as_match(force, mesh, state, *at));
+    std::copy_if(known.begin(), known.end(), std::back_inserter(result.matches),
                  [&](const BlockMatch& match) { return !dense.say_something_at(match.moving); });
     return result;
 }

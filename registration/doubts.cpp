@@ -42,13 +42,17 @@ void doubt_expectation(const ExpectedError& expected, std::vector<std::string>& 
 }
 
 void doubt_image(const ImageFit& fit, std::vector<std::string>& reasons) {
-    constexpr double least_matched = 0.1, least_shown = 0.5, most_residual_mm = 1.0;
+    constexpr double least_matched = 0.1, least_shown = 0.5, most_residual_mm = 1.0, least_agreement = 0.1;
     if (fit.matched < least_matched * fit.blocks)
         reasons.push_back("only " + std::to_string(fit.matched) + " of " + std::to_string(fit.blocks) +
                           " blocks of the moving image were found in the fixed one");
     if (fit.shown_share < least_shown)
         reasons.push_back("the fixed image shows only " + percent(fit.shown_share) +
                           " of the organ; the rest is where mechanics alone put it");
+    if (fit.agreement && *fit.agreement < least_agreement)
+        reasons.push_back("the images agree where the organ lies hardly better than by chance (" +
+                          to_text(*fit.agreement) +
+                          "; 0 is chance, 1 the same image): check that they show the same organ");
     if (fit.residual_mm > most_residual_mm)
         reasons.push_back("blocks found in the fixed image lie " + to_text(fit.residual_mm) +
                           " mm from where the tissue went");

@@ -40,11 +40,12 @@ int ImageEvidence::searches() const {
 
 void ImageEvidence::search(const State& state, Observer& observer) {
     if (searches_done_ == 0) {
-        blocks_ = consistent_matches(block_search(state, observer), options_.consistency);
-        use(blocks_);
+        use(consistent_matches(block_search(state, observer), options_.consistency));
     } else {
         const int coarsening = options_.dense_coarsening.at(static_cast<std::size_t>(searches_done_ - 1));
-        use(dense_->matches(state, coarsening, blocks_, locator_));
+        const DenseMatches found = dense_->matches(state, coarsening, blocks_.matches, locator_);
+        use(found.matches);
+        agreement_ = found.agreement;
     }
     ++searches_done_;
 }
@@ -64,28 +65,33 @@ Eigen::Matrix3Xd ImageEvidence::deformed(const Eigen::Matrix3Xd& points, const S
     return state.placement * result;
 }
 
-void ImageEvidence::use(std::vector<BlockMatch> matches) {
-    matches_.clear();
-    places_.clear();
+void ImageEvidence::use(const std::vector<BlockMatch>& matches) {
+    matches_ = located(matches);
+    if (searches_done_ == 0) blocks_ = matches_;
+}
+
+ImageEvidence::Located ImageEvidence::located(const std::vector<BlockMatch>& matches) const {
+    Located result;
     for (const BlockMatch& match : matches) {
         const auto at = locate_near(locator_, match.moving);
         if (!at) continue;
-        matches_.push_back(match);
-        places_.push_back(*at);
+        result.matches.push_back(match);
+        result.places.push_back(*at);
     }
+    return result;
 }
 
 Eigen::Isometry3d ImageEvidence::rigid_motion() const {
     constexpr std::size_t fewest = 10;
-    if (matches_.size() < fewest)
-        throw InvalidInput("only " + std::to_string(matches_.size()) +
+    if (matches_.matches.size() < fewest)
+        throw InvalidInput("only " + std::to_string(matches_.matches.size()) +
                            " blocks of the moving image were found in the fixed one; check that they show the same "
                            "organ, and bring them within the search range of each other");
-    const auto count = static_cast<Eigen::Index>(matches_.size());
+    const auto count = static_cast<Eigen::Index>(matches_.matches.size());
     Eigen::Matrix3Xd moving(3, count), fixed(3, count);
     for (Eigen::Index n = 0; n < count; ++n) {
-        moving.col(n) = matches_[static_cast<std::size_t>(n)].moving;
-        fixed.col(n) = matches_[static_cast<std::size_t>(n)].fixed;
+        moving.col(n) = matches_.matches[static_cast<std::size_t>(n)].moving;
+        fixed.col(n) = matches_.matches[static_cast<std::size_t>(n)].fixed;
     }
     if (view_share() < 0.9 && median_distance(moving, fixed) < options_.headers_within_mm)
         return Eigen::Isometry3d::Identity();
@@ -110,26 +116,30 @@ double ImageEvidence::view_share() const {
 ImageFit ImageEvidence::fit(const State& state) const {
     constexpr double near_mm = 15;
     const Eigen::Matrix3Xd& nodes = prepared_.model.mesh.nodes;
-    ImageFit fit{static_cast<int>(prepared_.image->blocks.points().cols()), static_cast<int>(blocks_.size()), 0, 0};
+    ImageFit fit;
+    fit.blocks = static_cast<int>(prepared_.image->blocks.points().cols());
+    fit.matched = static_cast<int>(blocks_.matches.size());
     std::vector<Eigen::Vector3d> places;
-    for (const BlockMatch& match : matches_) places.push_back(match.moving);
+    for (const BlockMatch& match : matches_.matches) places.push_back(match.moving);
     const PointTree tree(std::move(places));
     Eigen::Index shown = 0;
     for (Eigen::Index node = 0; node < nodes.cols(); ++node) shown += tree.distance(nodes.col(node)) < near_mm;
     fit.shown_share = double(shown) / double(nodes.cols());
-    fit.residual_mm = mean_residual(pulled(state));
+    fit.residual_mm = mean_residual(pulled(matches_, state));
+    fit.agreement = agreement_;
     return fit;
 }
 
-std::vector<ImageEvidence::PulledMatch> ImageEvidence::pulled(const State& state) const {
+std::vector<ImageEvidence::PulledMatch> ImageEvidence::pulled(const Located& located, const State& state) const {
     const Eigen::Isometry3d back = state.placement.inverse();
     std::vector<PulledMatch> result;
-    result.reserve(matches_.size());
-    for (std::size_t n = 0; n < matches_.size(); ++n) {
-        const BlockMatch& match = matches_[n];
+    result.reserve(located.matches.size());
+    for (std::size_t n = 0; n < located.matches.size(); ++n) {
+        const BlockMatch& match = located.matches[n];
         const Eigen::Matrix3d information = back.linear() * match.information * back.linear().transpose();
-        const Pull pull{places_[n], back * match.fixed - match.moving, information};
-        const Eigen::Vector3d e = pull.target - displacement_at(prepared_.model.mesh, state.displacement, places_[n]);
+        const Pull pull{located.places[n], back * match.fixed - match.moving, information};
+        const Eigen::Vector3d e =
+            pull.target - displacement_at(prepared_.model.mesh, state.displacement, located.places[n]);
         const double strongest =
             Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(information, Eigen::EigenvaluesOnly).eigenvalues()[2];
         result.push_back({pull, match.confidence, std::sqrt(e.dot(information * e) / strongest)});
@@ -147,7 +157,7 @@ double ImageEvidence::mean_residual(const std::vector<PulledMatch>& matches) {
 }
 
 Contribution ImageEvidence::contribution(const RoundPlan& plan, const State& state) const {
-    const std::vector<PulledMatch> matches = pulled(state);
+    const std::vector<PulledMatch> matches = pulled(matches_, state);
     std::vector<Pull> pulls;
     for (const PulledMatch& match : matches) {
         pulls.push_back(match.pull);

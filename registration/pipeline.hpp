@@ -196,6 +196,9 @@ struct ImageFit {
     int blocks = 0, matched = 0;
     double residual_mm = 0;  ///< of the last round, weighted by confidence
     double shown_share = 0;  ///< of the model's nodes: no further than 15 mm from a match
+    /// Σ ∇D₁·∇D₂ over Σ ½ (|∇D₁|² + |∇D₂|²) of the images' descriptors, before the last rounds: 1 for the same image,
+    /// near 0 for images of different things. Only with descriptors of self-similarity.
+    std::optional<double> agreement;
 };
 
 /// How pairs of points agree with the registered model.

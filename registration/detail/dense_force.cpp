@@ -25,6 +25,7 @@ struct Sums {
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();  // A
     Eigen::Vector3d right = Eigen::Vector3d::Zero();   // b
     double squares = 0;                                // Σ (D₁ − D₂)²
+    double structure = 0;                              // Σ ½ (|∇D₁|² + |∇D₂|²)
     double voxels = 0;
     Eigen::Vector3d index = Eigen::Vector3d::Zero();  // Σ x, of the cell's own voxels
 };
@@ -59,6 +60,8 @@ void add(Sums& sums, const Descriptor& first, const Descriptor& second) {
     for (std::size_t a = 0; a < 3; ++a) {
         const auto row = static_cast<Eigen::Index>(a);
         sums.right[row] += 0.5 * (double(dot(first.gradient[a], residual)) + double(dot(second.gradient[a], residual)));
+        sums.structure += 0.5 * (double(dot(first.gradient[a], first.gradient[a])) +
+                                 double(dot(second.gradient[a], second.gradient[a])));
         for (std::size_t b = 0; b <= a; ++b) {
             const double product = 0.5 * (double(dot(first.gradient[a], second.gradient[b])) +
                                           double(dot(first.gradient[b], second.gradient[a])));
@@ -181,8 +184,11 @@ DenseForces dense_forces(const MatchingImage& first, const MatchingImage& second
     tbb::parallel_for(std::size_t{0}, own.size(),
                       [&](std::size_t n) { own[n] = sums_of(cells.cell(n), first, second, counts); });
     const std::vector<Sums> windows = windowed(own, cells);
-    DenseForces result{{}, cells.grid(), std::vector<std::uint8_t>(own.size())};
+    DenseForces result{{}, cells.grid(), std::vector<std::uint8_t>(own.size()), 0};
+    double common = 0, structure = 0;
     for (std::size_t n = 0; n < own.size(); ++n) {
+        common += own[n].normal.trace();
+        structure += own[n].structure;
         if (own[n].voxels < 1) continue;
         std::optional<DenseForce> force = solved(windows[n], first.grid);
         if (!force) continue;
@@ -190,6 +196,7 @@ DenseForces dense_forces(const MatchingImage& first, const MatchingImage& second
         result.said[n] = 1;
         result.forces.push_back(*force);
     }
+    if (structure > 0) result.agreement = common / structure;
     return result;
 }
 

@@ -19,6 +19,7 @@ struct DenseForces {
     std::vector<DenseForce> forces;
     imaging::Geometry cells;
     std::vector<std::uint8_t> said;  ///< 1 for the cells that have a force
+    double agreement = 0;  ///< Σ ∇D₁·∇D₂ over Σ ½ (|∇D₁|² + |∇D₂|²): 1 for the same image, 0 by chance
 
     /// Whether the cell of a point (LPS mm) has a force.
     [[nodiscard]] bool say_something_at(const Eigen::Vector3d& point) const;

@@ -6,6 +6,11 @@
 
 namespace tissuewarp::registration::detail {
 
+struct DenseMatches {
+    std::vector<BlockMatch> matches;
+    double agreement = 0;  ///< of both images as far as they show the organ: DenseForces::agreement
+};
+
 class DenseSearch {
 public:
     /// `prepared.image` is there, its template made of self-similarity descriptors.
@@ -15,9 +20,8 @@ public:
     /// times doubled from the template's finest (or its coarsest): a match for each cell of voxels that has a force,
     /// and those known ones in whose cell the images say nothing. The fixed image is pulled back by the model to the
     /// moving grid, so that descriptors are compared which turned and stretched with the tissue.
-    [[nodiscard]] std::vector<BlockMatch> matches(const State& state, int coarsening,
-                                                  const std::vector<BlockMatch>& known,
-                                                  const meshing::PointLocator& locator) const;
+    [[nodiscard]] DenseMatches matches(const State& state, int coarsening, const std::vector<BlockMatch>& known,
+                                       const meshing::PointLocator& locator) const;
 
 private:
     const PreparedModel& prepared_;

@@ -17,7 +17,7 @@ public:
     /// Finds the blocks about where the model is; the later times, how all of the image is to shift there.
     void search(const State& state, Observer& observer);
     /// Takes matches that were found before.
-    void use(std::vector<BlockMatch> matches);
+    void use(const std::vector<BlockMatch>& matches);
     /// The rigid motion that most matches agree on, the rest of them is for the tissue. Where part of the organ is out
     /// of view, a deformation of the part in view would turn it as a whole: then none, unless the headers are far off.
     /// Throws InvalidInput when too few blocks were found.
@@ -40,8 +40,12 @@ private:
     double energy_;                     // mN mm that one standard deviation of a match weighs
     std::optional<DenseSearch> dense_;  // where the template has descriptors of self-similarity
     int searches_done_ = 0;
-    std::vector<BlockMatch> blocks_, matches_;  // of the first search, and of the last
-    std::vector<meshing::Location> places_;     // of the matches, in the mesh
+    struct Located {
+        std::vector<BlockMatch> matches;
+        std::vector<meshing::Location> places;  // in the mesh
+    };
+    Located blocks_, matches_;         // of the first search, and of the last
+    std::optional<double> agreement_;  // of both images, in the last dense search
 
     /// Whether the fixed image could show tissue at a point of its frame.
     [[nodiscard]] bool in_view(const Eigen::Vector3d& point) const;
@@ -52,7 +56,9 @@ private:
         double confidence;
         double residual_mm;  // along what the block shows best
     };
-    [[nodiscard]] std::vector<PulledMatch> pulled(const State& state) const;
+    /// Those that lie in the model.
+    [[nodiscard]] Located located(const std::vector<BlockMatch>& matches) const;
+    [[nodiscard]] std::vector<PulledMatch> pulled(const Located& located, const State& state) const;
     static double mean_residual(const std::vector<PulledMatch>& matches);
     [[nodiscard]] std::vector<BlockMatch> block_search(const State& state, Observer& observer) const;
     /// Where points of the moving image are in the fixed one.

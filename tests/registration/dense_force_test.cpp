@@ -180,9 +180,14 @@ TEST(DenseForce, TakesNoiseForNoStructure) {
         double sum = 0;
         const DenseForces found = dense_forces(noisy(3), noisy(4), all_voxels());
         for (const DenseForce& force : found.forces) sum += force.information.trace();
-        return sum;
+        return std::pair(sum, found.agreement);
     };
-    EXPECT_LT(certainty(0), 0.05 * certainty(1));
+    const auto [of_noise, by_chance] = certainty(0);
+    const auto [of_structure, agreement] = certainty(1);
+    EXPECT_LT(of_noise, 0.05 * of_structure);
+    EXPECT_NEAR(by_chance, 0, 0.05);
+    EXPECT_GT(agreement, 0.2);
+    EXPECT_NEAR(dense_forces(described(texture(still)), described(texture(still)), all_voxels()).agreement, 1, 1e-9);
 }
 
 TEST(DenseForce, IsTheSameForAnyNumberOfThreads) {
