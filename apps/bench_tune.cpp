@@ -58,16 +58,16 @@ tled::TuningEffort effort_of(const BenchOptions& options) {
 void print_table(tled::Element element, int elements, const std::vector<tled::StepShapeTiming>& timings,
                  const tled::GpuStepShape& suggested) {
     const double fastest = timings.front().seconds_per_step;
-    fmt::print("\n{} {}\n{:<22}{:>12}{:>12}{:>10}\n", elements, name_of(element), "shape", "median us", "ps/el",
+    fmt::print("\n{} {}\n{:<22}{:>14}{:>14}{:>10}\n", elements, name_of(element), "shape", "median us", "ps/el",
                "ratio");
     for (const tled::StepShapeTiming& timing : timings) {
         const std::string name = name_of(timing.shape);
         const char* note = timing.shape == suggested ? "  suggested" : "";
         if (timing.fault.empty())
-            fmt::print("{:<22}{:>12.2f}{:>12.2f}{:>10.3f}{}\n", name, timing.seconds_per_step * 1e6,
+            fmt::print("{:<22}{:>14.2f}{:>14.2f}{:>10.3f}{}\n", name, timing.seconds_per_step * 1e6,
                        timing.seconds_per_step / elements * 1e12, timing.seconds_per_step / fastest, note);
         else
-            fmt::print("{:<22}{:>12}{:>12}{:>10}{}  out: {}\n", name, "-", "-", "-", note, timing.fault);
+            fmt::print("{:<22}{:>14}{:>14}{:>10}{}  out: {}\n", name, "-", "-", "-", note, timing.fault);
     }
 }
 

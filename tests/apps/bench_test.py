@@ -186,7 +186,7 @@ class BenchmarkOptions(PhantomTest):
         printed, message = process.communicate(timeout=100)
         self.assertEqual(process.returncode, 130, message)
         self.assertEqual(message.count("\n"), 1, message)
-        self.assertEqual(printed, "")
+        self.assertNotIn("cube", printed)  # what was measured before a study is already there
         self.assertFalse(self.phantom.output.exists())
 
     def test_output_is_a_file(self):
