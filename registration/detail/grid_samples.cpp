@@ -51,6 +51,22 @@ private:
     }
 };
 
+/// Calls visit(i, j, k, place) for the voxels of a region of `grid` with its rim, `place` their index in the image.
+template <class Visit>
+void for_each_place(const imaging::Geometry& image, const imaging::Geometry& grid, const SearchRegion& region,
+                    const Visit& visit) {
+    constexpr int rim = GridSamples::rim;
+    const Eigen::Matrix3d matrix = image.point_to_index() * grid.index_to_point();
+    const Eigen::Vector3d start = image.index(grid.origin);
+    tbb::parallel_for(-rim, grid.size[2] + rim, [&](int k) {
+        for (int j = -rim; j < grid.size[1] + rim; ++j) {
+            const Eigen::Vector3d row = start + matrix.col(1) * j + matrix.col(2) * k;
+            const Range range = region.row(j, k, rim);
+            for (int i = range.first; i < range.last; ++i) visit(i, j, k, row + matrix.col(0) * i);
+        }
+    });
+}
+
 }  // namespace
 
 imaging::Geometry GridSamples::with_rim(const imaging::Geometry& grid) {
@@ -70,17 +86,9 @@ GridSamples::GridSamples(const imaging::Volume& image, const imaging::Volume& se
                          const SearchRegion& region)
     : GridSamples(grid) {
     const Reader reader(image, seen);
-    const Eigen::Matrix3d matrix = image.geometry.point_to_index() * grid.index_to_point();
-    const Eigen::Vector3d start = image.geometry.index(grid.origin);
-    tbb::parallel_for(-rim, grid.size[2] + rim, [&](int k) {
-        for (int j = -rim; j < grid.size[1] + rim; ++j) {
-            const Eigen::Vector3d row = start + matrix.col(1) * j + matrix.col(2) * k;
-            const Range range = region.row(j, k, rim);
-            for (int i = range.first; i < range.last; ++i) {
-                const auto n = static_cast<std::size_t>(offset(i, j, k));
-                reader.read(row + matrix.col(0) * i, value_[n], seen_[n]);
-            }
-        }
+    for_each_place(image.geometry, grid, region, [&](int i, int j, int k, const Eigen::Vector3d& place) {
+        const auto n = static_cast<std::size_t>(offset(i, j, k));
+        reader.read(place, value_[n], seen_[n]);
     });
 }
 
@@ -88,20 +96,12 @@ GridSamples::GridSamples(const imaging::Volume& image, const imaging::Volume& se
                          const SearchRegion& region, const imaging::Volume& displacement)
     : GridSamples(grid) {
     const Reader reader(image, seen);
-    const Eigen::Matrix3d to_index = image.geometry.point_to_index(), matrix = to_index * grid.index_to_point();
-    const Eigen::Vector3d start = image.geometry.index(grid.origin);
+    const Eigen::Matrix3d to_index = image.geometry.point_to_index();
     const auto* shift = displacement.data<cv::Vec3f>();
-    tbb::parallel_for(-rim, grid.size[2] + rim, [&](int k) {
-        for (int j = -rim; j < grid.size[1] + rim; ++j) {
-            const Eigen::Vector3d row = start + matrix.col(1) * j + matrix.col(2) * k;
-            const Range range = region.row(j, k, rim);
-            for (int i = range.first; i < range.last; ++i) {
-                const auto n = static_cast<std::size_t>(offset(i, j, k));
-                const cv::Vec3f& u = shift[n];
-                reader.read(row + matrix.col(0) * i + to_index * Eigen::Vector3d(u[0], u[1], u[2]), value_[n],
-                            seen_[n]);
-            }
-        }
+    for_each_place(image.geometry, grid, region, [&](int i, int j, int k, const Eigen::Vector3d& place) {
+        const auto n = static_cast<std::size_t>(offset(i, j, k));
+        const cv::Vec3f& u = shift[n];
+        reader.read(place + to_index * Eigen::Vector3d(u[0], u[1], u[2]), value_[n], seen_[n]);
     });
 }
 
