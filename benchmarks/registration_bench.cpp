@@ -1,10 +1,11 @@
 // Registration from every kind of intraoperative data against known truth, with sweeps of one option:
 //     registration_bench DATA [--case PART] [--OPTION V1,V2,…] [--mesh-edge MM] [--poisson NU] [--count POINTS]
-//                        [--errors FOLDER] [--repeats N]
+//                        [--errors FOLDER] [--repeats N] [--device cpu|gpu]
 // DATA holds phantom-brainshift, phantom-brain-sag and lung-ct; PART selects cases whose name holds it. Errors are at
 // the landmarks or, where there is a true field, at its points in the mask; FOLDER gets them point by point, as CSV.
-// With --repeats every update runs N times, and a line per case tells the time from data in to displacement field and
-// warped image out, the model prepared.
+// With --repeats every update runs N times, and a line per case tells the time from data in to warped image out, the
+// model prepared: on the processor (the default) through the displacement field of all voxels, on a GPU through
+// GpuWarp, whose voxels outside the mesh follow the placement.
 
 #include "core/errors.hpp"
 #include "imaging/image_io.hpp"
@@ -12,6 +13,7 @@
 #include "imaging/sampling.hpp"
 #include "registration/evaluation.hpp"
 #include "registration/field.hpp"
+#include "registration/gpu_warp.hpp"
 #include "registration/pipeline.hpp"
 #include "registration/surface_points.hpp"
 #include "registration/warp.hpp"
@@ -159,6 +161,7 @@ struct Arguments {
     double edge_length = 0, poissons_ratio = 0;
     int count = 5000;
     int repeats = 0;
+    Device device = Device::Cpu;
 };
 
 Arguments parse(int argc, char** argv) {
@@ -177,6 +180,9 @@ Arguments parse(int argc, char** argv) {
             result.errors = value;
         } else if (key == "--count") {
             result.count = std::stoi(value);
+        } else if (key == "--device") {
+            if (value != "cpu" && value != "gpu") throw InvalidInput("--device " + value + ": give cpu or gpu");
+            result.device = value == "gpu" ? Device::Gpu : Device::Cpu;
         } else if (key == "--repeats") {
             result.repeats = std::stoi(value);
         } else if (key.starts_with("--") && setters().contains(key.substr(2))) {
@@ -248,20 +254,40 @@ double percentile(std::vector<double> values, double share) {
     return values[std::max<std::size_t>(place, 1) - 1];
 }
 
-/// Data in, displacement field and warped image on the grid of the intraoperative image out, again and again.
+/// The moving image where a deformation takes it, on the grid of the intraoperative image.
+class Warper {
+public:
+    Warper(const PreparedModel& prepared, const Case& study, Device device) : moving_(study.moving) {
+        grid_ = study.seen.image ? study.seen.image->geometry : study.moving.geometry;
+        if (device == Device::Gpu) gpu_.emplace(prepared.model.mesh, moving_.as(CV_32F), grid_);
+    }
+
+    void operator()(const Deformation& deformation) {
+        if (gpu_)
+            gpu_->warp(deformation.displacement, deformation.placement, warped_);
+        else
+            warped_ = warp_image(moving_, displacement_fixed_to_moving(deformation, grid_));
+    }
+
+private:
+    const imaging::Volume& moving_;
+    imaging::Geometry grid_;
+    std::optional<GpuWarp> gpu_;
+    imaging::Volume warped_;
+};
+
+/// Data in, warped image out, again and again.
 void time_updates(const std::string& name, const PreparedModel& prepared, const Case& study,
                   const UpdateOptions& options, int repeats) {
-    const imaging::Volume& grid = study.seen.image ? *study.seen.image : study.moving;
+    Updater updater(prepared, options);
+    Warper warper(prepared, study, options.device);
     std::vector<double> wall, processor;
     std::map<std::string, std::vector<double>> stages;
     for (int n = 0; n < repeats; ++n) {
         const Clocks whole;
-        const UpdateResult result = update(prepared, study.seen, options);
-        const Clocks field_clock;
-        const imaging::Volume field = displacement_fixed_to_moving(result.deformation, grid.geometry);
-        stages["field"].push_back(field_clock.wall());
+        const UpdateResult result = updater.update(study.seen);
         const Clocks warp_clock;
-        const imaging::Volume warped = warp_image(study.moving, field);
+        warper(result.deformation);
         stages["warp"].push_back(warp_clock.wall());
         wall.push_back(whole.wall());
         processor.push_back(whole.processor());
@@ -295,7 +321,7 @@ void run(const Arguments& arguments) {
         if (study.seen.image) prepare_image(prepared, study.moving, image_options);
         for (const double value : arguments.values) {
             UpdateOptions update_options;
-            update_options.device = Device::Cpu;
+            update_options.device = arguments.device;
             update_options.align = study.align;
             std::string name = study.name;
             if (!arguments.option.empty()) {

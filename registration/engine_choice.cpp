@@ -33,4 +33,16 @@ std::unique_ptr<tled::Engine> make_engine(const PreparedModel& prepared, const U
     }
 }
 
+std::unique_ptr<DenseEngine> make_dense_engine(const PreparedModel& prepared, const UpdateOptions& options,
+                                               Observer& observer) {
+    if (options.device == Device::Gpu) return make_gpu_dense_engine(prepared, options.gpu_index);
+    if (options.device == Device::Cpu || !has_gpu()) return make_cpu_dense_engine(prepared);
+    try {
+        return make_gpu_dense_engine(prepared, options.gpu_index);
+    } catch (const GpuUnavailable& reason) {
+        observer.note(std::string("the CPU takes over the image's forces from the GPU: ") + reason.what());
+        return make_cpu_dense_engine(prepared);
+    }
+}
+
 }  // namespace tissuewarp::registration::detail

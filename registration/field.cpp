@@ -3,6 +3,7 @@
 #include "core/errors.hpp"
 #include "meshing/point_location.hpp"
 #include "registration/detail/continuation.hpp"
+#include "registration/detail/growth.hpp"
 #include "registration/detail/rasterisation.hpp"
 #include "registration/detail/uninitialised.hpp"
 
@@ -10,6 +11,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <optional>
 #include <string>
 
@@ -75,47 +77,22 @@ Raster rasterise_mesh(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tet
     return raster;
 }
 
-/// Gives the voxels around the mesh the mean of those next to them that have a value, `layers` times.
-void grow(Raster& raster, int layers) {
+/// Gives the voxels around the mesh the mean of those next to them that have a value, `count` layers of them.
+void grow(Raster& raster, int count) {
     const Geometry& grid = raster.values.geometry;
     const std::array<std::int64_t, 3> stride{1, grid.size[0], std::int64_t{grid.size[0]} * grid.size[1]};
-    constexpr std::uint8_t waits = 2;
-    const auto for_each_neighbour = [&](std::int64_t voxel, const auto& visit) {
-        for (int axis = 0; axis < 3; ++axis) {
-            const std::int64_t n = voxel / stride[axis] % grid.size[axis];
-            if (n > 0) visit(voxel - stride[axis]);
-            if (n + 1 < grid.size[axis]) visit(voxel + stride[axis]);
-        }
-    };
-    std::vector<std::int64_t> front, next;
-    const auto find_next = [&](std::int64_t voxel) {
-        for_each_neighbour(voxel, [&](std::int64_t other) {
-            auto& state = raster.inside[static_cast<std::size_t>(other)];
-            if (state != 0) return;
-            state = waits;
-            next.push_back(other);
-        });
-    };
-    for (std::int64_t voxel = 0; voxel < grid.voxel_count(); ++voxel)
-        if (raster.inside[static_cast<std::size_t>(voxel)] == 1) find_next(voxel);
     auto* values = raster.values.data<cv::Vec3f>();
-    for (int layer = 0; layer < layers; ++layer) {
-        front.swap(next);
-        next.clear();
-        for (const std::int64_t voxel : front) {
+    for (const auto& layer : detail::growth_layers(raster.inside, grid.size, count))
+        tbb::parallel_for(std::size_t{0}, layer.size(), [&](std::size_t n) {
+            const auto& [voxel, neighbours] = layer[n];
             cv::Vec3f sum(0, 0, 0);
-            int count = 0;
-            for_each_neighbour(voxel, [&](std::int64_t other) {
-                if (raster.inside[static_cast<std::size_t>(other)] != 1) return;
-                sum += values[other];
-                ++count;
-            });
-            values[voxel] = sum / float(count);
-        }
-        for (const std::int64_t voxel : front) raster.inside[static_cast<std::size_t>(voxel)] = 1;
-        for (const std::int64_t voxel : front) find_next(voxel);
-    }
-    for (const std::int64_t voxel : next) raster.inside[static_cast<std::size_t>(voxel)] = 0;
+            for (std::size_t axis = 0; axis < 3; ++axis) {
+                if (neighbours & 1U << 2 * axis) sum += values[voxel - stride[axis]];
+                if (neighbours & 2U << 2 * axis) sum += values[voxel + stride[axis]];
+            }
+            values[voxel] = sum / float(std::popcount(neighbours));
+            raster.inside[voxel] = 1;
+        });
 }
 
 /// Replaces v by `rotation` v + `linear` p + `constant` at every voxel centre p of `grid`, in double precision; voxels

@@ -23,15 +23,16 @@ double median_distance(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
 }  // namespace
 
 ImageEvidence::ImageEvidence(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
-                             double energy)
+                             DenseEngine* dense, double energy)
     : prepared_(prepared),
       fixed_(fixed),
       options_(options),
       view_(fixed),
       locator_(prepared.model.mesh),
       energy_(energy) {
-    if (prepared.image->blocks.options().similarity == Similarity::SelfSimilarityContext)
-        dense_.emplace(prepared, fixed);
+    if (!dense) return;
+    dense->set_fixed(fixed);
+    dense_.emplace(prepared, *dense);
 }
 
 int ImageEvidence::searches() const {

@@ -13,6 +13,7 @@
 #include "tled/model.hpp"
 
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -251,10 +252,29 @@ struct UpdateResult {
     std::vector<std::string> doubts;  ///< reasons not to trust the result, empty when there are none
 };
 
-/// Registers the prepared model to what was seen during the operation. Throws InvalidInput when there is nothing to
-/// register to, a bare volume without prepare_image, label maps that share no label or do not meet, surface points or
-/// pairs of points that cannot be used or lie nowhere near the model; SolverFailure when
-/// no trustworthy equilibrium is found, GpuUnavailable when a GPU was demanded.
+/// Registers one prepared model again and again. What the updates share is made once: the engine that solves, and on a
+/// GPU the context, programs and images of the model.
+class Updater {
+public:
+    /// `prepared` outlives this. Throws GpuUnavailable when a GPU was demanded and there is none.
+    explicit Updater(const PreparedModel& prepared, const UpdateOptions& options = {},
+                     Observer& observer = silent_observer());
+    ~Updater();
+    Updater(Updater&&) noexcept;
+    Updater& operator=(Updater&&) noexcept;
+
+    /// Registers the model to what was seen during the operation. Throws InvalidInput when there is nothing to register
+    /// to, a bare volume without prepare_image, label maps that share no label or do not meet, surface points or pairs
+    /// of points that cannot be used or lie nowhere near the model; SolverFailure when no trustworthy equilibrium is
+    /// found, GpuUnavailable when a device fails.
+    UpdateResult update(const Intraoperative& seen, Observer& observer = silent_observer());
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+/// One update: Updater(prepared, options).update(seen).
 UpdateResult update(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options = {},
                     Observer& observer = silent_observer());
 

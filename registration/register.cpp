@@ -88,19 +88,19 @@ struct Evidence {
 /// The rounds of matching and equilibrium.
 class Rematching {
 public:
-    Rematching(const PreparedModel& prepared, Evidence& evidence, const UpdateOptions& options, UpdateResult& result,
-               Observer& observer)
+    Rematching(const PreparedModel& prepared, tled::Engine& engine, Evidence& evidence, const UpdateOptions& options,
+               UpdateResult& result, Observer& observer)
         : prepared_(prepared),
           evidence_(evidence),
           options_(options),
           result_(result),
           observer_(observer),
-          engine_(detail::make_engine(prepared, options, observer)),
+          engine_(engine),
           equilibrium_(options.equilibrium),
           loads_(detail::nodal_forces(prepared, options.loads)),
           step_mm_(options.most_step_mm),
           state_{result.alignment.placement, Eigen::Matrix3Xd::Zero(3, prepared.rest.node_count)} {
-        result_.engine = engine_->description();
+        result_.engine = engine_.description();
     }
 
     /// Leaves the elastic displacement in the moving frame, 3 × N mm.
@@ -131,7 +131,7 @@ private:
     const UpdateOptions& options_;
     UpdateResult& result_;
     Observer& observer_;
-    std::unique_ptr<tled::Engine> engine_;
+    tled::Engine& engine_;
     tled::EquilibriumOptions equilibrium_;
     Eigen::Matrix3Xd loads_;  // mN, 3 × N
     double step_mm_;
@@ -225,7 +225,7 @@ private:
     /// frequency, which dynamic relaxation is tuned by.
     void choose_method() {
         const bool free = equilibrium_.method == tled::EquilibriumMethod::Automatic;
-        if (free && metric_ && engine_->processor() == tled::Processor::Cpu)
+        if (free && metric_ && engine_.processor() == tled::Processor::Cpu)
             equilibrium_.method = tled::EquilibriumMethod::Lbfgs;
     }
 
@@ -250,7 +250,7 @@ private:
         if (needs_metric() && !metric_) metric_.emplace(prepared_.rest, conditions, prepared_.stiffness);
         choose_method();
         const tled::EquilibriumResult solved =
-            tled::equilibrium(*engine_, metric_ ? *metric_ : prepared_.stiffness, conditions, equilibrium_,
+            tled::equilibrium(engine_, metric_ ? *metric_ : prepared_.stiffness, conditions, equilibrium_,
                               &state_.displacement, observer_);
         equilibrium_.method = solved.method;  // chosen and explained once, not in every round
         record.largest_change_mm =
@@ -287,8 +287,28 @@ Alignment align(const PreparedModel& prepared, const Intraoperative& seen, Evide
 
 }  // namespace
 
-UpdateResult update(const PreparedModel& prepared, const Intraoperative& given, const UpdateOptions& options,
-                    Observer& observer) {
+struct Updater::Impl {
+    const PreparedModel& prepared;
+    UpdateOptions options;
+    std::unique_ptr<tled::Engine> solver;
+    std::unique_ptr<detail::DenseEngine> dense;  // where the model has an image of descriptors
+
+    Impl(const PreparedModel& model, const UpdateOptions& given, Observer& observer)
+        : prepared(model), options(given), solver(detail::make_engine(model, given, observer)) {
+        const bool described =
+            model.image && model.image->blocks.options().similarity == Similarity::SelfSimilarityContext;
+        if (described) dense = detail::make_dense_engine(model, given, observer);
+    }
+};
+
+Updater::Updater(const PreparedModel& prepared, const UpdateOptions& options, Observer& observer)
+    : impl_(std::make_unique<Impl>(prepared, options, observer)) {}
+Updater::~Updater() = default;
+Updater::Updater(Updater&&) noexcept = default;
+Updater& Updater::operator=(Updater&&) noexcept = default;
+
+UpdateResult Updater::update(const Intraoperative& given, Observer& observer) {
+    const auto& [prepared, options, solver, dense] = *impl_;
     const Intraoperative seen = detail::without_neighbours(given, prepared.options.rigid_neighbours);
     require_usable(prepared, seen);
     detail::Stopwatch stopwatch;
@@ -296,7 +316,7 @@ UpdateResult update(const PreparedModel& prepared, const Intraoperative& given, 
     Evidence evidence;
     const TissuePrior& tissue = options.tissue;
     evidence.energy = detail::strain_energy_unit(prepared, tissue);
-    if (seen.image) evidence.image.emplace(prepared, *seen.image, options.image, evidence.energy);
+    if (seen.image) evidence.image.emplace(prepared, *seen.image, options.image, dense.get(), evidence.energy);
     if (seen.surface) evidence.surface.emplace(prepared, *seen.surface, options.surface, evidence.energy);
     if (seen.points) evidence.points.emplace(prepared, *seen.points, options.points, evidence.energy);
     if (!seen.labels && !seen.image)
@@ -311,10 +331,15 @@ UpdateResult update(const PreparedModel& prepared, const Intraoperative& given, 
     if (seen.labels) evidence.labels.emplace(prepared, *seen.labels, options);
     result.times.push_back(stopwatch.lap("boundary maps"));
 
-    const Eigen::Matrix3Xd displacement = Rematching(prepared, evidence, options, result, observer).run();
+    const Eigen::Matrix3Xd displacement = Rematching(prepared, *solver, evidence, options, result, observer).run();
     result.deformation = {prepared.model.mesh, displacement, result.alignment.placement};
     result.doubts = detail::doubts(prepared, seen, result);
     return result;
+}
+
+UpdateResult update(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options,
+                    Observer& observer) {
+    return Updater(prepared, options, observer).update(seen, observer);
 }
 
 }  // namespace tissuewarp::registration

@@ -85,6 +85,24 @@ ProgramSource warp_program(std::string kernel, WarpContinuation continuation) {
     return source;
 }
 
+struct MatchKernel {
+    const char* kernel;
+    std::vector<std::string> chunks;  // after index and match
+};
+
+const std::array<MatchKernel, match_pass_count> match_kernels{{
+    {"match_field", {"match.field"}},
+    {"match_grow", {"match.field"}},
+    {"match_sample", {"match.field"}},
+    {"match_difference", {"match.octahedron"}},
+    {"match_mean", {}},
+    {"match_distance", {"match.octahedron", "match.patch"}},
+    {"match_smooth", {"match.patch"}},
+    {"match_erode", {}},
+    {"match_describe", {"match.octahedron"}},
+    {"match_forces", {}},
+}};
+
 }  // namespace
 
 ProgramSource element_force_program(const ElementForces& forces) {
@@ -220,6 +238,21 @@ ProgramSource warp_field_program(WarpContinuation continuation) {
     return warp_program("warp_field", continuation);
 }
 
+ProgramSource match_program(MatchPass pass, int descriptor_reach) {
+    const MatchKernel& match = match_kernels[static_cast<std::size_t>(pass)];
+    ProgramSource source{match.kernel, {"index", "match"}, {{"WORKGROUP_SIZE", workgroup_size}}, {}};
+    source.chunks.insert(source.chunks.end(), match.chunks.begin(), match.chunks.end());
+    const auto number = [](int n) { return std::to_string(n) + "u"; };
+    if (pass == MatchPass::Difference) source.defines["PARTIALS"] = number(match_partials);
+    if (pass == MatchPass::Mean) source.defines["WORKGROUP_SIZE"] = std::to_string(match_partials);
+    if (pass == MatchPass::Erode) source.defines["DESCRIPTOR_REACH"] = number(descriptor_reach);
+    if (pass == MatchPass::Forces) {
+        source.defines["CELL_SIDE"] = number(match_cell_side);
+        source.defines["WORKGROUP_SIZE"] = std::to_string(match_cell_side * match_cell_side * match_cell_side);
+    }
+    return source;
+}
+
 ProgramSource copy_bandwidth_program() {
     return {"copy_bandwidth", {"index", "bindings"}, {{"WORKGROUP_SIZE", workgroup_size}}, {}};
 }
@@ -267,6 +300,7 @@ std::vector<ProgramSource> every_program() {
         for (const WarpTakes takes : {WarpTakes::Trilinear, WarpTakes::Nearest})
             all.push_back(warp_image_program(continuation, takes));
     }
+    for (int pass = 0; pass < match_pass_count; ++pass) all.push_back(match_program(static_cast<MatchPass>(pass), 3));
     all.push_back(copy_bandwidth_program());
     all.push_back(fma_rate_program());
     return all;

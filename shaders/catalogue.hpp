@@ -96,6 +96,16 @@ ProgramSource warp_rasterise_program();
 ProgramSource warp_image_program(WarpContinuation continuation, WarpTakes takes);
 ProgramSource warp_field_program(WarpContinuation continuation);
 
+/// Image matching (registration/detail/gpu_dense_force.hpp), in the order of its passes: kernels match_*.comp.
+enum class MatchPass { Field, Grow, Sample, Difference, Mean, Distance, Smooth, Erode, Describe, Forces };
+inline constexpr int match_pass_count = 10;
+/// Workgroups of MatchPass::Difference, and invocations of MatchPass::Mean, which merges what they leave.
+inline constexpr int match_partials = 128;
+/// Voxels along each axis of a cell of forces; its cube is the workgroup of MatchPass::Forces.
+inline constexpr int match_cell_side = 4;
+/// `descriptor_reach`: voxels around one that must be seen for its descriptor to count.
+ProgramSource match_program(MatchPass pass, int descriptor_reach);
+
 /// What measures a device's ceilings (ceilings.hpp).
 ProgramSource copy_bandwidth_program();
 inline constexpr int fma_per_round = 64;

@@ -2,7 +2,7 @@
 /// Dense forces of a bare intraoperative volume on a model in some state.
 
 #include "meshing/point_location.hpp"
-#include "registration/detail/evidence.hpp"
+#include "registration/detail/dense_engine.hpp"
 
 namespace tissuewarp::registration::detail {
 
@@ -13,8 +13,8 @@ struct DenseMatches {
 
 class DenseSearch {
 public:
-    /// `prepared.image` is there, its template made of self-similarity descriptors.
-    DenseSearch(const PreparedModel& prepared, const imaging::Volume& fixed);
+    /// `engine` has been made for `prepared` and given the fixed image.
+    DenseSearch(const PreparedModel& prepared, DenseEngine& engine);
 
     /// What `known`, found before, and the whole image say about where tissue belongs, on the grid that is `coarsening`
     /// times doubled from the template's finest (or its coarsest): a match for each cell of voxels that has a force,
@@ -25,7 +25,7 @@ public:
 
 private:
     const PreparedModel& prepared_;
-    imaging::Volume fixed_, seen_;
+    DenseEngine& engine_;
 };
 
 }  // namespace tissuewarp::registration::detail

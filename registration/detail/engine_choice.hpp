@@ -1,7 +1,7 @@
 #pragma once
-/// Where the equilibrium is computed.
+/// Where the equilibrium and the forces of images are computed.
 
-#include "registration/pipeline.hpp"
+#include "registration/detail/dense_engine.hpp"
 
 namespace tissuewarp::registration::detail {
 
@@ -9,5 +9,10 @@ namespace tissuewarp::registration::detail {
 /// there is none or when it cannot be trusted (noted). Throws GpuUnavailable when a GPU was demanded.
 std::unique_ptr<tled::Engine> make_engine(const PreparedModel& prepared, const UpdateOptions& options,
                                           Observer& observer);
+
+/// The same of dense forces, for which every hardware GPU is worth while. The model has an image, whose template is
+/// made of self-similarity descriptors.
+std::unique_ptr<DenseEngine> make_dense_engine(const PreparedModel& prepared, const UpdateOptions& options,
+                                               Observer& observer);
 
 }  // namespace tissuewarp::registration::detail

@@ -10,9 +10,10 @@ namespace tissuewarp::registration::detail {
 
 class ImageEvidence {
 public:
-    /// `prepared.image` is there. `energy` (mN mm) weighs as much as one standard deviation of a match.
+    /// `prepared.image` is there. `dense` computes forces after the first search; none without it. `energy` (mN mm)
+    /// weighs as much as one standard deviation of a match.
     ImageEvidence(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
-                  double energy);
+                  DenseEngine* dense, double energy);
 
     /// Finds the blocks about where the model is; the later times, how all of the image is to shift there.
     void search(const State& state, Observer& observer);
@@ -37,8 +38,8 @@ private:
     const ImageOptions& options_;
     FieldOfView view_;  // of `fixed_`
     meshing::PointLocator locator_;
-    double energy_;                     // mN mm that one standard deviation of a match weighs
-    std::optional<DenseSearch> dense_;  // where the template has descriptors of self-similarity
+    double energy_;  // mN mm that one standard deviation of a match weighs
+    std::optional<DenseSearch> dense_;
     int searches_done_ = 0;
     struct Located {
         std::vector<BlockMatch> matches;

@@ -79,10 +79,13 @@ MatchingImage matching_image(const Volume& image, const Volume& seen, const imag
     return result;
 }
 
+Volume smoothed_for(const Volume& image, const imaging::Geometry& grid) {
+    return imaging::smooth(image, smoothing * grid.spacing[0]);
+}
+
 MatchingImage pulled_back_image(const Volume& image, const Volume& seen, const imaging::Geometry& grid,
                                 const SearchRegion& region, const Volume& displacement) {
-    const Volume smooth = imaging::smooth(image, smoothing * grid.spacing[0]);
-    return described(GridSamples(smooth, seen, grid, region, displacement), grid, region);
+    return described(GridSamples(smoothed_for(image, grid), seen, grid, region, displacement), grid, region);
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -24,6 +24,9 @@ struct MatchingImage {
 MatchingImage matching_image(const imaging::Volume& image, const imaging::Volume& seen, const imaging::Geometry& grid,
                              const SearchRegion& region, Similarity similarity);
 
+/// An image smoothed by a Gaussian of 0.4 of a working grid's spacing.
+imaging::Volume smoothed_for(const imaging::Volume& image, const imaging::Geometry& grid);
+
 /// Descriptors of self-similarity of the image that has at each voxel of `grid` what `image` shows where a deformation
 /// takes that voxel: `displacement` (three channels float32, LPS mm) lies on GridSamples::with_rim(grid).
 MatchingImage pulled_back_image(const imaging::Volume& image, const imaging::Volume& seen,

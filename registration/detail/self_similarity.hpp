@@ -7,7 +7,10 @@ namespace tissuewarp::registration::detail {
 
 constexpr int descriptor_channels = 12;
 
-/// Voxels around one that must be seen for its descriptor to count. (It reads up to eight; the rest weighs little.)
+/// Voxels around one that its descriptor reads.
+constexpr int descriptor_extent = 8;
+
+/// And those that must be seen for it to count: the rest weighs little.
 constexpr int descriptor_reach = 3;
 
 struct Descriptors {

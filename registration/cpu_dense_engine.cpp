@@ -1,0 +1,56 @@
+#include "registration/detail/dense_engine.hpp"
+#include "registration/detail/rasterisation.hpp"
+#include "registration/detail/template_images.hpp"
+#include "registration/field.hpp"
+
+#include <algorithm>
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+/// 1 for the voxels of a grid whose centres lie in the mesh.
+std::vector<std::uint8_t> voxels_in(const meshing::TetMesh& mesh, const imaging::Geometry& grid) {
+    std::vector<std::uint8_t> inside(static_cast<std::size_t>(grid.voxel_count()));
+    const Eigen::Matrix3Xd index = grid.point_to_index() * (mesh.nodes.colwise() - grid.origin);
+    rasterise(index, mesh.tets, grid.size, [&](int, const Eigen::Vector4d&) {
+        return [&](const TetRow& row) {
+            const auto start = inside.begin() + grid.size[0] * (row.j + std::ptrdiff_t{grid.size[1]} * row.k);
+            std::fill(start + row.first, start + row.last + 1, std::uint8_t{1});
+        };
+    });
+    return inside;
+}
+
+class CpuDenseEngine : public DenseEngine {
+public:
+    explicit CpuDenseEngine(const PreparedModel& prepared) : prepared_(prepared) {}
+
+    void set_fixed(const imaging::Volume& fixed) override {
+        fixed_ = fixed.as(CV_32F);
+        seen_ = seen_region(fixed_);
+    }
+
+    DenseForces forces(const State& state, std::size_t level) override {
+        const meshing::TetMesh& mesh = prepared_.model.mesh;
+        const TemplateImages& images = prepared_.image->blocks.images();
+        const MatchingImage& moving = images.levels.at(level);
+        const imaging::Volume field = displacement_near_mesh({mesh, state.displacement, state.placement},
+                                                             GridSamples::with_rim(moving.grid), descriptor_extent);
+        const MatchingImage pulled_back =
+            pulled_back_image(fixed_, seen_, moving.grid, images.region(moving.grid), field);
+        return dense_forces(moving, pulled_back, voxels_in(mesh, moving.grid));
+    }
+
+private:
+    const PreparedModel& prepared_;
+    imaging::Volume fixed_, seen_;
+};
+
+}  // namespace
+
+std::unique_ptr<DenseEngine> make_cpu_dense_engine(const PreparedModel& prepared) {
+    return std::make_unique<CpuDenseEngine>(prepared);
+}
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,46 @@
+#pragma once
+/// From sums over the voxels of cells to forces.
+
+#include "registration/detail/dense_force.hpp"
+#include "registration/detail/descriptor_products.hpp"
+
+namespace tissuewarp::registration::detail {
+
+/// Cells of a grid: the voxels that have neighbours on all sides, by cubes.
+class CellGrid {
+public:
+    static constexpr int side = 4;  ///< voxels
+
+    explicit CellGrid(const imaging::Geometry& grid);
+
+    /// Centres of the cells.
+    [[nodiscard]] const imaging::Geometry& centres() const { return centres_; }
+    [[nodiscard]] std::size_t count() const { return static_cast<std::size_t>(centres_.voxel_count()); }
+    [[nodiscard]] std::ptrdiff_t stride(std::size_t axis) const { return stride_[axis]; }
+    [[nodiscard]] Voxel cell(std::size_t n) const;
+    /// Of the grid, that a cell begins with.
+    [[nodiscard]] Voxel first_voxel(std::size_t n) const;
+
+private:
+    imaging::Geometry centres_;
+    std::array<std::ptrdiff_t, 3> stride_{};
+};
+
+/// Sums over voxels, in voxels and steps of the descriptors' eight bits.
+struct CellSums {
+    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();  ///< A
+    Eigen::Vector3d right = Eigen::Vector3d::Zero();   ///< b
+    double squares = 0;                                ///< Σ (D₁ − D₂)²
+    double structure = 0;                              ///< Σ ½ (|∇D₁|² + |∇D₂|²)
+    double voxels = 0;
+    Eigen::Vector3d index = Eigen::Vector3d::Zero();  ///< Σ x
+};
+
+/// `index` is the sum of the voxels' own.
+CellSums cell_sums(const DescriptorProducts& products, double voxels, const Eigen::Vector3d& index);
+
+/// The forces of cells, in the order of `cells`, from the sums of each one's own voxels, which are spread over their
+/// neighbours first. Formulas: docs/method.md, section 11.
+DenseForces forces_of(const std::vector<CellSums>& own, const CellGrid& cells, const imaging::Geometry& grid);
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,60 @@
+#pragma once
+/// The arrays that the kernels of image matching read (contracts in shaders/chunks/match*.glsl,
+/// shaders/kernels/match_*.comp).
+
+#include "meshing/tet_mesh.hpp"
+#include "registration/detail/dense_cells.hpp"
+#include "registration/detail/growth.hpp"
+#include "registration/detail/matching_image.hpp"
+
+#include <Eigen/Geometry>
+
+#include <span>
+
+namespace tissuewarp::registration::detail {
+
+using Float4 = std::array<float, 4>;
+using Uint4 = std::array<std::uint32_t, 4>;
+
+/// The storage block MatchGrid.
+struct MatchGridBlock {
+    Uint4 wide_size, fixed_size, cell_count;
+    std::array<Float4, 3> to_fixed_index, shift_to_index;
+};
+MatchGridBlock match_grid_block(const imaging::Geometry& wide, const imaging::Geometry& fixed, const CellGrid& cells,
+                                const Eigen::Isometry3d& placement);
+
+/// An entry of the storage block MatchElements.
+struct MatchElement {
+    Uint4 nodes;
+    Float4 corner;
+    std::array<Float4, 3> gradient;
+};
+std::vector<MatchElement> elements_of(const meshing::TetMesh& mesh, const imaging::Geometry& wide);
+
+/// An entry of the storage block MatchCells: DescriptorProducts, voxels, their places in the cell.
+struct MatchCell {
+    DescriptorProducts products;
+    std::int32_t voxels;
+    std::array<std::int32_t, 3> places;
+    std::int32_t unused;
+};
+static_assert(sizeof(MatchCell) == 64);
+/// `first` is the voxel of the grid that the cell begins with.
+CellSums sums_of(const MatchCell& cell, const Voxel& first);
+
+/// What does not change with the state, of a mesh at rest on a working grid and its rim.
+struct MatchLayout {
+    imaging::Geometry wide;
+    std::vector<std::uint32_t> owner;                  ///< element of each voxel of `wide`, 0xffffffff outside
+    std::vector<GrownVoxel> growth;                    ///< layers about the mesh, one after the other
+    std::vector<std::array<std::uint32_t, 2>> layers;  ///< first and count of each
+    std::vector<std::uint32_t> counts;                 ///< of each voxel of the grid: in the mesh, and shown with its
+                                                       ///< six neighbours
+};
+MatchLayout match_layout(const meshing::TetMesh& mesh, const MatchingImage& moving);
+
+/// Its descriptors, three words a voxel.
+std::span<const std::uint32_t> words_of(const MatchingImage& image);
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,132 @@
+/// Dense forces on a device (Mesa's llvmpipe where there is no GPU) against their twin on the processor.
+#include "registration/detail/dense_engine.hpp"
+
+#include "registration/detail/growth.hpp"
+#include "registration/evaluation.hpp"
+#include "tests/registration/textured_phantom.hpp"
+#include "tests/support/label_shapes.hpp"
+
+#include <gtest/gtest.h>
+
+namespace tissuewarp::registration::detail {
+namespace {
+
+using namespace test;
+using imaging::Volume;
+
+constexpr double spacing_mm = 2.0;
+
+PreparedModel textured_model() {
+    shapes::Organ organ;
+    organ.semi_axes = {22, 19, 17};
+    organ.inclusion_radius = 0;
+    const Volume labels = shapes::organ_labels(organ, Eigen::Isometry3d::Identity(), spacing_mm);
+    PrepareOptions options;
+    options.meshing.edge_length = 7;
+    PreparedModel prepared = prepare(labels, options);
+    ImageModelOptions image;
+    image.features.count = 200;
+    image.blocks.grid_spacing_mm = spacing_mm;
+    image.blocks.levels = 2;
+    prepare_image(prepared, sampled(labels.geometry, Texture()), image);
+    return prepared;
+}
+
+/// A textured organ in a state near to where it went, and what a scanner shows of it there, on another grid, which cuts
+/// part of the organ off.
+struct Scene {
+    PreparedModel prepared = textured_model();
+    State state;
+    Volume fixed;
+
+    Scene() {
+        state.placement = motion(5, {1, 2, -1}, {2, -1, 1.5});
+        const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
+        state.displacement = Eigen::Matrix3Xd::Zero(3, nodes.cols());
+        for (Eigen::Index n = 0; n < nodes.cols(); ++n)
+            state.displacement.col(n) = 0.9 * smooth_displacement(nodes.col(n));
+        imaging::Geometry seen = prepared.labels.geometry;
+        seen.spacing = {1.7, 2.1, 2.3};
+        seen.size[0] -= 8;
+        const Eigen::Isometry3d back = state.placement.inverse();
+        fixed = sampled(seen, [&](const auto& y) { return 2 - Texture()(before_displacement(back * y)); });
+    }
+};
+
+double deviation(const DenseForce& force) {
+    return 1 / std::sqrt(force.information.norm());
+}
+
+/// Both say something in the same cells, where it lies, by how much and how surely; rounding moves a level of eight
+/// bits in a few channels. A displacement read from another element, a rim off by a voxel or a window along the wrong
+/// axis moves the image pulled back by tenths of voxels.
+TEST(DenseEngine, TheDeviceSaysWhatTheProcessorSays) {
+    const Scene scene;
+    const auto cpu = make_cpu_dense_engine(scene.prepared), gpu = make_gpu_dense_engine(scene.prepared);
+    cpu->set_fixed(scene.fixed);
+    gpu->set_fixed(scene.fixed);
+    for (const std::size_t level : {0U, 1U}) {
+        const DenseForces expected = cpu->forces(scene.state, level), found = gpu->forces(scene.state, level);
+        ASSERT_GT(expected.forces.size(), level == 0 ? 10U : 100U);
+        ASSERT_EQ(found.said, expected.said);
+        ASSERT_EQ(found.forces.size(), expected.forces.size());
+        EXPECT_NEAR(found.agreement, expected.agreement, 1e-3);
+        const double voxel = scene.prepared.image->blocks.options().grid_spacing_mm * (level == 0 ? 2 : 1);
+        std::vector<double> distances;
+        for (std::size_t n = 0; n < found.forces.size(); ++n) {
+            EXPECT_LT((found.forces[n].place - expected.forces[n].place).norm(), 0.1 * voxel);
+            EXPECT_NEAR(deviation(found.forces[n]) / deviation(expected.forces[n]), 1, 0.05);
+            distances.push_back((found.forces[n].shift - expected.forces[n].shift).norm() / voxel);
+        }
+        EXPECT_LT(summarise(distances).mean, 2e-3);
+        EXPECT_LT(summarise(distances).percentile_95, 1e-2);
+    }
+}
+
+// What an image leaves behind must not reach the next one.
+TEST(DenseEngine, TheDeviceRepeatsItselfAndTakesAnotherImage) {
+    const Scene scene;
+    const auto gpu = make_gpu_dense_engine(scene.prepared);
+    gpu->set_fixed(scene.fixed);
+    const DenseForces first = gpu->forces(scene.state, 1);
+    Volume still = scene.prepared.image->image;
+    gpu->set_fixed(still);
+    const State rest{Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, scene.state.displacement.cols())};
+    EXPECT_NEAR(gpu->forces(rest, 1).agreement, 1, 0.02);
+    gpu->set_fixed(scene.fixed);
+    const DenseForces again = gpu->forces(scene.state, 1);
+    ASSERT_EQ(first.forces.size(), again.forces.size());
+    for (std::size_t n = 0; n < first.forces.size(); ++n) {
+        EXPECT_EQ(first.forces[n].shift, again.forces[n].shift);
+        EXPECT_EQ(first.forces[n].information, again.forces[n].information);
+    }
+}
+
+// A ball grows by the octahedra of the city-block distance; a front that turns a corner too early or leaves the grid
+// shows.
+TEST(Growth, LayersAreThoseOfTheCityBlockDistance) {
+    const std::array<int, 3> size{9, 7, 5};
+    const auto offset = [&](int i, int j, int k) { return static_cast<std::size_t>(i + size[0] * (j + size[1] * k)); };
+    std::vector<std::uint8_t> inside(9 * 7 * 5, 0);
+    inside[offset(1, 3, 2)] = 1;
+    const auto layers = growth_layers(inside, size, 4);
+    ASSERT_EQ(layers.size(), 4U);
+    std::vector<int> layer_of(inside.size(), 0);
+    for (std::size_t layer = 0; layer < layers.size(); ++layer)
+        for (const GrownVoxel& grown : layers[layer]) {
+            ASSERT_EQ(layer_of[grown.voxel], 0);
+            ASSERT_NE(grown.neighbours, 0U);
+            layer_of[grown.voxel] = static_cast<int>(layer) + 1;
+        }
+    for (int k = 0; k < 5; ++k)
+        for (int j = 0; j < 7; ++j)
+            for (int i = 0; i < 9; ++i) {
+                const int distance = std::abs(i - 1) + std::abs(j - 3) + std::abs(k - 2);
+                EXPECT_EQ(layer_of[offset(i, j, k)], distance <= 4 ? distance : 0) << i << ' ' << j << ' ' << k;
+            }
+    EXPECT_EQ(layers[0].size(), 6U);
+    for (const GrownVoxel& grown : layers[0]) EXPECT_EQ(grown.neighbours == 1U, grown.voxel == offset(2, 3, 2));  // −i
+}
+
+}  // namespace
+}  // namespace tissuewarp::registration::detail
