@@ -1,6 +1,6 @@
 // Registration from every kind of intraoperative data against known truth, with sweeps of one option:
 //     registration_bench DATA [--case PART] [--OPTION V1,V2,…] [--mesh-edge MM] [--poisson NU] [--count POINTS]
-//                        [--errors FOLDER] [--repeats N] [--device cpu|gpu]
+//                        [--errors FOLDER] [--repeats N] [--device cpu|gpu|auto]
 // DATA holds phantom-brainshift, phantom-brain-sag and lung-ct; PART selects cases whose name holds it. Errors are at
 // the landmarks or, where there is a true field, at its points in the mask; FOLDER gets them point by point, as CSV.
 // With --repeats every update runs N times, and a line per case tells the time from data in to warped image out, the
@@ -181,8 +181,10 @@ Arguments parse(int argc, char** argv) {
         } else if (key == "--count") {
             result.count = std::stoi(value);
         } else if (key == "--device") {
-            if (value != "cpu" && value != "gpu") throw InvalidInput("--device " + value + ": give cpu or gpu");
-            result.device = value == "gpu" ? Device::Gpu : Device::Cpu;
+            static const std::map<std::string, Device> devices{
+                {"cpu", Device::Cpu}, {"gpu", Device::Gpu}, {"auto", Device::Auto}};
+            if (!devices.contains(value)) throw InvalidInput("--device " + value + ": give cpu, gpu or auto");
+            result.device = devices.at(value);
         } else if (key == "--repeats") {
             result.repeats = std::stoi(value);
         } else if (key.starts_with("--") && setters().contains(key.substr(2))) {
@@ -259,7 +261,7 @@ class Warper {
 public:
     Warper(const PreparedModel& prepared, const Case& study, Device device) : moving_(study.moving) {
         grid_ = study.seen.image ? study.seen.image->geometry : study.moving.geometry;
-        if (device == Device::Gpu) gpu_.emplace(prepared.model.mesh, moving_.as(CV_32F), grid_);
+        if (device != Device::Cpu) gpu_.emplace(prepared.model.mesh, moving_.as(CV_32F), grid_);
     }
 
     void operator()(const Deformation& deformation) {
