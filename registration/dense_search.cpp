@@ -4,6 +4,8 @@
 
 #include <Eigen/LU>
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 
 namespace tissuewarp::registration::detail {
@@ -40,10 +42,14 @@ DenseMatches DenseSearch::matches(const State& state, int coarsening, const std:
     const meshing::TetMesh& mesh = prepared_.model.mesh;
     const int finest = prepared_.image->blocks.options().levels - 1;
     const DenseForces dense = engine_.forces(state, static_cast<std::size_t>(std::max(0, finest - coarsening)));
+    std::vector<std::optional<BlockMatch>> found(dense.forces.size());
+    tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t n) {
+        if (const auto at = locate_near(locator, dense.forces[n].place))
+            found[n] = as_match(dense.forces[n], mesh, state, *at);
+    });
     DenseMatches result{{}, dense.agreement};
-    for (const DenseForce& force : dense.forces)
-        if (const auto at = locate_near(locator, force.place))
-            result.matches.push_back(as_match(force, mesh, state, *at));
+    for (const auto& match : found)
+        if (match) result.matches.push_back(*match);
     std::copy_if(known.begin(), known.end(), std::back_inserter(result.matches),
                  [&](const BlockMatch& match) { return !dense.say_something_at(match.moving); });
     return result;
