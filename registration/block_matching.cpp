@@ -234,8 +234,10 @@ public:
         std::vector<BlockMatch> best;
         double certainty = -1;
         const int levels = moving_.options.levels;
-        for (int n = options_.skipped_levels; n < levels; ++n) {
-            Level level = prepare(n);
+        const bool all = options_.finest == FinestGrid::AllPoints;
+        const int whole = all ? levels : std::max(levels - 1, options_.skipped_levels + 1);
+        for (int n = options_.skipped_levels; n < whole; ++n) {
+            Level level = prepare(n, order_);
             std::vector<BlockMatch> matches(order_.size());
             match(level, level.searched, matches);
             if (n + 1 < levels) predict(matches, level.searched);
@@ -247,6 +249,7 @@ public:
             observer.checkpoint("block matching", double(n + 1) / levels);
         }
         match(*best_level, best_level->left_out, best);
+        if (whole < levels) search_undescribed(best);
         std::erase_if(best, [](const BlockMatch& match) { return match.point < 0 || match.information.trace() <= 0; });
         return best;
     }
@@ -260,8 +263,26 @@ private:
     const ConsistencyOptions story_{};  // what neighbours must agree on, between levels as afterwards
     std::vector<std::size_t> order_;
 
-    /// The fixed image along the axes of the moving grid, turned: descriptors depend on the direction.
-    [[nodiscard]] Level prepare(int level) const {
+    /// Points between the described tissue and the border of what the moving image shows: the finest grid's matches
+    /// take the place of coarser ones where that grid serves them better.
+    void search_undescribed(std::vector<BlockMatch>& best) const {
+        const MatchingImage& finest = moving_.levels.back();
+        std::vector<std::size_t> points;
+        std::copy_if(order_.begin(), order_.end(), std::back_inserter(points), [&](std::size_t n) {
+            const Voxel centre = nearest_voxel(finest.grid, points_.col(static_cast<Eigen::Index>(n)));
+            return !finest.seen[static_cast<std::size_t>(finest.offset(centre))];
+        });
+        if (points.empty()) return;
+        const Level level = prepare(moving_.options.levels - 1, points);
+        std::vector<BlockMatch> matches(best.size());
+        match(level, points, matches);
+        if (mean_certainty(matches, points) < mean_certainty(best, points)) return;
+        for (const std::size_t n : points) best[n] = matches[n];
+    }
+
+    /// The fixed image about the points, along the axes of the moving grid, turned: descriptors depend on the
+    /// direction.
+    [[nodiscard]] Level prepare(int level, const std::vector<std::size_t>& points) const {
         const MatchingImage& moving = moving_.levels[static_cast<std::size_t>(level)];
         const double spacing = moving.grid.spacing[0];
         const bool first = level == options_.skipped_levels;
@@ -272,16 +293,17 @@ private:
                                std::to_string(reach) + " voxels of the first level, more than " + std::to_string(most) +
                                "; take more levels or a coarser grid");
         const int margin = detail::search_margin(reach, moving_.options.block_radius);
+        const Eigen::Matrix3Xd predicted = predicted_(Eigen::all, points);
         const imaging::Geometry grid =
-            detail::grid_about(predicted_, options_.rotation * moving.grid.direction, spacing, margin * spacing);
-        const detail::SearchRegion region(grid, predicted_, margin);
+            detail::grid_about(predicted, options_.rotation * moving.grid.direction, spacing, margin * spacing);
+        const detail::SearchRegion region(grid, predicted, margin);
         Level result{
             moving, detail::matching_image(fixed_, seen_, grid, region, moving_.options.similarity), reach, {}, {}};
         // Blocks of a coarse grid overlap so much that some tell the story of all.
         const std::size_t coarser = std::size_t{1} << (moving_.options.levels - 1 - level);
-        const std::size_t step = std::clamp(order_.size() / least_searched, std::size_t{1}, coarser);
-        for (std::size_t place = 0; place < order_.size(); ++place)
-            (place % step == 0 ? result.searched : result.left_out).push_back(order_[place]);
+        const std::size_t step = std::clamp(points.size() / least_searched, std::size_t{1}, coarser);
+        for (std::size_t place = 0; place < points.size(); ++place)
+            (place % step == 0 ? result.searched : result.left_out).push_back(points[place]);
         return result;
     }
 

@@ -6,6 +6,8 @@
 
 #include <Eigen/Eigenvalues>
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -55,14 +57,16 @@ std::vector<BlockMatch> ImageEvidence::block_search(const State& state, Observer
     const MatchingTemplate& blocks = prepared_.image->blocks;
     BlockMatchingOptions matching = options_.matching;
     matching.rotation = state.placement.linear();
+    if (dense_) matching.finest = FinestGrid::UndescribedPoints;
     return match_blocks(blocks, fixed_, deformed(blocks.points(), state), matching, observer);
 }
 
 Eigen::Matrix3Xd ImageEvidence::deformed(const Eigen::Matrix3Xd& points, const State& state) const {
     Eigen::Matrix3Xd result = points;
-    for (Eigen::Index n = 0; n < points.cols(); ++n)
+    tbb::parallel_for(Eigen::Index{0}, points.cols(), [&](Eigen::Index n) {
         if (const auto at = locate_near(locator_, points.col(n)))
             result.col(n) += displacement_at(prepared_.model.mesh, state.displacement, *at);
+    });
     return state.placement * result;
 }
 
@@ -72,12 +76,14 @@ void ImageEvidence::use(const std::vector<BlockMatch>& matches) {
 }
 
 ImageEvidence::Located ImageEvidence::located(const std::vector<BlockMatch>& matches) const {
+    std::vector<std::optional<meshing::Location>> places(matches.size());
+    tbb::parallel_for(std::size_t{0}, matches.size(),
+                      [&](std::size_t n) { places[n] = locate_near(locator_, matches[n].moving); });
     Located result;
-    for (const BlockMatch& match : matches) {
-        const auto at = locate_near(locator_, match.moving);
-        if (!at) continue;
-        result.matches.push_back(match);
-        result.places.push_back(*at);
+    for (std::size_t n = 0; n < matches.size(); ++n) {
+        if (!places[n]) continue;
+        result.matches.push_back(matches[n]);
+        result.places.push_back(*places[n]);
     }
     return result;
 }
@@ -133,9 +139,8 @@ ImageFit ImageEvidence::fit(const State& state) const {
 
 std::vector<ImageEvidence::PulledMatch> ImageEvidence::pulled(const Located& located, const State& state) const {
     const Eigen::Isometry3d back = state.placement.inverse();
-    std::vector<PulledMatch> result;
-    result.reserve(located.matches.size());
-    for (std::size_t n = 0; n < located.matches.size(); ++n) {
+    std::vector<PulledMatch> result(located.matches.size());
+    tbb::parallel_for(std::size_t{0}, result.size(), [&](std::size_t n) {
         const BlockMatch& match = located.matches[n];
         const Eigen::Matrix3d information = back.linear() * match.information * back.linear().transpose();
         const Pull pull{located.places[n], back * match.fixed - match.moving, information};
@@ -143,8 +148,8 @@ std::vector<ImageEvidence::PulledMatch> ImageEvidence::pulled(const Located& loc
             pull.target - displacement_at(prepared_.model.mesh, state.displacement, located.places[n]);
         const double strongest =
             Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(information, Eigen::EigenvaluesOnly).eigenvalues()[2];
-        result.push_back({pull, match.confidence, std::sqrt(e.dot(information * e) / strongest)});
-    }
+        result[n] = {pull, match.confidence, std::sqrt(e.dot(information * e) / strongest)};
+    });
     return result;
 }
 

@@ -70,8 +70,13 @@ private:
     std::shared_ptr<const detail::TemplateImages> images_;
 };
 
+/// Which points are searched on the finest grid: all; or those alone that lie too near the border of what the moving
+/// image shows to be described, where dense searches are to follow, which say nothing there.
+enum class FinestGrid { AllPoints, UndescribedPoints };
+
 struct BlockMatchingOptions {
-    int skipped_levels = 0;        ///< coarse levels left out: a prediction good to a few mm needs none of them
+    int skipped_levels = 0;  ///< coarse levels left out: a prediction good to a few mm needs none of them
+    FinestGrid finest = FinestGrid::AllPoints;
     double search_mm = 16.0;       ///< range of the first level about the predicted position, along each axis
     double least_share = 0.05;     ///< share of a block that both images must show
     double back_match_voxels = 1;  ///< standard deviation of the back-match error in the confidence

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 
 namespace tissuewarp::registration {
 namespace {
@@ -170,6 +171,35 @@ TEST(ImageMatching, TheFinestGridsAloneServeAGoodPrediction) {
     const auto matches = match_blocks(copy, pair.fixed, predicted, options);
     EXPECT_GE(static_cast<Eigen::Index>(matches.size()), pair.points.cols() * 9 / 10);
     EXPECT_LT(median(errors(matches)), 0.3);
+}
+
+// Beside padding dense forces say nothing: there, and only there, the finest grid is asked. Matches of a coarser one
+// know less of a place; those of the wrong points would be the other way about.
+TEST(ImageMatching, TheFinestGridMayBeKeptForWhatIsNotDescribed) {
+    Pair pair = deformed_pair();
+    constexpr double cut = 4;  // mm: the moving image shows x below it
+    for_each_voxel(pair.moving, [&](const Eigen::Vector3d& index, std::int64_t offset) {
+        if (pair.moving.geometry.point(index)[0] > cut) pair.moving.data<float>()[offset] = 0;
+    });
+    const MatchingTemplate moving(pair.moving, pair.points);
+    BlockMatchingOptions options = searching(8);
+    const auto all = match_blocks(moving, pair.fixed, pair.points, options);
+    options.finest = FinestGrid::UndescribedPoints;
+    const auto some = match_blocks(moving, pair.fixed, pair.points, options);
+    std::map<int, double> known;
+    for (const BlockMatch& match : all) known[match.point] = match.information.trace();
+    std::vector<double> beside, away;  // information over that of the finest grid
+    for (const BlockMatch& match : some) {
+        if (!known.contains(match.point)) continue;
+        const double depth = cut - match.moving[0], ratio = match.information.trace() / known[match.point];
+        if (depth > -2 && depth < 3) beside.push_back(ratio);
+        if (depth > 6) away.push_back(ratio);
+    }
+    ASSERT_GE(beside.size(), 5u);
+    ASSERT_GE(away.size(), 20u);
+    EXPECT_NEAR(median(beside), 1, 0.15);
+    EXPECT_LT(median(away), 0.7);
+    EXPECT_LT(median(errors(some)), 0.4);
 }
 
 // Sums in an order that depends on scheduling differ in their last digits.
