@@ -2,6 +2,8 @@
 
 #include "registration/detail/matching_image.hpp"
 
+#include <tbb/parallel_for.h>
+
 #include <cmath>
 #include <limits>
 
@@ -30,20 +32,25 @@ FieldOfView::FieldOfView(const imaging::Volume& image)
       support_(Eigen::VectorXd::Constant(directions_.cols(), -std::numeric_limits<double>::infinity())) {
     const imaging::Volume seen = seen_region(image.as(CV_32F));
     const auto& size = seen.geometry.size;
-    const auto include = [&](int i, int j, int k) {
-        const Eigen::Vector3d point = seen.geometry.point(Eigen::Vector3d(i, j, k));
-        support_ = support_.cwiseMax(directions_.transpose() * point);
-    };
-    for (int k = 0; k < size[2]; ++k)
+    Eigen::MatrixXd of_slices = support_.replicate(1, size[2]);
+    tbb::parallel_for(0, size[2], [&](int k) {
+        Eigen::VectorXd support = of_slices.col(k);
+        const auto include = [&](int i, int j) {
+            const Eigen::Vector3d point = seen.geometry.point(Eigen::Vector3d(i, j, k));
+            support = support.cwiseMax(directions_.transpose() * point);
+        };
         for (int j = 0; j < size[1]; ++j) {  // the ends of a row span what the row adds to the hull
             const auto* row = seen.data<std::uint8_t>() + seen.offset(0, j, k);
             int first = 0, last = size[0] - 1;
             while (first <= last && !row[first]) ++first;
             while (last > first && !row[last]) --last;
             if (first > last) continue;
-            include(first, j, k);
-            if (last > first) include(last, j, k);
+            include(first, j);
+            if (last > first) include(last, j);
         }
+        of_slices.col(k) = support;
+    });
+    support_ = of_slices.rowwise().maxCoeff();
 }
 
 double FieldOfView::distance(const Eigen::Vector3d& point) const {
