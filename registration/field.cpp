@@ -5,6 +5,7 @@
 #include "registration/detail/continuation.hpp"
 #include "registration/detail/growth.hpp"
 #include "registration/detail/rasterisation.hpp"
+#include "registration/detail/row_inverse.hpp"
 #include "registration/detail/uninitialised.hpp"
 
 #include <tbb/parallel_for.h>
@@ -125,62 +126,6 @@ void complete(Raster& raster, const Geometry& grid, const Eigen::Matrix3d& rotat
     raster.values.geometry = grid;
 }
 
-struct Inverse {
-    Eigen::Vector3d w;
-    bool converged;
-};
-
-/// w = X − z with X + u(X) = z, u the continued forward field: Broyden steps (his first method, Math. Comp. 19, 1965)
-/// from the guess w, shortened until the residual falls, which it does where the field does not fold. The gradient just
-/// outside the mesh is close to a rank-one matrix, ∂u/∂n ⊗ n, which one update learns.
-Inverse inverted(const detail::Continuation& forward, const Eigen::Vector3d& z, Eigen::Vector3d w) {
-    constexpr double negligible = 0.01;  // mm
-    constexpr int most_steps = 6, most_halvings = 3;
-    Eigen::Matrix3d inverse_gradient = Eigen::Matrix3d::Identity();
-    Eigen::Vector3d residual = w + forward(z + w);
-    for (int step = 0; step < most_steps && residual.squaredNorm() > negligible * negligible; ++step) {
-        Eigen::Vector3d change = -inverse_gradient * residual, next_residual;
-        int halvings = 0;
-        for (;; ++halvings, change *= 0.5) {
-            next_residual = w + change + forward(z + w + change);
-            if (next_residual.squaredNorm() < residual.squaredNorm() || halvings == most_halvings) break;
-        }
-        if (halvings == most_halvings) break;
-        const Eigen::Vector3d predicted = inverse_gradient * (next_residual - residual);
-        if (const double scale = change.dot(predicted); std::abs(scale) > 1e-12)
-            inverse_gradient += (change - predicted) * (change.transpose() * inverse_gradient) / scale;
-        w += change;
-        residual = next_residual;
-    }
-    if (!(residual.squaredNorm() <= negligible * negligible)) return {w, false};
-    return {w - inverse_gradient * residual, true};  // the next step, not worth its evaluation
-}
-
-/// The inverse at consecutive voxels of a row: where two are known the next is guessed from their line, which needs one
-/// evaluation in most places; at first, and where that leads nowhere, from the continued inverse.
-class RowInverse {
-public:
-    RowInverse(const detail::Continuation& forward, const detail::Continuation& backward)
-        : forward_(forward), backward_(backward) {}
-
-    Eigen::Vector3d operator()(int i, const Eigen::Vector3d& z) {
-        known_ = i == last_ + 1 ? std::min(known_ + 1, 2) : 0;
-        Inverse found{Eigen::Vector3d::Zero(), false};
-        if (known_ == 2) found = inverted(forward_, z, 2.0 * before_ - two_before_);
-        if (!found.converged) found = inverted(forward_, z, backward_(z));
-        if (!found.converged) known_ = -1;
-        two_before_ = before_;
-        before_ = found.w;
-        last_ = i;
-        return found.w;
-    }
-
-private:
-    const detail::Continuation &forward_, &backward_;
-    Eigen::Vector3d before_ = Eigen::Vector3d::Zero(), two_before_ = Eigen::Vector3d::Zero();
-    int last_ = -2, known_ = 0;
-};
-
 }  // namespace
 
 Volume displacement_moving_to_fixed(const Deformation& deformation, const Geometry& moving_grid,
@@ -234,16 +179,14 @@ Volume displacement_fixed_to_moving(const Deformation& deformation, const Geomet
         observer.note("field fixed to moving: " + std::to_string(raster.count.inverted) + " inverted and " +
                       std::to_string(raster.count.flat) + " flat tetrahedra; the field folds there");
     observer.checkpoint(stage, 0.15);
-    std::optional<detail::Continuation> forward, backward;
-    if (!raster.full()) {
-        const meshing::BoundarySurface boundary = meshing::boundary_surface(mesh);
-        forward.emplace(mesh.nodes, mesh.tets, boundary, deformation.displacement, options.fade_mm);
-        observer.checkpoint(stage, 0.4);
-        backward.emplace(deformed, mesh.tets, boundary, inverse, options.fade_mm);
-    }
+    const meshing::BoundarySurface boundary = meshing::boundary_surface(mesh);
+    std::optional<detail::Continuation> forward;
+    if (!raster.full()) forward.emplace(mesh.nodes, mesh.tets, boundary, deformation.displacement, options.fade_mm);
+    detail::LazyContinuation backward(
+        [&] { return detail::Continuation(deformed, mesh.tets, boundary, inverse, options.fade_mm); });
     observer.checkpoint(stage, 0.6);
     complete(raster, fixed_grid, Eigen::Matrix3d::Identity(), to_moving.linear() - Eigen::Matrix3d::Identity(),
-             to_moving.translation(), [&] { return RowInverse(*forward, *backward); });
+             to_moving.translation(), [&] { return detail::RowInverse(*forward, backward); });
     observer.progress(stage, 1.0);
     return raster.values;
 }

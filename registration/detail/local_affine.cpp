@@ -22,7 +22,7 @@ public:
     }
 
     [[nodiscard]] Vector12d solve(const std::vector<int>& used) const {
-        Matrix12d matrix = Matrix12d::Zero();
+        Matrix12d matrix = Matrix12d::Zero();  // its lower triangle, which the factorisation reads
         Vector12d right = Vector12d::Zero();
         for (const int n : used) {
             const Eigen::Vector4d phi = basis(n);
@@ -30,7 +30,7 @@ public:
             const Eigen::Vector3d pull = weight * motion_.displacements.col(n);
             for (int a = 0; a < 4; ++a) {
                 right.segment<3>(3 * a) += phi[a] * pull;
-                for (int b = 0; b < 4; ++b) matrix.block<3, 3>(3 * a, 3 * b) += phi[a] * phi[b] * weight;
+                for (int b = 0; b <= a; ++b) matrix.block<3, 3>(3 * a, 3 * b) += phi[a] * phi[b] * weight;
             }
         }
         // A little stiffness against stretch keeps few or collinear neighbours from extrapolating.
