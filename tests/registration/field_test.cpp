@@ -84,6 +84,38 @@ TEST(FieldNearTheMesh, IsTheForwardFieldInsideContinuedAsFarAsAsked) {
     EXPECT_GT(beyond, 10000);
 }
 
+// Layers grow in parallel by slices. A front that lost or doubled a voxel at the border of two slices, or that read
+// what its own layer had just written, would show in the last digits here.
+TEST(FieldNearTheMesh, GrowsByTheMeansOfWhatLiesBeside) {
+    const Deformation deformation =
+        test::deformed_by(test::box_at({-20, -15, -10}, {40, 30, 20}, {8, 6, 4}, 0.15), affine_displacement);
+    const Geometry grid = test::plain_grid({45, 39, 23}, 1.0, {-24, -17, -9});  // cuts the box along two axes
+    constexpr int reach = 5;
+    Volume expected = displacement_near_mesh(deformation, grid, 0);
+    const std::array<std::int64_t, 3> stride{1, grid.size[0], std::int64_t{grid.size[0]} * grid.size[1]};
+    for (int layer = 0; layer < reach; ++layer) {
+        const Volume before = expected.clone();
+        for_each_voxel(before, [&](const Eigen::Vector3d& index, std::int64_t n) {
+            const auto* values = before.data<cv::Vec3f>();
+            if (values[n] != cv::Vec3f(0, 0, 0)) return;
+            cv::Vec3f sum(0, 0, 0);
+            int count = 0;
+            for (int axis = 0; axis < 3; ++axis)
+                for (const int side : {-1, 1}) {
+                    const double place = index[axis] + side;
+                    if (place < 0 || place > grid.size[static_cast<std::size_t>(axis)] - 1) continue;
+                    const cv::Vec3f& beside = values[n + side * stride[static_cast<std::size_t>(axis)]];
+                    sum += beside;
+                    count += beside != cv::Vec3f(0, 0, 0);
+                }
+            if (count > 0) expected.data<cv::Vec3f>()[n] = sum / float(count);
+        });
+    }
+    EXPECT_TRUE(same_bits(displacement_near_mesh(deformation, grid, reach), expected));
+    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+    EXPECT_TRUE(same_bits(displacement_near_mesh(deformation, grid, reach), expected));
+}
+
 TEST(BackwardField, IsTheExactInverseOfAnAffineMap) {
     Deformation deformation =
         test::deformed_by(test::box_at({-20, -15, -10}, {40, 30, 20}, {8, 6, 4}, 0.15), affine_displacement);
