@@ -62,6 +62,18 @@ TEST(CookVerification, PlaneStrainHexahedra) {
     expect_met(problem, study(problem, Elements::Hexahedra, {6, 12, 18, 24}));
 }
 
+// Why a corner of the reference can be missed (docs/verification.md): on finer meshes T10 keeps the tip of the
+// reference, but its corner lies below by more than twice the uncertainty, as the reference's own meshes do the finer
+// they are.
+TEST(CookVerification, TheReferencesCornerIsNotConverged) {
+    const Problem problem = cook_plane_strain(Law::Iso, 0.3);
+    const Study found = study(problem, Elements::Quadratic, {8, 12, 16, 24});
+    const Comparison &tip = found.comparisons[1], &corner = found.comparisons[2];
+    EXPECT_LT(std::abs(tip.extrapolated - tip.reference[0]), tip.uncertain + tip.limit_error);
+    EXPECT_LT(corner.extrapolated + corner.limit_error, corner.reference[0] - 2.0 * corner.uncertain);
+    EXPECT_LT(corner.limit_error, 0.1 * corner.uncertain);
+}
+
 TEST(CookVerification, ThreeDimensions) {
     const Problem problem = *cook_3d(Law::Iso, 0.499);
     expect_met(problem, study(problem, Elements::AveragedPressure, {4, 8, 12, 16}));
