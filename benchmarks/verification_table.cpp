@@ -1,4 +1,4 @@
-// Prints the tables of docs/verification.md: the problems of data/reference by Newton's method, every element, on three
+// Prints the tables of docs/verification.md: the problems of data/reference by Newton's method, every element, on four
 // meshes and extrapolated; then every engine against Newton's method on one mesh.
 //     verification_table [--csv FILE] [--problem PART]... [--element NAME] [--no-studies] [--no-engines] [--gpu]
 //     verification_table --list
@@ -74,14 +74,14 @@ void print_head(const std::string& problem) {
 
 // Differences of exact states are rounding.
 bool has_order(const Comparison& c) {
-    return !std::isnan(c.order) && (!c.single() || c.mesh_error > 1e-10 * std::abs(c.reference[0]));
+    return !std::isnan(c.order) && (!c.single() || c.mesh_error() > 1e-10 * std::abs(c.reference[0]));
 }
 
 void print_row(const Problem& problem, Elements elements, const Study& study, const Comparison& c) {
-    std::printf("| %s | %s | %d | %.2f | %s, %s | ", name_of(problem.law), name_of(elements), study.nodes[2],
-                study.min_jacobian[2], c.quantity.c_str(), c.unit.c_str());
+    std::printf("| %s | %s | %d | %.2f | %s, %s | ", name_of(problem.law), name_of(elements), study.nodes.back(),
+                study.min_jacobian.back(), c.quantity.c_str(), c.unit.c_str());
     if (c.single()) {
-        std::printf("%.6g | ", c.fine[0]);
+        std::printf("%.6g | ", c.finest()[0]);
     } else {
         std::printf("– | ");
     }
@@ -101,7 +101,7 @@ void print_row(const Problem& problem, Elements elements, const Study& study, co
     } else {
         std::printf("± %.2g | %.3g, at most %.3g | ", c.uncertain, c.off, c.largest_off);
     }
-    std::printf("%.3g | ", c.mesh_error);
+    std::printf("%.3g + %.2g | ", c.distance, c.limit_error);
     if (c.met()) {
         std::printf("met | ");
     } else if (expected_to_lock(problem, elements)) {
@@ -113,13 +113,13 @@ void print_row(const Problem& problem, Elements elements, const Study& study, co
 }
 
 void write_csv(std::ofstream& csv, const Problem& problem, Elements elements, const Study& study, const Comparison& c) {
-    const std::array<const Eigen::VectorXd*, 3> values{&c.coarse, &c.middle, &c.fine};
-    for (std::size_t k = 0; k < 3; ++k) {
-        const double off = (*values[k] - c.reference).norm() / std::sqrt(static_cast<double>(c.fine.size()));
+    for (std::size_t k = 0; k < c.values.size(); ++k) {
+        const Eigen::VectorXd& value = c.values[k];
+        const double off = (value - c.reference).norm() / std::sqrt(static_cast<double>(value.size()));
         csv << '"' << problem.name << "\"," << name_of(problem.law) << ',' << name_of(elements) << ",\"" << c.quantity
-            << "\"," << c.unit << ',' << study.nodes[k] << ',' << (c.single() ? (*values[k])[0] : off) << ',' << off
-            << ',' << (c.single() ? c.reference[0] : 0.0) << ',' << c.uncertain << ',' << c.mesh_error << ','
-            << c.safety << ',' << (expected_to_lock(problem, elements) ? "yes" : "no") << '\n';
+            << "\"," << c.unit << ',' << study.nodes[k] << ',' << (c.single() ? value[0] : off) << ',' << off << ','
+            << (c.single() ? c.reference[0] : 0.0) << ',' << c.uncertain << ',' << c.mesh_error() << ','
+            << c.index_error() << ',' << (expected_to_lock(problem, elements) ? "yes" : "no") << '\n';
     }
     csv.flush();
 }
@@ -129,7 +129,7 @@ void run_studies(const Arguments& arguments) {
     if (!arguments.csv.empty()) {
         csv.open(arguments.csv);
         csv.precision(10);
-        csv << "problem,law,element,quantity,unit,nodes,value,off,reference,uncertainty,mesh_error,safety,"
+        csv << "problem,law,element,quantity,unit,nodes,value,off,reference,uncertainty,mesh_error,index_error,"
                "expected_to_lock\n";
     }
     std::vector<Problem> problems = all_problems();

@@ -142,10 +142,10 @@ def counts(rows):
              "|---|---|---|---|---|"]
     order = list(COLOURS)
     for name, group in sorted(groups.items(), key=lambda item: order.index(item[1][0]["element"])):
-        off, known, mesh, safety = (column(group, c) for c in ("off", "uncertainty", "mesh_error", "safety"))
+        off, known, mesh, index = (column(group, c) for c in ("off", "uncertainty", "mesh_error", "index_error"))
         bars = [k + m for k, m in zip(known, mesh)]
         lines.append(f"| {name} | {len(group)} | {sum(o <= b for o, b in zip(off, bars))} | "
-                     f"{sum(o <= k + s * m for o, k, s, m in zip(off, known, safety, mesh))} | "
+                     f"{sum(o <= k + i for o, k, i in zip(off, known, index))} | "
                      f"{max(o / b for o, b in zip(off, bars)):.3g} |")
     return "\n".join(lines)
 

@@ -53,8 +53,9 @@ struct Problem {
     /// `may_touch` it. Empty without contact.
     std::function<double(int stage)> plane_height;
     std::function<bool(const Eigen::Vector3d& X)> may_touch;
-    std::array<int, 3> levels{};            ///< of the study with linear elements, constant ratio
-    std::array<int, 3> quadratic_levels{};  ///< with quadratic ones
+    /// Of the study with linear and with quadratic elements: three of constant ratio, and the one halfway between the
+    /// two finest. Meshes of all levels have the same shape; their cells shrink alike in all directions.
+    std::array<int, 4> levels{}, quadratic_levels{};
     std::vector<Quantity> quantities;
 };
 

@@ -1,5 +1,5 @@
-// The problems of data/reference on small meshes: the finest of three agrees within the reference's uncertainty plus
-// the mesh error that the three show. The whole set on finer meshes: benchmarks/verification_table.
+// The problems of data/reference on small meshes: the finest of four agrees within the reference's uncertainty plus
+// the mesh error that the four show. The whole set on finer meshes: benchmarks/verification_table.
 
 #include "tests/verification/problems.hpp"
 #include "tests/verification/study.hpp"
@@ -14,7 +14,7 @@ namespace {
 void expect_met(const Problem& problem, const Study& study) {
     for (const Comparison& c : study.comparisons) {
         EXPECT_TRUE(c.met()) << problem.name << ", " << c.quantity << ": off by " << c.off << " " << c.unit
-                             << ", reference known to " << c.uncertain << ", mesh error " << c.mesh_error;
+                             << ", reference known to " << c.uncertain << ", mesh error " << c.mesh_error();
     }
 }
 
@@ -53,18 +53,30 @@ TEST(CookVerification, LumpedAveragesOfJErrInSecondOrder) {
 
 TEST(CookVerification, PlaneStrain) {
     const Problem problem = cook_plane_strain(Law::LnJ, 0.499);
-    expect_met(problem, study(problem, Elements::AveragedPressure, {8, 16, 32}));
+    expect_met(problem, study(problem, Elements::AveragedPressure, {6, 12, 18, 24}));
 }
 
 // Loads on faces of hexahedra: a wrong share per corner would miss by its ratio.
 TEST(CookVerification, PlaneStrainHexahedra) {
     const Problem problem = cook_plane_strain(Law::Iso, 0.499);
-    expect_met(problem, study(problem, Elements::Hexahedra, {8, 16, 32}));
+    expect_met(problem, study(problem, Elements::Hexahedra, {6, 12, 18, 24}));
+}
+
+// Why a corner of the reference can be missed (docs/verification.md): on finer meshes T10 keeps the tip of the
+// reference, but its corner lies below by more than twice the uncertainty, as the reference's own meshes do the finer
+// they are.
+TEST(CookVerification, TheReferencesCornerIsNotConverged) {
+    const Problem problem = cook_plane_strain(Law::Iso, 0.3);
+    const Study found = study(problem, Elements::Quadratic, {8, 12, 16, 24});
+    const Comparison &tip = found.comparisons[1], &corner = found.comparisons[2];
+    EXPECT_LT(std::abs(tip.extrapolated - tip.reference[0]), tip.uncertain + tip.limit_error);
+    EXPECT_LT(corner.extrapolated + corner.limit_error, corner.reference[0] - 2.0 * corner.uncertain);
+    EXPECT_LT(corner.limit_error, 0.1 * corner.uncertain);
 }
 
 TEST(CookVerification, ThreeDimensions) {
     const Problem problem = *cook_3d(Law::Iso, 0.499);
-    expect_met(problem, study(problem, Elements::AveragedPressure, {4, 8, 16}));
+    expect_met(problem, study(problem, Elements::AveragedPressure, {4, 8, 12, 16}));
 }
 
 TEST(BarVerification, Twist) {
@@ -75,24 +87,24 @@ TEST(BarVerification, Twist) {
 
 TEST(BarVerification, Cantilever) {
     const Problem problem = cantilever(Law::Iso);
-    expect_met(problem, study(problem, Elements::AveragedPressure, {2, 4, 8}));
+    expect_met(problem, study(problem, Elements::AveragedPressure, {2, 4, 6, 8}));
 }
 
 // Body forces on hexahedra.
 TEST(BarVerification, CantileverHexahedra) {
     const Problem problem = cantilever(Law::Iso);
-    expect_met(problem, study(problem, Elements::Hexahedra, {2, 4, 8}));
+    expect_met(problem, study(problem, Elements::Hexahedra, {2, 4, 6, 8}));
 }
 
 TEST(EllipsoidVerification, Plain) {
     const Problem problem = ellipsoid_plain(Law::LnJ);
-    expect_met(problem, study(problem, Elements::AveragedPressure, {2, 4, 8}));
+    expect_met(problem, study(problem, Elements::AveragedPressure, {2, 4, 6, 8}));
 }
 
 TEST(BreastVerification, GravityBothWays) {
     for (const Gravity gravity : {Gravity::Prone, Gravity::Supine}) {
         const Problem problem = breast(Law::Iso, gravity);
-        expect_met(problem, study(problem, Elements::AveragedPressure, {3, 6, 12}));
+        expect_met(problem, study(problem, Elements::AveragedPressure, {3, 6, 9, 12}));
     }
 }
 

@@ -1,27 +1,11 @@
 #include "tests/verification/study.hpp"
 
+#include "tests/verification/limit.hpp"
 #include "tled/model.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace tissuewarp::verification {
-
-Extrapolation richardson(double coarse, double middle, double fine, double ratio) {
-    const double fall = (coarse - middle) / (middle - fine);
-    if (!(fall > 1.0)) return {fine, std::numeric_limits<double>::quiet_NaN()};
-    return {fine + (fine - middle) / (fall - 1.0), std::log(fall) / std::log(ratio)};
-}
-
-double mesh_error(double coarse_difference, double fine_difference, double ratio, double highest_order) {
-    const double fall = coarse_difference / fine_difference;
-    if (!(fall > 0.0)) {
-        return std::max(std::abs(coarse_difference), std::abs(fine_difference)) / (ratio - 1.0);
-    }
-    const double order = std::clamp(std::log(fall) / std::log(ratio), 0.5, highest_order);
-    return std::abs(fine_difference) / (std::pow(ratio, order) - 1.0);
-}
 
 double safety_factor(double observed_order, double highest_order) {
     return std::abs(observed_order - highest_order) <= 0.1 * highest_order ? 1.25 : 3.0;
@@ -45,28 +29,20 @@ std::vector<Elements> elements_for(const Problem& problem) {
     return result;
 }
 
-Comparison compare(const Quantity& quantity, const std::array<Eigen::VectorXd, 3>& values, double ratio,
-                   double highest_order) {
-    Comparison c{quantity.name, quantity.unit,      values[0],           values[1],
-                 values[2],     quantity.reference, quantity.uncertainty};
-    const Eigen::VectorXd coarse_change = c.middle - c.coarse, fine_change = c.fine - c.middle;
-    c.largest_off = (c.fine - c.reference).cwiseAbs().maxCoeff();
-    if (c.single()) {
-        c.off = c.fine[0] - c.reference[0];
-        c.uncertain = c.uncertainty[0];
-        c.mesh_error = mesh_error(coarse_change[0], fine_change[0], ratio, highest_order);
-        const Extrapolation limit = richardson(c.coarse[0], c.middle[0], c.fine[0], ratio);
-        c.extrapolated = limit.value;
-        c.order = limit.order;
-        c.safety = safety_factor(c.order, highest_order);
-        return c;
-    }
-    const double root = std::sqrt(static_cast<double>(c.fine.size()));
-    c.off = (c.fine - c.reference).norm() / root;
+Comparison compare(const Quantity& quantity, const std::array<Eigen::VectorXd, 4>& values,
+                   const std::array<int, 4>& levels, double highest_order) {
+    Comparison c{quantity.name, quantity.unit, values, quantity.reference, quantity.uncertainty};
+    const Limit limit = limit_of({levels.begin(), levels.end()}, {values.begin(), values.end()}, highest_order);
+    const Eigen::VectorXd off = c.finest() - c.reference;
+    const double root = std::sqrt(static_cast<double>(off.size()));
+    c.off = c.single() ? off[0] : off.norm() / root;
+    c.largest_off = off.cwiseAbs().maxCoeff();
     c.uncertain = c.uncertainty.norm() / root;
-    c.mesh_error = mesh_error(coarse_change.norm(), fine_change.norm(), ratio, highest_order) / root;
-    c.order = std::log(coarse_change.norm() / fine_change.norm()) / std::log(ratio);
+    c.distance = (c.finest() - limit.value).norm() / root;
+    c.limit_error = limit.standard_error;
+    c.order = limit.order;
     c.safety = safety_factor(c.order, highest_order);
+    c.extrapolated = limit.value[0];
     return c;
 }
 
@@ -74,11 +50,10 @@ Study study(const Problem& problem, Elements elements) {
     return study(problem, elements, is_quadratic(elements) ? problem.quadratic_levels : problem.levels);
 }
 
-Study study(const Problem& problem, Elements elements, const std::array<int, 3>& levels) {
+Study study(const Problem& problem, Elements elements, const std::array<int, 4>& levels) {
     Study result;
-    const double ratio = static_cast<double>(levels[2]) / levels[1];
-    std::vector<std::array<Eigen::VectorXd, 3>> values(problem.quantities.size());
-    for (std::size_t k = 0; k < 3; ++k) {
+    std::vector<std::array<Eigen::VectorXd, 4>> values(problem.quantities.size());
+    for (std::size_t k = 0; k < levels.size(); ++k) {
         const Solution solution = solve(problem, elements, levels[k]);
         result.min_jacobian[k] = solution.min_jacobian;
         result.nodes[k] = static_cast<int>(solution.nodes().cols());
@@ -86,7 +61,7 @@ Study study(const Problem& problem, Elements elements, const std::array<int, 3>&
         for (std::size_t q = 0; q < values.size(); ++q) values[q][k] = problem.quantities[q].measure(solution);
     }
     for (std::size_t q = 0; q < values.size(); ++q) {
-        result.comparisons.push_back(compare(problem.quantities[q], values[q], ratio, highest_order(elements)));
+        result.comparisons.push_back(compare(problem.quantities[q], values[q], levels, highest_order(elements)));
     }
     return result;
 }

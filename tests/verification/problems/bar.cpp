@@ -69,8 +69,8 @@ Problem bar_twist(Law law) {
                                              [on_top](const Solution& s) { return s.reaction(on_top)[2]; }),
                           energy_quantity(values, 1.0),
                           all_points(file, values, [](const Solution& s, const Vector3d& X) { return s.at(X); })};
-    problem.levels = {3, 6, 12};
-    problem.quadratic_levels = {1, 2, 4};
+    problem.levels = {3, 6, 9, 12};
+    problem.quadratic_levels = {1, 2, 3, 4};
     return problem;
 }
 
@@ -103,8 +103,8 @@ Problem cantilever(Law law) {
                               const Vector3d u = s.at({X[0], X[1], std::abs(X[2])});
                               return X[2] < 0.0 ? Vector3d(u[0], u[1], -u[2]) : u;
                           })};
-    problem.levels = {4, 8, 16};
-    problem.quadratic_levels = {2, 4, 8};
+    problem.levels = {4, 8, 12, 16};
+    problem.quadratic_levels = {2, 4, 6, 8};
     return problem;
 }
 

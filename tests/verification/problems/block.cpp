@@ -50,7 +50,7 @@ Problem block_contact(Law law, int step) {
         component_quantity("side", "mm", entry("u_x_at_side"), 0, mm_per_m, [](const Solution& s) {
             return s.at({half, 0.0, half})[0];
         })};
-    problem.levels = {1, 2, 4};
+    problem.levels = {1, 2, 3, 4};
     return problem;
 }
 

@@ -96,8 +96,8 @@ Problem cook_plane_strain(Law law, double nu) {
     problem.quantities.push_back(point_quantity(
         points, entry, [](const Vector3d&) { return true; },
         [](const Solution& s, const Vector3d& X) { return s.at(X); }));
-    problem.levels = {16, 32, 64};
-    problem.quadratic_levels = {4, 8, 16};
+    problem.levels = {16, 32, 48, 64};
+    problem.quadratic_levels = {4, 8, 12, 16};
     return problem;
 }
 
@@ -107,7 +107,7 @@ std::optional<Problem> cook_3d(Law law, double nu) {
     const json* values = poisson_values(file, law, nu);
     if (values == nullptr) return std::nullopt;
     Problem problem = loaded("p4_cook_3d", law, nu);
-    problem.mesh = [](int n) { return membrane(graded(1.0, n, 2.6), n, graded_up(5.0, std::max(1, n / 4), 1.5)); };
+    problem.mesh = [](int n) { return membrane(graded(1.0, n, 2.6), n, graded_up(5.0, n / 4, 1.5)); };
     problem.hold = [](const Vector3d& X, int) {
         tled::PrescribedDisplacement held;
         const bool fixed = near(X[0], 0.0);
@@ -122,8 +122,8 @@ std::optional<Problem> cook_3d(Law law, double nu) {
         tip("tip x", "tip_mid_z_mid", 0, {width, middle, 0.0}), tip("tip y", "tip_mid_z_mid", 1, {width, middle, 0.0}),
         tip("tip y on the face", "tip_mid_z_face", 1, {width, middle, 5.0}),
         tip("top corner y", "tip_top_C_z_mid", 1, {width, right_high, 0.0}), energy_quantity(*values, 2.0)};
-    problem.levels = {8, 16, 32};
-    problem.quadratic_levels = {2, 4, 8};
+    problem.levels = {8, 16, 24, 32};
+    problem.quadratic_levels = {4, 8, 12, 16};
     return problem;
 }
 

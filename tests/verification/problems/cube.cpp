@@ -68,22 +68,22 @@ Problem axial(const std::string& name, Law law, double top, double grading, doub
 
 Problem cube_stretch(Law law) {
     Problem problem = axial("p1_cube_stretch", law, 20.0, 2.0, 0.0);
-    problem.levels = {8, 12, 18};
-    problem.quadratic_levels = {2, 4, 8};
+    problem.levels = {8, 12, 15, 18};
+    problem.quadratic_levels = {2, 4, 6, 8};
     return problem;
 }
 
 Problem cube_mild_compression(Law law) {
     Problem problem = axial("p2_cube_compress_mild", law, -15.0, 1.6, 20.0);
-    problem.levels = {8, 12, 18};
-    problem.quadratic_levels = {2, 4, 8};
+    problem.levels = {8, 12, 15, 18};
+    problem.quadratic_levels = {2, 4, 6, 8};
     return problem;
 }
 
 Problem cube_compression(Law law) {
     Problem problem = axial("p2_cube_compress", law, -30.0, 1.0, 20.0);
-    problem.levels = {4, 6, 9};
-    problem.quadratic_levels = {1, 2, 4};
+    problem.levels = {4, 6, 7, 9};
+    problem.quadratic_levels = {1, 2, 3, 4};
     return problem;
 }
 
@@ -119,8 +119,8 @@ Problem cube_shear(Law law) {
                           component_quantity("force z", "mN", values.at("force"), 1, mN_per_N, force(2)),
                           energy_quantity(values, 2.0),
                           point_quantity(file.at("points"), values.at("u"), away_from_plates(20.0), whole)};
-    problem.levels = {4, 6, 9};
-    problem.quadratic_levels = {1, 2, 4};
+    problem.levels = {4, 6, 7, 9};
+    problem.quadratic_levels = {1, 2, 3, 4};
     return problem;
 }
 

@@ -82,8 +82,8 @@ Problem pressed_ellipsoid(const char* name, const json& file, Law law, double pa
         energy_quantity(values, parts),
         point_quantity(
             file.at("points"), values.at("u"), [](const Vector3d&) { return true; }, unfolded(parts > 2.0))};
-    problem.levels = {4, 8, 16};
-    problem.quadratic_levels = {2, 4, 8};
+    problem.levels = {4, 8, 12, 16};
+    problem.quadratic_levels = {2, 4, 6, 8};
     return problem;
 }
 

@@ -112,8 +112,8 @@ Problem breast(Law law, Gravity gravity) {
     };
     add_points("points", "points", "u_rz");
     add_points("surface points", "surface_points_rz", "u_surface_rz");
-    problem.levels = {4, 8, 16};
-    problem.quadratic_levels = {4, 6, 9};
+    problem.levels = {4, 8, 12, 16};
+    problem.quadratic_levels = {4, 6, 7, 9};
     return problem;
 }
 
@@ -141,7 +141,7 @@ Problem half_ball_contact(Law law, int step) {
             component_quantity("bulge", "mm", values.at("max_radius_m"), step, mm_per_m,
                                [](const Solution& s) { return bulge_radius(s, contact_cap); }));
     }
-    problem.levels = {4, 8, 16};
+    problem.levels = {4, 8, 12, 16};
     return problem;
 }
 
