@@ -3,19 +3,13 @@
 
 #include "registration/pipeline.hpp"
 
-#include "imaging/labels.hpp"
-#include "registration/detail/contact_evidence.hpp"
 #include "registration/detail/doubts.hpp"
 #include "registration/detail/engine_choice.hpp"
+#include "registration/detail/evidence_set.hpp"
 #include "registration/detail/expected_error.hpp"
-#include "registration/detail/ground.hpp"
-#include "registration/detail/image_evidence.hpp"
-#include "registration/detail/label_evidence.hpp"
 #include "registration/detail/loads.hpp"
-#include "registration/detail/point_evidence.hpp"
 #include "registration/detail/rigid_part.hpp"
 #include "registration/detail/stopwatch.hpp"
-#include "registration/detail/surface_evidence.hpp"
 #include "registration/detail/surroundings.hpp"
 
 #include <algorithm>
@@ -32,64 +26,15 @@ double range_of(const UpdateOptions& options, int round) {
     return options.first_range_mm * std::pow(options.last_range_mm / options.first_range_mm, t);
 }
 
-void require_common_labels(const PreparedModel& prepared, const imaging::Volume& fixed_labels) {
-    for (const int label : imaging::labels_in(fixed_labels.as(CV_32S)))
-        if (prepared.model.materials.contains(label)) return;
-    throw InvalidInput("the fixed label map holds none of the labels of the model; check the label tables");
-}
-
-void require_usable(const PreparedModel& prepared, const Intraoperative& seen) {
-    if (!seen.labels && !seen.image && !seen.surface && !seen.points)
-        throw InvalidInput("nothing to register to; give labels, an image, points of a surface or pairs of points");
-    if (seen.image && !prepared.image)
-        throw InvalidInput("a bare volume was given, but the model holds no preoperative image; call prepare_image");
-    if (seen.labels) require_common_labels(prepared, *seen.labels);
-}
-
 void append(std::vector<tled::Spring>& springs, const std::vector<tled::Spring>& others) {
     springs.insert(springs.end(), others.begin(), others.end());
 }
 
-/// The data that are there, and what holds tissue that only points show in part.
-struct Evidence {
-    std::optional<detail::LabelEvidence> labels;
-    std::optional<detail::ImageEvidence> image;
-    std::optional<detail::SurfaceEvidence> surface;
-    std::optional<detail::PointEvidence> points;
-    std::optional<detail::ContactEvidence> contact;
-    double energy = 0;                 ///< mN mm that weighs as much as one standard deviation of a point
-    std::vector<tled::Spring> ground;  ///< moves with the placement
-    std::vector<tled::Spring> anchors;
-    bool placed = false;  ///< anchors or rigid neighbours say where the organ lies as a whole
-
-    /// Labels say where every boundary is, and an image holds what it does not show.
-    [[nodiscard]] bool only_points() const { return !labels && !image; }
-
-    /// Springs of all data together.
-    [[nodiscard]] detail::Contribution contribution(const detail::RoundPlan& plan, const detail::State& state) {
-        detail::Contribution sum;
-        if (labels) detail::add(sum, labels->contribution(plan, state));
-        if (image) detail::add(sum, image->contribution(plan, state));
-        if (surface) detail::add(sum, surface->contribution(plan, state));
-        if (points) detail::add(sum, points->contribution(plan, state));
-        return sum;
-    }
-
-    /// What holds tissue and is no datum: anchors, and rigid neighbours where tissue touches them.
-    [[nodiscard]] std::vector<tled::Spring> supports(const detail::RoundPlan& plan, const detail::State& state) const {
-        std::vector<tled::Spring> springs = anchors;
-        if (!contact) return springs;
-        const detail::Contribution touching = contact->contribution(plan, state);
-        append(springs, touching.conditions.springs);
-        return springs;
-    }
-};
-
 /// The rounds of matching and equilibrium.
 class Rematching {
 public:
-    Rematching(const PreparedModel& prepared, tled::Engine& engine, Evidence& evidence, const UpdateOptions& options,
-               UpdateResult& result, Observer& observer)
+    Rematching(const PreparedModel& prepared, tled::Engine& engine, detail::EvidenceSet& evidence,
+               const UpdateOptions& options, UpdateResult& result, Observer& observer)
         : prepared_(prepared),
           evidence_(evidence),
           options_(options),
@@ -127,7 +72,7 @@ public:
 
 private:
     const PreparedModel& prepared_;
-    Evidence& evidence_;
+    detail::EvidenceSet& evidence_;
     const UpdateOptions& options_;
     UpdateResult& result_;
     Observer& observer_;
@@ -200,10 +145,7 @@ private:
 
     /// What the data say of the result.
     void judge() {
-        if (evidence_.image) result_.image = evidence_.image->fit(state_);
-        if (evidence_.surface) result_.surface = evidence_.surface->fit(state_);
-        if (evidence_.points) result_.points = evidence_.points->fit(state_);
-        if (evidence_.contact) result_.contact = evidence_.contact->fit(state_);
+        evidence_.judge(state_, result_);
         if (!prepared_.options.anchors.empty()) result_.anchors = detail::anchor_fit(prepared_, state_);
         if (!evidence_.only_points()) return;
         detail::Stopwatch stopwatch;
@@ -272,19 +214,6 @@ private:
     }
 };
 
-/// Where the model starts: by labels; or by pairs of points that show how it is turned; or by points of its surface; or
-/// by what pairs there are; or by the matches of a first search, from where the headers place the images.
-Alignment align(const PreparedModel& prepared, const Intraoperative& seen, Evidence& evidence,
-                const UpdateOptions& options, Observer& observer) {
-    if (seen.labels) return align_labels(prepared.labels, *seen.labels, options.alignment, observer);
-    if (evidence.points && evidence.points->show_rotation()) return evidence.points->align();
-    if (evidence.surface) return evidence.surface->align(options.alignment, observer);
-    if (evidence.points) return evidence.points->align();
-    const detail::State start{Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, prepared.rest.node_count)};
-    evidence.image->search(start, observer);
-    return {evidence.image->rigid_motion(), 0};
-}
-
 }  // namespace
 
 struct Updater::Impl {
@@ -310,23 +239,11 @@ Updater& Updater::operator=(Updater&&) noexcept = default;
 UpdateResult Updater::update(const Intraoperative& given, Observer& observer) {
     const auto& [prepared, options, solver, dense] = *impl_;
     const Intraoperative seen = detail::without_neighbours(given, prepared.options.rigid_neighbours);
-    require_usable(prepared, seen);
+    detail::require_usable(prepared, seen);
     detail::Stopwatch stopwatch;
     UpdateResult result;
-    Evidence evidence;
-    const TissuePrior& tissue = options.tissue;
-    evidence.energy = detail::strain_energy_unit(prepared, tissue);
-    if (seen.image) evidence.image.emplace(prepared, *seen.image, options.image, dense.get(), evidence.energy);
-    if (seen.surface) evidence.surface.emplace(prepared, *seen.surface, options.surface, evidence.energy);
-    if (seen.points) evidence.points.emplace(prepared, *seen.points, options.points, evidence.energy);
-    if (!seen.labels && !seen.image)
-        evidence.ground = detail::ground_springs(prepared, evidence.energy, [&](const InterfaceNode&) {
-            return options.align ? tissue.free_motion_mm : tissue.held_motion_mm;
-        });
-    if (prepared.neighbours) evidence.contact.emplace(prepared, evidence.energy);
-    evidence.anchors = detail::anchor_springs(prepared, evidence.energy);
-    evidence.placed = evidence.contact || !evidence.anchors.empty();
-    if (options.align) result.alignment = align(prepared, seen, evidence, options, observer);
+    detail::EvidenceSet evidence(prepared, seen, options, dense.get());
+    if (options.align) result.alignment = detail::align(prepared, seen, evidence, options, observer);
     result.times.push_back(stopwatch.lap("rigid alignment"));
     if (seen.labels) evidence.labels.emplace(prepared, *seen.labels, options);
     result.times.push_back(stopwatch.lap("boundary maps"));
