@@ -40,6 +40,15 @@ struct Surface {
 /// Point clouds have no triangles. Throws IoError or InvalidInput.
 Surface read_surface(const std::filesystem::path& path);
 
+/// Points, some of them joined by lines: indices of nodes, two at least each.
+struct Polylines {
+    Eigen::Matrix3Xd nodes;  ///< 3 × N, mm, LPS
+    std::vector<std::vector<int>> lines;
+};
+
+/// Reads the LINES of a legacy VTK polydata file. Throws IoError or InvalidInput.
+Polylines read_polylines(const std::filesystem::path& path);
+
 /// Writes .ply (binary), .stl, .obj or .vtk by extension. Complete or absent. Throws IoError.
 void write_surface(const SurfaceMesh& surface, const std::filesystem::path& path);
 

@@ -25,27 +25,34 @@ RawSurface read_by_extension(const std::filesystem::path& path, FileReader& file
     file.fail("has the extension '" + extension + "'; surfaces are read from .ply, .stl, .obj, .vtk, .csv and .xyz");
 }
 
-Surface checked(const RawSurface& raw, const FileReader& file) {
+Eigen::Matrix3Xd checked_nodes(const RawSurface& raw, const FileReader& file) {
     if (raw.nodes.empty()) file.refuse("has no points; at least one is needed");
-    const auto count = static_cast<long long>(raw.nodes.size());
-    Surface surface;
-    surface.mesh.nodes.resize(3, count);
-    for (long long n = 0; n < count; ++n) {
-        if (!raw.nodes[static_cast<std::size_t>(n)].allFinite())
-            file.refuse("has a coordinate that is not finite at point " + std::to_string(n));
-        surface.mesh.nodes.col(n) = raw.nodes[static_cast<std::size_t>(n)];
+    Eigen::Matrix3Xd nodes(3, static_cast<Eigen::Index>(raw.nodes.size()));
+    for (Eigen::Index n = 0; n < nodes.cols(); ++n) {
+        nodes.col(n) = raw.nodes[static_cast<std::size_t>(n)];
+        if (!nodes.col(n).allFinite()) file.refuse("has a coordinate that is not finite at point " + std::to_string(n));
     }
+    return nodes;
+}
+
+int checked_index(long long node, Eigen::Index count, const FileReader& file) {
+    if (node < 0 || node >= count)
+        file.refuse("uses point " + std::to_string(node) + "; it has points 0 to " + std::to_string(count - 1));
+    return static_cast<int>(node);
+}
+
+Surface checked(const RawSurface& raw, const FileReader& file) {
+    Surface surface;
+    surface.mesh.nodes = checked_nodes(raw, file);
+    const Eigen::Index count = surface.mesh.nodes.cols();
     surface.mesh.triangles.resize(3, static_cast<Eigen::Index>(raw.triangles.size()));
     for (std::size_t t = 0; t < raw.triangles.size(); ++t)
-        for (int k = 0; k < 3; ++k) {
-            const long long node = raw.triangles[t][k];
-            if (node < 0 || node >= count)
-                file.refuse("uses point " + std::to_string(node) + "; it has points 0 to " + std::to_string(count - 1));
-            surface.mesh.triangles(k, static_cast<Eigen::Index>(t)) = static_cast<int>(node);
-        }
+        for (int k = 0; k < 3; ++k)
+            surface.mesh.triangles(k, static_cast<Eigen::Index>(t)) =
+                checked_index(raw.triangles[t][static_cast<std::size_t>(k)], count, file);
     if (raw.normals.size() != raw.nodes.size()) return surface;
     surface.normals.resize(3, count);
-    for (long long n = 0; n < count; ++n) {
+    for (Eigen::Index n = 0; n < count; ++n) {
         const Eigen::Vector3d& normal = raw.normals[static_cast<std::size_t>(n)];
         if (!normal.allFinite()) file.refuse("has a normal that is not finite at point " + std::to_string(n));
         surface.normals.col(n) = normal.norm() > 0.0 ? Eigen::Vector3d(normal.normalized()) : normal;
@@ -144,6 +151,19 @@ std::string document(const SurfaceMesh& surface, const std::filesystem::path& pa
 Surface read_surface(const std::filesystem::path& path) {
     FileReader file(path);
     return checked(read_by_extension(path, file), file);
+}
+
+Polylines read_polylines(const std::filesystem::path& path) {
+    FileReader file(path);
+    if (detail::extension_of(path) != ".vtk") file.fail("is no .vtk; lines are read from legacy VTK polydata");
+    const RawSurface raw = detail::read_vtk_polydata(file);
+    Polylines result{checked_nodes(raw, file), {}};
+    for (const std::vector<long long>& line : raw.lines) {
+        if (line.size() < 2) file.refuse("has a line of fewer than two points");
+        std::vector<int>& nodes = result.lines.emplace_back();
+        for (const long long node : line) nodes.push_back(checked_index(node, result.nodes.cols(), file));
+    }
+    return result;
 }
 
 void write_surface(const SurfaceMesh& surface, const std::filesystem::path& path) {

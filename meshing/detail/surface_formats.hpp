@@ -8,11 +8,12 @@
 
 namespace tissuewarp::meshing::detail {
 
-/// What a reader collects: triangles with the indices of the file, not yet checked.
+/// What a reader collects: triangles and lines with the indices of the file, not yet checked.
 struct RawSurface {
     std::vector<Eigen::Vector3d> nodes;
     std::vector<Eigen::Vector3d> normals;  ///< as many as nodes, or none
     std::vector<std::array<long long, 3>> triangles;
+    std::vector<std::vector<long long>> lines;  ///< legacy VTK alone has them
 
     /// Cuts a polygon into a fan of triangles.
     void add_polygon(const std::vector<long long>& corners) {

@@ -12,7 +12,8 @@ public:
 
     RawSurface read() {
         if (!file_.line().starts_with("# vtk DataFile")) file_.fail("is no VTK legacy file");
-        file_.line();  // title
+        if (file_.line().find("SPACE=RAS") != std::string_view::npos)  // the title, as 3D Slicer writes it
+            file_.refuse("says that its points are RAS; write them as LPS: negate x and y");
         const std::string_view encoding = file_.token();
         if (encoding != "ASCII" && encoding != "BINARY") file_.fail("is neither ASCII nor BINARY");
         binary_ = encoding == "BINARY";
@@ -32,7 +33,9 @@ private:
             read_vectors(count, surface_.nodes);
         } else if (keyword == "POLYGONS") {
             for (const auto& polygon : read_cells()) surface_.add_polygon(polygon);
-        } else if (keyword == "VERTICES" || keyword == "LINES") {
+        } else if (keyword == "LINES") {
+            surface_.lines = read_cells();
+        } else if (keyword == "VERTICES") {
             read_cells();
         } else if (keyword == "TRIANGLE_STRIPS") {
             file_.fail("has triangle strips; write triangles");
