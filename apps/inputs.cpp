@@ -4,6 +4,7 @@
 #include "core/sha256.hpp"
 #include "imaging/filters.hpp"
 #include "imaging/labels.hpp"
+#include "registration/curves.hpp"
 #include "registration/pipeline.hpp"
 #include "registration/surface_points.hpp"
 
@@ -161,6 +162,8 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
                                                                      {"fixed-surface", &options.fixed_surface},
                                                                      {"fixed-points", &options.point_pairs.fixed},
                                                                      {"moving-points", &options.point_pairs.moving},
+                                                                     {"moving-curves", &options.curves.moving},
+                                                                     {"fixed-curves", &options.curves.fixed},
                                                                      {"materials", &options.materials},
                                                                      {"landmarks", &options.landmarks.csv},
                                                                      {"landmarks-moving", &options.landmarks.moving},
@@ -173,6 +176,9 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
     inputs.point_pairs = read_point_pairs(options.point_pairs);
     if (!options.fixed_surface.empty())
         inputs.fixed_surface = registration::read_surface_points(options.fixed_surface, options.surface_deviation);
+    if (!options.curves.fixed.empty())
+        inputs.curves =
+            registration::read_curves(options.curves.moving, options.curves.fixed, options.curves.deviation);
     if (!options.points.empty()) inputs.points = read_points(options.points);
     observer.checkpoint("reading", 0.1);
 
@@ -221,6 +227,10 @@ void validate(RegistrationInputs& inputs, const RegisterOptions& options) {
     if (inputs.point_pairs) {
         check_moving(inputs.point_pairs->moving, "moving points");
         check_fixed(inputs.point_pairs->fixed, "fixed points");
+    }
+    if (inputs.curves) {
+        check_moving(registration::points_of(inputs.curves->moving), "points of the moving curves");
+        check_fixed(inputs.curves->fixed, "points of the fixed curves");
     }
     if (inputs.fixed_surface) check_fixed(inputs.fixed_surface->points, "points of the fixed surface");
     if (inputs.points) check_moving(*inputs.points, "points");

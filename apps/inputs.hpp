@@ -27,6 +27,7 @@ struct RegistrationInputs {
     imaging::Volume moving_labels, fixed_labels;               ///< the latter empty when not given
     std::optional<registration::SurfacePoints> fixed_surface;  ///< to register to, as the pairs
     std::optional<registration::PointPairs> point_pairs;
+    std::optional<registration::Curves> curves;
     std::optional<registration::Landmarks> landmarks;
     std::optional<Eigen::Matrix3Xd> points;  ///< moving frame, LPS mm
     std::map<int, TissueEntry> materials;    ///< empty without a table

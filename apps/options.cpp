@@ -188,6 +188,16 @@ struct Parser {
             ->needs(fixed_points);
         verb.number("--points-sd", o.point_pairs.deviation, "MM", 1e-3, 100.0,
                     "Standard deviation of a pair along each axis (mm)");
+        CLI::Option* moving_curves =
+            verb.path("--moving-curves", o.curves.moving,
+                      "Preoperative centre lines of vessels: .vtk with LINES, or CSV x,y,z,line (mm, LPS)");
+        CLI::Option* fixed_curves = verb.path("--fixed-curves", o.curves.fixed,
+                                              "Intraoperative points along the same vessels to register to, likewise; "
+                                              "those of no line need no column 'line'");
+        moving_curves->needs(fixed_curves);
+        fixed_curves->needs(moving_curves);
+        verb.number("--curve-deviation", o.curves.deviation, "MM", 1e-3, 100.0,
+                    "Standard deviation of these points along each axis across the vessel (mm)");
         verb.path("-o,--output", o.output, "Folder for the results")->required()->type_name("FOLDER");
         verb.landmarks(o.landmarks);
         verb.path("--points", o.points, "Moving points to carry along: CSV x,y,z (mm, LPS)");
@@ -356,13 +366,13 @@ struct Parser {
             registration.anchors = label_list("--anchor", anchors);
             registration.rigid_neighbours = label_list("--rigid-neighbour", rigid_neighbours);
             if (registration.fixed_labels.empty() && registration.fixed_surface.empty() &&
-                registration.point_pairs.fixed.empty())
+                registration.point_pairs.fixed.empty() && registration.curves.fixed.empty())
                 registration.match_image = true;
             if (registration.match_image && (registration.fixed.empty() || registration.moving.empty()))
                 throw InvalidInput(
                     registration.fixed.empty()
-                        ? "nothing to register to; give --fixed, --fixed-labels, --fixed-surface or --fixed-points, or "
-                          "several"
+                        ? "nothing to register to; give --fixed, --fixed-labels, --fixed-surface, --fixed-points or "
+                          "--fixed-curves, or several"
                         : "matching the fixed image takes the moving one; give --moving");
             registration.parameters = verbs.front().parameters({"save-parameters", "dry-run"});
             return registration;

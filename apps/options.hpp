@@ -34,12 +34,19 @@ struct PointPairFiles {
     double deviation = 1.0;               ///< mm
 };
 
+/// Centre lines of vessels in the moving image, and points along them seen during the operation; all or none.
+struct CurveFiles {
+    std::filesystem::path moving, fixed;
+    double deviation = 1.0;  ///< mm
+};
+
 struct RegisterOptions {
     CommonOptions common;
     std::filesystem::path moving, moving_labels, fixed, fixed_labels, output;
     std::filesystem::path fixed_surface;  ///< points of a part of the organ's surface
     double surface_deviation = 1.0;       ///< mm
     PointPairFiles point_pairs;
+    CurveFiles curves;
     LandmarkFiles landmarks;
     std::filesystem::path points, surface;    ///< of the moving frame, carried along
     double edge_length = 0.0;                 ///< mm; 0: from the volume of the organ and what is given

@@ -84,7 +84,7 @@ imaging::Geometry output_grid(const RegistrationRun& run) {
 }
 
 Intraoperative seen(const RegistrationInputs& inputs, const RegisterOptions& options) {
-    Intraoperative seen{.surface = inputs.fixed_surface, .points = inputs.point_pairs};
+    Intraoperative seen{.surface = inputs.fixed_surface, .points = inputs.point_pairs, .curves = inputs.curves};
     if (options.match_image) seen.image = inputs.fixed;
     if (!inputs.fixed_labels.empty()) seen.labels = inputs.fixed_labels;
     return seen;

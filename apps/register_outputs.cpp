@@ -160,6 +160,9 @@ std::string summary_text(const RegistrationRun& run, double total_seconds) {
     if (const auto& fit = run.result.points)
         text += fmt::format("paired points: {} of {} fit, {:.2f} mm off (root mean square)\n",
                             fit->used - fit->outliers, fit->used, fit->residual_mm);
+    if (const auto& fit = run.result.curves)
+        text += fmt::format("points along vessels: {:.0f} % of {} on the curves, {:.2f} mm across (root mean square)\n",
+                            100 * fit->inlier_share, fit->points, fit->residual_mm);
     if (const auto& fit = run.result.contact)
         text += fmt::format("rigid neighbours: {} surface nodes touch, at most {:.2f} mm deep\n", fit->touching,
                             fit->deepest_mm);

@@ -153,6 +153,11 @@ void add_fits(json& report, const registration::UpdateResult& result) {
     if (const auto& fit = result.points)
         report["points"] = {
             {"used", fit->used}, {"outliers", fit->outliers}, {"residual_mm", number(fit->residual_mm)}};
+    if (const auto& fit = result.curves)
+        report["curves"] = {{"points", fit->points},
+                            {"inlier_share", number(fit->inlier_share)},
+                            {"residual_mm", number(fit->residual_mm)},
+                            {"length_mm", number(fit->length_mm)}};
     if (const auto& fit = result.contact)
         report["contact"] = {{"touching", fit->touching}, {"deepest_mm", number(fit->deepest_mm)}};
     if (const auto& fit = result.anchors)

@@ -65,6 +65,18 @@ void doubt_points(const PointFit& fit, std::vector<std::string>& reasons) {
                           " pairs of points do not fit the tissue; check that they are the same places in both images");
 }
 
+/// Across a line an unbiased point lies √2 deviations off in root mean square.
+void doubt_curves(const CurveFit& fit, double deviation_mm, std::vector<std::string>& reasons) {
+    constexpr double least_inliers = 0.5, most_residual = 1.7;
+    if (fit.inlier_share < least_inliers)
+        reasons.push_back("only " + percent(fit.inlier_share) +
+                          " of the intraoperative points along vessels came near a preoperative curve; check that both "
+                          "show the same vessels, and that the headers place the images within some centimetres");
+    else if (fit.residual_mm > most_residual * deviation_mm)
+        reasons.push_back("points along vessels lie " + to_text(fit.residual_mm) + " mm across from the curves where " +
+                          to_text(deviation_mm) + " mm along each axis were stated");
+}
+
 void doubt_surroundings(const UpdateResult& result, std::vector<std::string>& reasons) {
     constexpr double most_mm = 0.5;
     if (result.contact && result.contact->deepest_mm > most_mm)
@@ -101,6 +113,7 @@ std::vector<std::string> doubts(const PreparedModel& prepared, const Intraoperat
     if (result.image) doubt_image(*result.image, reasons);
     if (result.surface) doubt_surface(*result.surface, seen.surface->deviation_mm, reasons);
     if (result.points) doubt_points(*result.points, reasons);
+    if (result.curves) doubt_curves(*result.curves, seen.curves->deviation_mm, reasons);
     doubt_surroundings(result, reasons);
     if (result.expected) doubt_expectation(*result.expected, reasons);
     if (!seen.labels) return reasons;

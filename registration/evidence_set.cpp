@@ -17,8 +17,9 @@ void require_common_labels(const PreparedModel& prepared, const imaging::Volume&
 }  // namespace
 
 void require_usable(const PreparedModel& prepared, const Intraoperative& seen) {
-    if (!seen.labels && !seen.image && !seen.surface && !seen.points)
-        throw InvalidInput("nothing to register to; give labels, an image, points of a surface or pairs of points");
+    if (!seen.labels && !seen.image && !seen.surface && !seen.points && !seen.curves)
+        throw InvalidInput(
+            "nothing to register to; give labels, an image, points of a surface, pairs of points or curves");
     if (seen.image && !prepared.image)
         throw InvalidInput("a bare volume was given, but the model holds no preoperative image; call prepare_image");
     if (seen.labels) require_common_labels(prepared, *seen.labels);
@@ -31,6 +32,7 @@ EvidenceSet::EvidenceSet(const PreparedModel& prepared, const Intraoperative& se
     if (seen.image) image.emplace(prepared, *seen.image, options.image, dense, energy);
     if (seen.surface) surface.emplace(prepared, *seen.surface, options.surface, energy);
     if (seen.points) points.emplace(prepared, *seen.points, options.points, energy);
+    if (seen.curves) curves.emplace(prepared, *seen.curves, options.curves, energy);
     if (!seen.labels && !seen.image)
         ground = ground_springs(prepared, energy, [&](const InterfaceNode&) {
             return options.align ? tissue.free_motion_mm : tissue.held_motion_mm;
@@ -46,6 +48,7 @@ Contribution EvidenceSet::contribution(const RoundPlan& plan, const State& state
     if (image) add(sum, image->contribution(plan, state));
     if (surface) add(sum, surface->contribution(plan, state));
     if (points) add(sum, points->contribution(plan, state));
+    if (curves) add(sum, curves->contribution(plan, state));
     return sum;
 }
 
@@ -61,6 +64,7 @@ void EvidenceSet::judge(const State& state, UpdateResult& result) const {
     if (image) result.image = image->fit(state);
     if (surface) result.surface = surface->fit(state);
     if (points) result.points = points->fit(state);
+    if (curves) result.curves = curves->fit(state);
     if (contact) result.contact = contact->fit(state);
 }
 
@@ -69,6 +73,9 @@ Alignment align(const PreparedModel& prepared, const Intraoperative& seen, Evide
     if (seen.labels) return align_labels(prepared.labels, *seen.labels, options.alignment, observer);
     if (evidence.points && evidence.points->show_rotation()) return evidence.points->align();
     if (evidence.surface) return evidence.surface->align(options.alignment, observer);
+    if (evidence.curves)
+        return evidence.curves->align(evidence.points ? evidence.points->align().placement
+                                                      : Eigen::Isometry3d::Identity());
     if (evidence.points) return evidence.points->align();
     const State start{Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, prepared.rest.node_count)};
     evidence.image->search(start, observer);

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 
 #include <optional>
+#include <vector>
 
 namespace tissuewarp::registration {
 
@@ -22,12 +23,23 @@ struct PointPairs {
     double deviation_mm = 1.0;       ///< standard deviation of a pair along each axis
 };
 
+/// Centre lines of vessels or ducts before the operation, and points along the same ones during it, from ultrasound or
+/// cone-beam CT: a part of them, in pieces, in any order, some of them of something else.
+struct Curves {
+    std::vector<Eigen::Matrix3Xd> moving;  ///< polylines, 3 × P each, LPS mm, moving frame
+    Eigen::Matrix3Xd fixed;                ///< points, 3 × P, LPS mm, fixed frame
+    Eigen::Matrix3Xd tangents;  ///< 3 × P, along the vessel at each point, unit, either sign; 0 where not known, or
+                                ///< 3 × 0 when none is
+    double deviation_mm = 1.0;  ///< standard deviation of a point along each axis across the vessel
+};
+
 /// Any of it may be absent; something must be there.
 struct Intraoperative {
     std::optional<imaging::Volume> labels = std::nullopt;  ///< label map with the numbers of the preoperative one
     std::optional<imaging::Volume> image = std::nullopt;   ///< grey values of the tissue, not segmented, any modality
     std::optional<SurfacePoints> surface = std::nullopt;
     std::optional<PointPairs> points = std::nullopt;
+    std::optional<Curves> curves = std::nullopt;
 };
 
 }  // namespace tissuewarp::registration

@@ -148,12 +148,21 @@ struct PointOptions {
     double outlier_deviations = 3;  ///< Geman–McClure scale of the last round, in standard deviations of a pair
 };
 
+/// How points along vessels are weighed.
+struct CurveOptions {
+    double step_mm = 1;             ///< between samples of the preoperative lines
+    double piece_mm = 10;           ///< length of a piece of vessel whose points say one thing together
+    double max_angle_deg = 45;      ///< between a point's tangent and the line's, where both are known
+    double outlier_deviations = 3;  ///< Geman–McClure scale of the last round, in standard deviations of a point
+};
+
 struct UpdateOptions {
     ImageOptions image;
     TissuePrior tissue;
     TissueLoads loads;
     SurfaceOptions surface;
     PointOptions points;
+    CurveOptions curves;
     AlignmentOptions alignment;
     bool align = true;             ///< false: the images are in one frame already
     int rematches = 8;             ///< rounds of correspondence and equilibrium; up to twice as many when the
@@ -209,6 +218,14 @@ struct PointFit {
     double residual_mm = 0;  ///< root mean square of the others
 };
 
+/// How points along vessels agree with the registered model.
+struct CurveFit {
+    int points = 0;           ///< that were taken
+    double inlier_share = 0;  ///< of them: within the scale of the last round of a line
+    double residual_mm = 0;   ///< root mean square of those, across the line
+    double length_mm = 0;     ///< of the preoperative lines in the model
+};
+
 /// How the organ lies to its rigid neighbours.
 struct ContactFit {
     int touching = 0;       ///< surface nodes that a neighbour holds back
@@ -245,6 +262,7 @@ struct UpdateResult {
     std::optional<ImageFit> image;          ///< where a bare volume was given
     std::optional<SurfaceFit> surface;      ///< where points of a surface were given
     std::optional<PointFit> points;         ///< where pairs of points were given
+    std::optional<CurveFit> curves;         ///< where points along vessels were given
     std::optional<ContactFit> contact;      ///< where the model has rigid neighbours
     std::optional<AnchorFit> anchors;       ///< and anchors
     std::optional<ExpectedError> expected;  ///< where neither labels nor an image show the organ as a whole
@@ -264,9 +282,9 @@ public:
     Updater& operator=(Updater&&) noexcept;
 
     /// Registers the model to what was seen during the operation. Throws InvalidInput when there is nothing to register
-    /// to, a bare volume without prepare_image, label maps that share no label or do not meet, surface points or pairs
-    /// of points that cannot be used or lie nowhere near the model; SolverFailure when no trustworthy equilibrium is
-    /// found, GpuUnavailable when a device fails.
+    /// to, a bare volume without prepare_image, label maps that share no label or do not meet, surface points, pairs
+    /// of points or curves that cannot be used or lie nowhere near the model; SolverFailure when no trustworthy
+    /// equilibrium is found, GpuUnavailable when a device fails.
     UpdateResult update(const Intraoperative& seen, Observer& observer = silent_observer());
 
 private:

@@ -2,34 +2,16 @@
 
 #include "core/errors.hpp"
 #include "meshing/mesh_io.hpp"
+#include "registration/detail/extent.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <sstream>
-#include <vector>
 
 namespace tissuewarp::registration {
 
 namespace {
 
 constexpr Eigen::Index least_points = 10;
-constexpr double least_extent_mm = 3, most_extent_mm = 2000;
-
-/// Twice the median distance from the median point, mm: stray points do not count.
-double extent_of(const Eigen::Matrix3Xd& points) {
-    const auto median = [](std::vector<double> values) {
-        const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-        std::nth_element(values.begin(), middle, values.end());
-        return *middle;
-    };
-    Eigen::Vector3d centre;
-    for (int axis = 0; axis < 3; ++axis) {
-        const Eigen::RowVectorXd row = points.row(axis);
-        centre[axis] = median({row.begin(), row.end()});
-    }
-    const Eigen::RowVectorXd distances = (points.colwise() - centre).colwise().norm();
-    return 2 * median({distances.begin(), distances.end()});
-}
 
 }  // namespace
 
@@ -50,11 +32,7 @@ void require_usable(const SurfacePoints& surface) {
             refuse("has a normal of length ", surface.normals.col(n).norm(), " at point ", n, "; unit normals or none");
     if (!(surface.deviation_mm > 0) || !std::isfinite(surface.deviation_mm))
         refuse("has a standard deviation of ", surface.deviation_mm, " mm; a positive number is needed");
-    const double extent = extent_of(points);
-    if (extent < least_extent_mm)
-        refuse("is about ", extent, " mm across; coordinates in mm are needed, are these in metres?");
-    if (extent > most_extent_mm)
-        refuse("is about ", extent, " mm across; coordinates in mm are needed, are these in micrometres?");
+    detail::require_millimetres(points, "the intraoperative surface is");
 }
 
 SurfacePoints read_surface_points(const std::filesystem::path& path, double deviation_mm) {

@@ -2,6 +2,7 @@
 /// All data of one registration together, and what holds tissue that they do not show.
 
 #include "registration/detail/contact_evidence.hpp"
+#include "registration/detail/curve_evidence.hpp"
 #include "registration/detail/image_evidence.hpp"
 #include "registration/detail/label_evidence.hpp"
 #include "registration/detail/point_evidence.hpp"
@@ -18,6 +19,7 @@ struct EvidenceSet {
     std::optional<ImageEvidence> image;
     std::optional<SurfaceEvidence> surface;
     std::optional<PointEvidence> points;
+    std::optional<CurveEvidence> curves;
     std::optional<ContactEvidence> contact;
     double energy = 0;                 ///< mN mm that weighs as much as one standard deviation of a point
     std::vector<tled::Spring> ground;  ///< moves with the placement
@@ -42,7 +44,8 @@ struct EvidenceSet {
 };
 
 /// Where the model starts: by labels; or by pairs of points that show how it is turned; or by points of its surface; or
-/// by what pairs there are; or by the matches of a first search, from where the headers place the images.
+/// by curves, from where the headers place the images or what pairs there are shift them; or by these pairs alone; or
+/// by the matches of a first search, from where the headers place the images.
 Alignment align(const PreparedModel& prepared, const Intraoperative& seen, EvidenceSet& evidence,
                 const UpdateOptions& options, Observer& observer);
 

@@ -6,13 +6,13 @@
 #include "registration/detail/surface_tree.hpp"
 #include "registration/field.hpp"
 #include "registration/pipeline.hpp"
+#include "tests/registration/numbers.hpp"
 #include "tests/registration/shapes.hpp"
 #include "tests/support/label_shapes.hpp"
 
 #include <gtest/gtest.h>
 
 #include <numeric>
-#include <random>
 
 namespace tissuewarp::registration {
 namespace {
@@ -20,29 +20,7 @@ namespace {
 using detail::NormalGate;
 using detail::SurfaceTree;
 using Eigen::Vector3d;
-
-/// Repeatable numbers, the same with every standard library.
-class Numbers {
-public:
-    explicit Numbers(unsigned seed) : engine_(seed) {}
-    double between(double low, double high) { return low + (high - low) * (double(engine_()) / 4294967295.0); }
-    Vector3d in_cube() { return {between(-1, 1), between(-1, 1), between(-1, 1)}; }
-    Vector3d direction() {
-        for (;;) {
-            const Vector3d x = in_cube();
-            if (x.norm() > 0.1 && x.norm() < 1) return x.normalized();
-        }
-    }
-    /// Nearly Gaussian, of deviation one.
-    Vector3d noise() {
-        Vector3d sum = Vector3d::Zero();
-        for (int n = 0; n < 12; ++n) sum += 0.5 * in_cube();
-        return sum;
-    }
-
-private:
-    std::mt19937 engine_;
-};
+using test::Numbers;
 
 /// A pear with a flat side: no rotation brings it near itself.
 Vector3d pear(const Vector3d& unit) {

@@ -1,0 +1,188 @@
+/// Files of centre lines, tangents along them, the nearest place on them, and curves that cannot be used.
+#include "registration/curves.hpp"
+
+#include "core/errors.hpp"
+#include "registration/detail/curve_tree.hpp"
+#include "tests/registration/numbers.hpp"
+
+#include <gtest/gtest.h>
+#include <Eigen/Geometry>
+
+#include <filesystem>
+#include <fstream>
+
+namespace tissuewarp::registration {
+namespace {
+
+namespace fs = std::filesystem;
+using detail::CurveTree;
+using detail::Segment;
+using Eigen::Matrix3Xd;
+using Eigen::Vector3d;
+
+class CurveFiles : public ::testing::Test {
+protected:
+    const fs::path folder = fs::path(::testing::TempDir()) / "curves_test";
+    void SetUp() override { fs::create_directories(folder); }
+    void TearDown() override { fs::remove_all(folder); }
+
+    fs::path written(const std::string& name, const std::string& text) const {
+        std::ofstream(folder / name) << text;
+        return folder / name;
+    }
+    std::string complaint(const fs::path& moving, const fs::path& fixed) const {
+        try {
+            read_curves(moving, fixed);
+        } catch (const std::runtime_error& problem) {
+            return problem.what();
+        }
+        return "";
+    }
+    /// Two lines of six points 4 mm apart, along x and along y.
+    fs::path good_table(const std::string& name, double unit = 1) const {
+        std::string text = "line,x,y,z\n";
+        for (int n = 0; n < 6; ++n)
+            for (const bool first : {true, false})
+                text += std::string(first ? "a" : "b") + "," + std::to_string((first ? 4 * n : 0) / unit) + "," +
+                        std::to_string((first ? 0 : 4 * n) / unit) + "," + std::to_string(7 / unit) + "\n";
+        return written(name, text);
+    }
+    static constexpr const char* vtk_header = "# vtk DataFile Version 3.0\nlines SPACE=LPS\nASCII\nDATASET POLYDATA\n";
+};
+
+TEST_F(CurveFiles, TablesOfLinesAndOfPoints) {
+    const fs::path lines = good_table("lines.csv");
+    const fs::path points = written("points.csv", "x,y,z\n1,2,3\n9,2,3\n1,12,3\n1,2,13\n7,7,7\n");
+    const Curves loose = read_curves(lines, points, 0.4);
+    ASSERT_EQ(loose.moving.size(), 2u);
+    EXPECT_EQ(loose.moving[1].cols(), 6);
+    EXPECT_NEAR((loose.moving[1].col(5) - Vector3d(0, 20, 7)).norm(), 0, 1e-9);
+    EXPECT_EQ(loose.fixed.cols(), 5);
+    EXPECT_EQ(loose.tangents.norm(), 0);  // not known
+    EXPECT_EQ(loose.deviation_mm, 0.4);
+    const Curves joined = read_curves(lines, lines, 0.4);
+    ASSERT_EQ(joined.tangents.cols(), 12);
+    for (Eigen::Index n = 0; n < 12; ++n)  // rows of both lines by turns
+        EXPECT_NEAR((joined.tangents.col(n) - Vector3d::Unit(n % 2)).norm(), 0, 1e-9) << n;
+}
+
+TEST_F(CurveFiles, PolydataOfBothVersions) {
+    const std::string points = "POINTS 6 float\n0 0 0 5 0 0 10 0 0 10 5 0 10 10 0 30 30 30\n";
+    const fs::path old = written("old.vtk", vtk_header + points + "LINES 2 7\n3 0 1 2\n2 2 4\n");
+    const fs::path modern =
+        written("new.vtk",
+                vtk_header + points + "LINES 3 5\nOFFSETS vtktypeint64\n0 3 5\nCONNECTIVITY vtktypeint64\n0 1 2 2 4\n");
+    for (const fs::path& path : {old, modern}) {
+        const Curves curves = read_curves(path, path);
+        ASSERT_EQ(curves.moving.size(), 2u) << path;
+        EXPECT_NEAR((curves.moving[1].col(1) - Vector3d(10, 10, 0)).norm(), 0, 1e-6) << path;
+        EXPECT_EQ(curves.fixed.cols(), 6) << path;
+        EXPECT_NEAR(curves.tangents.col(1)[0], 1, 1e-6) << path;
+        EXPECT_EQ(curves.tangents.col(5).norm(), 0) << path;  // on no line
+    }
+}
+
+TEST_F(CurveFiles, HostileFilesAreRefusedByName) {
+    const fs::path good = good_table("good.csv");
+    ASSERT_EQ(complaint(good, good), "");
+    const std::string points = "POINTS 2 float\n0 0 0 50 0 0\n";
+    const std::vector<std::pair<fs::path, std::string>> bad{
+        {written("empty.csv", ""), "empty.csv"},
+        {written("header.csv", "1,2,3,0\n4,5,6,0\n"), "lacks the column x"},
+        {written("nan.csv", "x,y,z,line\n1,2,3,0\nnan,2,3,0\n"), "nan.csv:3"},
+        {written("fields.csv", "x,y,z,line\n1,2,3,0\n1,2,3\n"), "fields.csv:3"},
+        {written("points.csv", "x,y,z\n1,2,3\n40,50,60\n"), "holds no line"},
+        {good_table("metres.csv", 1000), "metres"},
+        {written("lines.ply", "ply\n"), ".vtk"},
+        {written("index.vtk", vtk_header + points + "LINES 1 3\n2 0 2\n"), "uses point 2"},
+        {written("count.vtk", vtk_header + points + "LINES 99999999 3\n2 0 1\n"), "more than the file can hold"},
+        {written("one.vtk", vtk_header + points + "LINES 1 2\n1 0\n"), "fewer than two points"},
+        {written("ras.vtk", "# vtk DataFile Version 3.0\nSPACE=RAS\nASCII\nDATASET POLYDATA\n" + points), "RAS"},
+    };
+    for (const auto& [path, words] : bad)
+        EXPECT_NE(complaint(path, good).find(words), std::string::npos) << path << ": " << complaint(path, good);
+    EXPECT_NE(complaint(good, written("few.csv", "x,y,z\n1,2,3\n40,50,60\n")).find("at least 5"), std::string::npos);
+}
+
+TEST(Curves, TangentsAreChordsOfAHelix) {
+    const double radius = 12, pitch = 3;
+    Matrix3Xd line(3, 200);
+    for (Eigen::Index n = 0; n < line.cols(); ++n)
+        line.col(n) = Vector3d(radius * std::cos(0.05 * double(n)), radius * std::sin(0.05 * double(n)),
+                               pitch * 0.05 * double(n));
+    const Matrix3Xd tangents = tangents_along(line, 3);
+    for (Eigen::Index n = 10; n < 190; ++n) {
+        const double angle = 0.05 * double(n);
+        const Vector3d exact = Vector3d(-radius * std::sin(angle), radius * std::cos(angle), pitch).normalized();
+        EXPECT_GT(exact.dot(tangents.col(n)), std::cos(2 * EIGEN_PI / 180)) << n;
+    }
+    EXPECT_NEAR(tangents.col(0).norm(), 1, 1e-9);
+    EXPECT_EQ(tangents_along(line.leftCols(5), 3).norm(), 0);  // 2.5 mm: too short to say
+}
+
+/// The simple twin: every segment is looked at.
+CurveTree::Hit nearest_of_all(const Matrix3Xd& points, const std::vector<Segment>& segments, const Vector3d& query,
+                              const detail::TangentGate& gate) {
+    CurveTree::Hit best;
+    best.distance = 1e30;
+    for (std::size_t s = 0; s < segments.size(); ++s) {
+        const Vector3d chord = (points.col(segments[s].chord[1]) - points.col(segments[s].chord[0])).normalized();
+        if (!gate.tangent.isZero() && std::abs(gate.tangent.dot(chord)) < gate.least_cosine) continue;
+        const Vector3d a = points.col(segments[s].ends[0]), b = points.col(segments[s].ends[1]);
+        const double along = std::clamp((b - a).dot(query - a) / (b - a).squaredNorm(), 0.0, 1.0);
+        const double distance = (a + along * (b - a) - query).norm();
+        if (distance < best.distance) best = {int(s), along, a + along * (b - a), chord, distance};
+    }
+    return best;
+}
+
+TEST(CurveTree, AgreesWithLookingAtEverySegment) {
+    test::Numbers numbers(1);
+    Matrix3Xd points(3, 300);
+    std::vector<Segment> segments;
+    for (int n = 0; n < 300; ++n) {
+        const bool start = n % 60 == 0;
+        points.col(n) = start ? Vector3d(40 * numbers.in_cube()) : Vector3d(points.col(n - 1) + 3 * numbers.in_cube());
+        if (!start) segments.push_back({{n - 1, n}, {std::max(n - n % 60, n - 3), n}});
+    }
+    const CurveTree tree(points, segments);
+    int gated = 0;
+    for (int n = 0; n < 500; ++n) {
+        const Vector3d query = 60 * numbers.in_cube();
+        const detail::TangentGate gate{n % 3 ? numbers.direction() : Vector3d(0, 0, 0), 0.7};
+        const auto expected = nearest_of_all(points, segments, query, gate);
+        const auto found = tree.nearest(query, 1e3, gate);
+        ASSERT_TRUE(found) << n;
+        EXPECT_EQ(found->segment, expected.segment) << n;
+        EXPECT_NEAR(found->distance, expected.distance, 1e-9) << n;
+        EXPECT_NEAR((found->point - expected.point).norm(), 0, 1e-9) << n;
+        EXPECT_NEAR((found->tangent - expected.tangent).norm(), 0, 1e-9) << n;
+        gated += expected.distance > nearest_of_all(points, segments, query, {}).distance + 1e-6;
+        EXPECT_FALSE(tree.nearest(query, 0.99 * expected.distance, gate)) << n;
+    }
+    EXPECT_GT(gated, 50);  // the gate decided
+}
+
+TEST(Curves, WhatCannotBeUsedIsRefused) {
+    Curves good;
+    good.moving = {Matrix3Xd(3, 2)};
+    good.moving[0] << 0, 40, 0, 10, 0, 0;
+    good.fixed = Matrix3Xd::Random(3, 20) * 30;
+    good.tangents = Matrix3Xd::Zero(3, 20);
+    EXPECT_NO_THROW(require_usable(good));
+    std::vector<Curves> bad(9, good);
+    bad[0].moving.clear();
+    bad[1].moving[0](1, 1) = NAN;
+    bad[2].moving.emplace_back(3, 1);
+    bad[3].fixed(2, 7) = INFINITY;
+    bad[4].fixed.resize(3, 4);
+    bad[5].tangents(0, 3) = 0.5;
+    bad[6].deviation_mm = -1;
+    bad[7].fixed *= 1e-3;
+    bad[8].moving[0] = Matrix3Xd(3, 4000);  // back and forth
+    for (Eigen::Index n = 0; n < 4000; ++n) bad[8].moving[0].col(n) = Vector3d(n % 2 ? 50 : 0, 0, 0);
+    for (std::size_t n = 0; n < bad.size(); ++n) EXPECT_THROW(require_usable(bad[n]), InvalidInput) << n;
+}
+
+}  // namespace
+}  // namespace tissuewarp::registration
