@@ -1,4 +1,4 @@
-"""Registration to points of a surface and to pairs of points, without fixed labels or image."""
+"""Registration to points of a surface, to pairs of points and to vessels, without fixed labels or image."""
 
 import json
 import unittest
@@ -135,6 +135,64 @@ class FromPairs(PhantomTest):
                                        fixed_labels=None)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("carried along", result.stdout)
+
+
+def vessels():
+    """Lines in the unit ball: a trunk and four bowed branches of it."""
+    t = numpy.linspace(0, 1, 15)[:, None]
+    ends = [((-0.8, 0, 0), (0, 0.1, 0)), ((0, 0.1, 0), (0.6, 0.4, 0.3)), ((0, 0.1, 0), (0.5, -0.5, 0.1)),
+            ((0, 0.1, 0), (0.1, 0.2, -0.8)), ((-0.4, 0, 0.1), (-0.4, -0.4, 0.6))]
+    return [numpy.array(a) + t * (numpy.array(b) - a) + 0.1 * numpy.sin(numpy.pi * t) for a, b in ends]
+
+
+def save_polydata(lines, path):
+    """Legacy VTK with LINES."""
+    points = numpy.concatenate(lines)
+    first = numpy.cumsum([0] + [len(line) for line in lines])
+    cells = [" ".join(map(str, [b - a, *range(a, b)])) for a, b in zip(first, first[1:])]
+    path.write_text("# vtk DataFile Version 3.0\nSPACE=LPS\nASCII\nDATASET POLYDATA\n"
+                    f"POINTS {len(points)} double\n" + "\n".join(" ".join(map(str, p)) for p in points)
+                    + f"\nLINES {len(cells)} {len(points) + len(cells)}\n" + "\n".join(cells) + "\n")
+    return path
+
+
+class FromCurves(PhantomTest):
+    def setUp(self):
+        super().setUp()
+        self.moving = save_polydata([CENTRE_LPS + line * MOVING_AXES for line in vessels()],
+                                    self.phantom.folder / "vessels.vtk")
+        seen = numpy.concatenate([line[:-3] for line in vessels()])
+        noise = numpy.random.default_rng(2).normal(scale=0.3, size=seen.shape)
+        self.fixed = save_points(CENTRE_LPS + SHIFT_LPS + seen * FIXED_AXES + noise, self.phantom.folder / "seen.csv")
+
+    def register(self, *more):
+        return self.phantom.register(*more, "--edge-length", 4, fixed=None, fixed_labels=None)
+
+    def test_vessels_carry_the_organ(self):
+        result = self.register("--moving-curves", self.moving, "--fixed-curves", self.fixed, "--curve-deviation", 0.3,
+                               "--landmarks", pairs_of(self.phantom))
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("points along vessels: ", result.stdout)
+        report = json.loads((self.phantom.output / "report.json").read_text())
+        self.assertEqual(report["curves"]["points"], 60)
+        self.assertGreater(report["curves"]["inlier_share"], 0.9)
+        self.assertLess(report["curves"]["residual_mm"], 0.5)
+        self.assertEqual(report["parameters"]["curve-deviation"], 0.3)
+        self.assertEqual(len(report["inputs"]["moving-curves"]["sha256"]), 64)
+        error = report["target_registration_error"]["all"]
+        self.assertGreater(error["before"]["mean"], 2.5)
+        self.assertLess(error["after"]["mean"], 1.0)
+
+    def test_curves_that_cannot_be_used(self):
+        self.assert_refused(self.register("--moving-curves", self.moving), INPUT, "--fixed-curves")
+        self.assert_refused(self.register("--fixed-curves", self.fixed), INPUT, "--moving-curves")
+        self.assert_refused(self.register("--moving-curves", self.fixed, "--fixed-curves", self.fixed), INPUT,
+                            "seen.csv", "holds no line", "'line'")
+        ras = save_points((CENTRE_LPS + vessels()[0] * MOVING_AXES) * [-1, -1, 1] - [300, 0, 0],
+                          self.phantom.folder / "elsewhere.csv")
+        lines = save_polydata([numpy.loadtxt(ras, delimiter=",", skiprows=1)], self.phantom.folder / "elsewhere.vtk")
+        self.assert_refused(self.register("--moving-curves", lines, "--fixed-curves", self.fixed), INPUT,
+                            "moving curves", "RAS")
 
 
 class WithSurroundings(PhantomTest):
