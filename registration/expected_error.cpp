@@ -1,6 +1,7 @@
 #include "registration/detail/expected_error.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -11,6 +12,9 @@ namespace tissuewarp::registration::detail {
 namespace {
 
 constexpr int places = 16;
+/// Motions of the organ as a whole that no datum shows, such as one along a straight vessel, are known no worse: their
+/// variance stays finite.
+constexpr double least_known_mm = 100;
 
 using Columns = Eigen::MatrixXd;  // 3N × k, nodes' vectors one after the other
 
@@ -48,6 +52,13 @@ Columns unit_forces(const std::vector<int>& chosen, Eigen::Index rows) {
     return forces;
 }
 
+/// Of a symmetric matrix whose eigenvalues are to be no smaller than `least`.
+Eigen::MatrixXd bounded_inverse(const Eigen::MatrixXd& matrix, double least) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(matrix);
+    return modes.eigenvectors() * modes.eigenvalues().cwiseMax(least).cwiseInverse().asDiagonal() *
+           modes.eigenvectors().transpose();
+}
+
 std::vector<int> spread_nodes(const Eigen::Matrix3Xd& nodes) {
     std::vector<int> chosen;
     Eigen::RowVectorXd nearest = (nodes.colwise() - nodes.rowwise().mean()).colwise().squaredNorm();
@@ -77,7 +88,8 @@ ExpectedError expected_error(const PreparedModel& prepared, const WeighedSprings
     if (springs.free_placement) {
         const Columns motions = rigid_motions(nodes), held = times(springs.ground, motions);
         freed = stiffness.solve_columns(held);
-        middle = (motions.transpose() * held - held.transpose() * freed).inverse();
+        middle = bounded_inverse(motions.transpose() * held - held.transpose() * freed,
+                                 springs.energy / (least_known_mm * least_known_mm));
     }
     ExpectedError result;
     double sum = 0;
