@@ -174,6 +174,8 @@ void CurveEvidence::add_pulls(const CurveMatch& match, double stiffness, const S
     }
 }
 
+/// No match counts as held back by the step bound, for which the round would be repeated: among few points outliers
+/// alone would repeat it for ever. The inlier share says in the end what was not reached.
 Contribution CurveEvidence::contribution(const RoundPlan& plan, const State& state) {
     constexpr double scale_ratio = 0.6;  // from round to round
     const double reach = std::max(4 * final_scale_mm(), 3 * plan.range_mm);
@@ -192,12 +194,10 @@ Contribution CurveEvidence::contribution(const RoundPlan& plan, const State& sta
         const CurveMatch& match = found[n];
         if (!match.found) continue;
         ++result.matched;
-        const double robust = robust_weight(match.hit.distance, scale);
-        const double weight = robust * data_.shares[static_cast<Eigen::Index>(n)];
+        const double share = data_.shares[static_cast<Eigen::Index>(n)];
+        const double weight = share * robust_weight(match.hit.distance, scale);
         add_pulls(match, weight * stiffness, state, plan.most_step_mm, pulls);
-        const double away = match.across.norm();
-        result.held_back += robust > 0.5 && away > plan.most_step_mm;
-        result.mean_residual_mm += weight * away;
+        result.mean_residual_mm += weight * match.across.norm();
         weights += weight;
     }
     if (weights > 0) result.mean_residual_mm /= weights;

@@ -151,7 +151,7 @@ struct PointOptions {
 /// How points along vessels are weighed.
 struct CurveOptions {
     double step_mm = 1;             ///< between samples of the preoperative lines
-    double piece_mm = 10;           ///< length of a piece of vessel whose points say one thing together
+    double piece_mm = 5;            ///< length of a piece of vessel whose points say one thing together: its width
     double max_angle_deg = 45;      ///< between a point's tangent and the line's, where both are known
     double outlier_deviations = 3;  ///< Geman–McClure scale of the last round, in standard deviations of a point
 };

@@ -57,22 +57,26 @@ std::vector<Matrix3Xd> tree() {
             vessel({-17, 4, 3}, {-20, 18, -12}, {0, 2, 3})};
 }
 
+/// What the operation shows of it: all of every other vessel, and the nearer 60 % of those between.
+std::vector<Matrix3Xd> shown() {
+    std::vector<Matrix3Xd> lines = tree();
+    for (std::size_t v = 1; v < lines.size(); v += 2)
+        lines[v] = lines[v].leftCols(std::lround(0.6 * double(lines[v].cols()))).eval();
+    return lines;
+}
+
 using Map = std::function<Vector3d(const Vector3d&)>;
 
 Vector3d bent(const Vector3d& x) {
     return x + Vector3d(0, 0.03 * x[2], 0.004 * x[0] * x[0] - 0.03 * x[1]);
 }
 
-/// What a probe sees of the vessels after `where`: noisy pieces, the far end of every other vessel missing, and a share
-/// of points of something else.
+/// What a probe sees of the vessels after `where`, with noise, and a share of points of something else.
 Curves seen_after(const Map& where, double noise_mm, double outliers, Numbers& numbers, bool with_tangents) {
     Curves curves{tree(), Matrix3Xd(3, 0), Matrix3Xd(3, 0), 1.0};
     std::vector<Vector3d> points, tangents;
-    for (std::size_t v = 0; v < curves.moving.size(); ++v) {
-        const Matrix3Xd& line = curves.moving[v];
-        const double shown = v % 2 ? 0.6 : 1.0;
-        const auto last = static_cast<Eigen::Index>(shown * double(line.cols() - 1));
-        for (Eigen::Index n = 0; n < last; ++n) {
+    for (const Matrix3Xd& line : shown()) {
+        for (Eigen::Index n = 0; n + 1 < line.cols(); ++n) {
             const Vector3d place = line.col(n) + numbers.between(0, 1) * (line.col(n + 1) - line.col(n));
             const bool other = numbers.between(0, 1) < outliers;
             points.push_back(where(place) + noise_mm * numbers.noise());
@@ -90,10 +94,10 @@ Curves seen_after(const Map& where, double noise_mm, double outliers, Numbers& n
     return curves;
 }
 
-/// Tissue on a grid in the organ, at most `reach` from a vessel.
+/// Tissue on a grid in the organ, at most `reach` from a vessel that is shown.
 Matrix3Xd targets(double reach) {
     std::vector<Vector3d> places;
-    const std::vector<Matrix3Xd> vessels = tree();
+    const std::vector<Matrix3Xd> vessels = shown();
     for (double x = -40; x <= 40; x += 6)
         for (double y = -30; y <= 30; y += 6)
             for (double z = -25; z <= 25; z += 6) {
@@ -161,52 +165,93 @@ TEST(CurveEvidence, SpringsHaveTheForcesOfThePulls) {
     EXPECT_NEAR(found / expected, 1, 1e-6);
 }
 
+// Two lines that cross a millimetre apart: the point lies nearer to the one, and its tangent, which turns with the
+// placement, is that of the other.
+TEST(CurveMatches, GoWhereTheTangentsAgree) {
+    Matrix3Xd ends(3, 4);
+    ends << -20, 20, 0, 0, 0, 0, -20, 20, 0, 0, 1, 1;
+    const detail::CurveTree lines(ends, {{{0, 1}, {0, 1}}, {{2, 3}, {2, 3}}});
+    const Eigen::Isometry3d placement = test::motion(90, {0, 0, 1}, {30, -7, 12});
+    detail::CurvePoints points;
+    points.points = placement * Vector3d(0.2, 0.1, 0.3);
+    points.tangents = placement.linear() * Vector3d(0.2, -1, 0).normalized();
+    points.shares = Eigen::VectorXd::Ones(1);
+    const detail::CurveMatch gated = detail::match_curves(lines, points, placement, 5, 45).front();
+    ASSERT_TRUE(gated.found);
+    EXPECT_EQ(gated.hit.segment, 1);
+    EXPECT_NEAR((gated.across - Vector3d(0.2, 0, -0.7)).norm(), 0, 1e-9);
+    points.tangents.setZero();
+    const detail::CurveMatch nearest = detail::match_curves(lines, points, placement, 5, 45).front();
+    ASSERT_TRUE(nearest.found);
+    EXPECT_EQ(nearest.hit.segment, 0);
+    EXPECT_NEAR((nearest.across - Vector3d(0, 0.1, 0.3)).norm(), 0, 1e-9);
+}
+
 TEST(CurveEvidence, AShiftAlongAStraightLineMovesNothing) {
     const PreparedModel prepared = prepare(shapes::organ_labels({}), coarse());
     Curves curves{{vessel({-30, 5, 4}, {30, 5, 4}, {0, 0, 0})}, Matrix3Xd(3, 20), Matrix3Xd(3, 0), 0.5};
     for (Eigen::Index n = 0; n < 20; ++n) curves.fixed.col(n) = Vector3d(-20 + 2 * double(n) + 9, 5, 4);
     for (const UpdateOptions& options : {held(), on_cpu()}) {
         const UpdateResult result = update(prepared, {.curves = curves}, options);
-        EXPECT_LT(mean_error(result.deformation, targets(50), [](const Vector3d& x) { return x; }), 0.02);
+        EXPECT_LT(mean_error(result.deformation, targets(50), [](const Vector3d& x) -> Vector3d { return x; }), 0.02);
         EXPECT_EQ(result.curves->inlier_share, 1);
     }
+    const auto raised = [](const Vector3d& x) -> Vector3d { return x + Vector3d(0, 0, 4); };
     curves.fixed.row(2).array() += 4;  // the twin that must move: across the line
     const UpdateResult across = update(prepared, {.curves = curves}, on_cpu());
-    EXPECT_LT(mean_error(across.deformation, targets(50), [](const Vector3d& x) { return x + Vector3d(0, 0, 4); }), 1);
+    EXPECT_LT(mean_error(across.deformation, targets(50), raised), 1);
+    EXPECT_GT(across.expected->mean_mm, 20);  // nothing says where along the line, nor how it is turned
+    EXPECT_FALSE(across.doubts.empty());
 }
 
-class Seeds : public ::testing::TestWithParam<unsigned> {};
-
-INSTANTIATE_TEST_SUITE_P(Curves, Seeds, ::testing::Range(1u, 5u));
-
-// Turned 10° and shifted 11 mm; without tangents in every other draw. A descent that takes outliers for vessels, or the
-// wrong sign of a step, stays centimetres off.
-TEST_P(Seeds, ThePoseIsFoundFromWhereTheHeadersPlaceIt) {
-    Numbers numbers(GetParam());
-    const Eigen::Isometry3d truth = test::motion(10, numbers.direction(), 11 * numbers.direction());
-    const Curves seen =
-        seen_after([&](const Vector3d& x) { return truth * x; }, 0.7, 0.2, numbers, GetParam() % 2 == 0);
+// Turned 10° and shifted 11 mm; without tangents in every other draw. What is left is for the tissue: the scale ends at
+// 7 mm, within which outliers lie. A descent into another branch, or the wrong sign of a step, stays centimetres off.
+TEST(CurvePose, IsFoundFromWhereTheHeadersPlaceIt) {
     const PreparedModel prepared = prepare(shapes::organ_labels({}), coarse());
     const CurveOptions options;
-    const detail::CurveEvidence evidence(prepared, seen, options, 1);
-    const Alignment found = evidence.align(Eigen::Isometry3d::Identity());
     const Matrix3Xd places = targets(50);
-    EXPECT_GT(((truth * places) - places).colwise().norm().mean(), 8);
-    EXPECT_LT(((truth * places) - (found.placement * places)).colwise().norm().mean(), 1.5);
+    for (unsigned seed = 1; seed <= 8; ++seed) {
+        Numbers numbers(seed);
+        const Eigen::Isometry3d truth = test::motion(10, numbers.direction(), 11 * numbers.direction());
+        const Map moved = [&](const Vector3d& x) -> Vector3d { return truth * x; };
+        const Curves seen = seen_after(moved, 0.7, 0.2, numbers, seed % 2 == 0);
+        const detail::CurveEvidence evidence(prepared, seen, options, 1);
+        const Alignment found = evidence.align(Eigen::Isometry3d::Identity());
+        EXPECT_GT(((truth * places) - places).colwise().norm().mean(), 8) << seed;
+        EXPECT_LT(((truth * places) - (found.placement * places)).colwise().norm().mean(), 2.5) << seed;
+    }
 }
 
-// 20 % of other things, noise of a millimetre, a third of the vessels not seen.
-TEST_P(Seeds, PartialNoisyPointsCarryTheTissueAboutTheVessels) {
-    Numbers numbers(GetParam());
+// 20 % of other things, noise of a millimetre, part of the vessels not seen. Of forty draws the worst left 1.3 mm.
+TEST(CurveEvidence, PartialNoisyPointsCarryTheTissueAboutTheVessels) {
+    constexpr unsigned draws = 8;
     const PreparedModel prepared = prepare(shapes::organ_labels({}), coarse());
-    const Curves seen = seen_after(away_and_bent, 1.0, 0.2, numbers, GetParam() % 2 == 0);
     const Matrix3Xd places = targets(6);
     ASSERT_GT(mean_motion(places, away_and_bent), 7);
+    double mean = 0;
+    for (unsigned seed = 1; seed <= draws; ++seed) {
+        Numbers numbers(seed);
+        const Curves seen = seen_after(away_and_bent, 1.0, 0.2, numbers, seed % 2 == 0);
+        const UpdateResult result = update(prepared, {.curves = seen}, on_cpu());
+        const double error = mean_error(result.deformation, places, away_and_bent);
+        mean += error / draws;
+        EXPECT_LT(error, 1.4) << seed;
+        EXPECT_GT(result.curves->inlier_share, 0.7) << seed;
+        EXPECT_LT(result.curves->inlier_share, 0.95) << seed;
+        EXPECT_TRUE(result.doubts.empty()) << seed << ": " << result.doubts.front();
+    }
+    EXPECT_LT(mean, 1.0);
+}
+
+// Two outliers of this draw lie beyond the step bound. Counted as held back they repeated the first round until none
+// was left but the last, and 3.6 mm remained.
+TEST(CurveEvidence, OutliersDoNotRepeatTheRounds) {
+    const PreparedModel prepared = prepare(shapes::organ_labels({}), coarse());
+    Numbers numbers(18);
+    const Curves seen = seen_after(away_and_bent, 1.0, 0.4, numbers, false);
     const UpdateResult result = update(prepared, {.curves = seen}, on_cpu());
-    EXPECT_LT(mean_error(result.deformation, places, away_and_bent), 1.0);
-    EXPECT_GT(result.curves->inlier_share, 0.7);
-    EXPECT_LT(result.curves->inlier_share, 0.95);
-    EXPECT_TRUE(result.doubts.empty()) << result.doubts.front();
+    EXPECT_LE(result.rounds.size(), 8u);
+    EXPECT_LT(mean_error(result.deformation, targets(6), away_and_bent), 1.5);
 }
 
 bool doubts_vessels(const UpdateResult& result) {
@@ -239,18 +284,24 @@ SurfacePoints front(const Map& where, Numbers& numbers) {
 
 // The front shows one side of the organ, the vessels its inside: each alone leaves more of all the tissue unknown.
 TEST(CurveEvidence, TogetherWithASurfaceBetterThanEither) {
-    Numbers numbers(12);
+    constexpr unsigned draws = 4;
     const PreparedModel prepared = prepare(shapes::organ_labels({}), coarse());
-    const Curves curves = seen_after(bent, 1.0, 0.2, numbers, true);
-    const SurfacePoints surface = front(bent, numbers);
     const Matrix3Xd places = targets(50);
-    const auto error = [&](const Intraoperative& seen) {
-        return mean_error(update(prepared, seen, held()).deformation, places, bent);
-    };
-    const double curves_alone = error({.curves = curves}), surface_alone = error({.surface = surface});
-    const double both = error({.surface = surface, .curves = curves});
-    EXPECT_LT(both, 0.95 * curves_alone);
-    EXPECT_LT(both, 0.95 * surface_alone);
+    const Map more_bent = [](const Vector3d& x) -> Vector3d { return x + 2 * (bent(x) - x); };
+    double curves_alone = 0, surface_alone = 0, both = 0;
+    for (unsigned seed = 1; seed <= draws; ++seed) {
+        Numbers numbers(seed);
+        const Curves curves = seen_after(more_bent, 1.0, 0.2, numbers, true);
+        const SurfacePoints surface = front(more_bent, numbers);
+        const auto error = [&](const Intraoperative& seen) {
+            return mean_error(update(prepared, seen, held()).deformation, places, more_bent) / draws;
+        };
+        curves_alone += error({.curves = curves});
+        surface_alone += error({.surface = surface});
+        both += error({.surface = surface, .curves = curves});
+    }
+    EXPECT_LT(both, 0.9 * curves_alone);
+    EXPECT_LT(both, 0.9 * surface_alone);
 }
 
 TEST(CurveEvidence, WhatLiesElsewhereIsRefused) {
