@@ -71,7 +71,7 @@ void doubt_curves(const CurveFit& fit, double deviation_mm, std::vector<std::str
     if (fit.inlier_share < least_inliers)
         reasons.push_back("only " + percent(fit.inlier_share) +
                           " of the intraoperative points along vessels came near a preoperative curve; check that both "
-                          "show the same vessels, and that the headers place the images within some centimetres");
+                          "show the same vessels, and that the headers place the images within a centimetre or two");
     else if (fit.residual_mm > most_residual * deviation_mm)
         reasons.push_back("points along vessels lie " + to_text(fit.residual_mm) + " mm across from the curves where " +
                           to_text(deviation_mm) + " mm along each axis were stated");
