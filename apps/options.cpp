@@ -196,7 +196,7 @@ struct Parser {
                                               "those of no line need no column 'line'");
         moving_curves->needs(fixed_curves);
         fixed_curves->needs(moving_curves);
-        verb.number("--curve-deviation", o.curves.deviation, "MM", 1e-3, 100.0,
+        verb.number("--curves-sd", o.curves.deviation, "MM", 1e-3, 100.0,
                     "Standard deviation of these points along each axis across the vessel (mm)");
         verb.path("-o,--output", o.output, "Folder for the results")->required()->type_name("FOLDER");
         verb.landmarks(o.landmarks);

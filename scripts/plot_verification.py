@@ -131,12 +131,13 @@ def locking(rows):
 
 
 def counts(rows):
-    """A Markdown table: one line per element, plain tetrahedra apart where they are expected to lock."""
+    """A Markdown table: one line per element, singular corners apart, and plain tetrahedra where they are expected to lock."""
     finest = {(r["problem"], r["law"], r["element"], r["quantity"]): r for r in rows}  # the last line of each
     groups = {}
     for r in finest.values():
-        locks = r["expected_to_lock"] == "yes"
-        groups.setdefault(r["element"] + (", ν > 0.46: expected to lock" if locks else ""), []).append(r)
+        corner, locks = "corner" in r["quantity"], r["expected_to_lock"] == "yes"
+        apart = ", corners" if corner else ", ν > 0.46: expected to lock" if locks else ""
+        groups.setdefault(r["element"] + apart, []).append(r)
     lines = ["| element | quantities | within uncertainty + mesh error | with safety factor | "
              "largest distance / strict bar |",
              "|---|---|---|---|---|"]

@@ -169,7 +169,7 @@ class FromCurves(PhantomTest):
         return self.phantom.register(*more, "--edge-length", 4, fixed=None, fixed_labels=None)
 
     def test_vessels_carry_the_organ(self):
-        result = self.register("--moving-curves", self.moving, "--fixed-curves", self.fixed, "--curve-deviation", 0.3,
+        result = self.register("--moving-curves", self.moving, "--fixed-curves", self.fixed, "--curves-sd", 0.3,
                                "--landmarks", pairs_of(self.phantom))
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("points along vessels: ", result.stdout)
@@ -177,7 +177,7 @@ class FromCurves(PhantomTest):
         self.assertEqual(report["curves"]["points"], 60)
         self.assertGreater(report["curves"]["inlier_share"], 0.9)
         self.assertLess(report["curves"]["residual_mm"], 0.5)
-        self.assertEqual(report["parameters"]["curve-deviation"], 0.3)
+        self.assertEqual(report["parameters"]["curves-sd"], 0.3)
         self.assertEqual(len(report["inputs"]["moving-curves"]["sha256"]), 64)
         error = report["target_registration_error"]["all"]
         self.assertGreater(error["before"]["mean"], 2.5)
