@@ -193,8 +193,7 @@ private:
     void upload(const Level& level, const State& state) {
         memory_.grid.upload(std::array{match_grid_block(level.wide, fixed_.geometry, level.cells, state.placement)});
         std::vector<Float4> nodes;
-        for (const auto& u : state.displacement.colwise())
-            nodes.push_back({static_cast<float>(u[0]), static_cast<float>(u[1]), static_cast<float>(u[2]), 0});
+        for (const auto& u : state.displacement.colwise()) nodes.push_back(packed(u));
         memory_.nodes.upload(nodes);
     }
 

@@ -11,15 +11,6 @@ namespace {
 
 constexpr std::uint32_t no_owner = 0xffffffff;
 
-Float4 four(const Eigen::Vector3d& v, double w = 0) {
-    return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2]), static_cast<float>(w)};
-}
-
-Uint4 four(const std::array<int, 3>& size) {
-    return {static_cast<std::uint32_t>(size[0]), static_cast<std::uint32_t>(size[1]),
-            static_cast<std::uint32_t>(size[2]), 0};
-}
-
 /// The lowest element that holds each voxel.
 std::vector<std::uint32_t> owners(const meshing::TetMesh& mesh, const imaging::Geometry& grid) {
     std::vector<std::uint32_t> owner(static_cast<std::size_t>(grid.voxel_count()), no_owner);
@@ -59,11 +50,11 @@ MatchGridBlock match_grid_block(const imaging::Geometry& wide, const imaging::Ge
                                 const Eigen::Isometry3d& placement) {
     const Eigen::Matrix3d shift = fixed.point_to_index() * placement.linear(), matrix = shift * wide.index_to_point();
     const Eigen::Vector3d start = fixed.index(placement * wide.origin);
-    MatchGridBlock block{four(wide.size), four(fixed.size), four(cells.centres().size), {}, {}};
+    MatchGridBlock block{packed(wide.size), packed(fixed.size), packed(cells.centres().size), {}, {}};
     for (std::size_t axis = 0; axis < 3; ++axis) {
         const auto row = static_cast<Eigen::Index>(axis);
-        block.to_fixed_index[axis] = four(matrix.row(row).transpose(), start[row]);
-        block.shift_to_index[axis] = four(shift.row(row).transpose());
+        block.to_fixed_index[axis] = packed(matrix.row(row).transpose(), start[row]);
+        block.shift_to_index[axis] = packed(shift.row(row).transpose());
     }
     return block;
 }
@@ -78,9 +69,9 @@ std::vector<MatchElement> elements_of(const meshing::TetMesh& mesh, const imagin
                              {}};
         BarycentricMap map;
         if (map.set(index(Eigen::all, tet)) != 0) {  // a flat one holds no voxel
-            element.corner = four(map.corner);
+            element.corner = packed(map.corner);
             for (std::size_t n = 0; n < 3; ++n)
-                element.gradient[n] = four(map.matrix.row(static_cast<Eigen::Index>(n) + 1).transpose());
+                element.gradient[n] = packed(map.matrix.row(static_cast<Eigen::Index>(n) + 1).transpose());
         }
         elements.push_back(element);
     }

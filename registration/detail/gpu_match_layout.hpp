@@ -4,6 +4,7 @@
 
 #include "meshing/tet_mesh.hpp"
 #include "registration/detail/dense_cells.hpp"
+#include "registration/detail/gpu_words.hpp"
 #include "registration/detail/growth.hpp"
 #include "registration/detail/matching_image.hpp"
 
@@ -12,9 +13,6 @@
 #include <span>
 
 namespace tissuewarp::registration::detail {
-
-using Float4 = std::array<float, 4>;
-using Uint4 = std::array<std::uint32_t, 4>;
 
 /// The storage block MatchGrid.
 struct MatchGridBlock {

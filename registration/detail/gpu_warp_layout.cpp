@@ -12,20 +12,11 @@ using imaging::Geometry;
 /// the others rest.
 constexpr int rows_of_portion = 512;
 
-Float4 packed(const Eigen::Vector3d& v, double w = 0.0) {
-    return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2]), static_cast<float>(w)};
-}
-
 std::array<Float4, 3> rows_of(const Row4& matrix) {
     std::array<Float4, 3> rows;
     for (int r = 0; r < 3; ++r)
         rows[static_cast<std::size_t>(r)] = packed(matrix.row(r).head<3>().transpose(), matrix(r, 3));
     return rows;
-}
-
-Uint4 size_of(const Geometry& grid) {
-    return {static_cast<std::uint32_t>(grid.size[0]), static_cast<std::uint32_t>(grid.size[1]),
-            static_cast<std::uint32_t>(grid.size[2]), 0};
 }
 
 }  // namespace
@@ -51,7 +42,7 @@ GridBlock grid_block(const Geometry& moving, const Geometry& output, const Eigen
     Row4 offset, matrix;
     offset << to_index * grid.index_to_point() - Eigen::Matrix3d::Identity(), moving.index(grid.origin);
     matrix << to_index, Eigen::Vector3d::Zero();
-    return {size_of(output), size_of(moving), rows_of(offset), rows_of(rigid_field(output, placement)),
+    return {packed(output.size), packed(moving.size), rows_of(offset), rows_of(rigid_field(output, placement)),
             rows_of(matrix)};
 }
 

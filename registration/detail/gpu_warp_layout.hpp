@@ -3,6 +3,7 @@
 
 #include "imaging/geometry.hpp"
 #include "meshing/tet_mesh.hpp"
+#include "registration/detail/gpu_words.hpp"
 
 #include <Eigen/Geometry>
 
@@ -12,8 +13,6 @@
 
 namespace tissuewarp::registration::detail {
 
-using Float4 = std::array<float, 4>;
-using Uint4 = std::array<std::uint32_t, 4>;
 using Row4 = Eigen::Matrix<double, 3, 4>;
 
 /// The storage block WarpGrid.
