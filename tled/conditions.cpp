@@ -49,9 +49,7 @@ void sum_springs(const std::vector<Spring>& springs, int node_count, NodalCondit
     }
 }
 
-}  // namespace
-
-NodalConditions nodal_conditions(const Conditions& conditions, int node_count) {
+NodalConditions without_effects(const Conditions& conditions, int node_count) {
     NodalConditions nodal;
     sum_springs(conditions.springs, node_count, nodal);
     nodal.constrained = Eigen::Matrix<bool, 3, Eigen::Dynamic>::Constant(3, node_count, false);
@@ -76,6 +74,20 @@ NodalConditions nodal_conditions(const Conditions& conditions, int node_count) {
                            " nodes");
     nodal.external_force = conditions.external_force;
     return nodal;
+}
+
+}  // namespace
+
+NodalConditions nodal_conditions(const Conditions& conditions, const RestState& rest) {
+    NodalConditions nodal = without_effects(conditions, rest.node_count);
+    if (!conditions.effects.none()) nodal.effects = nodal_effects(conditions.effects, rest);
+    return nodal;
+}
+
+NodalConditions nodal_conditions(const Conditions& conditions, int node_count) {
+    if (!conditions.effects.none())
+        throw InvalidInput("effects of the conditions need the rest state of the model: pass it for the node count");
+    return without_effects(conditions, node_count);
 }
 
 }  // namespace tissuewarp::tled

@@ -1,5 +1,7 @@
 #pragma once
-/// What acts on the model: springs to targets, prescribed displacements, forces.
+/// What acts on the model: springs to targets, prescribed displacements, forces, effects.
+
+#include "tled/nodal_effects.hpp"
 
 #include <Eigen/Core>
 
@@ -26,6 +28,7 @@ struct Conditions {
     std::vector<Spring> springs;
     std::vector<PrescribedDisplacement> prescribed;  ///< at most one per node
     Eigen::Matrix3Xd external_force;                 ///< mN, 3 × N or empty
+    Effects effects;
 };
 
 /// Conditions in the form that engines take: per node one summed spring K and K·target, a mask and imposed values.
@@ -36,10 +39,14 @@ struct NodalConditions {
     Eigen::Matrix<bool, 3, Eigen::Dynamic> constrained;         ///< 3 × N
     Eigen::Matrix3Xd imposed;                                   ///< mm, 3 × N, zero where free
     Eigen::Matrix3Xd external_force;                            ///< mN, 3 × N
+    NodalEffects effects;
 };
 
-/// Throws InvalidInput on node indices out of range, a node prescribed twice, non-finite values, or a stiffness that is
-/// not symmetric positive semi-definite.
+/// Throws InvalidInput on node indices out of range, a node prescribed twice, non-finite values, a stiffness that is
+/// not symmetric positive semi-definite, or effects that nodal_effects() refuses.
+NodalConditions nodal_conditions(const Conditions& conditions, const RestState& rest);
+/// The same for conditions without effects, which are all that can do without a rest state; throws InvalidInput where
+/// there are any.
 NodalConditions nodal_conditions(const Conditions& conditions, int node_count);
 
 }  // namespace tissuewarp::tled

@@ -1,0 +1,197 @@
+// Forces of effects, face by face and in float64.
+
+#include "core/errors.hpp"
+#include "tled/nodal_effects.hpp"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace tissuewarp::tled {
+namespace {
+
+using Eigen::Matrix2d;
+using Eigen::Matrix3Xd;
+using Eigen::Vector3d;
+using Edges = Eigen::Matrix<double, 3, 2>;
+
+Edges edges(const Matrix3Xd& x, const Eigen::Vector3i& face) {
+    return (Edges() << x.col(face[1]) - x.col(face[0]), x.col(face[2]) - x.col(face[0])).finished();
+}
+
+Matrix2d rest_map(const SurfaceEffects& effects, Eigen::Index face) {
+    const auto d = effects.membrane_rest.col(face);
+    return Matrix2d{{d[0], d[1]}, {0, d[2]}};
+}
+
+void add_pressures(const SurfaceEffects& effects, const Matrix3Xd& x, Matrix3Xd& force) {
+    for (Eigen::Index f = 0; f < effects.pressure_faces.cols(); ++f) {
+        const Edges e = edges(x, effects.pressure_faces.col(f));
+        const Vector3d third = -effects.pressure[f] / 6 * e.col(0).cross(e.col(1));
+        for (const int node : effects.pressure_faces.col(f)) force.col(node) += third;
+    }
+}
+
+/// P = μ (F − F C⁻¹/det C) for F = [x₁ − x₀, x₂ − x₀] D⁻¹.
+void add_membranes(const SurfaceEffects& effects, const Matrix3Xd& x, Matrix3Xd& force) {
+    for (Eigen::Index f = 0; f < effects.membrane_faces.cols(); ++f) {
+        const Matrix2d to_rest = rest_map(effects, f);
+        const Edges F = edges(x, effects.membrane_faces.col(f)) * to_rest;
+        const Matrix2d C = F.transpose() * F;
+        const Edges P = F - F * C.inverse() / C.determinant();
+        const Edges internal = effects.membrane_stiffness[f] * P * to_rest.transpose();
+        const auto face = effects.membrane_faces.col(f);
+        force.col(face[1]) -= internal.col(0);
+        force.col(face[2]) -= internal.col(1);
+        force.col(face[0]) += internal.rowwise().sum();
+    }
+}
+
+void add_sliding(const SurfaceEffects& effects, const Matrix3Xd& u, Matrix3Xd& force) {
+    for (const SlidingPair& pair : effects.sliding) {
+        const Vector3d gap = u.col(pair.first) - u.col(pair.second);
+        const Vector3d pull = pair.stiffness * pair.normal.dot(gap) * pair.normal;
+        force.col(pair.first) -= pull;
+        force.col(pair.second) += pull;
+    }
+}
+
+/// Six times the volume between faces and the origin.
+double six_volumes(const Matrix3Xd& x, const Eigen::Vector3i& face) {
+    return x.col(face[0]).dot(x.col(face[1]).cross(x.col(face[2])));
+}
+
+double pressure_energy(const SurfaceEffects& effects, const Matrix3Xd& X, const Matrix3Xd& x) {
+    double energy = 0;
+    for (Eigen::Index f = 0; f < effects.pressure_faces.cols(); ++f) {
+        const Eigen::Vector3i face = effects.pressure_faces.col(f);
+        energy += effects.pressure[f] / 6 * (six_volumes(x, face) - six_volumes(X, face));
+    }
+    return energy;
+}
+
+double membrane_energy(const SurfaceEffects& effects, const Matrix3Xd& x) {
+    double energy = 0;
+    for (Eigen::Index f = 0; f < effects.membrane_faces.cols(); ++f) {
+        const Edges F = edges(x, effects.membrane_faces.col(f)) * rest_map(effects, f);
+        const Matrix2d C = F.transpose() * F;
+        energy += 0.5 * effects.membrane_stiffness[f] * (C.trace() + 1 / C.determinant() - 3);
+    }
+    return energy;
+}
+
+double sliding_energy(const SurfaceEffects& effects, const Matrix3Xd& u) {
+    double energy = 0;
+    for (const SlidingPair& pair : effects.sliding) {
+        const double gap = pair.normal.dot(u.col(pair.first) - u.col(pair.second));
+        energy += 0.5 * pair.stiffness * gap * gap;
+    }
+    return energy;
+}
+
+/// Depth of a column's middle below the level, in column heights, from −½ (dry) to ½ (drowned).
+double immersion(const NodalFluid& fluid, const Matrix3Xd& u, Eigen::Index node) {
+    const double depth = fluid.level - fluid.rest_height[node] - fluid.up.dot(u.col(node));
+    return std::clamp(depth / fluid.column_height[node], -0.5, 0.5);
+}
+
+/// Energy of the lift: its integral over the depth, from far below.
+double fluid_energy(const NodalFluid& fluid, const Matrix3Xd& u) {
+    double energy = 0;
+    const Matrix3Xd rest = Matrix3Xd::Zero(3, u.cols());
+    const auto potential = [&](const Matrix3Xd& at, Eigen::Index a) {
+        const double s = immersion(fluid, at, a) + 0.5, h = fluid.column_height[a];
+        const double depth = fluid.level - fluid.rest_height[a] - fluid.up.dot(at.col(a));
+        return 0.5 * s * s * h + std::max(0.0, depth - 0.5 * h);
+    };
+    for (Eigen::Index a = 0; a < u.cols(); ++a) energy += fluid.weight[a] * (potential(u, a) - potential(rest, a));
+    return energy;
+}
+
+/// Weights of the four samples about a point a fraction t past the second, and their derivatives (Keys 1981, eq. 15
+/// with a = −1/2).
+struct CubicWeights {
+    std::array<double, 4> value, slope;
+};
+CubicWeights cubic_weights(double t) {
+    return {{((-0.5 * t + 1) * t - 0.5) * t, (1.5 * t - 2.5) * t * t + 1, ((-1.5 * t + 2) * t + 0.5) * t,
+             (0.5 * t - 0.5) * t * t},
+            {(-1.5 * t + 2) * t - 0.5, (4.5 * t - 5) * t, (-4.5 * t + 4) * t + 0.5, (1.5 * t - 1) * t}};
+}
+
+}  // namespace
+
+Matrix3Xd surface_force(const SurfaceEffects& effects, const Matrix3Xd& position, const Matrix3Xd& u) {
+    const Matrix3Xd x = position + u;
+    Matrix3Xd force = Matrix3Xd::Zero(3, u.cols());
+    add_pressures(effects, x, force);
+    add_membranes(effects, x, force);
+    add_sliding(effects, u, force);
+    return force;
+}
+
+Matrix3Xd fluid_force(const NodalFluid& fluid, const Matrix3Xd& u) {
+    Matrix3Xd force(3, u.cols());
+    for (Eigen::Index a = 0; a < u.cols(); ++a)
+        force.col(a) = fluid.weight[a] * (0.5 + immersion(fluid, u, a)) * fluid.up;
+    return force;
+}
+
+double energy(const NodalEffects& effects, const Matrix3Xd& position, const Matrix3Xd& u) {
+    const Matrix3Xd x = position + u;
+    double sum = pressure_energy(effects.surface, position, x) + membrane_energy(effects.surface, x) +
+                 sliding_energy(effects.surface, u);
+    if (effects.fluid) sum += fluid_energy(*effects.fluid, u);
+    return sum;
+}
+
+Distance distance_to(const Obstacle& obstacle, const Vector3d& position) {
+    const DistanceGrid& grid = obstacle.surface;
+    const Eigen::Matrix3d to_grid = grid.steps.inverse();
+    const Vector3d at = to_grid * (position - obstacle.shift - grid.origin);
+    const Vector3d corner = at.array().floor();
+    if (!((corner.array() >= 1).all() && (corner.array() <= grid.size.cast<double>().array() - 3).all()))
+        return {std::numeric_limits<double>::infinity(), Vector3d::Zero()};
+    const Eigen::Vector3i first = corner.cast<int>() - Eigen::Vector3i::Ones();
+    const CubicWeights x = cubic_weights(at[0] - corner[0]), y = cubic_weights(at[1] - corner[1]),
+                       z = cubic_weights(at[2] - corner[2]);
+    double value = 0;
+    Vector3d slope = Vector3d::Zero();
+    for (std::size_t k = 0; k < 4; ++k)
+        for (std::size_t j = 0; j < 4; ++j)
+            for (std::size_t i = 0; i < 4; ++i) {
+                const auto sample = [&](int axis, std::size_t n) { return static_cast<std::size_t>(first[axis]) + n; };
+                const std::size_t nx = static_cast<std::size_t>(grid.size[0]),
+                                  ny = static_cast<std::size_t>(grid.size[1]);
+                const double d = grid.distance[sample(0, i) + nx * (sample(1, j) + ny * sample(2, k))];
+                value += x.value[i] * y.value[j] * z.value[k] * d;
+                slope += Vector3d(x.slope[i] * y.value[j] * z.value[k], x.value[i] * y.slope[j] * z.value[k],
+                                  x.value[i] * y.value[j] * z.slope[k]) *
+                         d;
+            }
+    return {value, to_grid.transpose() * slope};
+}
+
+Motion in_contact(const std::vector<Obstacle>& obstacles, const Vector3d& X, const Motion& free) {
+    Motion motion = free;
+    for (const Obstacle& obstacle : obstacles) {
+        const Distance distance = distance_to(obstacle, X + motion.u);
+        const double steepness = distance.gradient.norm();
+        if (!(distance.value < 0) || !(steepness > 0)) continue;
+        const Vector3d normal = distance.gradient / steepness;
+        const double depth = -distance.value / steepness;
+        const Vector3d slip = motion.v - normal.dot(motion.v) * normal;
+        const double length = slip.norm();
+        Vector3d correction = depth * normal;
+        if (length > 0) correction -= std::min(1.0, obstacle.friction * depth / length) * slip;
+        motion.u += correction;
+        motion.v += correction;
+    }
+    return motion;
+}
+
+}  // namespace tissuewarp::tled

@@ -1,0 +1,83 @@
+#pragma once
+/// Effects in the form that engines take, and what they do, plainly: the slow twin of every engine.
+
+#include "tled/effects.hpp"
+#include "tled/rest_state.hpp"
+
+#include <Eigen/Core>
+
+#include <optional>
+#include <vector>
+
+namespace tissuewarp::tled {
+
+/// Effects whose force on a node depends on where others are. `node` lists all nodes that any of them moves; lists of
+/// entries are by place in `node`, offset[i] … offset[i + 1].
+struct SurfaceEffects {
+    std::vector<int> node;  ///< S, ascending
+
+    Eigen::Matrix3Xi pressure_faces;
+    Eigen::VectorXd pressure;      ///< kPa, of each of these faces
+    Incidence pressure_incidence;  ///< entries 3·face + corner
+
+    Eigen::Matrix3Xi membrane_faces;
+    Eigen::Matrix3Xd membrane_rest;  ///< (D⁻¹)₀₀, (D⁻¹)₀₁, (D⁻¹)₁₁ of D = [X₁ − X₀, X₂ − X₀] in the face's plane, with
+                                     ///< X₁ − X₀ along its first axis; 1/mm
+    Eigen::VectorXd membrane_stiffness;  ///< μ times the sheet's volume on the face, mN mm
+    Incidence membrane_incidence;        ///< entries 3·face + corner
+
+    std::vector<SlidingPair> sliding;
+    Incidence sliding_incidence;  ///< entries 2·pair + (0: first, 1: second)
+
+    [[nodiscard]] bool empty() const { return node.empty(); }
+};
+
+/// The force on node a is weight_a · clamp(½ + (level − height_a − up·u_a) / column_a, 0, 1) up.
+struct NodalFluid {
+    Eigen::Vector3d up;
+    double level = 0.0;             ///< mm
+    Eigen::VectorXd rest_height;    ///< N, up·X, mm
+    Eigen::VectorXd weight;         ///< N, of the fluid that the node displaces, mN
+    Eigen::VectorXd column_height;  ///< N, cube root of the node's volume, mm
+};
+
+struct NodalContact {
+    std::vector<int> node;           ///< ascending
+    Eigen::Matrix3Xd rest_position;  ///< 3 × as many, mm
+    std::vector<Obstacle> obstacles;
+};
+
+struct NodalEffects {
+    SurfaceEffects surface;  ///< empty where nothing acts
+    std::optional<NodalFluid> fluid;
+    std::optional<NodalContact> contact;
+};
+
+/// Throws InvalidInput on nodes out of range, faces without area, numbers that are not finite or have no meaning.
+NodalEffects nodal_effects(const Effects& effects, const RestState& rest);
+
+/// Force of pressures, membranes and sliding pairs on every node at displacement `u` (3 × N, mm), mN, 3 × N.
+Eigen::Matrix3Xd surface_force(const SurfaceEffects& effects, const Eigen::Matrix3Xd& position,
+                               const Eigen::Matrix3Xd& u);
+/// Lift on every node, mN, 3 × N.
+Eigen::Matrix3Xd fluid_force(const NodalFluid& fluid, const Eigen::Matrix3Xd& u);
+/// Energy whose negative gradient these forces are, mN mm, zero at rest; of a pressure where its surface is closed or
+/// its rim does not move.
+double energy(const NodalEffects& effects, const Eigen::Matrix3Xd& position, const Eigen::Matrix3Xd& u);
+
+/// Distance to the obstacle's surface and its gradient by cubic convolution (Keys 1981) of the samples; +∞ and zero
+/// outside the grid less its outermost samples.
+struct Distance {
+    double value = 0.0;        ///< mm
+    Eigen::Vector3d gradient;  ///< not normalised
+};
+Distance distance_to(const Obstacle& obstacle, const Eigen::Vector3d& position);
+
+/// A node at rest position X that a step has brought to displacement u by the increment v, after contact with all
+/// obstacles in turn.
+struct Motion {
+    Eigen::Vector3d u, v;
+};
+Motion in_contact(const std::vector<Obstacle>& obstacles, const Eigen::Vector3d& X, const Motion& free);
+
+}  // namespace tissuewarp::tled
