@@ -4,6 +4,7 @@
 
 #include "core/errors.hpp"
 #include "tled/detail/cpu_batches.hpp"
+#include "tled/detail/cpu_effects.hpp"
 #include "tled/detail/cpu_kernels.hpp"
 #include "tled/detail/cpu_pressures.hpp"
 #include "tled/detail/cpu_springs.hpp"
@@ -18,6 +19,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <type_traits>
 
 namespace tissuewarp::tled {
 
@@ -54,6 +57,7 @@ public:
           tet_(rest.tet),
           hex_(rest.hexahedra.hex),
           admits_inversion_(tled::admits_inversion(rest)),
+          position_(rest.position),
           internal_(fans.internal),
           own_nodes_(fans.own_nodes),
           sources_(detail::force_sources(rest, fans, hex_layout_)),
@@ -75,6 +79,7 @@ public:
     void set_conditions(const NodalConditions& conditions) override {
         require_columns(conditions.constrained.cols(), node_count_, "the set of conditions");
         springs_ = detail::CpuSprings<T>(conditions, internal_);
+        set_effects(conditions.effects);
         for (std::size_t node = 0; node < node_count_; ++node)
             for (std::size_t c = 0; c < 3; ++c) {
                 const auto row = static_cast<Eigen::Index>(c), column = static_cast<Eigen::Index>(node);
@@ -135,13 +140,15 @@ public:
         const T momentum = T(coefficients.momentum), gain = T(coefficients.gain);
         set_time_step(coefficients.time_step);
         T* u = displacement_.data();
-        for (int step = 0; step < steps; ++step)
-            sum_forces(u, Advance::Yes, [&](std::size_t begin, std::size_t end) {
-                springs_.take_off(u, begin, end, force_.data());
-                const std::size_t at = begin * record;
-                detail::advance_nodes(momentum, gain, &inverse_mass_[at], &force_load_[at], &force_[at], &free_[at],
-                                      &increment_[at], u + at, end - begin);
-            });
+        with_effects([&](auto surface, auto fluid, auto contact) {
+            for (int step = 0; step < steps; ++step)
+                sum_all_forces(surface, fluid, u, Advance::Yes, [&](std::size_t begin, std::size_t end) {
+                    const std::size_t at = begin * record;
+                    detail::advance_nodes(momentum, gain, &inverse_mass_[at], &force_load_[at], &force_[at], &free_[at],
+                                          &increment_[at], u + at, end - begin);
+                    if constexpr (contact) contact_->settle(begin, end, free_.data(), increment_.data(), u);
+                });
+        });
     }
 
     [[nodiscard]] Eigen::Matrix3Xd displacement() const override { return to_matrix(displacement_); }
@@ -216,6 +223,7 @@ private:
     std::vector<int> tet_, hex_;
     bool admits_inversion_;
 
+    Eigen::Matrix3Xd position_;            // 3 × N, mm, at rest
     std::vector<std::uint32_t> internal_;  // node of the mesh → internal number
     std::size_t own_nodes_;                // internal numbers below belong to one patch
     detail::SourceLists sources_;          // of the other nodes: of `contribution_`
@@ -224,6 +232,9 @@ private:
 
     detail::CpuPressures<T> pressures_;
     detail::CpuSprings<T> springs_;
+    std::optional<detail::CpuSurface<T>> surface_;  // absent where the scene has none, as the next two
+    std::optional<detail::CpuFluid<T>> fluid_;
+    std::optional<detail::CpuContact> contact_;
 
     // by material, for tetrahedra and then again for hexahedra; empty where none is viscous
     std::vector<PronySeries> viscosity_;
@@ -277,6 +288,44 @@ private:
             for (std::size_t node = begin; node != end; ++node) sum_contributions(node);
             after(begin, end);
         });
+    }
+
+    /// body(surface, fluid, contact), each std::true_type where the scene has it and std::false_type otherwise: the
+    /// step of a scene is compiled for the effects that it has.
+    template <class Body>
+    void with_effects(const Body& body) {
+        const auto choose = [](bool present, const auto& next) {
+            if (present)
+                next(std::true_type{});
+            else
+                next(std::false_type{});
+        };
+        choose(surface_.has_value(), [&](auto surface) {
+            choose(fluid_.has_value(), [&](auto fluid) {
+                choose(contact_.has_value(), [&](auto contact) { body(surface, fluid, contact); });
+            });
+        });
+    }
+
+    /// Internal forces less those of springs and effects, as sum_forces.
+    template <class Surface, class Fluid, class After>
+    void sum_all_forces(Surface surface, Fluid fluid, T* u, Advance advance, const After& after) {
+        if constexpr (surface) surface_->evaluate(u);
+        sum_forces(u, advance, [&](std::size_t begin, std::size_t end) {
+            springs_.take_off(u, begin, end, force_.data());
+            if constexpr (surface) surface_->take_off(begin, end, force_.data());
+            if constexpr (fluid) fluid_->take_off(u, begin, end, force_.data());
+            after(begin, end);
+        });
+    }
+
+    void set_effects(const NodalEffects& effects) {
+        surface_.reset();
+        fluid_.reset();
+        contact_.reset();
+        if (!effects.surface.empty()) surface_.emplace(effects.surface, position_, internal_);
+        if (effects.fluid) fluid_.emplace(*effects.fluid, internal_);
+        if (effects.contact) contact_.emplace(*effects.contact, internal_);
     }
 
     void patch_forces(const FanPatch& patch, const T* u, Advance advance, detail::PatchScratch<T>& scratch) {
@@ -343,10 +392,11 @@ private:
 
     /// f_ext + f_spring − f_int, masked by the constraints.
     [[nodiscard]] Eigen::Matrix3Xd residual_at(T* u) {
-        sum_forces(u, Advance::No, [&](std::size_t begin, std::size_t end) {
-            springs_.take_off(u, begin, end, force_.data());
-            for (std::size_t at = begin * record; at < end * record; ++at)
-                force_[at] = free_[at] * (force_load_[at] - force_[at]);
+        with_effects([&](auto surface, auto fluid, auto) {
+            sum_all_forces(surface, fluid, u, Advance::No, [&](std::size_t begin, std::size_t end) {
+                for (std::size_t at = begin * record; at < end * record; ++at)
+                    force_[at] = free_[at] * (force_load_[at] - force_[at]);
+            });
         });
         return to_matrix(force_);
     }

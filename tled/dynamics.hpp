@@ -19,7 +19,7 @@ struct DynamicsState {
 /// damping: kinetic energy of the half step, mean of the potential at both its ends, −¼ Δu·K Δu.
 struct EnergyBalance {
     double kinetic = 0;
-    double potential = 0;  ///< elastic energy and springs, less the work of constant forces
+    double potential = 0;  ///< elastic energy, springs and effects, less the work of constant forces
     double total = 0;
     double largest_growth = 0;  ///< of `total` over its first value, relative to the largest exchange of energy so far
 };
@@ -47,7 +47,8 @@ struct DynamicsResult {
 /// at once. A step above the critical one is refused (InvalidInput). When energy grows, tissue inverts that must not,
 /// or a value is not finite, the run goes back to the last good state and takes half the step; after six cuts it throws
 /// SolverFailure with cause, time and place, and leaves the engine in the last good state. Viscous tissue may give back
-/// what it stored, so only a doubling of its energy counts as growth.
+/// what it stored, and pressures and obstacles may do work that no potential tells, so only a doubling of energy counts
+/// as growth there.
 DynamicsResult dynamics(Engine& engine, const RestState& rest, const Eigen::Matrix3Xd& mass,
                         const NodalConditions& conditions, const DynamicsState& start, double duration,
                         const DynamicsOptions& options = {}, Observer& observer = silent_observer());

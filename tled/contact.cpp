@@ -1,0 +1,217 @@
+#include "tled/contact.hpp"
+
+#include "core/errors.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace tissuewarp::tled {
+namespace {
+
+using Eigen::Matrix3Xd;
+using Eigen::Vector3d;
+
+/// A node that may touch one of the obstacles.
+struct Candidate {
+    int node;
+    Vector3d X;
+    double stiffness;  // mN/mm
+};
+
+struct Touch {
+    std::size_t obstacle;
+    double push;  // mm beyond the surface to which the spring pulls
+};
+
+struct Gap {
+    double distance;  // mm
+    Vector3d normal;
+};
+
+class Rounds {
+public:
+    Rounds(Engine& engine, const RestState& rest, const NodalConditions& conditions, const ContactOptions& options,
+           Observer& observer)
+        : engine_(engine), rest_(rest), free_(conditions), options_(options), observer_(observer) {
+        contact_ = *conditions.effects.contact;
+        free_.effects.contact.reset();
+        without_springs_.emplace(rest, free_);
+        const Matrix3Xd diagonal = without_springs_->diagonal(free_);
+        for (std::size_t i = 0; i < contact_.node.size(); ++i)
+            candidates_.push_back({contact_.node[i], contact_.rest_position.col(static_cast<Eigen::Index>(i)),
+                                   options.stiffness * diagonal.col(contact_.node[i]).mean()});
+        touches_.resize(candidates_.size());
+    }
+
+    ContactResult run(const Matrix3Xd* start) {
+        Matrix3Xd u = start ? *start : Matrix3Xd::Zero(3, rest_.node_count);
+        follow(u);
+        for (result_.rounds = 1;; ++result_.rounds) {
+            solve(u);
+            const bool changed = follow(u);
+            if (!changed && settled(u)) break;
+            if (result_.rounds == options_.most_rounds) fail(u);
+            observer_.checkpoint("contact", static_cast<double>(result_.rounds) / options_.most_rounds);
+        }
+        report(u);
+        return std::move(result_);
+    }
+
+private:
+    [[nodiscard]] Gap gap(const Candidate& candidate, std::size_t obstacle, const Matrix3Xd& u) const {
+        const Distance d = distance_to(contact_.obstacles[obstacle], candidate.X + u.col(candidate.node));
+        const double steepness = d.gradient.norm();
+        if (!(steepness > 0)) return {d.value, Vector3d::Zero()};
+        return {d.value / steepness, d.gradient / steepness};
+    }
+
+    void solve(Matrix3Xd& u) {
+        const NodalConditions conditions = with_springs(u);
+        const RestStiffness stiffness(rest_, conditions, *without_springs_);
+        const EquilibriumResult& before = result_.equilibrium;
+        EquilibriumResult found = equilibrium(engine_, stiffness, conditions, options_.equilibrium, &u, observer_);
+        found.force_evaluations += before.force_evaluations;
+        found.lifted_residuals += before.lifted_residuals;
+        u = found.displacement;
+        result_.equilibrium = std::move(found);
+    }
+
+    /// The springs of the touching nodes at `u`, each towards a point `push` beyond the surface.
+    [[nodiscard]] NodalConditions with_springs(const Matrix3Xd& u) const {
+        Conditions springs;
+        for (std::size_t i = 0; i < candidates_.size(); ++i) {
+            if (!touches_[i]) continue;
+            const Candidate& candidate = candidates_[i];
+            const Gap here = gap(candidate, touches_[i]->obstacle, u);
+            springs.springs.push_back({candidate.node, candidate.stiffness * here.normal * here.normal.transpose(),
+                                       u.col(candidate.node) + (touches_[i]->push - here.distance) * here.normal});
+        }
+        return merged(free_, nodal_conditions(springs, rest_.node_count));
+    }
+
+    /// `conditions` with the springs of `more`.
+    static NodalConditions merged(const NodalConditions& conditions, const NodalConditions& more) {
+        struct Sum {
+            Eigen::Matrix<double, 6, 1> stiffness = Eigen::Matrix<double, 6, 1>::Zero();
+            Vector3d force = Vector3d::Zero();
+        };
+        std::map<int, Sum> sums;
+        for (const NodalConditions* each : {&conditions, &more})
+            for (std::size_t s = 0; s < each->spring_node.size(); ++s) {
+                Sum& sum = sums[each->spring_node[s]];
+                sum.stiffness += each->spring_stiffness.col(static_cast<Eigen::Index>(s));
+                sum.force += each->spring_force.col(static_cast<Eigen::Index>(s));
+            }
+        NodalConditions result = conditions;
+        result.spring_node.clear();
+        result.spring_stiffness.resize(6, static_cast<Eigen::Index>(sums.size()));
+        result.spring_force.resize(3, static_cast<Eigen::Index>(sums.size()));
+        for (const auto& [node, sum] : sums) {
+            const auto column = static_cast<Eigen::Index>(result.spring_node.size());
+            result.spring_stiffness.col(column) = sum.stiffness;
+            result.spring_force.col(column) = sum.force;
+            result.spring_node.push_back(node);
+        }
+        return result;
+    }
+
+    /// Moves the ends of the springs on, lets go and takes hold; whether the set of touching nodes has changed.
+    bool follow(const Matrix3Xd& u) {
+        bool changed = false;
+        for (std::size_t i = 0; i < candidates_.size(); ++i) {
+            std::optional<Touch>& touch = touches_[i];
+            if (touch) {
+                touch->push -= gap(candidates_[i], touch->obstacle, u).distance;
+                if (touch->push > 0) continue;
+                touch.reset();
+                changed = true;
+            } else if (const std::optional<std::size_t> entered = deepest_obstacle(candidates_[i], u)) {
+                touch = Touch{*entered, 0.0};
+                changed = true;
+            }
+        }
+        return changed;
+    }
+
+    [[nodiscard]] std::optional<std::size_t> deepest_obstacle(const Candidate& candidate, const Matrix3Xd& u) const {
+        std::optional<std::size_t> found;
+        double deepest = 0;
+        for (std::size_t o = 0; o < contact_.obstacles.size(); ++o)
+            if (const double distance = gap(candidate, o, u).distance; distance < deepest) {
+                deepest = distance;
+                found = o;
+            }
+        return found;
+    }
+
+    [[nodiscard]] bool settled(const Matrix3Xd& u) const {
+        for (std::size_t i = 0; i < candidates_.size(); ++i)
+            if (touches_[i] &&
+                !(std::abs(gap(candidates_[i], touches_[i]->obstacle, u).distance) <= options_.penetration_mm))
+                return false;
+        return true;
+    }
+
+    [[nodiscard]] double largest_penetration(const Matrix3Xd& u) const {
+        double largest = 0;
+        for (const Candidate& candidate : candidates_)
+            if (const auto obstacle = deepest_obstacle(candidate, u))
+                largest = std::max(largest, -gap(candidate, *obstacle, u).distance);
+        return largest;
+    }
+
+    void report(const Matrix3Xd& u) {
+        result_.largest_penetration_mm = largest_penetration(u);
+        result_.reaction = Matrix3Xd::Zero(3, rest_.node_count);
+        for (std::size_t i = 0; i < candidates_.size(); ++i) {
+            if (!touches_[i]) continue;
+            ++result_.touching;
+            const Candidate& candidate = candidates_[i];
+            result_.reaction.col(candidate.node) =
+                candidate.stiffness * touches_[i]->push * gap(candidate, touches_[i]->obstacle, u).normal;
+        }
+    }
+
+    [[noreturn]] void fail(const Matrix3Xd& u) const {
+        throw SolverFailure("the contact does not settle: after " + std::to_string(result_.rounds) +
+                            " rounds a node is " + std::to_string(largest_penetration(u)) +
+                            " mm inside an obstacle; apply the load in parts, refine the mesh at the contact, or take "
+                            "dynamics");
+    }
+
+    Engine& engine_;
+    const RestState& rest_;
+    NodalConditions free_;  // without contact
+    NodalContact contact_;
+    const ContactOptions& options_;
+    Observer& observer_;
+    std::optional<RestStiffness> without_springs_;
+    std::vector<Candidate> candidates_;
+    std::vector<std::optional<Touch>> touches_;  // of each candidate
+    ContactResult result_;
+};
+
+void require_usable(const NodalConditions& conditions, const ContactOptions& options) {
+    if (!conditions.effects.contact)
+        throw InvalidInput("equilibrium in contact needs conditions with contact: take equilibrium()");
+    for (const Obstacle& obstacle : conditions.effects.contact->obstacles)
+        if (obstacle.friction > 0)
+            throw InvalidInput("an obstacle has a friction of " + std::to_string(obstacle.friction) +
+                               ": where tissue comes to rest depends on its way then; take dynamics");
+    if (!(options.penetration_mm > 0) || options.most_rounds < 1 || !(options.stiffness > 0))
+        throw InvalidInput("contact needs a positive penetration (mm), a round and a positive stiffness at least");
+}
+
+}  // namespace
+
+ContactResult equilibrium_in_contact(Engine& engine, const RestState& rest, const NodalConditions& conditions,
+                                     const ContactOptions& options, const Eigen::Matrix3Xd* start, Observer& observer) {
+    require_usable(conditions, options);
+    return Rounds(engine, rest, conditions, options, observer).run(start);
+}
+
+}  // namespace tissuewarp::tled

@@ -1,0 +1,209 @@
+#pragma once
+/// Effects (nodal_effects.hpp) by the internal numbers of the CPU engine. Nodal vectors are records.
+
+#include "tled/detail/cpu_kernels.hpp"
+#include "tled/detail/parallel.hpp"
+#include "tled/nodal_effects.hpp"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace tissuewarp::tled::detail {
+
+/// The part of a list sorted by internal node that belongs to [begin, end).
+template <class Entry>
+std::pair<const Entry*, const Entry*> of_nodes(const std::vector<Entry>& list, std::size_t begin, std::size_t end) {
+    const auto before = [](const Entry& each, std::size_t node) { return each.node < node; };
+    const auto first = std::lower_bound(list.begin(), list.end(), begin, before);
+    const auto last = std::lower_bound(first, list.end(), end, before);
+    return {list.data() + (first - list.begin()), list.data() + (last - list.begin())};
+}
+
+/// Pressures, membranes and sliding pairs. Every node sums what its own faces and pairs do to it, in a fixed order.
+template <class T>
+class CpuSurface {
+    using Vector = Eigen::Matrix<T, 3, 1>;
+    using Edges = Eigen::Matrix<T, 3, 2>;
+    using Matrix2 = Eigen::Matrix<T, 2, 2>;
+
+public:
+    CpuSurface(const SurfaceEffects& effects, const Eigen::Matrix3Xd& position,
+               const std::vector<std::uint32_t>& internal)
+        : effects_(effects), internal_(internal), force_(effects.node.size()) {
+        for (Eigen::Index f = 0; f < effects.pressure_faces.cols(); ++f)
+            pressure_edges_.push_back(rest_edges(position, effects.pressure_faces.col(f)).template cast<T>());
+        for (Eigen::Index f = 0; f < effects.membrane_faces.cols(); ++f) {
+            const auto d = effects.membrane_rest.col(f);
+            const Eigen::Matrix2d to_rest{{d[0], d[1]}, {0, d[2]}};
+            membrane_map_.push_back(to_rest.cast<T>());
+            membrane_basis_.push_back(
+                (rest_edges(position, effects.membrane_faces.col(f)) * to_rest).template cast<T>());
+        }
+        for (std::size_t i = 0; i < effects.node.size(); ++i)
+            place_.push_back({internal[static_cast<std::size_t>(effects.node[i])], i});
+        std::sort(place_.begin(), place_.end(), [](const Place& x, const Place& y) { return x.node < y.node; });
+    }
+
+    /// Forces at displacement `u`, mN, to be taken off once no node has moved yet.
+    void evaluate(const T* u) {
+        parallel_ranges(0, force_.size(), 256, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i != end; ++i) force_[i] = force_on(i, u);
+        });
+    }
+
+    /// Takes the forces on internal nodes [begin, end) off `force`, mN.
+    void take_off(std::size_t begin, std::size_t end, T* force) const {
+        const auto [first, last] = of_nodes(place_, begin, end);
+        for (const Place* place = first; place != last; ++place)
+            for (int c = 0; c < 3; ++c)
+                force[place->node * std::size_t{record} + static_cast<std::size_t>(c)] -= force_[place->entry][c];
+    }
+
+private:
+    struct Place {
+        std::uint32_t node;  // internal
+        std::size_t entry;
+    };
+
+    static Eigen::Matrix<double, 3, 2> rest_edges(const Eigen::Matrix3Xd& X, const Eigen::Vector3i& face) {
+        return (Eigen::Matrix<double, 3, 2>() << X.col(face[1]) - X.col(face[0]), X.col(face[2]) - X.col(face[0]))
+            .finished();
+    }
+
+    [[nodiscard]] Vector at(const T* u, int node) const {
+        return Eigen::Map<const Vector>(u + internal_[static_cast<std::size_t>(node)] * std::size_t{record});
+    }
+
+    [[nodiscard]] Edges stretch(const T* u, const Eigen::Vector3i& face) const {
+        const Vector origin = at(u, face[0]);
+        return (Edges() << at(u, face[1]) - origin, at(u, face[2]) - origin).finished();
+    }
+
+    template <class Body>
+    static void for_entries(const Incidence& incidence, std::size_t i, const Body& body) {
+        for (int k = incidence.offset[i]; k < incidence.offset[i + 1]; ++k)
+            body(incidence.entry[static_cast<std::size_t>(k)]);
+    }
+
+    [[nodiscard]] Vector force_on(std::size_t i, const T* u) const {
+        Vector force = Vector::Zero();
+        for_entries(effects_.pressure_incidence, i, [&](int entry) { force += pressure_on(entry / 3, u); });
+        for_entries(effects_.membrane_incidence, i, [&](int entry) { force += tension_on(entry / 3, entry % 3, u); });
+        for_entries(effects_.sliding_incidence, i, [&](int entry) { force += pull_on(entry / 2, entry % 2, u); });
+        return force;
+    }
+
+    [[nodiscard]] Vector pressure_on(int f, const T* u) const {
+        const Edges e = pressure_edges_[static_cast<std::size_t>(f)] + stretch(u, effects_.pressure_faces.col(f));
+        return -T(effects_.pressure[f] / 6) * e.col(0).cross(e.col(1));
+    }
+
+    /// P = μ F (I − C⁻¹/det C), with F = Q + H and C = I + A written such that nothing cancels near rest: with d =
+    /// tr A + det A, the bracket is ((d (2 + d) − tr A) I + A) / (1 + d)².
+    [[nodiscard]] Vector tension_on(int f, int corner, const T* u) const {
+        const Edges& Q = membrane_basis_[static_cast<std::size_t>(f)];
+        const Matrix2& to_rest = membrane_map_[static_cast<std::size_t>(f)];
+        const Edges H = stretch(u, effects_.membrane_faces.col(f)) * to_rest;
+        const Matrix2 QH = Q.transpose() * H;
+        const Matrix2 A = QH + QH.transpose() + H.transpose() * H;
+        const T trace = A.trace(), d = trace + A.determinant();
+        const Matrix2 bracket = ((d * (2 + d) - trace) * Matrix2::Identity() + A) / ((1 + d) * (1 + d));
+        const Edges internal = T(effects_.membrane_stiffness[f]) * ((Q + H) * bracket) * to_rest.transpose();
+        if (corner == 0) return internal.rowwise().sum();
+        return -internal.col(corner - 1);
+    }
+
+    [[nodiscard]] Vector pull_on(int p, int second, const T* u) const {
+        const SlidingPair& pair = effects_.sliding[static_cast<std::size_t>(p)];
+        const Vector n = pair.normal.cast<T>();
+        const Vector pull = T(pair.stiffness) * n.dot(at(u, pair.first) - at(u, pair.second)) * n;
+        return second == 0 ? Vector(-pull) : pull;
+    }
+
+    SurfaceEffects effects_;
+    const std::vector<std::uint32_t>& internal_;
+    std::vector<Edges> pressure_edges_, membrane_basis_;
+    std::vector<Matrix2> membrane_map_;
+    std::vector<Vector> force_;  // by entry of SurfaceEffects::node
+    std::vector<Place> place_;   // ascending by node
+};
+
+template <class T>
+class CpuFluid {
+public:
+    CpuFluid(const NodalFluid& fluid, const std::vector<std::uint32_t>& internal)
+        : up_{T(fluid.up[0]), T(fluid.up[1]), T(fluid.up[2])}, column_(internal.size()) {
+        for (std::size_t node = 0; node < internal.size(); ++node) {
+            const auto a = static_cast<Eigen::Index>(node);
+            column_[internal[node]] = {T((fluid.level - fluid.rest_height[a]) / fluid.column_height[a]),
+                                       T(1 / fluid.column_height[a]), T(fluid.weight[a])};
+        }
+    }
+
+    /// Takes the lift of nodes [begin, end) at displacement `u` off `force`, mN.
+    void take_off(const T* u, std::size_t begin, std::size_t end, T* force) const {
+        for (std::size_t node = begin; node != end; ++node) {
+            const Column& c = column_[node];
+            const T* at = u + node * record;
+            const T rise = up_[0] * at[0] + up_[1] * at[1] + up_[2] * at[2];
+            const T lift = c.weight * std::clamp(T(0.5) + c.depth - rise * c.inverse_height, T(0), T(1));
+            for (std::size_t i = 0; i < 3; ++i) force[node * record + i] -= lift * up_[i];
+        }
+    }
+
+private:
+    struct Column {
+        T depth = 0, inverse_height = 0, weight = 0;  // depth at rest in column heights; 1/mm; mN
+    };
+    std::array<T, 3> up_;
+    std::vector<Column> column_;  // by internal node
+};
+
+/// In float64 whatever the engine computes in: few nodes are near an obstacle, and its surface is a matter of
+/// micrometres.
+class CpuContact {
+public:
+    CpuContact(const NodalContact& contact, const std::vector<std::uint32_t>& internal)
+        : obstacles_(contact.obstacles) {
+        for (std::size_t i = 0; i < contact.node.size(); ++i)
+            point_.push_back({internal[static_cast<std::size_t>(contact.node[i])],
+                              contact.rest_position.col(static_cast<Eigen::Index>(i))});
+        std::sort(point_.begin(), point_.end(), [](const Point& x, const Point& y) { return x.node < y.node; });
+    }
+
+    /// Puts internal nodes [begin, end) that have entered an obstacle back, in components that are free.
+    template <class T>
+    void settle(std::size_t begin, std::size_t end, const T* free, T* v, T* u) const {
+        const auto [first, last] = of_nodes(point_, begin, end);
+        for (const Point* point = first; point != last; ++point) {
+            const std::size_t at = point->node * std::size_t{record};
+            Motion before;
+            for (int c = 0; c < 3; ++c) {
+                before.u[c] = double(u[at + static_cast<std::size_t>(c)]);
+                before.v[c] = double(v[at + static_cast<std::size_t>(c)]);
+            }
+            const Motion after = in_contact(obstacles_, point->position, before);
+            if (after.u == before.u) continue;
+            for (std::size_t c = 0; c < 3; ++c) {
+                if (free[at + c] == T(0)) continue;
+                u[at + c] = T(after.u[static_cast<Eigen::Index>(c)]);
+                v[at + c] = T(after.v[static_cast<Eigen::Index>(c)]);
+            }
+        }
+    }
+
+private:
+    struct Point {
+        std::uint32_t node;  // internal
+        Eigen::Vector3d position;
+    };
+    std::vector<Obstacle> obstacles_;
+    std::vector<Point> point_;  // ascending by node
+};
+
+}  // namespace tissuewarp::tled::detail
