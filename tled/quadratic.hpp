@@ -17,7 +17,7 @@
 namespace tissuewarp::tled {
 
 namespace detail {
-struct PressureRows;  // tled/detail/stiffness.hpp
+struct RankOneRows;  // tled/detail/stiffness.hpp
 }
 
 /// Tetrahedra with a node in the middle of every edge.
@@ -97,7 +97,7 @@ private:
                                                const Eigen::VectorXd& nodal) const;
     void add_element_matrices(const Eigen::Matrix3Xd& u, const Eigen::VectorXd& J, const Eigen::VectorXd& nodal,
                               detail::BlockRows& rows) const;
-    void add_pressure_rows(const Eigen::Matrix3Xd& u, const Eigen::VectorXd& J, detail::PressureRows& rows) const;
+    void add_pressure_rows(const Eigen::Matrix3Xd& u, const Eigen::VectorXd& J, detail::RankOneRows& rows) const;
 
     int node_count_ = 0, points_ = 0;
     Eigen::Matrix<int, 10, Eigen::Dynamic> tets_;

@@ -12,30 +12,8 @@ namespace tissuewarp::tled {
 using Eigen::Matrix3Xd;
 using Eigen::VectorXd;
 
-namespace {
-
-// node → entries of the rows that hold it.
-void transpose(int node_count, detail::PressureRows& rows) {
-    rows.row.resize(rows.node.size());
-    rows.node_offset.assign(static_cast<std::size_t>(node_count) + 1, 0);
-    for (int a = 0; a < rows.rows(); ++a) {
-        for (int k = rows.offset[static_cast<std::size_t>(a)]; k < rows.offset[static_cast<std::size_t>(a) + 1]; ++k) {
-            rows.row[static_cast<std::size_t>(k)] = a;
-            ++rows.node_offset[static_cast<std::size_t>(rows.node[static_cast<std::size_t>(k)]) + 1];
-        }
-    }
-    for (std::size_t i = 1; i < rows.node_offset.size(); ++i) rows.node_offset[i] += rows.node_offset[i - 1];
-    std::vector<int> next = rows.node_offset;
-    rows.node_entry.resize(rows.node.size());
-    for (std::size_t k = 0; k < rows.node.size(); ++k) {
-        rows.node_entry[static_cast<std::size_t>(next[static_cast<std::size_t>(rows.node[k])]++)] = static_cast<int>(k);
-    }
-}
-
-}  // namespace
-
 // ∇J_a = ∫ L_a cof F ∇N / ∫ L_a over the elements around a.
-void QuadraticTetrahedra::add_pressure_rows(const Matrix3Xd& u, const VectorXd& J, detail::PressureRows& rows) const {
+void QuadraticTetrahedra::add_pressure_rows(const Matrix3Xd& u, const VectorXd& J, detail::RankOneRows& rows) const {
     rows.offset.push_back(0);
     rows.stiffness.resize(static_cast<Eigen::Index>(pressure_nodes_.size()));
     for (int a = 0; a < static_cast<int>(pressure_nodes_.size()); ++a) {
@@ -60,7 +38,7 @@ void QuadraticTetrahedra::add_pressure_rows(const Matrix3Xd& u, const VectorXd& 
         rows.stiffness[a] = node.volume * volumetric_modulus(node.material) *
                             volumetric_function(node.material, nodal_jacobian(a, J)).second;
     }
-    transpose(node_count_, rows);
+    detail::list_by_node(node_count_, rows);
 }
 
 detail::BlockRows QuadraticTetrahedra::stiffness(const Matrix3Xd& u) const {
@@ -70,8 +48,8 @@ detail::BlockRows QuadraticTetrahedra::stiffness(const Matrix3Xd& u) const {
     K.elements.column = row_column_;
     K.elements.block.assign(row_column_.size(), Eigen::Matrix3d::Zero());
     add_element_matrices(u, J, nodal, K.elements);
-    K.pressure.node_offset.assign(static_cast<std::size_t>(node_count_) + 1, 0);
-    if (pressure_ == QuadraticPressure::NodalAverage) add_pressure_rows(u, J, K.pressure);
+    K.products.node_offset.assign(static_cast<std::size_t>(node_count_) + 1, 0);
+    if (pressure_ == QuadraticPressure::NodalAverage) add_pressure_rows(u, J, K.products);
     return detail::assembled(K, detail::Triangle::Lower);
 }
 

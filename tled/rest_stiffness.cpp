@@ -9,6 +9,7 @@
 
 #include "core/errors.hpp"
 #include "tled/detail/cholmod_factor.hpp"
+#include "tled/detail/effect_stiffness.hpp"
 #include "tled/detail/held_tissue.hpp"
 #include "tled/detail/springs.hpp"
 #include "tled/detail/stiffness.hpp"
@@ -30,8 +31,9 @@ bool same_springs(const NodalConditions& a, const NodalConditions& b) {
 }  // namespace
 
 struct RestStiffness::Impl {
-    NodalConditions conditions;                        // those factorised
-    std::shared_ptr<const detail::Stiffness> elastic;  // K₀ without springs, all degrees of freedom
+    NodalConditions conditions;  // those factorised
+    std::shared_ptr<const detail::Stiffness>
+        elastic;  // K₀ with membranes and sliding pairs, without springs, all degrees of freedom
     std::unique_ptr<detail::CholmodFactor> factor;
     std::vector<int> index;  // degree of freedom 3·node + component → free number or −1
     int free_count = 0;
@@ -168,7 +170,9 @@ void RestStiffness::Impl::factorise(const detail::CholmodFactor* analysed) {
 RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& conditions)
     : impl_(std::make_unique<Impl>()) {
     detail::require_held(rest, conditions);
-    impl_->elastic = std::make_shared<detail::Stiffness>(detail::stiffness(rest, Matrix3Xd::Zero(3, rest.node_count)));
+    detail::Stiffness elastic = detail::stiffness(rest, Matrix3Xd::Zero(3, rest.node_count));
+    detail::add_effects(conditions.effects.surface, rest.position, elastic);
+    impl_->elastic = std::make_shared<detail::Stiffness>(std::move(elastic));
     impl_->number_free(conditions);
     impl_->factorise(nullptr);
 }
@@ -178,7 +182,8 @@ RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& condi
     detail::require_held(rest, conditions);
     detail::Stiffness metric = detail::stiffness(rest, displacement);
     metric.elements = detail::stiffness(rest, Matrix3Xd::Zero(3, rest.node_count)).elements;
-    metric.pressure.stiffness = metric.pressure.stiffness.cwiseMax(0.0);
+    metric.products.stiffness = metric.products.stiffness.cwiseMax(0.0);
+    detail::add_effects(conditions.effects.surface, rest.position, metric);
     impl_->elastic = std::make_shared<detail::Stiffness>(std::move(metric));
     impl_->number_free(conditions);
     impl_->factorise(nullptr);

@@ -11,9 +11,9 @@
 
 namespace tissuewarp::tled {
 
-/// K₀ + springs of the rest configuration with constrained degrees of freedom removed. Moving targets do not change it.
-/// Free rigid modes are excluded by the springs or prescribed displacements; without them construction throws
-/// InvalidInput ("nothing holds the tissue").
+/// K₀ + springs, membranes and sliding pairs of the rest configuration with constrained degrees of freedom removed.
+/// Moving targets do not change it; pressures, fluid and contact are not in it. Free rigid modes are excluded by the
+/// springs or prescribed displacements; without them construction throws InvalidInput ("nothing holds the tissue").
 class RestStiffness {
 public:
     RestStiffness(const RestState& rest, const NodalConditions& conditions);
@@ -21,8 +21,8 @@ public:
     /// that state, always positive definite, for tissue of which almost only the volume is stiff. Throws SolverFailure
     /// where det F ≤ 0.
     RestStiffness(const RestState& rest, const NodalConditions& conditions, const Eigen::Matrix3Xd& displacement);
-    /// The same tissue and constraints as `other` under other springs: K₀ and the analysis of its pattern are taken
-    /// over, only the numbers are factorised again. Throws InvalidInput for other constraints.
+    /// The same tissue, constraints and surface effects as `other` under other springs: K₀ and the analysis of its
+    /// pattern are taken over, only the numbers are factorised again. Throws InvalidInput for other constraints.
     RestStiffness(const RestState& rest, const NodalConditions& conditions, const RestStiffness& other);
     ~RestStiffness();
     RestStiffness(RestStiffness&&) noexcept;

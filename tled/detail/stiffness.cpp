@@ -177,25 +177,9 @@ std::vector<HexTerms> hex_terms(const RestState& rest, const Matrix3Xd& displace
     return terms;
 }
 
-// node → entries of the pressure rows that hold it.
-void transpose_rows(int node_count, PressureRows& rows) {
-    rows.row.resize(rows.node.size());
-    rows.node_offset.assign(node_count + 1, 0);
-    for (int a = 0; a < rows.rows(); ++a) {
-        for (int k = rows.offset[a]; k < rows.offset[a + 1]; ++k) {
-            rows.row[k] = a;
-            ++rows.node_offset[rows.node[k] + 1];
-        }
-    }
-    accumulate_counts(rows.node_offset);
-    std::vector<int> next = rows.node_offset;
-    rows.node_entry.resize(rows.node.size());
-    for (std::size_t k = 0; k < rows.node.size(); ++k) rows.node_entry[next[rows.node[k]]++] = static_cast<int>(k);
-}
-
-PressureRows pressure_rows(const RestState& rest, const std::vector<ElementTerms>& terms,
-                           const std::vector<VolumetricFunction>& nodal) {
-    PressureRows result;
+RankOneRows pressure_rows(const RestState& rest, const std::vector<ElementTerms>& terms,
+                          const std::vector<VolumetricFunction>& nodal) {
+    RankOneRows result;
     const PressureNodes& pressure = rest.pressure;
     const Incidence& incidence = pressure.incidence;
     const auto gather = [&](int a, RowGatherer& gatherer) {
@@ -219,11 +203,26 @@ PressureRows pressure_rows(const RestState& rest, const std::vector<ElementTerms
             }
         }
     });
-    transpose_rows(rest.node_count, result);
+    list_by_node(rest.node_count, result);
     return result;
 }
 
 }  // namespace
+
+void list_by_node(int node_count, RankOneRows& rows) {
+    rows.row.resize(rows.node.size());
+    rows.node_offset.assign(node_count + 1, 0);
+    for (int a = 0; a < rows.rows(); ++a) {
+        for (int k = rows.offset[a]; k < rows.offset[a + 1]; ++k) {
+            rows.row[k] = a;
+            ++rows.node_offset[rows.node[k] + 1];
+        }
+    }
+    accumulate_counts(rows.node_offset);
+    std::vector<int> next = rows.node_offset;
+    rows.node_entry.resize(rows.node.size());
+    for (std::size_t k = 0; k < rows.node.size(); ++k) rows.node_entry[next[rows.node[k]]++] = static_cast<int>(k);
+}
 
 Matrix3d& BlockRows::diagonal(int i) {
     const auto place = std::lower_bound(column.begin() + offset[i], column.begin() + offset[i + 1], i);
@@ -252,18 +251,18 @@ Stiffness stiffness(const RestState& rest, const Matrix3Xd& displacement) {
 
     Stiffness result;
     result.elements = element_rows(rest, terms, hex_terms(rest, displacement));
-    result.pressure = pressure_rows(rest, terms, nodal);
+    result.products = pressure_rows(rest, terms, nodal);
     return result;
 }
 
 Matrix3Xd Stiffness::multiply(const Matrix3Xd& x) const {
-    VectorXd rate(pressure.rows());  // stiffness_a ∇J_a·x
-    parallel_for(0, pressure.rows(), [&](int a) {
+    VectorXd rate(products.rows());  // stiffness_a ∇J_a·x
+    parallel_for(0, products.rows(), [&](int a) {
         double sum = 0.0;
-        for (int k = pressure.offset[a]; k < pressure.offset[a + 1]; ++k) {
-            sum += pressure.gradient[k].dot(x.col(pressure.node[k]));
+        for (int k = products.offset[a]; k < products.offset[a + 1]; ++k) {
+            sum += products.gradient[k].dot(x.col(products.node[k]));
         }
-        rate[a] = pressure.stiffness[a] * sum;
+        rate[a] = products.stiffness[a] * sum;
     });
     Matrix3Xd y(3, elements.rows());
     parallel_for(0, elements.rows(), [&](int i) {
@@ -271,9 +270,9 @@ Matrix3Xd Stiffness::multiply(const Matrix3Xd& x) const {
         for (int k = elements.offset[i]; k < elements.offset[i + 1]; ++k) {
             sum += elements.block[k] * x.col(elements.column[k]);
         }
-        for (int k = pressure.node_offset[i]; k < pressure.node_offset[i + 1]; ++k) {
-            const int entry = pressure.node_entry[k];
-            sum += rate[pressure.row[entry]] * pressure.gradient[entry];
+        for (int k = products.node_offset[i]; k < products.node_offset[i + 1]; ++k) {
+            const int entry = products.node_entry[k];
+            sum += rate[products.row[entry]] * products.gradient[entry];
         }
         y.col(i) = sum;
     });
@@ -284,10 +283,10 @@ std::vector<Matrix3d> Stiffness::diagonal_blocks() const {
     std::vector<Matrix3d> result(elements.rows());
     parallel_for(0, elements.rows(), [&](int i) {
         result[i] = elements.diagonal(i);
-        for (int k = pressure.node_offset[i]; k < pressure.node_offset[i + 1]; ++k) {
-            const int entry = pressure.node_entry[k];
-            const Vector3d& gradient = pressure.gradient[entry];
-            result[i] += pressure.stiffness[pressure.row[entry]] * gradient * gradient.transpose();
+        for (int k = products.node_offset[i]; k < products.node_offset[i + 1]; ++k) {
+            const int entry = products.node_entry[k];
+            const Vector3d& gradient = products.gradient[entry];
+            result[i] += products.stiffness[products.row[entry]] * gradient * gradient.transpose();
         }
     });
     return result;
@@ -295,16 +294,16 @@ std::vector<Matrix3d> Stiffness::diagonal_blocks() const {
 
 BlockRows assembled(const Stiffness& stiffness, Triangle triangle) {
     const BlockRows& elements = stiffness.elements;
-    const PressureRows& pressure = stiffness.pressure;
+    const RankOneRows& products = stiffness.products;
     const auto gather = [&](int i, RowGatherer& gatherer) {
         const int first = triangle == Triangle::Lower ? i : 0;
         const auto insert = [&](int j) {
             if (j >= first) gatherer.insert(j);
         };
         for (int k = elements.offset[i]; k < elements.offset[i + 1]; ++k) insert(elements.column[k]);
-        for (int k = pressure.node_offset[i]; k < pressure.node_offset[i + 1]; ++k) {
-            const int a = pressure.row[pressure.node_entry[k]];
-            for (int m = pressure.offset[a]; m < pressure.offset[a + 1]; ++m) insert(pressure.node[m]);
+        for (int k = products.node_offset[i]; k < products.node_offset[i + 1]; ++k) {
+            const int a = products.row[products.node_entry[k]];
+            for (int m = products.offset[a]; m < products.offset[a + 1]; ++m) insert(products.node[m]);
         }
     };
     BlockRows result;
@@ -321,12 +320,12 @@ BlockRows assembled(const Stiffness& stiffness, Triangle triangle) {
             const int slot = gatherer.slot[elements.column[k]];
             if (slot >= 0) blocks[slot] += elements.block[k];
         }
-        for (int k = pressure.node_offset[i]; k < pressure.node_offset[i + 1]; ++k) {
-            const int entry = pressure.node_entry[k], a = pressure.row[entry];
-            const Vector3d own = pressure.stiffness[a] * pressure.gradient[entry];
-            for (int m = pressure.offset[a]; m < pressure.offset[a + 1]; ++m) {
-                const int slot = gatherer.slot[pressure.node[m]];
-                if (slot >= 0) blocks[slot] += own * pressure.gradient[m].transpose();
+        for (int k = products.node_offset[i]; k < products.node_offset[i + 1]; ++k) {
+            const int entry = products.node_entry[k], a = products.row[entry];
+            const Vector3d own = products.stiffness[a] * products.gradient[entry];
+            for (int m = products.offset[a]; m < products.offset[a + 1]; ++m) {
+                const int slot = gatherer.slot[products.node[m]];
+                if (slot >= 0) blocks[slot] += own * products.gradient[m].transpose();
             }
         }
         gatherer.clear();

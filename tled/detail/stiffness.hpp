@@ -20,21 +20,25 @@ struct BlockRows {
     [[nodiscard]] const Eigen::Matrix3d& diagonal(int i) const;
 };
 
-/// ∇J_a of the pressure nodes: row a holds the nodes on which J_a depends and ∂J_a/∂u, 1/mm.
-struct PressureRows {
+/// Σ_a stiffness_a g_a g_aᵀ, row a with the nodes and vectors of g_a. Of a pressure node: those on which J_a depends
+/// and ∂J_a/∂u, 1/mm.
+struct RankOneRows {
     std::vector<int> offset, node;
     std::vector<Eigen::Vector3d> gradient;
-    Eigen::VectorXd stiffness;                 ///< V_a M_a U''(J_a), mN·mm; may be negative far from rest
+    Eigen::VectorXd stiffness;  ///< V_a M_a U''(J_a), mN·mm, of a pressure node; may be negative far from rest
     std::vector<int> node_offset, node_entry;  ///< node → its entries in the rows, ascending
     std::vector<int> row;                      ///< row of every entry
     [[nodiscard]] int rows() const { return static_cast<int>(offset.size()) - 1; }
 };
 
-/// K = elements + Σ_a stiffness_a ∇J_a ∇J_aᵀ. The sum over pressure nodes couples nodes two edges apart, so that the
-/// product form is several times smaller than the assembled matrix.
+/// Fills node_offset, node_entry and row from the others.
+void list_by_node(int node_count, RankOneRows& rows);
+
+/// K = elements + products. The sum over pressure nodes couples nodes two edges apart, so that the product form is
+/// several times smaller than the assembled matrix.
 struct Stiffness {
     BlockRows elements;
-    PressureRows pressure;
+    RankOneRows products;
 
     /// K x, 3 × N, the same numbers for any number of threads.
     [[nodiscard]] Eigen::Matrix3Xd multiply(const Eigen::Matrix3Xd& x) const;

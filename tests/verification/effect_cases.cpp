@@ -1,0 +1,458 @@
+#include "tests/verification/effect_cases.hpp"
+
+#include "meshing/primitives.hpp"
+#include "tests/verification/shapes.hpp"
+#include "tled/contact.hpp"
+#include "tled/dynamics.hpp"
+#include "tled/equilibrium.hpp"
+#include "tled/reference.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+namespace tissuewarp::verification {
+namespace {
+
+using Eigen::Matrix3Xd;
+using Eigen::Matrix3Xi;
+using Eigen::Vector3d;
+using tled::Conditions;
+using tled::Model;
+using tled::RestState;
+
+constexpr double gravity = 9810.0;              // mm/s²
+constexpr double density = 1e-6;                // kg/mm³
+constexpr double modulus = 3.0, poisson = 0.3;  // kPa, of columns
+
+// Columns of 100 mm on a square of 10 mm, whose sides cannot move sideways: one stretch λ(X) along z.
+
+constexpr double length = 100.0, side = 10.0;
+
+Model column(int cells) {
+    Model model;
+    model.mesh = meshing::box_mesh({side, side, length}, {1, 1, cells});
+    model.materials = {{1, tled::neo_hookean_iso(modulus, poisson)}};
+    model.element = tled::Element::T4;
+    model.density = density;
+    return model;
+}
+
+/// P of W = μ/2 (λ^(−2/3) (2 + λ²) − 3) + κ/2 (λ − 1)², kPa.
+double column_stress(double stretch) {
+    const auto law = tled::neo_hookean_iso(modulus, poisson);
+    return 0.5 * law.shear_modulus *
+               (-2.0 / 3 * std::pow(stretch, -5.0 / 3) * (2 + stretch * stretch) + 2 * std::cbrt(stretch)) +
+           law.bulk_modulus * (stretch - 1);
+}
+
+double column_stretch(double stress) {
+    double low = 0.2, high = 3.0;
+    for (int i = 0; i < 80; ++i) (column_stress(0.5 * (low + high)) < stress ? low : high) = 0.5 * (low + high);
+    return 0.5 * (low + high);
+}
+
+/// ∫ λ(P(X)) dX over [from, to] by Simpson's rule.
+double deformed_length(const std::function<double(double)>& stress, double from, double to) {
+    constexpr int parts = 400;
+    double sum = 0;
+    for (int i = 0; i <= parts; ++i) {
+        const double weight = i == 0 || i == parts ? 1 : i % 2 == 1 ? 4 : 2;
+        sum += weight * column_stretch(stress(from + (to - from) * i / parts));
+    }
+    return sum * (to - from) / (3 * parts);
+}
+
+/// The column stands on its base, or its base may move upright too.
+void guide(const Model& model, bool base_held, Conditions& conditions) {
+    for (int a = 0; a < model.mesh.node_count(); ++a)
+        conditions.prescribed.push_back({a, {true, true, base_held && model.mesh.nodes(2, a) < 1e-9}, {0, 0, 0}});
+}
+
+Matrix3Xd weight(const RestState& rest, const Vector3d& pull) {
+    return pull * rest.lumped_mass.transpose();
+}
+
+double mean(const Model& model, const Matrix3Xd& u, int component, const std::function<bool(const Vector3d&)>& on) {
+    double sum = 0;
+    int count = 0;
+    for (int a = 0; a < model.mesh.node_count(); ++a)
+        if (on(model.mesh.nodes.col(a))) {
+            sum += u(component, a);
+            ++count;
+        }
+    return sum / count;
+}
+
+bool on_top(const Vector3d& X) {
+    return X.z() > length - 1e-9;
+}
+
+Matrix3Xd settle(const Model& model, const Conditions& conditions, const MakeEngine& make) {
+    const RestState rest = tled::rest_state(model);
+    const tled::NodalConditions nodal = tled::nodal_conditions(conditions, rest);
+    const auto engine = make(rest);
+    return tled::equilibrium(*engine, tled::RestStiffness(rest, nodal), nodal, {.tolerance_mm = 1e-3, .rest = &rest})
+        .displacement;
+}
+
+// Gravity: P(X) = −ρ g (L − X).
+double sag_of_column() {
+    return deformed_length([](double X) { return -density * gravity * (length - X); }, 0, length) - length;
+}
+double measured_sag(const MakeEngine& make) {
+    const Model model = column(50);
+    Conditions conditions;
+    guide(model, true, conditions);
+    conditions.external_force = weight(tled::rest_state(model), {0, 0, -gravity});
+    return mean(model, settle(model, conditions, make), 2, on_top);
+}
+
+// Gravity that has turned sideways on a layer that can only shear: τ = μ γ, so that u = ρ g (L X − X²/2)/μ.
+double measured_shear(const MakeEngine& make) {
+    const Model model = column(50);
+    Conditions conditions;
+    for (int a = 0; a < model.mesh.node_count(); ++a)
+        conditions.prescribed.push_back({a, {model.mesh.nodes(2, a) < 1e-9, true, true}, {0, 0, 0}});
+    conditions.external_force = weight(tled::rest_state(model), {0.2 * gravity, 0, 0});
+    return mean(model, settle(model, conditions, make), 0, on_top);
+}
+
+// Fluid of 0.9 of the tissue's density up to a level of 60 mm: below the section X_h that comes to lie there, the
+// tissue weighs a tenth.
+constexpr double level = 60.0, lift = 0.9;
+double sag_in_fluid() {
+    const auto stress = [](double wet) {
+        return [wet](double X) {
+            return -density * gravity * ((length - std::max(X, wet)) + (1 - lift) * std::max(0.0, wet - X));
+        };
+    };
+    double low = level, high = length;
+    for (int i = 0; i < 60; ++i) {
+        const double wet = 0.5 * (low + high);
+        (deformed_length(stress(wet), 0, wet) < level ? low : high) = wet;
+    }
+    const double wet = 0.5 * (low + high);
+    return deformed_length(stress(wet), 0, wet) + deformed_length(stress(wet), wet, length) - length;
+}
+double measured_sag_in_fluid(const MakeEngine& make) {
+    const Model model = column(50);
+    Conditions conditions;
+    guide(model, true, conditions);
+    conditions.external_force = weight(tled::rest_state(model), {0, 0, -gravity});
+    conditions.effects.fluid = tled::Fluid{lift * density, {0, 0, -gravity}, level};
+    return mean(model, settle(model, conditions, make), 2, on_top);
+}
+
+// Elastic foundation of s = 0.05 kPa/mm under a column pressed by 0.5 kPa: −p/s at the base, λ(−p) above it.
+constexpr double foundation = 0.05, dead_load = 0.5;
+double foundation_shortening() {
+    return -dead_load / foundation + (column_stretch(-dead_load) - 1) * length;
+}
+double measured_foundation_shortening(const MakeEngine& make) {
+    const Model model = column(10);
+    Conditions conditions;
+    guide(model, false, conditions);
+    conditions.external_force = Matrix3Xd::Zero(3, model.mesh.node_count());
+    for (const meshing::InterfaceFace& face : meshing::interface_faces(model.mesh)) {
+        const auto is_at = [&](double z) {
+            return std::all_of(face.nodes.begin(), face.nodes.end(),
+                               [&](int a) { return std::abs(model.mesh.nodes(2, a) - z) < 1e-9; });
+        };
+        const double third = side * side / 2 / 3;
+        for (const int a : face.nodes) {
+            if (is_at(0))
+                conditions.springs.push_back(
+                    {a, third * foundation * Vector3d::UnitZ() * Vector3d::UnitZ().transpose(), {0, 0, 0}});
+            if (is_at(length)) conditions.external_force(2, a) -= third * dead_load;
+        }
+    }
+    return mean(model, settle(model, conditions, make), 2, on_top);
+}
+
+// An eighth of a thick shell of nearly incompressible neo-Hookean material, A ≤ R ≤ B, inflated from inside: with the
+// stretches λ_A = a/A and λ_B = b/B of the incompressible shell, b³ − a³ = B³ − A³,
+// p = μ/2 (4/λ_B + 1/λ_B⁴ − 4/λ_A − 1/λ_A⁴) (Green and Zerna 1968, section 3.10).
+constexpr double shell_inner = 20.0, shell_outer = 30.0, shell_stretch = 1.3, shell_modulus = 1.0;
+double shell_pressure() {
+    const double a = shell_stretch * shell_inner;
+    const double b = std::cbrt(std::pow(a, 3) + std::pow(shell_outer, 3) - std::pow(shell_inner, 3));
+    const auto part = [](double stretch) { return 4 / stretch + 1 / std::pow(stretch, 4); };
+    return 0.5 * shell_modulus * (part(b / shell_outer) - part(shell_stretch));
+}
+Model shell(int cells) {
+    Model model;
+    model.mesh = meshing::box_mesh({1, 1, 1}, {cells, cells, cells / 2});
+    for (auto X : model.mesh.nodes.colwise()) {
+        // The unit square to an octant of the sphere by equal angles: u and v turn about y and x.
+        const Vector3d ray = Vector3d(std::tan(M_PI / 4 * X[0]), std::tan(M_PI / 4 * X[1]), 1).normalized();
+        X = (shell_inner + (shell_outer - shell_inner) * X[2]) * ray;
+    }
+    model.materials = {{1, tled::NeoHookeanIso{shell_modulus, 500 * shell_modulus}}};
+    model.element = tled::Element::AveragedPressureT4;
+    model.density = density;
+    return model;
+}
+/// A part of the shell between the planes x = 0, y = 0, x = z and y = z, which by symmetry are not crossed.
+double measured_shell_radius(const MakeEngine& make) {
+    const Model model = shell(12);
+    Conditions conditions;
+    const Matrix3Xd& X = model.mesh.nodes;
+    const double stiff = 1e4;
+    Matrix3Xi inside(3, 0);
+    for (const meshing::InterfaceFace& face : meshing::interface_faces(model.mesh))
+        if (std::all_of(face.nodes.begin(), face.nodes.end(),
+                        [&](int a) { return X.col(a).norm() < shell_inner * (1 + 1e-9); })) {
+            inside.conservativeResize(3, inside.cols() + 1);
+            inside.rightCols(1) << face.nodes[0], face.nodes[1], face.nodes[2];
+        }
+    for (int a = 0; a < X.cols(); ++a)
+        for (const Vector3d& n : {Vector3d(1, 0, 0), Vector3d(0, 1, 0), Vector3d(1, 0, -1), Vector3d(0, 1, -1)})
+            if (std::abs(n.dot(X.col(a))) < 1e-6)
+                conditions.springs.push_back({a, stiff * n * n.transpose(), {0, 0, 0}});
+    conditions.effects.pressures.push_back({inside, shell_pressure()});
+    const Matrix3Xd u = settle(model, conditions, make);
+    double sum = 0;
+    int count = 0;
+    for (int a = 0; a < X.cols(); ++a)
+        if (X.col(a).norm() < shell_inner * (1 + 1e-9)) {
+            sum += (X.col(a) + u.col(a)).norm();
+            ++count;
+        }
+    return sum / count;
+}
+
+// A block of 20 mm between two plates, drawn out by 1.3, with sheets on its four free sides: block and sheets stretch
+// alike, each with μ (λ − λ⁻²) over its section.
+constexpr double block_side = 20.0, block_stretch = 1.3, sheet_modulus = 30.0, sheet_thickness = 0.2;
+double block_force() {
+    const double tension = block_stretch - 1 / (block_stretch * block_stretch);
+    return tension * (block_side * block_side * 1.0 + 4 * block_side * sheet_thickness * sheet_modulus);
+}
+double measured_block_force(const MakeEngine& make) {
+    Model model;
+    model.mesh = meshing::box_mesh({block_side, block_side, block_side}, {4, 4, 4});
+    model.materials = {{1, tled::NeoHookeanIso{1.0, 2000.0}}};
+    model.element = tled::Element::AveragedPressureT4;
+    model.density = density;
+    const Matrix3Xd& X = model.mesh.nodes;
+    Conditions conditions;
+    for (int a = 0; a < X.cols(); ++a) {
+        const bool top = X(2, a) > block_side - 1e-9;
+        conditions.prescribed.push_back({a,
+                                         {X(0, a) < 1e-9, X(1, a) < 1e-9, X(2, a) < 1e-9 || top},
+                                         {0, 0, top ? (block_stretch - 1) * block_side : 0.0}});
+    }
+    Matrix3Xi sides(3, 0);
+    for (const meshing::InterfaceFace& face : meshing::interface_faces(model.mesh)) {
+        const auto flat = [&](double z) {
+            return std::all_of(face.nodes.begin(), face.nodes.end(),
+                               [&](int a) { return std::abs(X(2, a) - z) < 1e-9; });
+        };
+        if (flat(0) || flat(block_side)) continue;
+        sides.conservativeResize(3, sides.cols() + 1);
+        sides.rightCols(1) << face.nodes[0], face.nodes[1], face.nodes[2];
+    }
+    conditions.effects.membranes.push_back({sides, sheet_modulus, sheet_thickness});
+    const RestState rest = tled::rest_state(model);
+    const tled::NodalConditions nodal = tled::nodal_conditions(conditions, rest);
+    const auto engine = make(rest);
+    const Matrix3Xd u =
+        tled::equilibrium(*engine, tled::RestStiffness(rest, nodal), nodal, {.tolerance_mm = 1e-4}).displacement;
+    const Matrix3Xd force = engine->internal_force() - tled::surface_force(nodal.effects.surface, rest.position, u);
+    double sum = 0;
+    for (int a = 0; a < X.cols(); ++a)
+        if (X(2, a) > block_side - 1e-9) sum += force(2, a);
+    return sum;
+}
+
+// Two columns, one on the other, that slide: moving the lower sideways by 5 mm leaves the upper where springs hold it.
+struct Stacked {
+    Model model;
+    std::vector<tled::SlidingPair> pairs;
+    int first_upper = 0;
+};
+Stacked stacked(int cells) {
+    Stacked s;
+    s.model = column(cells);
+    meshing::TetMesh& lower = s.model.mesh;
+    s.first_upper = lower.node_count();
+    const int tets = lower.tet_count();
+    Matrix3Xd nodes(3, 2 * s.first_upper);
+    nodes << lower.nodes, lower.nodes.colwise() + Vector3d(0, 0, length);
+    Eigen::Matrix4Xi both(4, 2 * tets);
+    both << lower.tets, lower.tets.array() + s.first_upper;
+    lower.nodes = nodes;
+    lower.tets = both;
+    lower.labels = Eigen::VectorXi::Constant(2 * tets, 1);
+    for (int a = 0; a < s.first_upper; ++a)
+        for (int b = s.first_upper; b < 2 * s.first_upper; ++b)
+            if ((nodes.col(a) - nodes.col(b)).norm() < 1e-9) s.pairs.push_back({a, b, Vector3d::UnitZ(), 1e4});
+    return s;
+}
+Matrix3Xd slid(const Stacked& s, const MakeEngine& make) {
+    Conditions conditions;
+    const Matrix3Xd& X = s.model.mesh.nodes;
+    for (int a = 0; a < X.cols(); ++a) {
+        const bool lower = a<s.first_upper, top = X(2, a)> 2 * length - 1e-9;
+        conditions.prescribed.push_back(
+            {a, {lower, true, X(2, a) < 1e-9 || top}, {lower ? 5.0 : 0.0, 0, top ? -20.0 : 0.0}});
+        if (!lower)
+            conditions.springs.push_back({a, 0.01 * Vector3d::UnitX() * Vector3d::UnitX().transpose(), {0, 0, 0}});
+    }
+    conditions.effects.sliding = s.pairs;
+    return settle(s.model, conditions, make);
+}
+double measured_slip(const MakeEngine& make) {
+    const Stacked s = stacked(5);
+    const Matrix3Xd u = slid(s, make);
+    return u.row(0).tail(u.cols() - s.first_upper).mean();
+}
+double measured_share_of_lower(const MakeEngine& make) {
+    const Stacked s = stacked(5);
+    // Sideways the upper column gives way and the lower does not: both are measured by the force that they pass on.
+    const RestState rest = tled::rest_state(s.model);
+    const Matrix3Xd force = tled::internal_force(rest, slid(s, make));
+    double base = 0, top = 0;
+    for (int a = 0; a < s.model.mesh.node_count(); ++a) {
+        if (s.model.mesh.nodes(2, a) < 1e-9) base += force(2, a);
+        if (s.model.mesh.nodes(2, a) > 2 * length - 1e-9) top += force(2, a);
+    }
+    return -base / top;
+}
+
+// Obstacles.
+
+tled::DistanceGrid half_space(double height, double reach) {
+    constexpr int samples = 11;
+    const double step = 2 * reach / (samples - 1);
+    tled::DistanceGrid grid{{-reach, -reach, height - reach}, step * Eigen::Matrix3d::Identity(), {}, {}};
+    grid.size.setConstant(samples);
+    for (int k = 0; k < samples; ++k)
+        grid.distance.insert(grid.distance.end(), samples * samples, static_cast<float>(k * step - reach));
+    return grid;
+}
+
+tled::RigidContact contact_of_all(const Model& model, double friction, const tled::DistanceGrid& grid) {
+    tled::RigidContact contact;
+    for (int a = 0; a < model.mesh.node_count(); ++a) contact.nodes.push_back(a);
+    contact.obstacles.push_back({grid, Vector3d::Zero(), friction});
+    return contact;
+}
+
+tled::DynamicsState moving(const Model& model, const Vector3d& velocity) {
+    const Eigen::Index nodes = model.mesh.node_count();
+    return {Matrix3Xd::Zero(3, nodes), velocity.replicate(1, nodes), 0};
+}
+
+tled::DynamicsResult moved(const Model& model, const Conditions& conditions, const tled::DynamicsState& start,
+                           double duration, const MakeEngine& make) {
+    const RestState rest = tled::rest_state(model);
+    const tled::NodalConditions nodal = tled::nodal_conditions(conditions, rest);
+    const auto engine = make(rest);
+    const Matrix3Xd mass = rest.lumped_mass.transpose().replicate(3, 1);
+    return tled::dynamics(*engine, rest, mass, nodal, start, duration);
+}
+
+/// v, mm/s: slow against the waves of 2009 mm/s, so that the bar answers linearly.
+constexpr double impact_velocity = 5.0;
+/// Velocity of the centre of mass after the wall has let go.
+double measured_rebound(const MakeEngine& make) {
+    Model model = column(50);
+    Conditions conditions;
+    guide(model, false, conditions);
+    conditions.effects.contact = contact_of_all(model, 0, half_space(0, 20));
+    const auto law = tled::neo_hookean_iso(modulus, poisson);
+    const double contact_time = 2 * length / std::sqrt(tled::p_wave_modulus(law) / density);
+    const auto end = moved(model, conditions, moving(model, {0, 0, -impact_velocity}), 1.5 * contact_time, make).state;
+    const RestState rest = tled::rest_state(model);
+    return end.velocity.row(2).dot(rest.lumped_mass) / rest.lumped_mass.sum();
+}
+/// Mean force of the wall while the bar is shortening, by the change of momentum in half of the time of contact.
+double measured_impact_stress(const MakeEngine& make) {
+    Model model = column(50);
+    Conditions conditions;
+    guide(model, false, conditions);
+    conditions.effects.contact = contact_of_all(model, 0, half_space(0, 20));
+    const auto law = tled::neo_hookean_iso(modulus, poisson);
+    const double time = 0.8 * length / std::sqrt(tled::p_wave_modulus(law) / density);
+    const auto end = moved(model, conditions, moving(model, {0, 0, -impact_velocity}), time, make).state;
+    const RestState rest = tled::rest_state(model);
+    const double momentum = end.velocity.row(2).dot(rest.lumped_mass) + impact_velocity * rest.lumped_mass.sum();
+    return momentum / (time * side * side);
+}
+double impact_stress() {
+    const double wave_modulus = tled::p_wave_modulus(tled::neo_hookean_iso(modulus, poisson));
+    return density * std::sqrt(wave_modulus / density) * impact_velocity;
+}
+
+// A stiff block that slides on a table until friction has stopped it: v²/(2 μ g).
+constexpr double sliding_velocity = 100.0, friction = 0.3;
+double measured_stopping_distance(const MakeEngine& make) {
+    Model model;
+    model.mesh = meshing::box_mesh({10, 10, 4}, {4, 4, 2});
+    model.materials = {{1, tled::neo_hookean_iso(2000.0, poisson)}};
+    model.element = tled::Element::T4;
+    model.density = density;
+    Conditions conditions;
+    conditions.external_force = weight(tled::rest_state(model), {0, 0, -gravity});
+    conditions.effects.contact = contact_of_all(model, friction, half_space(0, 40));
+    const double time = 1.3 * sliding_velocity / (friction * gravity);
+    const auto end = moved(model, conditions, moving(model, {sliding_velocity, 0, 0}), time, make).state;
+    return end.displacement.row(0).mean();
+}
+
+// A column under its weight, hung up by a weak spring, that settles on a table which comes 5 mm up: as gravity on a
+// held base, 5 mm higher.
+double measured_sag_on_table(const MakeEngine& make) {
+    const Model model = column(50);
+    const RestState rest = tled::rest_state(model);
+    Conditions conditions;
+    guide(model, false, conditions);
+    conditions.external_force = weight(rest, {0, 0, -gravity});
+    for (int a = 0; a < model.mesh.node_count(); ++a)
+        conditions.springs.push_back({a, 1e-6 * Eigen::Matrix3d::Identity(), {0, 0, 0}});
+    conditions.effects.contact = contact_of_all(model, 0, half_space(5, 20));
+    const auto engine = make(rest);
+    tled::ContactOptions options;
+    options.equilibrium.tolerance_mm = 1e-3;
+    options.penetration_mm = 1e-3;
+    const Matrix3Xd u = tled::equilibrium_in_contact(*engine, rest, tled::nodal_conditions(conditions, rest), options)
+                            .equilibrium.displacement;
+    return mean(model, u, 2, on_top);
+}
+
+}  // namespace
+
+std::vector<EffectCase> effect_cases() {
+    const double sag = sag_of_column();
+    const auto shear = tled::neo_hookean_iso(modulus, poisson).shear_modulus;
+    return {
+        {"gravity", "column under its weight", "sag of the top", "mm", "quadrature of P(λ(X)) = −ρ g (L − X)", sag,
+         0.01, measured_sag},
+        {"gravity, turned", "layer that shears", "shift of the top", "mm", "ρ g L²/(2 μ)",
+         0.2 * density * gravity * length * length / (2 * shear), 0.01, measured_shear},
+        {"fluid level", "column in fluid up to 60 mm", "sag of the top", "mm",
+         "quadrature, lighter below the deformed level", sag_in_fluid(), 0.02, measured_sag_in_fluid},
+        {"elastic foundation", "column pressed onto springs", "shift of the top", "mm", "−p/s + (λ(−p) − 1) L",
+         foundation_shortening(), 2e-3, measured_foundation_shortening},
+        {"pressure", "thick shell inflated by 1.3", "inner radius", "mm", "Green and Zerna 1968",
+         shell_stretch * shell_inner, 0.1, measured_shell_radius},
+        {"membrane", "block in four sheets, drawn out", "force", "mN", "μ (λ − λ⁻²) over the section", block_force(),
+         0.5, measured_block_force},
+        {"sliding", "two columns, the lower moved aside", "shift of the upper", "mm", "none passes", 0.0, 2e-3,
+         measured_slip},
+        {"sliding", "two columns, the upper pressed", "force below over above", "1", "all passes", 1.0, 1e-3,
+         measured_share_of_lower},
+        {"contact, static", "column on a table 5 mm higher", "shift of the top", "mm", "sag + 5", sag + 5, 0.02,
+         measured_sag_on_table},
+        {"contact, dynamic", "bar thrown at a wall", "velocity back", "mm/s", "wave of a linear bar", impact_velocity,
+         0.03 * impact_velocity, measured_rebound},
+        {"contact, dynamic", "bar thrown at a wall", "stress at the wall", "kPa", "ρ c v", impact_stress(),
+         0.03 * impact_stress(), measured_impact_stress},
+        {"friction", "block that slides to rest", "distance", "mm", "v²/(2 μ g)",
+         sliding_velocity * sliding_velocity / (2 * friction * gravity), 0.03, measured_stopping_distance},
+    };
+}
+
+}  // namespace tissuewarp::verification

@@ -1,0 +1,28 @@
+#pragma once
+/// Every effect in a scene whose answer is known in closed form, or from an independent computation.
+
+#include "tests/verification/transient.hpp"
+
+#include <ostream>
+#include <string>
+#include <vector>
+
+namespace tissuewarp::verification {
+
+/// One number of a scene. What a failure would look like stands in `source`'s terms: another number.
+struct EffectCase {
+    std::string effect, scene, quantity, unit;
+    std::string source;  ///< of the reference
+    double reference = 0.0;
+    double bound = 0.0;  ///< accepted difference, in the same unit: what the mesh and the time step leave, seen to
+                         ///< shrink with both, doubled
+    double (*measure)(const MakeEngine& engine) = nullptr;
+};
+
+inline void PrintTo(const EffectCase& each, std::ostream* out) {
+    *out << each.scene << ", " << each.quantity;
+}
+
+std::vector<EffectCase> effect_cases();
+
+}  // namespace tissuewarp::verification
