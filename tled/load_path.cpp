@@ -54,6 +54,8 @@ private:
         if (!from_rest_) return partial;
         partial.spring_force *= load;
         partial.external_force *= load;
+        partial.effects.surface.pressure *= load;
+        if (partial.effects.fluid) partial.effects.fluid->weight *= load;
         return partial;
     }
 

@@ -5,6 +5,8 @@
 #include "tled/contact.hpp"
 #include "tled/dynamics.hpp"
 #include "tled/equilibrium.hpp"
+#include "tled/growth.hpp"
+#include "tled/load_path.hpp"
 #include "tled/reference.hpp"
 
 #include <algorithm>
@@ -92,8 +94,9 @@ Matrix3Xd settle(const Model& model, const Conditions& conditions, const MakeEng
     const RestState rest = tled::rest_state(model);
     const tled::NodalConditions nodal = tled::nodal_conditions(conditions, rest);
     const auto engine = make(rest);
-    return tled::equilibrium(*engine, tled::RestStiffness(rest, nodal), nodal, {.tolerance_mm = 1e-3, .rest = &rest})
-        .displacement;
+    tled::LoadPathOptions options;
+    options.equilibrium = {.tolerance_mm = 1e-3, .rest = &rest};
+    return tled::equilibrium_along_load(*engine, tled::RestStiffness(rest, nodal), nodal, options).displacement;
 }
 
 // Gravity: P(X) = −ρ g (L − X).
@@ -321,6 +324,46 @@ double measured_share_of_lower(const MakeEngine& make) {
     return -base / top;
 }
 
+// Growth by g = 1.2 of a block between walls that do not give: F is I and the tissue's own F is I/g, so that the walls
+// carry p = κ (1 − g⁻³) (J's part; the isochoric part of I/g is none).
+constexpr double growth = 1.2;
+Model grown_block(std::vector<tled::SurfacePressure>& pressures) {
+    Model model;
+    model.mesh = meshing::box_mesh({10, 10, 10}, {3, 3, 3}, 0.1, 5);
+    model.materials = {{1, tled::neo_hookean_iso(modulus, poisson)}};
+    model.element = tled::Element::T4;
+    model.density = density;
+    tled::Grown grown = tled::grown(model, {{1, growth}});
+    pressures = grown.pressures;
+    return grown.model;
+}
+double measured_wall_pressure(const MakeEngine& make) {
+    Conditions conditions;
+    const Model model = grown_block(conditions.effects.pressures);
+    for (int a = 0; a < model.mesh.node_count(); ++a)
+        conditions.prescribed.push_back({a, {true, true, true}, {0, 0, 0}});
+    const RestState rest = tled::rest_state(model);
+    const tled::NodalConditions nodal = tled::nodal_conditions(conditions, rest);
+    const auto engine = make(rest);
+    engine->set_conditions(nodal);
+    const Matrix3Xd still = Matrix3Xd::Zero(3, rest.node_count);
+    const Matrix3Xd on_walls =
+        tled::surface_force(nodal.effects.surface, rest.position, still) - engine->internal_force();
+    double sum = 0;
+    for (int a = 0; a < rest.node_count; ++a)
+        if (model.mesh.nodes(2, a) > 10 - 1e-9) sum += on_walls(2, a);
+    return sum / 100;
+}
+double measured_free_growth(const MakeEngine& make) {
+    Conditions conditions;
+    const Model model = grown_block(conditions.effects.pressures);
+    const Matrix3Xd& X = model.mesh.nodes;
+    for (int a = 0; a < X.cols(); ++a)
+        conditions.prescribed.push_back({a, {X(0, a) < 1e-9, X(1, a) < 1e-9, X(2, a) < 1e-9}, {0, 0, 0}});
+    const Matrix3Xd u = settle(model, conditions, make);
+    return (u - (growth - 1) * X).colwise().norm().maxCoeff();
+}
+
 // Obstacles.
 
 tled::DistanceGrid half_space(double height, double reach) {
@@ -444,6 +487,11 @@ std::vector<EffectCase> effect_cases() {
          measured_slip},
         {"sliding", "two columns, the upper pressed", "force below over above", "1", "all passes", 1.0, 1e-3,
          measured_share_of_lower},
+        {"growth", "block that grows by 1.2 between walls", "pressure on the walls", "kPa", "κ (1 − g⁻³)",
+         tled::neo_hookean_iso(modulus, poisson).bulk_modulus * (1 - std::pow(growth, -3)), 1e-5,
+         measured_wall_pressure},
+        {"growth", "block that grows by 1.2", "largest distance from (g − 1) X", "mm", "exact on any mesh", 0.0, 2e-3,
+         measured_free_growth},
         {"contact, static", "column on a table 5 mm higher", "shift of the top", "mm", "sag + 5", sag + 5, 0.02,
          measured_sag_on_table},
         {"contact, dynamic", "bar thrown at a wall", "velocity back", "mm/s", "wave of a linear bar", impact_velocity,
