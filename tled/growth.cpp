@@ -16,23 +16,9 @@ namespace {
                        "ogden or transversely_isotropic");
 }
 
-void scale_shear(NeoHookeanIso& law, double by) {
-    law.shear_modulus *= by;
-}
-void scale_shear(Polynomial& law, double by) {
-    for (double* c : {&law.c10, &law.c01, &law.c20, &law.c11, &law.c02, &law.c30}) *c *= by;
-}
-void scale_shear(Ogden& law, double by) {
-    for (OgdenTerm& term : law.terms) term.modulus *= by;
-}
-void scale_shear(TransverselyIsotropic& law, double by) {
-    law.shear_modulus *= by;
-    law.fibre_modulus *= by;
-}
-
 /// The law of tissue that has grown to `volume` times its own.
 Material grown_law(const Material& material, double volume, int label) {
-    Material result = material;
+    Material result = with_shear_scaled(material, volume);
     std::visit(
         [&](auto& law) {
             using Law = std::decay_t<decltype(law)>;
@@ -40,7 +26,6 @@ Material grown_law(const Material& material, double volume, int label) {
                           std::is_same_v<Law, ArrudaBoyce>) {
                 refuse(material, label);
             } else {
-                scale_shear(law, volume);
                 law.bulk_modulus /= volume;
             }
         },

@@ -364,6 +364,60 @@ double measured_free_growth(const MakeEngine& make) {
     return (u - (growth - 1) * X).colwise().norm().maxCoeff();
 }
 
+// A cube whose whole boundary moves by F, so that the stress is one number: of fibres along z drawn out to λ at
+// constant volume, P_zz = μ (λ − I₁/(3 λ)) + 4/3 η (λ² − 1) λ with I₁ = λ² + 2/λ; of a viscous law sheared and held,
+// the part 1 − g (1 − exp(−t/τ)) that is left.
+Model cube_of(const tled::Material& law) {
+    Model model;
+    model.mesh = meshing::box_mesh({10, 10, 10}, {2, 2, 2});
+    model.materials = {{1, law}};
+    model.element = tled::Element::T4;
+    model.density = density;
+    return model;
+}
+tled::NodalConditions moved_by(const Eigen::Matrix3d& F, const RestState& rest) {
+    Conditions conditions;
+    for (int a = 0; a < rest.node_count; ++a)
+        conditions.prescribed.push_back(
+            {a, {true, true, true}, (F - Eigen::Matrix3d::Identity()) * rest.position.col(a)});
+    return tled::nodal_conditions(conditions, rest);
+}
+double stress_on_top(tled::Engine& engine, const RestState& rest, int component) {
+    const Matrix3Xd force = engine.internal_force();
+    double sum = 0;
+    for (int a = 0; a < rest.node_count; ++a)
+        if (rest.position(2, a) > 10 - 1e-9) sum += force(component, a);
+    return sum / 100;
+}
+constexpr double fibre_stretch = 1.2, fibre_modulus = 4.0;
+double fibre_stress() {
+    const double first_invariant = fibre_stretch * fibre_stretch + 2 / fibre_stretch;
+    return fibre_stretch - first_invariant / (3 * fibre_stretch) +
+           4.0 / 3 * fibre_modulus * (fibre_stretch * fibre_stretch - 1) * fibre_stretch;
+}
+double measured_fibre_stress(const MakeEngine& make) {
+    const Model model = cube_of(tled::TransverselyIsotropic{1.0, 50.0, fibre_modulus, Vector3d::UnitZ()});
+    const RestState rest = tled::rest_state(model);
+    const double across = 1 / std::sqrt(fibre_stretch);
+    const auto engine = make(rest);
+    engine->set_conditions(moved_by(Vector3d(across, across, fibre_stretch).asDiagonal(), rest));
+    return stress_on_top(*engine, rest, 2);
+}
+constexpr double relaxing_part = 0.5, relaxation_time = 0.1;
+double measured_relaxation(const MakeEngine& make) {
+    Model model = cube_of(tled::NeoHookeanIso{1.0, 50.0});
+    model.viscosity = {{1, {{{relaxing_part, relaxation_time}}}}};
+    const RestState rest = tled::rest_state(model);
+    Eigen::Matrix3d F = Eigen::Matrix3d::Identity();
+    F(0, 2) = 0.1;
+    const auto engine = make(rest);
+    engine->set_conditions(moved_by(F, rest));
+    const double at_once = stress_on_top(*engine, rest, 0);
+    constexpr int steps = 400;
+    engine->run(steps, {0, 0, relaxation_time / steps});
+    return stress_on_top(*engine, rest, 0) / at_once;
+}
+
 // Obstacles.
 
 tled::DistanceGrid half_space(double height, double reach) {
@@ -492,6 +546,10 @@ std::vector<EffectCase> effect_cases() {
          measured_wall_pressure},
         {"growth", "block that grows by 1.2", "largest distance from (g − 1) X", "mm", "exact on any mesh", 0.0, 2e-3,
          measured_free_growth},
+        {"fibres", "cube drawn out along them", "stress", "kPa", "4/3 η (λ² − 1) λ and the matrix", fibre_stress(),
+         1e-4, measured_fibre_stress},
+        {"viscosity", "cube sheared and held for τ", "part that is left", "1", "1 − g (1 − 1/e)",
+         1 - relaxing_part * (1 - std::exp(-1.0)), 2e-3, measured_relaxation},
         {"contact, static", "column on a table 5 mm higher", "shift of the top", "mm", "sag + 5", sag + 5, 0.02,
          measured_sag_on_table},
         {"contact, dynamic", "bar thrown at a wall", "velocity back", "mm/s", "wave of a linear bar", impact_velocity,

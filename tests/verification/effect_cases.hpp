@@ -14,8 +14,8 @@ struct EffectCase {
     std::string effect, scene, quantity, unit;
     std::string source;  ///< of the reference
     double reference = 0.0;
-    double bound = 0.0;  ///< accepted difference, in the same unit: what the mesh and the time step leave, seen to
-                         ///< shrink with both, doubled
+    double bound =
+        0.0;  ///< accepted difference, in the same unit: of the mesh, the time step or the solver's tolerance
     double (*measure)(const MakeEngine& engine) = nullptr;
 };
 
