@@ -39,10 +39,12 @@ ProgramSource law_program(std::string kernel, Cell cell, const ElementForces& fo
         {"index", "bindings", "numbers", "deformation", kinematics_chunk(cell), "material", "isochoric"},
         {},
         {}};
+    if (has_fibres(forces.law)) source.chunks.emplace_back("element.fibre");
     add_law(source, forces.law);
     const bool viscous = forces.viscosity != Viscosity::None;
     source.defines = {{"WORKGROUP_SIZE", workgroup_size}, {"USES_SHEAR", "1"}, {"HAS_VISCOSITY", flag(viscous)}};
     if (viscous) {
+        source.chunks.emplace_back("viscosity");
         source.chunks.emplace_back("viscosity.prony");
         source.defines["PRONY_TERMS"] = std::to_string(forces.prony_terms) + "u";
         source.defines["ADVANCES_TIME"] = flag(forces.viscosity == Viscosity::Advance);
@@ -61,6 +63,25 @@ ProgramSource node_program(std::string kernel, const NodeEffects& effects) {
     return source;
 }
 
+/// What tetrahedra have for themselves and the forces that follow from it. Viscous stresses stay in shared memory where
+/// the sizes have places for them.
+void add_patch_forces(ProgramSource& source, const PatchTissue& tissue, bool stresses_stay, int places) {
+    const bool fibres = has_fibres(tissue.law), viscous = tissue.prony_terms > 0;
+    if (viscous) source.chunks.emplace_back("viscosity");
+    if (fibres || viscous) source.chunks.emplace_back("patch.tissue");
+    if (fibres) source.chunks.emplace_back("patch.fibre");
+    if (viscous) {
+        source.chunks.emplace_back(stresses_stay ? "patch.stresses.shared" : "patch.stresses.memory");
+        source.chunks.emplace_back("patch.viscosity");
+        source.defines["PRONY_TERMS"] = std::to_string(tissue.prony_terms) + "u";
+    }
+    if (stresses_stay) source.defines["PLACES"] = std::to_string(places) + "u";
+    source.chunks.emplace_back("patch.forces");
+    source.defines["HAS_FIBRES"] = flag(fibres);
+    source.defines["HAS_VISCOSITY"] = flag(viscous);
+}
+
+/// But the one that advances alone, which knows no law.
 constexpr std::array<PatchStages, 7> every_patch_stages{{
     {.forces = true},
     {.advances = true, .forces = true},
@@ -146,7 +167,11 @@ ProgramSource node_residual_program(const NodeEffects& effects, MaskConstrained 
     return source;
 }
 
-ProgramSource patch_step_program(Law law, const NodeEffects& effects, const PatchSizes& sizes,
+bool has_fibres(Law law) {
+    return law == Law::TransverselyIsotropic;
+}
+
+ProgramSource patch_step_program(const PatchTissue& tissue, const NodeEffects& effects, const PatchSizes& sizes,
                                  const PatchStages& stages) {
     ProgramSource source{"patch_step", {"index", "bindings", "numbers"}, {}, {}};
     const auto add = [&](const char* chunk) { source.chunks.emplace_back(chunk); };
@@ -154,16 +179,18 @@ ProgramSource patch_step_program(Law law, const NodeEffects& effects, const Patc
     if (stages.forces)
         for (const char* chunk : {"deformation", "material", "isochoric"}) add(chunk);
     if (stages.forces || stages.averages) {
-        add_law(source, law);
+        add_law(source, tissue.law);
         define("USES_SHEAR", flag(stages.forces));
     }
     if (effects.springs) add("node.springs");
     if (effects.external_force) add("node.external_force");
     for (const char* chunk : {"patch", "patch.exchange", "patch.nodes", "patch.units", "patch.fans"}) add(chunk);
     if (stages.averages) add("patch.pressure.averaged");
+    const bool stays = stages.persists && sizes.each_has_one;
+    const bool stresses_stay = stays && stages.forces && tissue.prony_terms > 0 && sizes.places > 0;
     if (stages.forces) {
         if (!stages.averages) add("patch.pressure.element");
-        add("patch.forces");
+        add_patch_forces(source, tissue, stresses_stay, sizes.places);
     }
     if (stages.persists) add("patch.neighbours");
     define("WORKGROUP_SIZE", std::to_string(sizes.workgroup));
@@ -172,7 +199,8 @@ ProgramSource patch_step_program(Law law, const NodeEffects& effects, const Patc
     define("FORCES", flag(stages.forces));
     define("AVERAGES", flag(stages.averages));
     define("PERSISTS", flag(stages.persists));
-    define("STAYS", flag(stages.persists && sizes.each_has_one));
+    define("STAYS", flag(stays));
+    define("STRESSES_STAY", flag(stresses_stay));
     define("HAS_SPRINGS", flag(effects.springs));
     define("HAS_EXTERNAL_FORCE", flag(effects.external_force));
     define("COHERENT", stages.persists ? "coherent" : "");
@@ -186,6 +214,16 @@ ProgramSource patch_load_program() {
 
 ProgramSource patch_store_program() {
     return {"patch_store", {"index", "bindings"}, {{"WORKGROUP_SIZE", workgroup_size}}, {}};
+}
+
+ProgramSource patch_stress_program(const PatchTissue& tissue, PatchStresses direction) {
+    return {"patch_stress",
+            {"index", "bindings"},
+            {{"WORKGROUP_SIZE", workgroup_size},
+             {"PRONY_TERMS", std::to_string(tissue.prony_terms) + "u"},
+             {"HAS_FIBRES", flag(has_fibres(tissue.law))},
+             {"LOADS", flag(direction == PatchStresses::Load)}},
+            {}};
 }
 
 ProgramSource impose_program() {
@@ -264,6 +302,24 @@ ProgramSource fma_rate_program() {
             {}};
 }
 
+namespace {
+
+/// Every law, elastic and viscous, in every stage where that makes a difference.
+void add_patch_steps(std::vector<ProgramSource>& all, const NodeEffects& effects) {
+    all.push_back(patch_step_program({}, effects, {}, {.advances = true}));
+    for (int index = 0; index < law_count; ++index) {
+        const auto law = static_cast<Law>(index);
+        for (const PatchStages& stages : every_patch_stages) {
+            all.push_back(patch_step_program({law}, effects, {}, stages));
+            if (!stages.forces) continue;
+            all.push_back(patch_step_program({law, 3}, effects, {}, stages));
+            if (stages.persists) all.push_back(patch_step_program({law, 3}, effects, {.places = 64}, stages));
+        }
+    }
+}
+
+}  // namespace
+
 std::vector<ProgramSource> every_program() {
     std::vector<ProgramSource> all{element_volume_program(),        impose_program(),
                                    previous_displacement_program(), observe_nodes_program(),
@@ -285,11 +341,12 @@ std::vector<ProgramSource> every_program() {
                 all.push_back(node_step_program(effects, store));
             for (const MaskConstrained mask : {MaskConstrained::No, MaskConstrained::Yes})
                 all.push_back(node_residual_program(effects, mask));
-            for (int law = 0; law < law_count; ++law)
-                for (const PatchStages& stages : every_patch_stages)
-                    if (static_cast<Law>(law) != Law::TransverselyIsotropic)  // patches hold no fibres
-                        all.push_back(patch_step_program(static_cast<Law>(law), effects, {}, stages));
+            add_patch_steps(all, effects);
         }
+    for (const bool fibres : {false, true})
+        for (const PatchStresses direction : {PatchStresses::Load, PatchStresses::Store})
+            all.push_back(
+                patch_stress_program({fibres ? Law::TransverselyIsotropic : Law::NeoHookeanIso, 3}, direction));
     all.push_back(patch_load_program());
     all.push_back(patch_store_program());
     all.push_back(warp_clear_program());

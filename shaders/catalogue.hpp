@@ -63,6 +63,7 @@ struct PatchSizes {
     int slots = 64;            ///< for each patch, in shared memory
     int workgroup = 128;       ///< invocations
     bool each_has_one = true;  ///< where a dispatch persists: whether each workgroup has one patch
+    int places = 0;            ///< where each has one: tetrahedra whose viscous stresses stay in shared memory
 };
 /// What one dispatch over patches does (kernels/patch_step.comp).
 struct PatchStages {
@@ -70,9 +71,18 @@ struct PatchStages {
     bool averages = false;  ///< the pressure
     bool persists = false;  ///< goes on for many steps
 };
+/// What the tetrahedra of patches are made of: laws with fibres have one for each of them.
+struct PatchTissue {
+    Law law = Law::NeoHookeanIso;
+    int prony_terms = 0;  ///< of the scene's materials, the most; 0: elastic
+};
 /// One workgroup for each patch; springs and forces as effects name them.
-ProgramSource patch_step_program(Law law, const NodeEffects& effects, const PatchSizes& sizes,
+ProgramSource patch_step_program(const PatchTissue& tissue, const NodeEffects& effects, const PatchSizes& sizes,
                                  const PatchStages& stages);
+bool has_fibres(Law law);
+/// Viscous stresses from elements to patches, or back.
+enum class PatchStresses { Load, Store };
+ProgramSource patch_stress_program(const PatchTissue& tissue, PatchStresses direction);
 ProgramSource patch_load_program();
 ProgramSource patch_store_program();
 

@@ -97,7 +97,7 @@ enum class Scalar { Float32, Float64 };
 std::unique_ptr<Engine> make_cpu_engine(const RestState& rest, Scalar scalar = Scalar::Float32);
 
 /// How a GPU takes its steps. Patches take one dispatch for a step (two with averaged pressure) where they know the
-/// scene: tetrahedra of one law without fibres, viscosity and hexahedra. Anything else, and every scene with
+/// scene: tetrahedra of one law, with fibres and viscosity where it has them. Anything else, and every scene with
 /// `patch_tets` 0, takes a pass over elements and one over nodes.
 struct GpuStepShape {
     int patch_tets = 0;   ///< tetrahedra of a patch; fewer where its nodes do not fit into shared memory

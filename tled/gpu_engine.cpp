@@ -162,6 +162,7 @@ public:
     void run(int steps, const StepCoefficients& coefficients) override {
         if (steps <= 0) return;
         const CurrentContext current = device_.make_current();
+        force_.set_time_step(coefficients.time_step);
         if (patches_) {
             blocks_.set("Displacement", displacement_);
             patches_->run(steps, coefficients, effects_.flags, blocks_);
@@ -174,7 +175,6 @@ public:
             program->set(1, static_cast<float>(coefficients.momentum));
             program->set(2, static_cast<float>(coefficients.gain));
         }
-        force_.set_time_step(coefficients.time_step);
         blocks_.set("Displacement", displacement_);
         blocks_.set("Residual", previous_residual_);
         force_.bind(blocks_);

@@ -249,7 +249,7 @@ std::vector<StepShapeTiming> tuned_gpu_step_shape(const RestState& rest, int dev
         const shaders::Device on(device);
         if (!detail::GpuPatches::suit(rest, on))
             throw InvalidInput("this scene takes two passes on " + on.renderer() +
-                               " whatever the shape: patches know tetrahedra of one law without fibres and viscosity; "
+                               " whatever the shape: patches know tetrahedra of one law; "
                                "there is nothing to tune");
         multiprocessors = on.limits().multiprocessors;
         if (!on.hardware()) spent.warm_up_seconds = 0;

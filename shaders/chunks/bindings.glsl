@@ -38,6 +38,8 @@
 #define BINDING_PATCH_NODE 15
 #define BINDING_PATCH_VOLUMES 17
 #define BINDING_PATCH_SLOT 18
+#define BINDING_PATCH_TISSUE 20
+#define BINDING_PATCH_ELEMENT 21
 
 // Outside of a step, these take the place of blocks that the kernel at hand does not use.
 #define BINDING_PARTIAL 6

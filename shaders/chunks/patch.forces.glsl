@@ -1,6 +1,8 @@
 // Needs: numbers, deformation, material, isochoric, a law with USES_SHEAR 1, patch.nodes, patch.units, patch.fans, and
-// patch.pressure.element or patch.pressure.averaged.
+// patch.pressure.element or patch.pressure.averaged; patch.fibre and patch.viscosity where their flags are 1.
 // Gives: the forces of a patch's tetrahedra on its nodes, in shared memory.
+//! define HAS_FIBRES
+//! define HAS_VISCOSITY
 
 shared int force_x[SLOTS], force_y[SLOTS], force_z[SLOTS];  // units of a sixth mN over scale
 
@@ -34,12 +36,31 @@ void leave_force(uint i, vec3 f, inout Tally tally) {
     add_force(i, units);
 }
 
+#if HAS_FIBRES || HAS_VISCOSITY
+/// What the next tetrahedron of a fan has for itself is fetched well before it is needed.
+void next_tetrahedron() {
+    next_place();
+#if HAS_FIBRES
+    fetch_fibre();
+#endif
+#if HAS_VISCOSITY
+    fetch_viscous_stress();
+#endif
+}
+#endif
+
 /// P of a tetrahedron.
 mat3 stress_of_tetrahedron(Edges t, Parameters parameters, Pressure pressure) {
     mat3 G = mat3(t.moved_b, t.moved_c, t.moved_d);
     mat3 N = mat3(t.normal_b, t.normal_c, t.normal_d);
     Deformation d = deformation((G * transpose(N)) * reciprocal(dot(t.rest_b, t.normal_b)));
+#if HAS_VISCOSITY
+    mat3 P = stress(0u, d, parameters, 0.0);
+    mat3 viscous = viscous_stress(d, P);  // not in `P -= …`: README, traps
+    return P - viscous + pressure_of(pressure, d.volume_change) * cofactor_F(d);
+#else
     return stress(0u, d, parameters, pressure_of(pressure, d.volume_change));
+#endif
 }
 
 /// Six times the forces of a fan's nodes; the force on a is minus the sum of the others, to the unit.
@@ -52,6 +73,9 @@ void add_fan(uvec4 fan, Parameters parameters, Patch here, inout Tally tally) {
     vec3 force_c = vec3(0.0);
     tally.sum = ivec3(0);
     for (Ring ring = ring_of(fan); ring.next != no_node; ring = next_of_ring(ring)) {
+#if HAS_FIBRES || HAS_VISCOSITY
+        next_tetrahedron();
+#endif
         t = next_edges(t, node_of_a, node(ring.next));
         take_next_node(pressure, ring.next);
         mat3 P = stress_of_tetrahedron(t, parameters, pressure);
@@ -69,11 +93,17 @@ void add_fan(uvec4 fan, Parameters parameters, Patch here, inout Tally tally) {
 /// fan_of(here, lane); each further one is fetched while the one before is computed. Ends with all of them in place.
 bool compute_forces(Patch here, uvec4 first, Parameters parameters, inout float scale, out uint largest) {
     uint lane = gl_LocalInvocationID.x;
+#if HAS_VISCOSITY
+    advance_stresses(here.material);
+#endif
     for (;;) {
         Tally tally = Tally(scale, 0u, ivec3(0));
         uvec4 fan = first;
         for (uint f = lane; f < here.fans; f += WORKGROUP_SIZE) {
             uvec4 next = fan_of(here, f + WORKGROUP_SIZE);
+#if HAS_FIBRES || HAS_VISCOSITY
+            begin_fan(here, f);
+#endif
             add_fan(fan, parameters, here, tally);
             fan = next;
         }
@@ -83,6 +113,9 @@ bool compute_forces(Patch here, uvec4 first, Parameters parameters, inout float 
         if (!countable(largest)) return false;
         if (fits(largest, scale)) return true;
         scale = scale_for(largest);
+#if HAS_VISCOSITY
+        hold_stresses();
+#endif
         barrier();
         for (uint i = lane; i < here.slots; i += WORKGROUP_SIZE) clear_force(i);
         if (lane == 0u) largest_of_patch = 0u;

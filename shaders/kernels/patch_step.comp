@@ -7,7 +7,8 @@
 // A stage that reads what others left runs in a later dispatch. So T4 advances and computes forces in one dispatch, and
 // averaged pressure takes two. PERSISTS 1 instead goes on for `steps` in one dispatch: a patch waits for its neighbours alone,
 // and all workgroups must run at the same time, which OpenGL does not promise: one that has waited too long says so, and all
-// give up. STAYS 1 where each of these has one patch, whose positions and displacements stay in shared memory.
+// give up. STAYS 1 where each of these has one patch, whose positions and displacements stay in shared memory, and with
+// STRESSES_STAY 1 its viscous stresses.
 // Needs: the patch chunks of its stages and what they need; patch.neighbours where PERSISTS is 1.
 //! define ADVANCES
 //! define VOLUMES
@@ -15,6 +16,7 @@
 //! define AVERAGES
 //! define PERSISTS
 //! define STAYS
+//! define STRESSES_STAY
 
 layout(location = 0) uniform uint first_step;  // of this dispatch; its parity tells which forces the first step reads
 layout(location = 1) uniform float momentum;
@@ -122,6 +124,9 @@ void end_patch(Patch here) {
 #if STAYS
     for (uint i = gl_LocalInvocationID.x; i < here.slots; i += WORKGROUP_SIZE)
         store_displacement(here.index * SLOTS + i, i);
+#if STRESSES_STAY
+    leave_stresses(here);
+#endif
 #else
     barrier();  // before the next patch takes the shared memory
 #endif
@@ -135,6 +140,9 @@ bool run_steps(uint first) {
     uint step = first_step;
 #if STAYS
     Patch here = begin_patch(first, fan, largest);
+#if STRESSES_STAY
+    take_stresses(here);
+#endif
     for (; step != first_step + steps && good; ++step) {
         good = begin_step(here, fan, largest, step);
         if (good) good = end_step(here, fan, largest, step);

@@ -2,7 +2,6 @@
 
 #include "tled/detail/prony_coefficients.hpp"
 
-#include <algorithm>
 #include <stdexcept>
 
 namespace tissuewarp::tled::detail {
@@ -32,12 +31,6 @@ std::vector<LawRun> law_runs(const RestState& rest, const std::vector<MaterialBl
         runs.back().end = block.end;
     }
     return runs;
-}
-
-std::size_t most_terms(const std::vector<PronySeries>& series) {
-    std::size_t most = 0;
-    for (const PronySeries& each : series) most = std::max(most, each.terms.size());
-    return most;
 }
 
 std::uint32_t unsigned_count(std::size_t count) {
@@ -165,14 +158,7 @@ Stage GpuForce::force_stage(shaders::ProgramCache& programs, const RestState& re
 }
 
 void GpuForce::set_time_step(double time_step) {
-    if (!viscous_) return;
-    std::vector<Float2> table(viscous_->series.size() * viscous_->terms, Float2{0.0F, 0.0F});
-    for (std::size_t m = 0; m < viscous_->series.size(); ++m) {
-        auto entry = table.begin() + static_cast<std::ptrdiff_t>(m * viscous_->terms);
-        for (const auto& [a, b] : prony_coefficients(viscous_->series[m], time_step))
-            *entry++ = {static_cast<float>(a), static_cast<float>(b)};
-    }
-    viscous_->coefficients.upload(table);
+    if (viscous_) viscous_->coefficients.upload(prony_table(viscous_->series, time_step));
 }
 
 void GpuForce::forget_viscous_stresses() {

@@ -1,23 +1,19 @@
 #include "tled/detail/gpu_patches.hpp"
 
+#include "tled/detail/step_shapes.hpp"
+
 #include <algorithm>
 #include <array>
 
 namespace tissuewarp::tled::detail {
 namespace {
 
-using shaders::Law;
 using shaders::PatchStages;
 using shaders::Program;
 
 /// Recorded steps are handed over in portions of this many, so that the device starts while the host still records.
 constexpr int steps_per_flush = 64;
 constexpr int steps_per_dispatch = 500;
-constexpr int storage_blocks = 14;  // of patch_step with all effects
-
-Law law_of(const RestState& rest) {
-    return static_cast<Law>(rest.materials[static_cast<std::size_t>(rest.blocks.front().material)].index());
-}
 
 bool every_node_has_tetrahedra(const RestState& rest) {
     const std::vector<int>& offset = rest.incidence.offset;
@@ -44,6 +40,11 @@ bool keeps_a_part(const RestState& rest) {
     return rest.pressure.count() > 0 && rest.volumetric_modulus.cwiseAbs().maxCoeff() > 0;
 }
 
+/// Storage blocks of patch_step with all effects.
+int storage_blocks(const RestState& rest) {
+    return 14 + (rest.pressure.count() > 0 ? 1 : 0) + (rest.fibre.cols() > 0 || !rest.viscosity.empty() ? 1 : 0);
+}
+
 /// Bytes of shared memory that the patches' programs take.
 std::size_t shared_bytes(std::size_t slots, bool averages) {
     return slots * (averages ? 44 : 36) + 16;
@@ -68,9 +69,23 @@ PatchLayout fitting_layout(const RestState& rest, const GpuStepShape& shape, std
     return patch_layout(rest, patches);
 }
 
+/// Places that a patch has in shared memory for viscous stresses, in steps as slots have them; 0 where all workgroups
+/// of a multiprocessor together have no room for these beside their nodes.
+int places_that_stay(const TissueOfPatches& tissue, const PatchCapacity& capacity, bool averages, int workgroups,
+                     const shaders::DeviceLimits& limits) {
+    if (!tissue.viscous()) return 0;
+    const std::size_t places = slots_for(static_cast<std::size_t>(capacity.longest_fan * capacity.fans));
+    const int multiprocessors = limits.multiprocessors > 0 ? limits.multiprocessors : default_multiprocessors;
+    const auto side_by_side = static_cast<std::size_t>((workgroups + multiprocessors - 1) / multiprocessors);
+    const std::size_t bytes =
+        shared_bytes(static_cast<std::size_t>(capacity.slots), averages) + tissue.stress_bytes(places);
+    return side_by_side * bytes <= limits.shared_memory_bytes ? static_cast<int>(places) : 0;
+}
+
 constexpr std::array<PatchStages, 1> first_forces{{{.forces = true}}};
 constexpr std::array<PatchStages, 1> one_step{{{.advances = true, .forces = true}}};
 constexpr std::array<PatchStages, 1> many_steps{{{.advances = true, .forces = true, .persists = true}}};
+constexpr std::array<PatchStages, 1> last_step{{{.advances = true}}};
 constexpr std::array<PatchStages, 2> averaged_first_forces{
     {{.volumes = true, .averages = true}, {.forces = true, .averages = true}}};
 constexpr std::array<PatchStages, 2> averaged_one_step{
@@ -81,8 +96,8 @@ constexpr std::array<PatchStages, 1> averaged_many_steps{
 }  // namespace
 
 bool GpuPatches::suit(const RestState& rest, const shaders::Device& device) {
-    if (rest.blocks.empty() || rest.hexahedra.count() > 0 || keeps_a_part(rest) || !rest.viscosity.empty() ||
-        rest.fibre.cols() > 0 || device.limits().storage_blocks < storage_blocks)
+    if (rest.blocks.empty() || rest.hexahedra.count() > 0 || keeps_a_part(rest) ||
+        device.limits().storage_blocks < storage_blocks(rest))
         return false;
     const auto follows_the_law = [&](const MaterialBlock& block) {
         return rest.materials[static_cast<std::size_t>(block.material)].index() ==
@@ -95,7 +110,6 @@ bool GpuPatches::suit(const RestState& rest, const shaders::Device& device) {
 GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& programs, const RestState& rest,
                        const GpuStepShape& shape, BlockBuffers& blocks)
     : programs_(programs),
-      law_(law_of(rest)),
       shape_(shape),
       averages_(rest.pressure.count() > 0),
       node_count_(static_cast<std::size_t>(rest.node_count)) {
@@ -104,7 +118,10 @@ GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& pro
     workgroups_ = shape.at_once > 0 ? std::min(shape.at_once, c.patches) : c.patches;
     many_steps_ = shape.at_once > 0;
     capacity_ = c;
+    tissue_.emplace(device, rest, layout, blocks);
     sizes_ = {c.slots, shape.workgroup, workgroups_ == c.patches};
+    if (many_steps_ && sizes_.each_has_one)
+        sizes_.places = places_that_stay(*tissue_, c, averages_, workgroups_, device.limits());
     slot_count_ = layout.node_of_slot.size();
     head_.emplace(device, layout.head, "heads of patches");
     fans_.emplace(device, layout.fans, "fans of patches");
@@ -134,18 +151,16 @@ GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& pro
 
 void GpuPatches::run(int steps, const StepCoefficients& coefficients, const shaders::NodeEffects& effects,
                      const BlockBuffers& blocks) {
-    if (!loaded_) load(effects, blocks);
-    if (many_steps_) {
-        step_many(next_steps(steps, coefficients), effects, blocks);
-        // The nodes still hold the state that the run began with.
-        if (gave_up()) {
-            many_steps_ = false;
-            load(effects, blocks);
-        }
+    tissue_->set_time_step(coefficients.time_step);
+    begin_run(effects, blocks);
+    advance(steps, coefficients, effects, blocks);
+    // The nodes still hold the state that the run began with.
+    if (many_steps_ && gave_up()) {
+        many_steps_ = false;
+        forget_state();
+        begin_run(effects, blocks);
+        advance(steps, coefficients, effects, blocks);
     }
-    if (!many_steps_)
-        dispatch(averages_ ? Stages(averaged_one_step) : one_step, steps, 1, next_steps(steps, coefficients), effects,
-                 blocks);
     store(blocks);
     shaders::check_errors("time steps over patches");
 }
@@ -154,11 +169,29 @@ GpuPatches::Run GpuPatches::next_steps(int steps, const StepCoefficients& coeffi
     return {step_, step_ + static_cast<std::uint32_t>(steps), coefficients};
 }
 
-void GpuPatches::step_many(const Run& run, const shaders::NodeEffects& effects, const BlockBuffers& blocks) {
-    const int steps = static_cast<int>(run.end - run.begin);
-    const Stages stages = averages_ ? averaged_many_steps : many_steps;
-    dispatch(stages, steps / steps_per_dispatch, steps_per_dispatch, run, effects, blocks);
-    if (const int left = steps % steps_per_dispatch; left > 0) dispatch(stages, 1, left, run, effects, blocks);
+/// The forces that the first step starts from. Elastic ones are those that the run before ended with.
+void GpuPatches::begin_run(const shaders::NodeEffects& effects, const BlockBuffers& blocks) {
+    if (!loaded_) load(blocks);
+    if (!loaded_ || tissue_->viscous())
+        dispatch(averages_ ? Stages(averaged_first_forces) : first_forces, 1, 1, next_steps(1, {}), effects, blocks);
+    loaded_ = true;
+}
+
+/// Forces that nothing follows would take viscous stresses a step further than the displacements: a run over viscous
+/// tissue ends without.
+void GpuPatches::advance(int steps, const StepCoefficients& coefficients, const shaders::NodeEffects& effects,
+                         const BlockBuffers& blocks) {
+    const Run run = next_steps(steps, coefficients);
+    const int with_forces = tissue_->viscous() ? steps - 1 : steps;
+    if (many_steps_) {
+        const Stages stages = averages_ ? averaged_many_steps : many_steps;
+        dispatch(stages, with_forces / steps_per_dispatch, steps_per_dispatch, run, effects, blocks);
+        if (const int left = with_forces % steps_per_dispatch; left > 0)
+            dispatch(stages, 1, left, run, effects, blocks);
+    } else {
+        dispatch(averages_ ? Stages(averaged_one_step) : one_step, with_forces, 1, run, effects, blocks);
+    }
+    if (with_forces < steps) dispatch(last_step, 1, 1, run, effects, blocks);
 }
 
 int GpuPatches::workgroups_of(const PatchStages& stages) const {
@@ -181,7 +214,7 @@ void GpuPatches::dispatch(Stages stages, int repeats, int steps, const Run& run,
                           const BlockBuffers& blocks) {
     std::vector<const Program*> programs;
     for (const PatchStages& each : stages) {
-        programs.push_back(&programs_.get(shaders::patch_step_program(law_, effects, sizes_, each)));
+        programs.push_back(&programs_.get(shaders::patch_step_program(tissue_->kind(), effects, sizes_, each)));
         blocks.bind(*programs.back());
         programs.back()->set(1, static_cast<float>(run.coefficients.momentum));
         programs.back()->set(2, static_cast<float>(run.coefficients.gain));
@@ -189,6 +222,7 @@ void GpuPatches::dispatch(Stages stages, int repeats, int steps, const Run& run,
         programs.back()->set(4, run.begin);
         programs.back()->set(5, run.end);
         set_sizes(*programs.back(), workgroups_of(each));
+        if (each.forces) tissue_->set_places(*programs.back());
     }
     const int workgroups = workgroups_of(stages.front());
     for (int i = 1; i <= repeats; ++i) {
@@ -202,15 +236,14 @@ void GpuPatches::dispatch(Stages stages, int repeats, int steps, const Run& run,
     }
 }
 
-/// State from nodes to slots, and the forces that the first step starts from.
-void GpuPatches::load(const shaders::NodeEffects& effects, const BlockBuffers& blocks) {
+/// State from nodes and elements to patches.
+void GpuPatches::load(const BlockBuffers& blocks) {
     largest_->clear();
     const Program& load = programs_.get(shaders::patch_load_program());
     blocks.bind(load);
     load.dispatch(slot_count_);
     shaders::storage_barrier();
-    dispatch(averages_ ? Stages(averaged_first_forces) : first_forces, 1, 1, next_steps(1, {}), effects, blocks);
-    loaded_ = true;
+    tissue_->load_stresses(programs_, blocks);
 }
 
 void GpuPatches::store(const BlockBuffers& blocks) {
@@ -220,6 +253,7 @@ void GpuPatches::store(const BlockBuffers& blocks) {
     blocks.bind(store);
     store.dispatch(node_count_);
     shaders::storage_barrier();
+    tissue_->store_stresses(programs_, blocks);
 }
 
 GpuStepShape GpuPatches::shape() const {

@@ -4,6 +4,7 @@
 
 #include "tled/detail/gpu_force.hpp"
 #include "tled/detail/patch_layout.hpp"
+#include "tled/detail/patch_tissue.hpp"
 #include "tled/engine.hpp"
 
 #include <span>
@@ -12,14 +13,14 @@ namespace tissuewarp::tled::detail {
 
 class GpuPatches {
 public:
-    /// Whether patches can compute the scene on the device: tetrahedra of one law without fibres and viscosity, no
-    /// hexahedra, no node outside of all tetrahedra or of more than most_sharing_patches materials.
+    /// Whether patches can compute the scene on the device: tetrahedra of one law, no hexahedra, no node outside of all
+    /// tetrahedra or of more than most_sharing_patches materials.
     static bool suit(const RestState& rest, const shaders::Device& device);
 
     GpuPatches(const shaders::Device& device, shaders::ProgramCache& programs, const RestState& rest,
                const GpuStepShape& shape, BlockBuffers& blocks);
 
-    /// Advances what is bound as Displacement and Increment.
+    /// Advances what is bound as Displacement and Increment, and as ViscousStress where tissue is viscous.
     void run(int steps, const StepCoefficients& coefficients, const shaders::NodeEffects& effects,
              const BlockBuffers& blocks);
     /// As asked for, without many steps in a dispatch once the device has proved unable to run them.
@@ -37,17 +38,19 @@ private:
     /// Dispatches of the stages, `repeats` times, each of which counts `steps` of the run.
     void dispatch(Stages stages, int repeats, int steps, const Run& run, const shaders::NodeEffects& effects,
                   const BlockBuffers& blocks);
-    void step_many(const Run& run, const shaders::NodeEffects& effects, const BlockBuffers& blocks);
+    void begin_run(const shaders::NodeEffects& effects, const BlockBuffers& blocks);
+    void advance(int steps, const StepCoefficients& coefficients, const shaders::NodeEffects& effects,
+                 const BlockBuffers& blocks);
     [[nodiscard]] int workgroups_of(const shaders::PatchStages& stages) const;
     void set_sizes(const shaders::Program& program, int workgroups) const;
     [[nodiscard]] Run next_steps(int steps, const StepCoefficients& coefficients) const;
-    void load(const shaders::NodeEffects& effects, const BlockBuffers& blocks);
+    void load(const BlockBuffers& blocks);
     void store(const BlockBuffers& blocks);
     /// Whether a patch waited too long for its neighbours: the state is then not that of any step.
     [[nodiscard]] bool gave_up() const;
 
     shaders::ProgramCache& programs_;
-    shaders::Law law_;
+    std::optional<TissueOfPatches> tissue_;
     GpuStepShape shape_;
     bool averages_, many_steps_;
     std::size_t node_count_, slot_count_;

@@ -101,6 +101,7 @@ PatchCapacity capacity_of(const std::vector<Patch>& patches, const std::vector<s
     for (std::size_t p = 0; p < patches.size(); ++p) {
         grow(c.slots, slots_for(patches[p].node.size()));
         grow(c.fans, patches[p].fan.size());
+        for (const Fan& fan : patches[p].fan) grow(c.longest_fan, index(fan.length));
         const std::size_t in_planes = planes[p].empty() ? 0 : planes[p].front();
         grow(c.sources, sum(planes[p]) + shared_count(patches[p], slots) - in_planes);
         grow(c.contributions, most_contributions(patches[p]));
@@ -146,6 +147,7 @@ public:
             write_fans(p);
             write_sources(p);
         }
+        if (rest_.fibre.cols() > 0 || !rest_.viscosity.empty()) write_places();
         return std::move(layout_);
     }
 
@@ -202,6 +204,18 @@ private:
         const std::vector<Fan>& fans = patches_[p].fan;
         std::transform(fans.begin(), fans.end(),
                        layout_.fans.begin() + static_cast<std::ptrdiff_t>(p * index(layout_.capacity.fans)), packed);
+    }
+
+    void write_places() {
+        const std::size_t patches = index(layout_.capacity.patches), fans = index(layout_.capacity.fans);
+        layout_.element_of_place.assign(index(layout_.capacity.longest_fan) * patches * fans, none);
+        for (std::size_t p = 0; p < patches; ++p)
+            for (std::size_t f = 0; f < patches_[p].fan.size(); ++f) {
+                const Fan& fan = patches_[p].fan[f];
+                for (std::size_t k = 0; k < index(fan.length); ++k)
+                    layout_.element_of_place[(k * patches + p) * fans + f] =
+                        word(index(patches_[p].tet[index(fan.tet[k])]));
+            }
     }
 
     void write_sources(std::size_t p) {

@@ -24,6 +24,7 @@ struct PatchCapacity {
     int patches = 0;
     int slots = 0;  ///< local nodes, in steps of slot_step
     int fans = 0;
+    int longest_fan = 0;
     int sources = 0;        ///< slots that share a node with one of a patch, itself counted, over its shared nodes
     int neighbours = 0;     ///< patches that share a node with one
     int contributions = 0;  ///< most nodes of fans that are one node
@@ -36,6 +37,9 @@ struct PatchLayout {
     std::vector<std::uint32_t> sources, neighbours;
     std::vector<std::uint32_t> node_of_slot;  ///< 0xffffffff where a patch has fewer nodes
     std::vector<std::uint32_t> slot_of_node;  ///< of one of its patches; 0xffffffff of a node without tetrahedra
+    /// Tetrahedron k of fan f of patch p is at (k patches + p) fans + f; 0xffffffff where there is none. Empty where
+    /// tetrahedra have nothing for themselves, neither fibres nor viscous stresses.
+    std::vector<std::uint32_t> element_of_place;
 };
 
 /// Largest number of patches that share a node.

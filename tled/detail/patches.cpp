@@ -83,9 +83,12 @@ private:
 };
 
 Fan fan_of(const std::vector<Arc>& chain) {
-    Fan fan{chain.front().a, chain.front().b, {}, static_cast<int>(chain.size())};
+    Fan fan{chain.front().a, chain.front().b, {}, static_cast<int>(chain.size()), {}};
     fan.ring[0] = chain.front().from;
-    for (std::size_t i = 0; i < chain.size(); ++i) fan.ring[i + 1] = chain[i].to;
+    for (std::size_t i = 0; i < chain.size(); ++i) {
+        fan.ring[i + 1] = chain[i].to;
+        fan.tet[i] = chain[i].tet;
+    }
     return fan;
 }
 

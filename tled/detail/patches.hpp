@@ -26,6 +26,7 @@ struct Fan {
     int a = 0, b = 0;
     std::array<int, most_of_a_fan + 1> ring{};
     int length = 0;
+    std::array<int, most_of_a_fan> tet{};  ///< places in the list of tetrahedra that the fan was made of
 };
 
 /// Tetrahedra of one material. Nodes that more patches share come first.

@@ -1,0 +1,35 @@
+// One invocation per place of the patches' tetrahedra: viscous stresses from those of elements, or back to them.
+// Needs: index, bindings.
+//! define PRONY_TERMS
+//! define HAS_FIBRES
+//! define LOADS
+
+layout(location = 0) uniform uint element_count;
+
+/// As chunks/viscosity.prony.glsl and chunks/patch.tissue.glsl have them.
+layout(std430, binding = BINDING_VISCOUS_STRESS) buffer ViscousStress { vec4 viscous_stress[]; };
+layout(std430, binding = BINDING_PATCH_TISSUE) buffer PatchTissue { vec2 patch_tissue[]; };
+/// Of every place; 0xffffffff where a fan has none.
+layout(std430, binding = BINDING_PATCH_ELEMENT) readonly buffer PatchElement { uint element_of_place[]; };
+
+void main() {
+    uint place = invocation_index();
+    uint places = uint(element_of_place.length());
+    if (place >= places) return;
+    uint e = element_of_place[place];
+    if (e == 0xffffffffu) return;
+    for (uint term = 0u; term < PRONY_TERMS; ++term) {
+        uint from = 2u * term * element_count + e;
+        uint to = (HAS_FIBRES + 3u * term) * places + place;
+#if LOADS
+        vec4 a = viscous_stress[from];
+        vec4 b = viscous_stress[from + element_count];
+        patch_tissue[to] = a.xy;
+        patch_tissue[to + places] = a.zw;
+        patch_tissue[to + 2u * places] = b.xy;
+#else
+        viscous_stress[from] = vec4(patch_tissue[to], patch_tissue[to + places]);
+        viscous_stress[from + element_count] = vec4(patch_tissue[to + 2u * places], 0.0, 0.0);
+#endif
+    }
+}
