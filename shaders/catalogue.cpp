@@ -304,14 +304,14 @@ ProgramSource fma_rate_program() {
 
 namespace {
 
-/// Every law, elastic and viscous, in every stage where that makes a difference.
+/// Every law in every stage, and viscous in those where that makes a difference, with all effects on nodes or none.
 void add_patch_steps(std::vector<ProgramSource>& all, const NodeEffects& effects) {
     all.push_back(patch_step_program({}, effects, {}, {.advances = true}));
     for (int index = 0; index < law_count; ++index) {
         const auto law = static_cast<Law>(index);
         for (const PatchStages& stages : every_patch_stages) {
             all.push_back(patch_step_program({law}, effects, {}, stages));
-            if (!stages.forces) continue;
+            if (!stages.forces || effects.springs != effects.external_force) continue;
             all.push_back(patch_step_program({law, 3}, effects, {}, stages));
             if (stages.persists) all.push_back(patch_step_program({law, 3}, effects, {.places = 64}, stages));
         }

@@ -114,5 +114,40 @@ TEST(Composition, ChunksOfAbsentEffectsAreAbsent) {
     EXPECT_THAT(with, HasSubstr("#define HAS_SPRINGS 1\n"));
 }
 
+// Elastic tissue without fibres pays for neither.
+TEST(Composition, StepsOverPatchesHoldNoTraceOfAbsentTissue) {
+    const PatchStages stages{.advances = true, .forces = true};
+    const ComposedSource plain = compose(patch_step_program({Law::NeoHookeanLnJ}, {}, {}, stages));
+    for (const std::string& file : plain.files) {
+        EXPECT_THAT(file, Not(HasSubstr("fibre")));
+        EXPECT_THAT(file, Not(HasSubstr("viscosity")));
+        EXPECT_THAT(file, Not(HasSubstr("patch.tissue")));
+        EXPECT_THAT(file, Not(HasSubstr("patch.stresses")));
+    }
+    EXPECT_THAT(plain.text, HasSubstr("#define HAS_FIBRES 0\n"));
+    EXPECT_THAT(plain.text, HasSubstr("#define HAS_VISCOSITY 0\n"));
+    const auto files = [&](const PatchTissue& tissue) {
+        return compose(patch_step_program(tissue, {}, {}, stages)).files;
+    };
+    using ::testing::Contains;
+    EXPECT_THAT(files({Law::TransverselyIsotropic}), Contains("chunks/patch.fibre.glsl"));
+    EXPECT_THAT(files({Law::TransverselyIsotropic}), Not(Contains("chunks/patch.viscosity.glsl")));
+    EXPECT_THAT(files({Law::NeoHookeanLnJ, 1}), Contains("chunks/patch.viscosity.glsl"));
+    EXPECT_THAT(files({Law::NeoHookeanLnJ, 1}), Not(Contains("chunks/patch.fibre.glsl")));
+}
+
+// Room that no program uses would take other workgroups' place.
+TEST(Composition, ViscousStressesStayInSharedMemoryOnlyWhereOnePatchDoes) {
+    const auto stays = [](const PatchSizes& sizes, bool persists) {
+        const PatchStages stages{.advances = true, .forces = true, .persists = persists};
+        return compose(patch_step_program({Law::NeoHookeanLnJ, 1}, {}, sizes, stages)).text.find("stresses_here") !=
+               std::string::npos;
+    };
+    EXPECT_TRUE(stays({.places = 64}, true));
+    EXPECT_FALSE(stays({.places = 0}, true));
+    EXPECT_FALSE(stays({.places = 64}, false));
+    EXPECT_FALSE(stays({.each_has_one = false, .places = 64}, true));
+}
+
 }  // namespace
 }  // namespace tissuewarp::shaders

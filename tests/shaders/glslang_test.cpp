@@ -72,5 +72,22 @@ TEST(Glslang, NothingOfAnAbsentEffectIsLeftBehindThePreprocessor) {
     EXPECT_THAT(full, ::testing::HasSubstr("external_force"));
 }
 
+TEST(Glslang, NothingOfAbsentTissueIsLeftInStepsOverPatches) {
+    for (const bool persists : {false, true}) {
+        const PatchStages stages{.advances = true, .forces = true, .persists = persists};
+        const auto [bare, status] =
+            glslang(compose(patch_step_program({Law::NeoHookeanLnJ}, {}, {}, stages)).text, "-S comp -E");
+        ASSERT_EQ(status, 0) << bare;
+        EXPECT_THAT(bare, ::testing::HasSubstr("add_fan"));
+        for (const char* trace : {"fibre", "visc", "prony", "tissue", "place", "stresses"})
+            EXPECT_THAT(lower(bare), ::testing::Not(::testing::HasSubstr(trace)));
+        const auto [full, full_status] =
+            glslang(compose(patch_step_program({Law::TransverselyIsotropic, 2}, {}, {}, stages)).text, "-S comp -E");
+        ASSERT_EQ(full_status, 0) << full;
+        for (const char* trace : {"fibre", "visc", "prony", "tissue", "place"})
+            EXPECT_THAT(lower(full), ::testing::HasSubstr(trace));
+    }
+}
+
 }  // namespace
 }  // namespace tissuewarp::shaders

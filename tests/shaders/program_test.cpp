@@ -127,6 +127,29 @@ TEST_F(ProgramTest, StorageBlocksOfAbsentEffectsAreNotBound) {
                                                 "CornerForce", "SpringIndex", "Springs"));
 }
 
+// Sixteen blocks are what NVIDIA's drivers offer a compute shader: one more, and no scene would run over patches there.
+TEST_F(ProgramTest, StepsOverPatchesBindTissueOnceAndSixteenBlocksAtMost) {
+    const auto names = [&](const PatchTissue& tissue, const NodeEffects& effects, const PatchStages& stages) {
+        const Program program(device, compose(patch_step_program(tissue, effects, {}, stages)));
+        std::vector<std::string> found;
+        for (const StorageBlock& block : program.storage_blocks()) found.push_back(block.name);
+        return found;
+    };
+    const PatchStages step{.advances = true, .forces = true};
+    const std::vector<std::string> plain = names({Law::NeoHookeanLnJ}, {}, step);
+    EXPECT_THAT(plain,
+                ::testing::UnorderedElementsAre("PatchHead", "PatchRest", "PatchState", "PatchForces", "PatchSources",
+                                                "PatchFans", "PatchLargest", "MaterialParameters"));
+    std::vector<std::string> with_tissue = plain;
+    with_tissue.emplace_back("PatchTissue");
+    for (const PatchTissue& tissue :
+         {PatchTissue{Law::TransverselyIsotropic}, {Law::NeoHookeanLnJ, 2}, {Law::TransverselyIsotropic, 2}})
+        EXPECT_THAT(names(tissue, {}, step), ::testing::UnorderedElementsAreArray(with_tissue));
+    const PatchStages everything{.advances = true, .volumes = true, .forces = true, .averages = true, .persists = true};
+    EXPECT_LE(names({Law::TransverselyIsotropic, 2}, {true, true}, everything).size(), 16U);
+    EXPECT_LE(names({Law::NeoHookeanLnJ}, {true, true}, everything).size(), 15U);
+}
+
 TEST_F(ProgramTest, AMisuseOfOpenGLBecomesAnException) {
     const Program program(device, compose(doubling, doubling_library()));
     program.set(77, 1.0F);

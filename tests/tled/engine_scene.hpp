@@ -33,10 +33,11 @@ inline const char* name_of(Kind kind) {
     return names[static_cast<int>(kind)];
 }
 
-enum class Laws { Iso, LnJ, Stable, Polynomial, ArrudaBoyce, Ogden, Fibres, Mixed };
+enum class Laws { Iso, LnJ, Stable, Polynomial, ArrudaBoyce, Ogden, Fibres, TwoFibres, Mixed };
 
 inline const char* name_of(Laws laws) {
-    constexpr const char* names[] = {"Iso", "LnJ", "Stable", "Polynomial", "ArrudaBoyce", "Ogden", "Fibres", "Mixed"};
+    constexpr const char* names[] = {"Iso",   "LnJ",    "Stable",    "Polynomial", "ArrudaBoyce",
+                                     "Ogden", "Fibres", "TwoFibres", "Mixed"};
     return names[static_cast<int>(laws)];
 }
 
@@ -60,6 +61,8 @@ inline std::array<Material, 2> materials_of(Laws laws) {
                     tled::Ogden{{OgdenTerm{2.5, 2.0}}, 30.0}};
         case Laws::Fibres:
             return {TransverselyIsotropic{1.007, 50.0, 2.0, fibre}, NeoHookeanIso{2.5, 30.0}};
+        case Laws::TwoFibres:
+            return {TransverselyIsotropic{1.007, 50.0, 2.0, fibre}, TransverselyIsotropic{2.5, 30.0, 1.0, -fibre}};
         case Laws::Mixed:
             return {soft_lnj, NeoHookeanIso{2.5, 30.0}};
     }

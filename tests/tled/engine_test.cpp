@@ -28,7 +28,7 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Combine(::testing::Values(Kind::CpuFloat64, Kind::CpuFloat32, Kind::Gpu, Kind::GpuPatches),
                        ::testing::Values(Cells::T4, Cells::AveragedPressure, Cells::Hexahedra, Cells::Mixed),
                        ::testing::Values(Laws::Iso, Laws::LnJ, Laws::Stable, Laws::Polynomial, Laws::ArrudaBoyce,
-                                         Laws::Ogden, Laws::Fibres, Laws::Mixed)),
+                                         Laws::Ogden, Laws::Fibres, Laws::TwoFibres, Laws::Mixed)),
     [](const auto& each) {
         return std::string(name_of(std::get<0>(each.param))) + name_of(std::get<1>(each.param)) +
                name_of(std::get<2>(each.param));

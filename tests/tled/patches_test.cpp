@@ -133,6 +133,13 @@ TEST_P(GpuSteps, RepeatBitByBit) {
 // shared memory, or several in turn, each of which takes the place of the one before.
 TEST_P(GpuSteps, ManyInADispatchAreThoseOneByOne) {
     for (const int patch_tets : {100000, 150}) {
+        if (patch_tets > 750) {  // of one material, or there are two patches
+            Model alone = model;
+            alone.mesh.labels.setOnes();
+            rest = rest_state(alone);
+        } else {
+            rest = rest_state(model);
+        }
         const GpuStepShape one{.patch_tets = patch_tets, .longest_fan = 5, .workgroup = 128};
         GpuStepShape many = one;
         many.at_once = 1;

@@ -32,7 +32,8 @@ std::vector<Fan> filling_groups(const std::vector<Fan>& fans) {
             Fan shorter = full[i];
             --shorter.length;
             of_length[length - 1].push_back(shorter);
-            of_length[1].push_back({shorter.a, shorter.b, {full[i].ring[length - 1], full[i].ring[length]}, 1, {full[i].tet[length - 1]}});
+            of_length[1].push_back(
+                {shorter.a, shorter.b, {full[i].ring[length - 1], full[i].ring[length]}, 1, {full[i].tet[length - 1]}});
         }
         result.insert(result.end(), full.begin(), full.begin() + static_cast<std::ptrdiff_t>(kept));
     }

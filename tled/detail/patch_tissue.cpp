@@ -16,12 +16,11 @@ Float2 folded(const Eigen::Vector3d& fibre) {
 }  // namespace
 
 shaders::Law law_of(const RestState& rest) {
-    return static_cast<shaders::Law>(
-        rest.materials[static_cast<std::size_t>(rest.blocks.front().material)].index());
+    return static_cast<shaders::Law>(rest.materials[static_cast<std::size_t>(rest.blocks.front().material)].index());
 }
 
 TissueOfPatches::TissueOfPatches(const shaders::Device& device, const RestState& rest, const PatchLayout& layout,
-                         BlockBuffers& blocks)
+                                 BlockBuffers& blocks)
     : kind_{law_of(rest), static_cast<int>(most_terms(rest.viscosity))},
       series_(rest.viscosity),
       element_count_(static_cast<std::size_t>(rest.element_count())),
@@ -69,7 +68,7 @@ void TissueOfPatches::store_stresses(shaders::ProgramCache& programs, const Bloc
 }
 
 void TissueOfPatches::move_stresses(shaders::PatchStresses direction, shaders::ProgramCache& programs,
-                                const BlockBuffers& blocks) const {
+                                    const BlockBuffers& blocks) const {
     if (!viscous()) return;
     const shaders::Program& program = programs.get(shaders::patch_stress_program(kind_, direction));
     program.set(0, static_cast<std::uint32_t>(element_count_));

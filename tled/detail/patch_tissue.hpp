@@ -15,7 +15,8 @@ shaders::Law law_of(const RestState& rest);
 
 class TissueOfPatches {
 public:
-    TissueOfPatches(const shaders::Device& device, const RestState& rest, const PatchLayout& layout, BlockBuffers& blocks);
+    TissueOfPatches(const shaders::Device& device, const RestState& rest, const PatchLayout& layout,
+                    BlockBuffers& blocks);
 
     /// The law, and the most terms of viscosity.
     [[nodiscard]] const shaders::PatchTissue& kind() const { return kind_; }
