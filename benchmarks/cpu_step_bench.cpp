@@ -1,12 +1,15 @@
 // Time of an explicit step on the CPU by instruction set and number of threads, beside a plain scalar loop, and how far
 // float32 strays from float64. The cube of benchmarks/stretched_cube.hpp.
 //     cpu_step_bench [--cells 14,24,55] [--threads 1,2] [--steps N] [--runs N] [--checked-steps N]
-//                    [--element t4|averaged] [--law lnj|iso] [--targets AVX3,AVX2,SSE4] [--plain]
+//                    [--element t4|averaged] [--law lnj|iso] [--targets AVX3,AVX2,SSE4] [--plain] [--tissue]
 // A row has the fewest and the median nanoseconds per element-step of --runs (200) runs of --steps (2) steps each by
 // the clock, and the mean processor time of all threads. Where others use the machine, the fewest are the engine's own,
 // of runs short enough to fall between theirs. Then the seconds to make the engine and, after --checked-steps (1000; 0
 // for none) steps, the difference to the float64 engine over the largest displacement, and whether every number of
-// threads and a repeat give the same bits. --plain adds the scalar loop.
+// threads and a repeat give the same bits. --plain adds the scalar loop. --tissue times what fibres and viscosity cost
+// instead: all tissues of the cube in turns of ten runs, with the ratio of their fewest and of their median turn to
+// plain neo-Hookean's; the widest instruction set, T4 unless --element says averaged, two turns for every ten of
+// --runs.
 
 #include "benchmarks/stretched_cube.hpp"
 #include "core/errors.hpp"
@@ -40,6 +43,7 @@ struct Options {
     int checked_steps = 1000;
     std::string element, law;  // empty: both
     bool plain = false;
+    bool tissue = false;
 };
 
 double processor_seconds() {
@@ -210,6 +214,48 @@ void measure(int cells, const Options& options) {
     }
 }
 
+/// Fewest nanoseconds per element-step of ten runs, after one that fills the caches.
+double turn_of(tled::Engine& engine, const tled::RestState& rest, int steps) {
+    const tled::StepCoefficients step = coefficients(rest);
+    return timed(10, double(steps) * rest.element_count(), [&] { engine.run(steps, step); }).fewest;
+}
+
+void measure_tissues(int cells, const Options& options) {
+    const Scene scene = stretched(meshing::box_mesh({edge, edge, edge}, {cells, cells, cells}));
+    const std::vector<Variant> variants = tissues(scene, options.element);
+    for (const std::string& threads : options.threads) {
+        const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::stoul(threads));
+        std::vector<std::unique_ptr<tled::Engine>> engines;
+        std::vector<std::function<double()>> turns;
+        for (const Variant& variant : variants) {
+            engines.push_back(tled::make_cpu_engine(variant.rest));
+            set_start(*engines.back(), scene);
+            turns.emplace_back([engine = engines.back().get(), &variant, &options] {
+                return turn_of(*engine, variant.rest, options.steps);
+            });
+        }
+        const std::vector<std::vector<double>> times = in_turn(turns, std::max(1, options.runs / 5));
+        const auto fewest = [&](std::size_t i) { return *std::min_element(times[i].begin(), times[i].end()); };
+        for (std::size_t i = 0; i < variants.size(); ++i) {
+            std::vector<double> ratios;
+            for (std::size_t turn = 0; turn < times[i].size(); ++turn)
+                ratios.push_back(times[i][turn] / times[0][turn]);
+            std::printf("| %-16s | %2d | %s thr. | %6.2f | %6.2f | %5.2f | %5.2f |\n", variants[i].name.c_str(), cells,
+                        threads.c_str(), fewest(i), median(times[i]), fewest(i) / fewest(0), median(ratios));
+        }
+        std::fflush(stdout);
+    }
+}
+
+void print_head(const Options& options) {
+    std::printf("%d runs of %d steps, ns per element-step\n\n", options.runs, options.steps);
+    std::printf(options.tissue
+                    ? "| tissue | cells | threads | fewest | median | fewest over iso | median over iso |\n"
+                      "|---|---|---|---|---|---|---|\n"
+                    : "| element, law | cells | engine | fewest | median | processor | start s | difference |\n"
+                      "|---|---|---|---|---|---|---|---|\n");
+}
+
 std::vector<std::string> split(const std::string& list) {
     std::vector<std::string> parts;
     std::istringstream stream(list);
@@ -221,8 +267,8 @@ Options parsed(int argc, char** argv) {
     Options options;
     for (int i = 1; i < argc; ++i) {
         const std::string name = argv[i];
-        if (name == "--plain") {
-            options.plain = true;
+        if (name == "--plain" || name == "--tissue") {
+            (name == "--plain" ? options.plain : options.tissue) = true;
             continue;
         }
         if (++i == argc) throw InvalidInput(name + " needs a value");
@@ -253,10 +299,9 @@ Options parsed(int argc, char** argv) {
 
 int main(int argc, char** argv) try {
     const Options options = parsed(argc, argv);
-    std::printf("%d runs of %d steps, ns per element-step\n\n", options.runs, options.steps);
-    std::printf("| element, law | cells | engine | fewest | median | processor | start s | difference |\n");
-    std::printf("|---|---|---|---|---|---|---|---|\n");
-    for (const std::string& cells : options.cells) measure(std::stoi(cells), options);
+    print_head(options);
+    const auto each = options.tissue ? measure_tissues : measure;
+    for (const std::string& cells : options.cells) each(std::stoi(cells), options);
     return 0;
 } catch (const std::exception& error) {
     std::fprintf(stderr, "cpu_step_bench: %s\n", error.what());

@@ -3,12 +3,15 @@
 //     gpu_step_bench [--list] [--device N] [--cells 14,24,55,128] [--steps N] [--repeats N] [--compare-limit ELEMENTS]
 //                    [--element t4|averaged] [--law lnj|iso] [--mesh FILE.vtu] [--shapes
 //                    TETS:FAN:WORKGROUP[:AT_ONCE],…]
-//                    [--render-passes] [--stretch 0.2]
+//                    [--render-passes] [--stretch 0.2] [--tissue]
 // Without options: on hardware 14, 24, 55 and 128 cells an edge and 1000 steps, on a software rasteriser 14 and 24
 // cells and 50 steps; five repeats, the median is printed; both elements, both laws. The float64 engine runs the same
-// steps where the mesh has no more than --compare-limit elements (1 100 000). A mesh file of about that cube is
-// measured after those of --cells. Shapes are those of tled::GpuStepShape, 0:0:0 the two passes; without them the
-// suggested one. --render-passes adds the fragment shaders of 2007 for T4.
+// steps where the mesh has no more than --compare-limit elements (1 100 000, with --tissue 100 000). A mesh file of
+// about that cube is measured after those of --cells. Shapes are those of tled::GpuStepShape, 0:0:0 the two passes;
+// without them the suggested one. --render-passes adds the fragment shaders of 2007 for T4.
+// --tissue times what fibres and viscosity cost instead: for each element all tissues of the cube in turn, with the
+// ratio to plain neo-Hookean in the same shape, in the suggested shape and in others of its patches; 14, 24, 40 and 55
+// cells.
 
 #include "benchmarks/stretched_cube.hpp"
 #include "core/errors.hpp"
@@ -37,12 +40,13 @@ struct Options {
     std::vector<int> cells;
     int steps = 0;
     int repeats = 5;
-    int compare_limit = 1100000;
+    int compare_limit = 0;     // 0: 1 100 000, with --tissue 100 000
     std::string element, law;  // empty: both
     std::string mesh;
     double stretch = default_stretch;
     std::vector<tled::GpuStepShape> shapes;  // empty: the suggested one
     bool render_passes = false;
+    bool tissue = false;
 };
 
 void set_start(tled::Engine& engine, const Scene& scene) {
@@ -66,6 +70,14 @@ double timed_steps(AnyEngine& engine, int steps, const tled::StepCoefficients& s
     return ((middle - begin) - (now() - middle)) / steps;
 }
 
+double difference_to_float64(const Scene& scene, const tled::RestState& rest, const Matrix3Xd& found, int steps) {
+    const auto cpu = tled::make_cpu_engine(rest, tled::Scalar::Float64);
+    set_start(*cpu, scene);
+    cpu->run(steps, coefficients(rest));
+    const Matrix3Xd exact = cpu->displacement();
+    return (found - exact).cwiseAbs().maxCoeff() / exact.cwiseAbs().maxCoeff();
+}
+
 /// A device at rest takes most of a second to reach its clock under load.
 constexpr double warm_up_seconds = 1;
 
@@ -86,17 +98,12 @@ void report(AnyEngine& engine, double start_seconds, const Scene& scene, const t
     std::printf("| %-28s | %-8s | %9d | %9.2f | %9.1f | %6.2f | %6.3f ", name.c_str(), mesh.c_str(),
                 rest.element_count(), per_step * 1e6, per_step / rest.element_count() * 1e12, start_seconds,
                 tled::jacobians(rest, result).minCoeff());
-    if (!result.allFinite()) {
+    if (!result.allFinite())
         std::printf("| not finite |\n");
-    } else if (rest.element_count() > options.compare_limit) {
+    else if (rest.element_count() > options.compare_limit)
         std::printf("| – |\n");
-    } else {
-        const auto cpu = tled::make_cpu_engine(rest, tled::Scalar::Float64);
-        set_start(*cpu, scene);
-        cpu->run(options.steps, step);
-        const Matrix3Xd exact = cpu->displacement();
-        std::printf("| %.1e |\n", (result - exact).cwiseAbs().maxCoeff() / exact.cwiseAbs().maxCoeff());
-    }
+    else
+        std::printf("| %.1e |\n", difference_to_float64(scene, rest, result, options.steps));
     std::fflush(stdout);
 }
 
@@ -118,10 +125,72 @@ void report_engines(const Scene& scene, const tled::RestState& rest, const std::
     report(passes, now() - begin, scene, rest, name + ", 2007", mesh, options);
 }
 
-void measure(meshing::TetMesh mesh, const std::string& mesh_name, const Options& options) {
-    const Scene scene = stretched(std::move(mesh), options.stretch);
+void measure(const meshing::TetMesh& mesh, const std::string& mesh_name, const Options& options) {
+    const Scene scene = stretched(mesh, options.stretch);
     for (const Variant& variant : variants(scene, options.element, options.law))
         report_engines(scene, variant.rest, variant.name, mesh_name, options);
+}
+
+/// The shapes in which tissue is timed: what more registers and shared memory for tissue ask for may differ.
+std::vector<tled::GpuStepShape> tissue_shapes(const tled::RestState& rest, const Options& options) {
+    if (!options.shapes.empty()) return options.shapes;
+    const tled::GpuStepShape suggested = tled::suggested_gpu_step_shape(
+        rest.element_count(), tled::element_of(rest), tled::step_device(options.device).multiprocessors);
+    std::vector<tled::GpuStepShape> shapes{suggested};
+    for (const int workgroup : {384, 512}) {
+        shapes.push_back(suggested);
+        shapes.back().workgroup = workgroup;
+    }
+    shapes.push_back(suggested);
+    shapes.back().at_once = 0;
+    if (rest.element_count() <= options.compare_limit) shapes.emplace_back();  // two passes
+    std::vector<tled::GpuStepShape> different;
+    for (const tled::GpuStepShape& shape : shapes)
+        if (std::find(different.begin(), different.end(), shape) == different.end()) different.push_back(shape);
+    return different;
+}
+
+/// Rows of one shape: all tissues in turn.
+void report_tissues(const std::vector<Variant>& variants, const Scene& scene, const tled::GpuStepShape& shape,
+                    const std::string& mesh, const Options& options) {
+    std::vector<std::unique_ptr<tled::Engine>> engines;
+    std::vector<Matrix3Xd> results(variants.size());
+    std::vector<std::function<double()>> runs;
+    for (std::size_t i = 0; i < variants.size(); ++i) {
+        engines.push_back(tled::make_gpu_engine(variants[i].rest, options.device, shape));
+        runs.emplace_back([&, i] {
+            set_start(*engines[i], scene);
+            return timed_steps(*engines[i], options.steps, coefficients(variants[i].rest), results[i]);
+        });
+    }
+    for (const double start = now(); now() - start < warm_up_seconds;) in_turn(runs, 1);
+    const std::vector<std::vector<double>> seconds = in_turn(runs, options.repeats);
+    for (std::size_t i = 0; i < variants.size(); ++i) {
+        const tled::RestState& rest = variants[i].rest;
+        std::vector<double> ratios;
+        for (std::size_t turn = 0; turn < seconds[i].size(); ++turn)
+            ratios.push_back(seconds[i][turn] / seconds[0][turn]);
+        const double per_step = median(seconds[i]);
+        std::printf("| %-16s | %-8s | %9d | %-36s | %9.2f | %9.1f | %5.2f ", variants[i].name.c_str(), mesh.c_str(),
+                    rest.element_count(),
+                    engines[i]->description().substr(engines[i]->description().rfind(',') + 2).c_str(), per_step * 1e6,
+                    per_step / rest.element_count() * 1e12, median(ratios));
+        if (rest.element_count() > options.compare_limit)
+            std::printf("| – |\n");
+        else
+            std::printf("| %.1e |\n", difference_to_float64(scene, rest, results[i], options.steps));
+    }
+    std::fflush(stdout);
+}
+
+void measure_tissue(const meshing::TetMesh& mesh, const std::string& mesh_name, const Options& options) {
+    const Scene scene = stretched(mesh, options.stretch);
+    for (const char* element : {"t4", "averaged"}) {
+        if (!options.element.empty() && options.element != element) continue;
+        const std::vector<Variant> variants = tissues(scene, element);
+        for (const tled::GpuStepShape& shape : tissue_shapes(variants.front().rest, options))
+            report_tissues(variants, scene, shape, std::string(element) + " " + mesh_name, options);
+    }
 }
 
 void list_devices() {
@@ -132,12 +201,26 @@ void list_devices() {
                     device.problem.empty() ? "" : ", unusable: ", device.problem.c_str());
 }
 
+void print_head(const Options& options) {
+    std::printf("%d steps, median of %d runs\n\n", options.steps, options.repeats);
+    if (options.tissue)
+        std::printf(
+            "| tissue | mesh | elements | steps | µs/step | ps/element-step | over iso | largest difference to float64 "
+            "/ "
+            "largest displacement |\n|---|---|---|---|---|---|---|---|\n");
+    else
+        std::printf(
+            "| element, law, engine | mesh | elements | µs/step | ps/element-step | start s | min J | largest "
+            "difference "
+            "to float64 / largest displacement |\n|---|---|---|---|---|---|---|---|\n");
+}
+
 Options parsed(int argc, char** argv) {
     Options options;
     for (int i = 1; i < argc; ++i) {
         const std::string name = argv[i];
-        if (name == "--render-passes") {
-            options.render_passes = true;
+        if (name == "--render-passes" || name == "--tissue") {
+            (name == "--tissue" ? options.tissue : options.render_passes) = true;
             continue;
         }
         if (++i == argc) throw InvalidInput(name + " needs a value");
@@ -193,17 +276,16 @@ int main(int argc, char** argv) try {
                     device.vendor().c_str(), device.version().c_str(), hardware ? "hardware" : "software");
     }
     if (options.cells.empty() && options.mesh.empty())
-        options.cells = hardware ? std::vector<int>{14, 24, 55, 128} : std::vector<int>{14, 24};
+        options.cells = !hardware        ? std::vector<int>{14, 24}
+                        : options.tissue ? std::vector<int>{14, 24, 40, 55}
+                                         : std::vector<int>{14, 24, 55, 128};
     if (options.steps <= 0) options.steps = hardware ? 1000 : 50;
-    std::printf("%d steps, median of %d runs\n\n", options.steps, options.repeats);
-    std::printf(
-        "| element, law, engine | mesh | elements | µs/step | ps/element-step | start s | min J | largest difference "
-        "to "
-        "float64 / largest displacement |\n|---|---|---|---|---|---|---|---|\n");
+    if (options.compare_limit <= 0) options.compare_limit = options.tissue ? 100000 : 1100000;
+    print_head(options);
+    const auto each = options.tissue ? measure_tissue : measure;
     for (const int cells : options.cells)
-        measure(meshing::box_mesh({edge, edge, edge}, {cells, cells, cells}), std::to_string(cells) + " cells",
-                options);
-    if (!options.mesh.empty()) measure(meshing::read_vtu(options.mesh), "file", options);
+        each(meshing::box_mesh({edge, edge, edge}, {cells, cells, cells}), std::to_string(cells) + " cells", options);
+    if (!options.mesh.empty()) each(meshing::read_vtu(options.mesh), "file", options);
     return 0;
 } catch (const std::exception& error) {
     std::fprintf(stderr, "gpu_step_bench: %s\n", error.what());

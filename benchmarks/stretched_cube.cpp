@@ -56,6 +56,36 @@ std::vector<Variant> variants(const Scene& scene, const std::string& element, co
     return result;
 }
 
+std::vector<Variant> tissues(const Scene& scene, const std::string& element) {
+    const double bulk = lambda + 2 * shear / 3;
+    const tled::NeoHookeanIso iso{shear, bulk};
+    const tled::TransverselyIsotropic fibres{shear, bulk, shear, Eigen::Vector3d(1, 2, 2) / 3};
+    const tled::PronySeries none, one{{{0.4, 0.05}}}, two{{{0.2, 0.01}, {0.3, 0.1}}};
+    const auto tissue = [&](const std::string& name, const tled::Material& material, const tled::PronySeries& series) {
+        tled::Model model;
+        model.mesh = scene.mesh;
+        model.materials[1] = material;
+        if (!series.terms.empty()) model.viscosity[1] = series;
+        model.element = element == "averaged" ? tled::Element::AveragedPressureT4 : tled::Element::T4;
+        return Variant{name, tled::rest_state(model)};
+    };
+    return {tissue("iso", iso, none),
+            tissue("lnJ", tled::NeoHookeanLnJ{shear, lambda}, none),
+            tissue("fibres", fibres, none),
+            tissue("iso, 1 term", iso, one),
+            tissue("iso, 2 terms", iso, two),
+            tissue("lnJ, 1 term", tled::NeoHookeanLnJ{shear, lambda}, one),
+            tissue("fibres, 1 term", fibres, one),
+            tissue("fibres, 2 terms", fibres, two)};
+}
+
+std::vector<std::vector<double>> in_turn(const std::vector<std::function<double()>>& run, int turns) {
+    std::vector<std::vector<double>> results(run.size());
+    for (int turn = 0; turn < turns; ++turn)
+        for (std::size_t i = 0; i < run.size(); ++i) results[i].push_back(run[i]());
+    return results;
+}
+
 tled::StepCoefficients coefficients(const tled::RestState& rest) {
     double sum = 0;
     for (int e = 0; e < rest.element_count(); ++e) {
@@ -63,7 +93,7 @@ tled::StepCoefficients coefficients(const tled::RestState& rest) {
         sum = std::max(sum, gradient.squaredNorm() + gradient.rowwise().sum().squaredNorm());
     }
     const double time_step = 0.9 * 2 / std::sqrt(4 * (lambda + 2 * shear) / density * sum);  // s
-    return {(1 - 0.01) / (1 + 0.01), time_step * time_step / (1 + 0.01)};
+    return {(1 - 0.01) / (1 + 0.01), time_step * time_step / (1 + 0.01), time_step};
 }
 
 double now() {

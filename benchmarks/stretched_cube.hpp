@@ -5,6 +5,7 @@
 #include "meshing/tet_mesh.hpp"
 #include "tled/engine.hpp"
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,10 @@ struct Variant {
 /// Both elements and both laws where `element` (t4, averaged) and `law` (lnj, iso) are empty.
 std::vector<Variant> variants(const Scene& scene, const std::string& element, const std::string& law);
 
+/// Tissue of one element (t4, averaged): plain neo-Hookean (iso) first, lnJ, with fibres, with one and two terms of
+/// viscosity, with both. What each costs is its time over the first one's.
+std::vector<Variant> tissues(const Scene& scene, const std::string& element);
+
 /// 0.9 of the step that the element bound allows, ω² ≤ 4 (λ + 2μ)/ρ Σ |grad N|², damped by α with α Δt/2 = 0.01.
 tled::StepCoefficients coefficients(const tled::RestState& rest);
 
@@ -42,5 +47,9 @@ tled::StepCoefficients coefficients(const tled::RestState& rest);
 double now();
 
 double median(std::vector<double> values);
+
+/// What each of `run` returns, `turns` times: all of them in turn, so that they meet the same clock and the same
+/// neighbours on the machine.
+std::vector<std::vector<double>> in_turn(const std::vector<std::function<double()>>& run, int turns);
 
 }  // namespace tissuewarp::stretched_cube
