@@ -16,35 +16,25 @@ HWY_BEFORE_NAMESPACE();
 namespace tissuewarp::tled::detail {
 namespace HWY_NAMESPACE {
 
-/// Takes F Σ q⁺ off P, q⁺ = a S + b q with S = F⁻¹ P = (cof F)ᵀ P / J.
+/// Σ q⁺ with q⁺ = a S + b q.
 template <class T>
 struct PronyRelaxation {
     ViscousBatches<T>* viscous;
     Advance advance;
 
     template <class D>
-    void operator()(D d, std::size_t batch, int lane, const Strain<D>& strain, Vec<D> (&P)[3][3]) const {
-        constexpr int row[6] = {0, 1, 2, 0, 1, 0}, column[6] = {0, 1, 2, 1, 2, 2};
-        const auto inverse_J = hn::Set(d, 1) / (hn::Set(d, 1) + strain.change);
-        Vec<D> S[6], sum[6];
-        for (int k = 0; k < 6; ++k) {
-            auto product = cof(d, strain, 0, row[k]) * P[0][column[k]];
-            for (int m = 1; m < 3; ++m) product = hn::MulAdd(cof(d, strain, m, row[k]), P[m][column[k]], product);
-            S[k] = product * inverse_J;
-            sum[k] = hn::Zero(d);
-        }
+    HWY_INLINE SecondStress<D> operator()(D d, std::size_t batch, int lane, const SecondStress<D>& s) const {
+        SecondStress<D> sum;
+        for (int k = 0; k < 6; ++k) sum.S[k] = hn::Zero(d);
         T* stress = viscous->stress.data() +
                     (batch - viscous->first_batch) * viscous->coefficient.size() * 6 * batch_width + lane;
         for (const auto& [a, b] : viscous->coefficient)
             for (int k = 0; k < 6; ++k, stress += batch_width) {
-                const auto q = hn::MulAdd(hn::Set(d, a), S[k], hn::Set(d, b) * hn::LoadU(d, stress));
-                if (advance == Advance::Yes) hn::StoreU(q, d, stress);
-                sum[k] = sum[k] + q;
+                const auto q = hn::MulAdd(hn::Set(d, a), s.S[k], hn::Set(d, b) * hn::Load(d, stress));
+                if (advance == Advance::Yes) hn::Store(q, d, stress);
+                sum.S[k] = sum.S[k] + q;
             }
-        Vec<D> full[3][3];
-        for (int k = 0; k < 6; ++k) full[row[k]][column[k]] = full[column[k]][row[k]] = sum[k];
-        for (int i = 0; i < 3; ++i)
-            for (int j = 0; j < 3; ++j) P[i][j] = P[i][j] - (full[i][j] + dot<D>(strain.H[i], full[j]));
+        return sum;
     }
 };
 

@@ -14,10 +14,13 @@ mat3 stress(uint e, Deformation d, Parameters p, float pressure) {
     vec3 a = fibre_of(e);
     vec3 stretch = d.H * a;
     float excess = 2.0 * dot(a, stretch) + dot(stretch, stretch);  // a·C a - 1
-    float j_minus_1 = exp_minus_one(-2.0 / 3.0 * log_one_plus(d.volume_change));
-    float strength = j_minus_1 * (1.0 + excess) + excess;  // I4 - 1
-    float third = (1.0 + excess) * (1.0 / 3.0) / (1.0 + d.volume_change);
-    float j = 1.0 + j_minus_1;
+    float J = 1.0 + d.volume_change;
+    float j = isochoric_factor(d);
+    float sum = 1.0 + j + j * j;
+    float inverse = 1.0 / (J * J * sum);
+    // With j³ = J⁻², 1 - j = (1 - j³)/(1 + j + j²) keeps small strains.
+    float strength = excess - d.volume_change * (1.0 + J) * inverse * (1.0 + excess);  // I4 - 1
+    float third = (1.0 + excess) * (1.0 / 3.0) * (inverse * J * sum);
     float c = 2.0 * p.a.y * strength * j;
     return first_invariant_stress(d, 0.5 * p.a.x, j, pressure - c * third) + outerProduct(c * (a + stretch), a);
 }

@@ -136,7 +136,7 @@ enum class Advance { No, Yes };
 template <class T>
 struct ViscousBatches {
     std::vector<std::array<T, 2>> coefficient;  ///< (a, b) of each term
-    std::vector<T> stress;                      ///< batch × terms × 6 × width; V q, kPa mm³, 11 22 33 12 23 13
+    AlignedVector<T> stress;                    ///< batch × terms × 6 × width; V q, kPa mm³, 11 22 33 12 23 31
     std::size_t first_batch = 0;                ///< the batch that `stress` begins with
 };
 

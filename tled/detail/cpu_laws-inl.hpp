@@ -247,29 +247,32 @@ template <>
 struct Response<TransverselyIsotropic> : QuadraticVolume {
     static constexpr bool admits_inversion = false, has_fibre = true;
 
-    /// P of the isochoric neo-Hookean law and 2 η (Ī₄ − 1) J^(−2/3) (f aᵀ − I₄/3 G) with f = F a.
+    /// P of the isochoric neo-Hookean law and 2 η (Ī₄ − 1) j (f aᵀ − I₄/3 G) with f = F a, j = J^(−2/3) and G = cof
+    /// F/J. Ī₄ − 1 = (j − 1) I₄ + (I₄ − 1), where j − 1 = (j³ − 1)/(1 + j + j²) and j³ = J⁻².
     template <class D>
-    static void shear_stress(D d, const Strain<D>& strain, const Tissue<D>& tissue, Vec<D> volume, Vec<D> (&P)[3][3]) {
-        detail::HWY_NAMESPACE::shear_stress<NeoHookeanIso>(d, strain, tissue, volume, P);
-        Vec<D> stretch[3], f[3];  // H a, F a
+    static HWY_INLINE FibreStressFactors<D> shear_factors(D d, const Strain<D>& strain, const Tissue<D>& tissue,
+                                                          Vec<D> volume) {
+        const auto one = hn::Set(d, 1), J = one + strain.change;
+        const auto power = power_of_minus_five_thirds(d, J), j = J * power;
+        FibreStressFactors<D> factors;
+        static_cast<StressFactors<D>&>(factors) =
+            first_invariant_factors(d, trace_excess(strain), volume * hn::Set(d, tissue.parameter[0]) * power);
+        Vec<D> stretch[3];  // H a
         for (int i = 0; i < 3; ++i) {
             stretch[i] = dot<D>(strain.H[i], tissue.fibre);
-            f[i] = tissue.fibre[i] + stretch[i];
+            factors.fibre[i] = tissue.fibre[i];
+            factors.stretched[i] = tissue.fibre[i] + stretch[i];
         }
         const auto along = dot<D>(tissue.fibre, stretch);
         const auto excess = along + along + dot<D>(stretch, stretch);  // I₄ − 1 for a unit vector
-        const auto exponent = isochoric_exponent(d, strain);
-        const auto j_excess = hn::Expm1(d, exponent + exponent);  // J^(−2/3) − 1
-        const auto I4 = hn::Set(d, 1) + excess;
-        const auto strength = hn::MulAdd(j_excess, I4, excess);  // Ī₄ − 1
-        const auto scale =
-            volume * hn::Set(d, tissue.parameter[1]) * (strength + strength) * (hn::Set(d, 1) + j_excess);
-        const auto third = I4 * hn::Set(d, Scalar<D>(1.0 / 3)) / (hn::Set(d, 1) + strain.change);
-        for (int i = 0; i < 3; ++i)
-            for (int k = 0; k < 3; ++k) {
-                const auto bracket = hn::NegMulAdd(third, cof(d, strain, i, k), f[i] * tissue.fibre[k]);
-                P[i][k] = hn::MulAdd(scale, bracket, P[i][k]);
-            }
+        const auto I4 = one + excess, sum = hn::MulAdd(j, one + j, one);
+        const auto inverse = one / (J * J * sum);
+        const auto j_lack = strain.change * (one + J) * inverse;  // 1 − j
+        const auto strength = hn::NegMulAdd(j_lack, I4, excess);
+        factors.of_fibre = volume * hn::Set(d, tissue.parameter[1]) * (strength + strength) * j;
+        const auto third = I4 * (inverse * J * sum) * hn::Set(d, Scalar<D>(1.0 / 3));
+        factors.of_I = hn::NegMulAdd(factors.of_fibre, third, factors.of_I);
+        return factors;
     }
 };
 

@@ -87,6 +87,107 @@ HWY_INLINE void stress_of(const StressFactors<D>& f, const Strain<D>& strain, Ve
         }
 }
 
+/// Those of a law with fibres a: of_fibre f aᵀ with f = F a comes to the others.
+template <class D>
+struct FibreStressFactors : StressFactors<D> {
+    Vec<D> of_fibre, fibre[3], stretched[3];  // a, f
+};
+
+template <class D>
+HWY_INLINE void stress_of(const FibreStressFactors<D>& f, const Strain<D>& strain, Vec<D> (&P)[3][3]) {
+    stress_of<D>(static_cast<const StressFactors<D>&>(f), strain, P);
+    for (int i = 0; i < 3; ++i) {
+        const auto scaled = f.of_fibre * f.stretched[i];
+        for (int j = 0; j < 3; ++j) P[i][j] = hn::MulAdd(scaled, f.fibre[j], P[i][j]);
+    }
+}
+
+/// A symmetric second Piola–Kirchhoff stress: 11 22 33 12 23 31.
+template <class D>
+struct SecondStress {
+    Vec<D> S[6];
+};
+
+/// F⁻¹ P of the same factors, and what a pressure p adds to it: p cof C / J. With A = cof C, C A = J² I gives A E =
+/// J² I − A, so S = (of_E (J² I − A) + of_I A)/J. A = (1 + tr E) I − B with B = E − cof E keeps small strains.
+template <class D>
+class SecondStressOf {
+public:
+    HWY_INLINE SecondStressOf(D d, const Strain<D>& strain) {
+        const auto& E = strain.E;
+        for (int i = 0; i < 3; ++i) {
+            const int j = (i + 1) % 3, k = (i + 2) % 3;
+            B_[i] = E[i][i] - hn::NegMulAdd(E[j][k], E[j][k], E[j][j] * E[k][k]);
+            B_[3 + i] = hn::NegMulAdd(E[k][i], E[k][j], hn::MulAdd(E[i][j], E[k][k], E[i][j]));
+        }
+        trace_ = trace_excess(strain);
+        one_and_trace_ = hn::Set(d, 1) + trace_;
+        change_of_square_ = strain.change * (hn::Set(d, 2) + strain.change);  // J² − 1
+        inverse_J_ = hn::Set(d, 1) / (hn::Set(d, 1) + strain.change);
+    }
+
+    HWY_INLINE SecondStress<D> shear(const StressFactors<D>& f) const {
+        const auto of_E = f.of_E * inverse_J_, of_I = f.of_I * inverse_J_;
+        return combined(of_E - of_I, hn::MulAdd(of_E, change_of_square_ - trace_, of_I * one_and_trace_));
+    }
+    HWY_INLINE SecondStress<D> shear(const FibreStressFactors<D>& f) const {
+        SecondStress<D> s = shear(static_cast<const StressFactors<D>&>(f));
+        for (int i = 0; i < 3; ++i) {
+            const auto scaled = f.of_fibre * f.fibre[i];
+            s.S[i] = hn::MulAdd(scaled, f.fibre[i], s.S[i]);
+            s.S[3 + i] = hn::MulAdd(scaled, f.fibre[(i + 1) % 3], s.S[3 + i]);
+        }
+        return s;
+    }
+    HWY_INLINE SecondStress<D> pressure(Vec<D> p) const {
+        const auto over_J = p * inverse_J_;
+        return combined(hn::Neg(over_J), over_J * one_and_trace_);
+    }
+
+private:
+    Vec<D> B_[6];  ///< 11 22 33 12 23 31
+    Vec<D> trace_, one_and_trace_, change_of_square_, inverse_J_;
+
+    HWY_INLINE SecondStress<D> combined(Vec<D> of_B, Vec<D> of_I) const {
+        SecondStress<D> s;
+        for (int i = 0; i < 3; ++i) {
+            s.S[i] = hn::MulAdd(of_B, B_[i], of_I);
+            s.S[3 + i] = of_B * B_[3 + i];
+        }
+        return s;
+    }
+};
+
+/// S = F⁻¹ P = (cof F)ᵀ P / J of any law.
+template <class D>
+HWY_INLINE SecondStress<D> second_stress_of(D d, const Strain<D>& strain, const Vec<D> (&P)[3][3]) {
+    const auto inverse_J = hn::Set(d, 1) / (hn::Set(d, 1) + strain.change);
+    SecondStress<D> s;
+    for (int k = 0; k < 6; ++k) {
+        const int i = k % 3, j = k < 3 ? i : (i + 1) % 3;
+        auto product = cof(d, strain, 0, i) * P[0][j];
+        for (int m = 1; m < 3; ++m) product = hn::MulAdd(cof(d, strain, m, i), P[m][j], product);
+        s.S[k] = product * inverse_J;
+    }
+    return s;
+}
+
+/// P = F S.
+template <class D>
+HWY_INLINE void first_stress_of(const SecondStress<D>& s, const Strain<D>& strain, Vec<D> (&P)[3][3]) {
+    Vec<D> full[3][3];
+    for (int i = 0; i < 3; ++i) {
+        const int j = (i + 1) % 3;
+        full[i][i] = s.S[i];
+        full[i][j] = full[j][i] = s.S[3 + i];
+    }
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            P[i][j] = full[i][j];
+            for (int k = 0; k < 3; ++k) P[i][j] = hn::MulAdd(strain.H[i][k], full[k][j], P[i][j]);
+        }
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace tissuewarp::tled::detail
 HWY_AFTER_NAMESPACE();
