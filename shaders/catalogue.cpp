@@ -1,5 +1,6 @@
 #include "shaders/catalogue.hpp"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -34,11 +35,11 @@ std::string kinematics_chunk(Cell cell) {
 
 /// Kinematics, law and viscosity of an element pass; the pressure follows.
 ProgramSource law_program(std::string kernel, Cell cell, const ElementForces& forces) {
-    ProgramSource source{
-        std::move(kernel),
-        {"index", "bindings", "numbers", "deformation", kinematics_chunk(cell), "material", "isochoric"},
-        {},
-        {}};
+    ProgramSource source{std::move(kernel),
+                         {"index", "bindings", "numbers", "deformation", kinematics_chunk(cell), "material",
+                          "isochoric", "isochoric.first"},
+                         {},
+                         {}};
     if (has_fibres(forces.law)) source.chunks.emplace_back("element.fibre");
     add_law(source, forces.law);
     const bool viscous = forces.viscosity != Viscosity::None;
@@ -63,6 +64,12 @@ ProgramSource node_program(std::string kernel, const NodeEffects& effects) {
     return source;
 }
 
+/// Whether patches take S from the law: viscous stresses are of it, and these laws make theirs of stretch_difference.
+bool gives_second(const PatchTissue& tissue) {
+    constexpr std::array laws{Law::NeoHookeanIso, Law::NeoHookeanLnJ, Law::ArrudaBoyce, Law::TransverselyIsotropic};
+    return tissue.prony_terms > 0 && std::find(laws.begin(), laws.end(), tissue.law) != laws.end();
+}
+
 /// What tetrahedra have for themselves and the forces that follow from it. Viscous stresses stay in shared memory where
 /// the sizes have places for them.
 void add_patch_forces(ProgramSource& source, const PatchTissue& tissue, bool stresses_stay, int places) {
@@ -76,6 +83,7 @@ void add_patch_forces(ProgramSource& source, const PatchTissue& tissue, bool str
         source.defines["PRONY_TERMS"] = std::to_string(tissue.prony_terms) + "u";
     }
     if (stresses_stay) source.defines["PLACES"] = std::to_string(places) + "u";
+    if (fibres || viscous) source.defines["LAW_GIVES_SECOND"] = flag(gives_second(tissue));
     source.chunks.emplace_back("patch.forces");
     source.defines["HAS_FIBRES"] = flag(fibres);
     source.defines["HAS_VISCOSITY"] = flag(viscous);
@@ -177,7 +185,9 @@ ProgramSource patch_step_program(const PatchTissue& tissue, const NodeEffects& e
     const auto add = [&](const char* chunk) { source.chunks.emplace_back(chunk); };
     const auto define = [&](const char* name, const std::string& value) { source.defines[name] = value; };
     if (stages.forces)
-        for (const char* chunk : {"deformation", "material", "isochoric"}) add(chunk);
+        for (const char* chunk :
+             {"deformation", "material", "isochoric", gives_second(tissue) ? "isochoric.second" : "isochoric.first"})
+            add(chunk);
     if (stages.forces || stages.averages) {
         add_law(source, tissue.law);
         define("USES_SHEAR", flag(stages.forces));
@@ -368,11 +378,12 @@ ProgramSource full_screen_vertices() {
 }
 
 ProgramSource element_forces_pass(Law law) {
-    ProgramSource source{"element_forces",
-                         {"numbers", "texels", "deformation", "element.textures", "material.textures", "isochoric"},
-                         {{"USES_SHEAR", "1"}},
-                         {},
-                         ShaderStage::Fragment};
+    ProgramSource source{
+        "element_forces",
+        {"numbers", "texels", "deformation", "element.textures", "material.textures", "isochoric", "isochoric.first"},
+        {{"USES_SHEAR", "1"}},
+        {},
+        ShaderStage::Fragment};
     add_law(source, law);
     source.chunks.emplace_back("pressure.element");
     return source;

@@ -27,16 +27,8 @@ mat3 strain_excess(Deformation d) {
     return mat3(a.x, b.x, b.z, b.x, a.y, b.y, b.z, b.y, a.z);
 }
 
-/// c (F - F⁻ᵀ) + q cof F = cof F (c/J E + q I), since F - F⁻ᵀ = F⁻ᵀ (FᵀF - I). In a turned body the terms of F - F⁻ᵀ are of
-/// the order of 1 and cancel; what rounding left of them had moments, which turned the body (docs/decisions/
-/// gpu_arithmetic.md). E is small and symmetric from the start.
-mat3 stretch_difference(Deformation d, float c, float q) {
-    StrainExcess E = symmetric_strain(d);
-    float factor = c * reciprocal(1.0 + d.volume_change);
-    vec3 a = factor * E.diagonal + vec3(q);
-    vec3 b = factor * E.others;
-    return cofactor_F(d) * mat3(a.x, b.x, b.z, b.x, a.y, b.y, b.z, b.y, a.z);
-}
+/// c (F - F⁻ᵀ) + q cof F, which isochoric.first gives, or F⁻¹ of it, from isochoric.second.
+mat3 stretch_difference(Deformation d, float c, float q);
 
 /// psi_1 times the derivative of J^(-2/3) tr C, and pressure cof F: 2 psi_1 j (F - (tr C)/3 F⁻ᵀ); with tr C = 3 + x the
 /// bracket is F - F⁻ᵀ - x/3 cof F / J.

@@ -55,9 +55,7 @@ mat3 stress_of_tetrahedron(Edges t, Parameters parameters, Pressure pressure) {
     mat3 N = mat3(t.normal_b, t.normal_c, t.normal_d);
     Deformation d = deformation((G * transpose(N)) * reciprocal(dot(t.rest_b, t.normal_b)));
 #if HAS_VISCOSITY
-    mat3 P = stress(0u, d, parameters, 0.0);
-    mat3 viscous = viscous_stress(d, P);  // not in `P -= …`: README, traps
-    return P - viscous + pressure_of(pressure, d.volume_change) * cofactor_F(d);
+    return relaxed_stress(d, stress(0u, d, parameters, 0.0), pressure_of(pressure, d.volume_change));
 #else
     return stress(0u, d, parameters, pressure_of(pressure, d.volume_change));
 #endif

@@ -1,7 +1,8 @@
 // Effect: viscous stresses of a Prony series (chunk viscosity) over patches. Needs: viscosity, patch.tissue, patch.stresses.*.
-// Gives: viscous_stress, F sum q⁺ of the tetrahedron in hand (kPa), which keeps q⁺; fetch_viscous_stress comes before it. A patch
+// Gives: relaxed_stress, P of the tetrahedron in hand (kPa) less F sum q⁺, which keeps q⁺; fetch_viscous_stress comes before it. A patch
 // that computes its forces again in a step finds its stresses advanced: advance_stresses, hold_stresses.
 //! define HAS_FIBRES
+//! define LAW_GIVES_SECOND
 
 /// (a, b) of each term. Terms that a material lacks have a = b = 0.
 vec2 prony[PRONY_TERMS];
@@ -21,8 +22,8 @@ void fetch_viscous_stress() {
     for (uint i = 0u; i < 3u * PRONY_TERMS; ++i) stress_in_hand[i] = kept_stress(i);
 }
 
-mat3 viscous_stress(Deformation d, mat3 P) {
-    SecondStress S = second_stress(d, P);
+/// Sum q⁺ of q⁺ = a S + b q.
+SecondStress viscous_stress(SecondStress S) {
     vec2 sum_a = vec2(0.0);
     vec2 sum_b = vec2(0.0);
     vec2 sum_c = vec2(0.0);
@@ -39,5 +40,19 @@ mat3 viscous_stress(Deformation d, mat3 P) {
         sum_b += b;
         sum_c += c;
     }
-    return first_stress(d, SecondStress(vec3(sum_a, sum_b.x), vec3(sum_b.y, sum_c)));
+    return SecondStress(vec3(sum_a, sum_b.x), vec3(sum_b.y, sum_c));
 }
+
+/// From what the law gives of the shear part, and the pressure.
+#if LAW_GIVES_SECOND
+mat3 relaxed_stress(Deformation d, mat3 S, float pressure) {
+    mat3 q = full(viscous_stress(SecondStress(vec3(S[0][0], S[1][1], S[2][2]), vec3(S[1][2], S[0][2], S[0][1]))));
+    mat3 total = S - q + stretch_difference(d, 0.0, pressure);
+    return total + d.H * total;
+}
+#else
+mat3 relaxed_stress(Deformation d, mat3 P, float pressure) {
+    mat3 viscous = first_stress(d, viscous_stress(second_stress(d, P)));  // not in `P -= …`: README, traps
+    return P - viscous + pressure * cofactor_F(d);
+}
+#endif

@@ -6,6 +6,12 @@ struct SecondStress {
     vec3 diagonal, others;  // 11 22 33, 23 13 12
 };
 
+mat3 full(SecondStress S) {
+    vec3 a = S.diagonal;
+    vec3 b = S.others;
+    return mat3(a.x, b.z, b.y, b.z, a.y, b.x, b.y, b.x, a.z);
+}
+
 /// S = F⁻¹ P = (cof F)ᵀ P / J.
 SecondStress second_stress(Deformation d, mat3 P) {
     mat3 C = cofactor_F(d);
@@ -16,8 +22,6 @@ SecondStress second_stress(Deformation d, mat3 P) {
 
 /// F S.
 mat3 first_stress(Deformation d, SecondStress S) {
-    vec3 a = S.diagonal;
-    vec3 b = S.others;
-    mat3 full = mat3(a.x, b.z, b.y, b.z, a.y, b.x, b.y, b.x, a.z);
-    return full + d.H * full;
+    mat3 whole = full(S);
+    return whole + d.H * whole;
 }
