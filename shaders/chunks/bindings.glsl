@@ -22,10 +22,12 @@
 #define BINDING_FIBRE 17               // unit vector of element
 #define BINDING_PRONY 18
 #define BINDING_VISCOUS_STRESS 19      // kPa
-#define BINDING_HEX_NODES 20
-#define BINDING_HEX_REST 21
+#define BINDING_SURFACE_EFFECTS 20
+#define BINDING_SURFACE_FORCE 21       // mN, xyz of node
+#define BINDING_FLUID 22
+#define BINDING_CONTACT 23
 
-// Steps over patches, whose programs share displacements, springs, external forces and materials with the others.
+// Steps over patches, whose programs share materials and the effects on nodes with the others.
 #define BINDING_PATCH_HEAD 3
 #define BINDING_PATCH_REST 4
 #define BINDING_PATCH_STATE 5

@@ -50,6 +50,39 @@ std::vector<std::uint32_t> node_incidence(const RestState& rest) {
     return result;
 }
 
+/// What chunks/element.hexahedron.glsl reads behind the data of tetrahedra.
+void append_hexahedra(const HexState& hexahedra, GpuElements& elements) {
+    const auto plane = static_cast<std::size_t>(hexahedra.count());
+    const std::size_t first_node = elements.nodes.size(), first_rest = elements.rest.size();
+    elements.nodes.resize(first_node + 2 * plane);
+    elements.rest.resize(first_rest + 10 * plane);
+    const std::vector<int> material = material_of_elements(hexahedra.blocks);
+    for (int e = 0; e < hexahedra.count(); ++e) {
+        const auto at = static_cast<std::size_t>(e);
+        for (int corner = 0; corner < 8; ++corner)
+            elements.nodes[first_node + static_cast<std::size_t>(corner / 4) * plane + at]
+                          [static_cast<std::size_t>(corner % 4)] =
+                static_cast<std::uint32_t>(hexahedra.nodes(corner, e));
+        const std::array<double, 7> last{hexahedra.volume[e],
+                                         static_cast<double>(material[at]),
+                                         hexahedra.volumetric_modulus[e],
+                                         hexahedra.hourglass_stiffness[e],
+                                         0,
+                                         0,
+                                         0};
+        for (std::size_t k = 0; k < 7; ++k) {
+            const auto row = static_cast<Eigen::Index>(3 * k);
+            elements.rest[first_rest + k * plane + at] = {single(hexahedra.gradient(row, e)),
+                                                          single(hexahedra.gradient(row + 1, e)),
+                                                          single(hexahedra.gradient(row + 2, e)), single(last[k])};
+        }
+        for (std::size_t j = 0; j < 3; ++j)
+            for (std::size_t alpha = 0; alpha < 4; ++alpha)
+                elements.rest[first_rest + (7 + j) * plane + at][alpha] =
+                    single(hexahedra.rest_hourglass(static_cast<Eigen::Index>(3 * alpha + j), e));
+    }
+}
+
 }  // namespace
 
 GpuElements gpu_elements(const RestState& rest) {
@@ -73,39 +106,9 @@ GpuElements gpu_elements(const RestState& rest) {
                                              single(rest.gradient(row + 2, e)), single(last[k])};
         }
     }
+    append_hexahedra(rest.hexahedra, elements);
     elements.node_incidence = node_incidence(rest);
     return elements;
-}
-
-GpuHexahedra gpu_hexahedra(const HexState& hexahedra) {
-    const auto plane = static_cast<std::size_t>(hexahedra.count());
-    GpuHexahedra result;
-    result.nodes.resize(2 * plane);
-    result.rest.resize(10 * plane);
-    const std::vector<int> material = material_of_elements(hexahedra.blocks);
-    for (int e = 0; e < hexahedra.count(); ++e) {
-        const auto at = static_cast<std::size_t>(e);
-        for (int corner = 0; corner < 8; ++corner)
-            result.nodes[static_cast<std::size_t>(corner / 4) * plane + at][static_cast<std::size_t>(corner % 4)] =
-                static_cast<std::uint32_t>(hexahedra.nodes(corner, e));
-        const std::array<double, 7> last{hexahedra.volume[e],
-                                         static_cast<double>(material[at]),
-                                         hexahedra.volumetric_modulus[e],
-                                         hexahedra.hourglass_stiffness[e],
-                                         0,
-                                         0,
-                                         0};
-        for (std::size_t k = 0; k < 7; ++k) {
-            const auto row = static_cast<Eigen::Index>(3 * k);
-            result.rest[k * plane + at] = {single(hexahedra.gradient(row, e)), single(hexahedra.gradient(row + 1, e)),
-                                           single(hexahedra.gradient(row + 2, e)), single(last[k])};
-        }
-        for (std::size_t j = 0; j < 3; ++j)
-            for (std::size_t alpha = 0; alpha < 4; ++alpha)
-                result.rest[(7 + j) * plane + at][alpha] =
-                    single(hexahedra.rest_hourglass(static_cast<Eigen::Index>(3 * alpha + j), e));
-    }
-    return result;
 }
 
 GpuPressure gpu_pressure(const RestState& rest) {

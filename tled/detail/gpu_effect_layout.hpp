@@ -1,0 +1,29 @@
+#pragma once
+/// Effects in the arrays that the GLSL chunks read (contracts in shaders/chunks/surface*.glsl, node.fluid.glsl and
+/// node.contact.glsl). Words hold whole numbers, or floats by their bits.
+
+#include "tled/detail/gpu_layout.hpp"
+#include "tled/nodal_effects.hpp"
+
+#include <Eigen/Core>
+
+#include <cstdint>
+#include <vector>
+
+namespace tissuewarp::tled::detail {
+
+struct GpuSurface {
+    std::vector<std::uint32_t> words;
+    std::uint32_t pressure_lists = 0, membrane_lists = 0, sliding_lists = 0;  ///< places in words; 0: no such effect
+};
+/// `position` is at rest, 3 × N, mm.
+GpuSurface gpu_surface(const SurfaceEffects& effects, const Eigen::Matrix3Xd& position);
+
+std::vector<Float4> gpu_fluid(const NodalFluid& fluid);
+
+std::vector<std::uint32_t> gpu_contact(const NodalContact& contact, int node_count);
+
+/// What a sample can exceed the distance by at a point to which no other sample is nearer, mm.
+double reach_of_interpolation(const DistanceGrid& grid);
+
+}  // namespace tissuewarp::tled::detail
