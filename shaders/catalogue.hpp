@@ -58,7 +58,7 @@ struct SurfaceForces {
 };
 
 /// The most that a pass over elements or nodes declares; those over patches are counted in tled/detail/gpu_patches.cpp.
-inline constexpr int storage_blocks_of_passes = 12;
+inline constexpr int storage_blocks_of_passes = 11;
 
 enum class StoreResidual { No, Yes };
 enum class MaskConstrained { No, Yes };

@@ -10,8 +10,7 @@
 #define BINDING_CORNER_FORCE 5         // mN
 #define BINDING_NODE_INCIDENCE 6
 #define BINDING_EXTERNAL_FORCE 7       // mN, xyz of node
-#define BINDING_SPRING_INDEX 8
-#define BINDING_SPRINGS 9
+#define BINDING_SPRINGS 8
 #define BINDING_RESIDUAL 10            // mN, xyz of node, zero where constrained
 #define BINDING_VOLUME_CHANGE 11
 #define BINDING_PRESSURE 12            // kPa
@@ -33,7 +32,6 @@
 #define BINDING_PATCH_STATE 5
 #define BINDING_PATCH_FORCES 6
 #define BINDING_PATCH_SOURCES 10
-#define BINDING_PATCH_FANS 11
 #define BINDING_PATCH_LARGEST 12
 #define BINDING_PATCH_NEIGHBOURS 13
 #define BINDING_PATCH_PROGRESS 14

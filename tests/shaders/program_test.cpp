@@ -124,7 +124,7 @@ TEST_F(ProgramTest, StorageBlocksOfAbsentEffectsAreNotBound) {
                                                            "CornerForce"));
     EXPECT_THAT(names({true, false}),
                 ::testing::UnorderedElementsAre("Displacement", "Increment", "InverseMass", "NodeIncidence",
-                                                "CornerForce", "SpringIndex", "Springs"));
+                                                "CornerForce", "Springs"));
 }
 
 TEST_F(ProgramTest, AMisuseOfOpenGLBecomesAnException) {

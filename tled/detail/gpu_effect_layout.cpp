@@ -103,6 +103,17 @@ std::array<float, 3> largest_differences(const DistanceGrid& grid) {
 
 }  // namespace
 
+Words gpu_springs(const NodalConditions& conditions, int node_count) {
+    Words words(static_cast<std::size_t>(node_count), 0U);
+    for (std::size_t s = 0; s < conditions.spring_node.size(); ++s) {
+        const auto column = static_cast<Eigen::Index>(s);
+        words[static_cast<std::size_t>(conditions.spring_node[s])] = place(words.size());
+        for (const double k : conditions.spring_stiffness.col(column)) put(words, k);
+        put(words, conditions.spring_force.col(column).eval());
+    }
+    return words;
+}
+
 GpuSurface gpu_surface(const SurfaceEffects& effects, const Matrix3Xd& position) {
     GpuSurface surface;
     Words& words = surface.words;

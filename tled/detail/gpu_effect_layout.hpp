@@ -1,9 +1,9 @@
 #pragma once
-/// Effects in the arrays that the GLSL chunks read (contracts in shaders/chunks/surface*.glsl, node.fluid.glsl and
-/// node.contact.glsl). Words hold whole numbers, or floats by their bits.
+/// Effects in the arrays that the GLSL chunks read (contracts in shaders/chunks/surface*.glsl and node.*.glsl). Words
+/// hold whole numbers, or floats by their bits.
 
+#include "tled/conditions.hpp"
 #include "tled/detail/gpu_layout.hpp"
-#include "tled/nodal_effects.hpp"
 
 #include <Eigen/Core>
 
@@ -11,6 +11,8 @@
 #include <vector>
 
 namespace tissuewarp::tled::detail {
+
+std::vector<std::uint32_t> gpu_springs(const NodalConditions& conditions, int node_count);
 
 struct GpuSurface {
     std::vector<std::uint32_t> words;

@@ -25,9 +25,8 @@ void GpuEffects::set(const NodalConditions& conditions, BlockBuffers& blocks) {
 void GpuEffects::set_springs(const NodalConditions& conditions, BlockBuffers& blocks) {
     springs_.reset();
     if (conditions.spring_node.empty()) return;
-    springs_.emplace(device_, gpu_springs(conditions, static_cast<int>(position_.cols())));
-    blocks.set("SpringIndex", springs_->index);
-    blocks.set("Springs", springs_->springs);
+    springs_.emplace(device_, gpu_springs(conditions, static_cast<int>(position_.cols())), "springs");
+    blocks.set("Springs", *springs_);
 }
 
 void GpuEffects::set_external_force(const Eigen::Matrix3Xd& force, BlockBuffers& blocks) {

@@ -35,12 +35,6 @@ private:
     void set_fluid(const std::optional<NodalFluid>& fluid, BlockBuffers& blocks);
     void set_contact(const std::optional<NodalContact>& contact, BlockBuffers& blocks);
 
-    struct Springs {
-        Springs(const shaders::Device& device, const GpuSprings& layout)
-            : index(device, layout.index, "springs of nodes"), springs(device, layout.springs, "springs") {}
-        shaders::Buffer<std::int32_t> index;
-        shaders::Buffer<GpuSpring> springs;
-    };
     struct Surface {
         Surface(const shaders::Device& device, const GpuSurface& layout, std::size_t nodes)
             : words(device, layout.words, "surface effects"), force(device, nodes, "surface forces") {}
@@ -52,10 +46,9 @@ private:
     shaders::ProgramCache& programs_;
     Eigen::Matrix3Xd position_;  ///< 3 × N, mm, at rest
     shaders::NodeEffects on_nodes_;
-    std::optional<Springs> springs_;
     std::optional<shaders::Buffer<Float4>> external_force_, fluid_;
     std::optional<Surface> surface_;
-    std::optional<shaders::Buffer<std::uint32_t>> contact_;
+    std::optional<shaders::Buffer<std::uint32_t>> springs_, contact_;
     std::optional<Pass> surface_pass_;
 };
 

@@ -127,18 +127,6 @@ GpuPressure gpu_pressure(const RestState& rest) {
     return pressure;
 }
 
-GpuSprings gpu_springs(const NodalConditions& conditions, int node_count) {
-    GpuSprings result;
-    result.index.assign(static_cast<std::size_t>(node_count), -1);
-    for (std::size_t s = 0; s < conditions.spring_node.size(); ++s) {
-        result.index[static_cast<std::size_t>(conditions.spring_node[s])] = static_cast<std::int32_t>(s);
-        const auto k = [&](int row) { return single(conditions.spring_stiffness(row, static_cast<Eigen::Index>(s))); };
-        const auto f = [&](int row) { return single(conditions.spring_force(row, static_cast<Eigen::Index>(s))); };
-        result.springs.push_back({{k(0), k(1), k(2), k(3)}, {k(4), k(5), f(0), f(1)}, {f(2), 0.0F, 0.0F, 0.0F}});
-    }
-    return result;
-}
-
 std::vector<Float4> packed(const Eigen::Matrix3Xd& vectors) {
     std::vector<Float4> result(static_cast<std::size_t>(vectors.cols()));
     for (Eigen::Index a = 0; a < vectors.cols(); ++a)

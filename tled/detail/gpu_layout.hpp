@@ -32,16 +32,6 @@ struct GpuPressure {
 };
 GpuPressure gpu_pressure(const RestState& rest);
 
-/// One spring of node.springs.glsl.
-struct GpuSpring {
-    Float4 stiffness_a, stiffness_b, force_z;
-};
-struct GpuSprings {
-    std::vector<std::int32_t> index;  ///< N, spring of the node or −1
-    std::vector<GpuSpring> springs;
-};
-GpuSprings gpu_springs(const NodalConditions& conditions, int node_count);
-
 /// 3 × N in float64 to N float32 vectors of four, and back.
 std::vector<Float4> packed(const Eigen::Matrix3Xd& vectors);
 Eigen::Matrix3Xd unpacked(const std::vector<Float4>& vectors);

@@ -45,7 +45,7 @@ bool keeps_a_part(const RestState& rest) {
 
 /// Most storage blocks of the patches' programs.
 int storage_blocks(bool averages, const shaders::NodeEffects& effects) {
-    return 11 + int{averages} + 2 * int{effects.springs} + int{effects.external_force} + int{effects.fluid} +
+    return 10 + int{averages} + int{effects.springs} + int{effects.external_force} + int{effects.fluid} +
            int{effects.contact};
 }
 
@@ -112,8 +112,9 @@ GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& pro
     capacity_ = c;
     sizes_ = {c.slots, shape.workgroup, workgroups_ == c.patches};
     slot_count_ = layout.node_of_slot.size();
-    head_.emplace(device, layout.head, "heads of patches");
-    fans_.emplace(device, layout.fans, "fans of patches");
+    std::vector<Uint4> head = layout.head;
+    head.insert(head.end(), layout.fans.begin(), layout.fans.end());
+    head_.emplace(device, head, "heads and fans of patches");
     rest_.emplace(device, layout.rest, "rest data of patches");
     state_.emplace(device, 6 * slot_count_, "state of patches");
     sources_.emplace(device, layout.sources, "sources of forces");
@@ -125,7 +126,6 @@ GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& pro
     slot_of_node_.emplace(device, layout.slot_of_node, "slots of nodes");
     forces_.emplace(device, 2 * slot_count_ + 1, "forces of patches");
     blocks.set("PatchHead", *head_);
-    blocks.set("PatchFans", *fans_);
     blocks.set("PatchRest", *rest_);
     blocks.set("PatchState", *state_);
     blocks.set("PatchSources", *sources_);

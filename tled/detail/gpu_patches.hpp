@@ -58,7 +58,7 @@ private:
     PatchCapacity capacity_;
     int workgroups_;  ///< of a dispatch that persists
     shaders::PatchSizes sizes_;
-    std::optional<shaders::Buffer<Uint4>> head_, fans_;
+    std::optional<shaders::Buffer<Uint4>> head_;
     std::optional<shaders::Buffer<float>> rest_, state_, volumes_;
     std::optional<shaders::Buffer<std::uint32_t>> sources_, neighbours_, progress_, node_of_slot_, slot_of_node_;
     std::optional<shaders::Buffer<std::array<std::uint32_t, 2>>> largest_;
