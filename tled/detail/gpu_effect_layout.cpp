@@ -1,5 +1,6 @@
 #include "tled/detail/gpu_effect_layout.hpp"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 
 #include <algorithm>
