@@ -2,7 +2,7 @@
 /// out.
 #include "meshing/primitives.hpp"
 #include "tests/tled/engine_scene.hpp"
-#include "tled/detail/gpu_effect_layout.hpp"
+#include "tled/detail/interpolation_reach.hpp"
 
 #include <gmock/gmock.h>
 
@@ -318,7 +318,7 @@ TEST(GpuEffects, NoInterpolationIsFurtherBelowTheNearestSampleThanTheReach) {
         for (int i = 0; i < 64; ++i)
             obstacle.surface.distance.push_back(
                 static_cast<float>(((i + i / 4 + i / 16) % 2 == 0 ? 1 : -1) + 0.3 * noise(random)));
-        const double reach = detail::reach_of_interpolation(obstacle.surface);
+        const double reach = detail::interpolation_reach(obstacle.surface);
         for (int point = 0; point < 50; ++point) {
             const Vector3d x(1 + part(random), 1 + part(random), 1 + part(random));
             const auto nearest = [&](int axis) { return static_cast<std::size_t>(std::lround(x[axis])); };

@@ -25,7 +25,4 @@ std::vector<Float4> gpu_fluid(const NodalFluid& fluid);
 
 std::vector<std::uint32_t> gpu_contact(const NodalContact& contact, int node_count);
 
-/// What a sample can exceed the distance by at a point to which no other sample is nearer, mm.
-double reach_of_interpolation(const DistanceGrid& grid);
-
 }  // namespace tissuewarp::tled::detail
