@@ -1,6 +1,7 @@
 #include "shaders/catalogue.hpp"
 
 #include <array>
+#include <bit>
 #include <utility>
 
 namespace tissuewarp::shaders {
@@ -50,14 +51,28 @@ ProgramSource law_program(std::string kernel, Cell cell, const ElementForces& fo
     return source;
 }
 
+/// An effect's chunk where the scene has it, and its flag either way.
+void add_effect(ProgramSource& source, const char* chunk, const char* name, bool present) {
+    if (present) source.chunks.emplace_back(chunk);
+    source.defines[name] = flag(present);
+}
+
+/// Forces that depend on the node alone.
+void add_nodal_forces(ProgramSource& source, const NodeEffects& effects) {
+    add_effect(source, "node.springs", "HAS_SPRINGS", effects.springs);
+    add_effect(source, "node.external_force", "HAS_EXTERNAL_FORCE", effects.external_force);
+    add_effect(source, "node.fluid", "HAS_FLUID", effects.fluid);
+}
+
+void add_contact(ProgramSource& source, const NodeEffects& effects) {
+    add_effect(source, "node.contact", "HAS_CONTACT", effects.contact);
+}
+
 ProgramSource node_program(std::string kernel, const NodeEffects& effects) {
-    ProgramSource source{std::move(kernel), {"index", "bindings", "node"}, {}, {}};
-    if (effects.springs) source.chunks.emplace_back("node.springs");
-    if (effects.external_force) source.chunks.emplace_back("node.external_force");
+    ProgramSource source{std::move(kernel), {"index", "bindings", "node"}, {{"WORKGROUP_SIZE", workgroup_size}}, {}};
+    add_nodal_forces(source, effects);
+    add_effect(source, "node.surface_force", "HAS_SURFACE_FORCE", effects.surface_force);
     source.chunks.emplace_back("node.residual");
-    source.defines = {{"WORKGROUP_SIZE", workgroup_size},
-                      {"HAS_SPRINGS", flag(effects.springs)},
-                      {"HAS_EXTERNAL_FORCE", flag(effects.external_force)}};
     return source;
 }
 
@@ -134,8 +149,17 @@ ProgramSource nodal_pressure_program(Law law) {
     return source;
 }
 
+ProgramSource surface_force_program(const SurfaceForces& forces) {
+    ProgramSource source{"surface_force", {"index", "bindings", "surface"}, {{"WORKGROUP_SIZE", workgroup_size}}, {}};
+    add_effect(source, "surface.pressure", "HAS_PRESSURE", forces.pressure);
+    add_effect(source, "surface.membrane", "HAS_MEMBRANE", forces.membrane);
+    add_effect(source, "surface.sliding", "HAS_SLIDING", forces.sliding);
+    return source;
+}
+
 ProgramSource node_step_program(const NodeEffects& effects, StoreResidual store) {
     ProgramSource source = node_program("node_step", effects);
+    add_contact(source, effects);
     source.defines["STORES_RESIDUAL"] = flag(store == StoreResidual::Yes);
     return source;
 }
@@ -157,8 +181,8 @@ ProgramSource patch_step_program(Law law, const NodeEffects& effects, const Patc
         add_law(source, law);
         define("USES_SHEAR", flag(stages.forces));
     }
-    if (effects.springs) add("node.springs");
-    if (effects.external_force) add("node.external_force");
+    add_nodal_forces(source, effects);
+    add_contact(source, effects);
     for (const char* chunk : {"patch", "patch.exchange", "patch.nodes", "patch.units", "patch.fans"}) add(chunk);
     if (stages.averages) add("patch.pressure.averaged");
     if (stages.forces) {
@@ -173,8 +197,6 @@ ProgramSource patch_step_program(Law law, const NodeEffects& effects, const Patc
     define("AVERAGES", flag(stages.averages));
     define("PERSISTS", flag(stages.persists));
     define("STAYS", flag(stages.persists && sizes.each_has_one));
-    define("HAS_SPRINGS", flag(effects.springs));
-    define("HAS_EXTERNAL_FORCE", flag(effects.external_force));
     define("COHERENT", stages.persists ? "coherent" : "");
     define("SLOTS", std::to_string(sizes.slots) + "u");
     return source;
@@ -264,6 +286,54 @@ ProgramSource fma_rate_program() {
             {}};
 }
 
+namespace {
+
+/// None of these flags, each alone, each pair and all: what one effect's chunk takes from another's, a name or a
+/// binding, shows in a pair.
+template <class Effects, std::size_t count>
+std::vector<Effects> combinations(const std::array<bool Effects::*, count>& flags) {
+    std::vector<Effects> all;
+    for (unsigned chosen = 0; chosen < 1U << count; ++chosen) {
+        if (const int size = std::popcount(chosen); size > 2 && size < static_cast<int>(count)) continue;
+        Effects& effects = all.emplace_back();
+        for (std::size_t i = 0; i < count; ++i) effects.*flags[i] = (chosen >> i & 1U) != 0;
+    }
+    return all;
+}
+
+void add_node_passes(std::vector<ProgramSource>& all) {
+    using E = NodeEffects;
+    for (const NodeEffects& effects :
+         combinations<E, 5>({&E::springs, &E::external_force, &E::surface_force, &E::fluid, &E::contact}))
+        for (const StoreResidual store : {StoreResidual::No, StoreResidual::Yes})
+            all.push_back(node_step_program(effects, store));
+    for (const NodeEffects& effects :
+         combinations<E, 4>({&E::springs, &E::external_force, &E::surface_force, &E::fluid}))
+        for (const MaskConstrained mask : {MaskConstrained::No, MaskConstrained::Yes})
+            all.push_back(node_residual_program(effects, mask));
+    using S = SurfaceForces;
+    for (const SurfaceForces& forces : combinations<S, 3>({&S::pressure, &S::membrane, &S::sliding}))
+        if (forces.pressure || forces.membrane || forces.sliding) all.push_back(surface_force_program(forces));
+}
+
+/// Laws and effects do not meet in the code of a patch: every law with no effect and with all of them, one law with the
+/// other combinations.
+void add_patch_steps(std::vector<ProgramSource>& all) {
+    using E = NodeEffects;
+    const std::vector<NodeEffects> effects =
+        combinations<E, 4>({&E::springs, &E::external_force, &E::fluid, &E::contact});
+    for (const PatchStages& stages : every_patch_stages) {
+        for (int law = 0; law < law_count; ++law)
+            if (static_cast<Law>(law) != Law::TransverselyIsotropic)  // patches hold no fibres
+                for (const NodeEffects& each : {effects.front(), effects.back()})
+                    all.push_back(patch_step_program(static_cast<Law>(law), each, {}, stages));
+        for (std::size_t i = 1; i + 1 < effects.size(); ++i)
+            all.push_back(patch_step_program(Law::NeoHookeanIso, effects[i], {}, stages));
+    }
+}
+
+}  // namespace
+
 std::vector<ProgramSource> every_program() {
     std::vector<ProgramSource> all{element_volume_program(),        impose_program(),
                                    previous_displacement_program(), observe_nodes_program(),
@@ -278,18 +348,8 @@ std::vector<ProgramSource> every_program() {
             all.push_back(hexahedron_force_program({law, PressureRule::Element, viscosity, 3}));
         all.push_back(nodal_pressure_program(law));
     }
-    for (const bool springs : {false, true})
-        for (const bool external_force : {false, true}) {
-            const NodeEffects effects{springs, external_force};
-            for (const StoreResidual store : {StoreResidual::No, StoreResidual::Yes})
-                all.push_back(node_step_program(effects, store));
-            for (const MaskConstrained mask : {MaskConstrained::No, MaskConstrained::Yes})
-                all.push_back(node_residual_program(effects, mask));
-            for (int law = 0; law < law_count; ++law)
-                for (const PatchStages& stages : every_patch_stages)
-                    if (static_cast<Law>(law) != Law::TransverselyIsotropic)  // patches hold no fibres
-                        all.push_back(patch_step_program(static_cast<Law>(law), effects, {}, stages));
-        }
+    add_node_passes(all);
+    add_patch_steps(all);
     all.push_back(patch_load_program());
     all.push_back(patch_store_program());
     all.push_back(warp_clear_program());

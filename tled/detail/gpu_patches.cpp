@@ -13,7 +13,6 @@ using shaders::Program;
 /// Recorded steps are handed over in portions of this many, so that the device starts while the host still records.
 constexpr int steps_per_flush = 64;
 constexpr int steps_per_dispatch = 500;
-constexpr int storage_blocks = 14;  // of patch_step with all effects
 
 Law law_of(const RestState& rest) {
     return static_cast<Law>(rest.materials[static_cast<std::size_t>(rest.blocks.front().material)].index());
@@ -42,6 +41,12 @@ bool too_many_materials_meet(const RestState& rest) {
 /// Whether elements keep a part of an averaged pressure.
 bool keeps_a_part(const RestState& rest) {
     return rest.pressure.count() > 0 && rest.volumetric_modulus.cwiseAbs().maxCoeff() > 0;
+}
+
+/// Most storage blocks of the patches' programs.
+int storage_blocks(bool averages, const shaders::NodeEffects& effects) {
+    return 10 + int{averages} + int{effects.springs} + int{effects.external_force} + int{effects.fluid} +
+           int{effects.contact};
 }
 
 /// Bytes of shared memory that the patches' programs take.
@@ -82,7 +87,7 @@ constexpr std::array<PatchStages, 1> averaged_many_steps{
 
 bool GpuPatches::suit(const RestState& rest, const shaders::Device& device) {
     if (rest.blocks.empty() || rest.hexahedra.count() > 0 || keeps_a_part(rest) || !rest.viscosity.empty() ||
-        rest.fibre.cols() > 0 || device.limits().storage_blocks < storage_blocks)
+        rest.fibre.cols() > 0 || device.limits().storage_blocks < storage_blocks(rest.pressure.count() > 0, {}))
         return false;
     const auto follows_the_law = [&](const MaterialBlock& block) {
         return rest.materials[static_cast<std::size_t>(block.material)].index() ==
@@ -98,6 +103,7 @@ GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& pro
       law_(law_of(rest)),
       shape_(shape),
       averages_(rest.pressure.count() > 0),
+      storage_blocks_(device.limits().storage_blocks),
       node_count_(static_cast<std::size_t>(rest.node_count)) {
     const PatchLayout layout = fitting_layout(rest, shape, device.limits().shared_memory_bytes);
     const PatchCapacity& c = layout.capacity;
@@ -106,8 +112,9 @@ GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& pro
     capacity_ = c;
     sizes_ = {c.slots, shape.workgroup, workgroups_ == c.patches};
     slot_count_ = layout.node_of_slot.size();
-    head_.emplace(device, layout.head, "heads of patches");
-    fans_.emplace(device, layout.fans, "fans of patches");
+    std::vector<Uint4> head = layout.head;
+    head.insert(head.end(), layout.fans.begin(), layout.fans.end());
+    head_.emplace(device, head, "heads and fans of patches");
     rest_.emplace(device, layout.rest, "rest data of patches");
     state_.emplace(device, 6 * slot_count_, "state of patches");
     sources_.emplace(device, layout.sources, "sources of forces");
@@ -119,7 +126,6 @@ GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& pro
     slot_of_node_.emplace(device, layout.slot_of_node, "slots of nodes");
     forces_.emplace(device, 2 * slot_count_ + 1, "forces of patches");
     blocks.set("PatchHead", *head_);
-    blocks.set("PatchFans", *fans_);
     blocks.set("PatchRest", *rest_);
     blocks.set("PatchState", *state_);
     blocks.set("PatchSources", *sources_);
@@ -130,6 +136,10 @@ GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& pro
     blocks.set("PatchSlot", *slot_of_node_);
     blocks.set("PatchForces", *forces_);
     blocks.set("PatchVolumes", *volumes_);
+}
+
+bool GpuPatches::take(const shaders::NodeEffects& effects) const {
+    return !effects.surface_force && storage_blocks(averages_, effects) <= storage_blocks_;
 }
 
 void GpuPatches::run(int steps, const StepCoefficients& coefficients, const shaders::NodeEffects& effects,
