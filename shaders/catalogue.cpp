@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <utility>
 
 namespace tissuewarp::shaders {
@@ -53,14 +54,28 @@ ProgramSource law_program(std::string kernel, Cell cell, const ElementForces& fo
     return source;
 }
 
+/// An effect's chunk where the scene has it, and its flag either way.
+void add_effect(ProgramSource& source, const char* chunk, const char* name, bool present) {
+    if (present) source.chunks.emplace_back(chunk);
+    source.defines[name] = flag(present);
+}
+
+/// Forces that depend on the node alone.
+void add_nodal_forces(ProgramSource& source, const NodeEffects& effects) {
+    add_effect(source, "node.springs", "HAS_SPRINGS", effects.springs);
+    add_effect(source, "node.external_force", "HAS_EXTERNAL_FORCE", effects.external_force);
+    add_effect(source, "node.fluid", "HAS_FLUID", effects.fluid);
+}
+
+void add_contact(ProgramSource& source, const NodeEffects& effects) {
+    add_effect(source, "node.contact", "HAS_CONTACT", effects.contact);
+}
+
 ProgramSource node_program(std::string kernel, const NodeEffects& effects) {
-    ProgramSource source{std::move(kernel), {"index", "bindings", "node"}, {}, {}};
-    if (effects.springs) source.chunks.emplace_back("node.springs");
-    if (effects.external_force) source.chunks.emplace_back("node.external_force");
+    ProgramSource source{std::move(kernel), {"index", "bindings", "node"}, {{"WORKGROUP_SIZE", workgroup_size}}, {}};
+    add_nodal_forces(source, effects);
+    add_effect(source, "node.surface_force", "HAS_SURFACE_FORCE", effects.surface_force);
     source.chunks.emplace_back("node.residual");
-    source.defines = {{"WORKGROUP_SIZE", workgroup_size},
-                      {"HAS_SPRINGS", flag(effects.springs)},
-                      {"HAS_EXTERNAL_FORCE", flag(effects.external_force)}};
     return source;
 }
 
@@ -163,8 +178,17 @@ ProgramSource nodal_pressure_program(Law law) {
     return source;
 }
 
+ProgramSource surface_force_program(const SurfaceForces& forces) {
+    ProgramSource source{"surface_force", {"index", "bindings", "surface"}, {{"WORKGROUP_SIZE", workgroup_size}}, {}};
+    add_effect(source, "surface.pressure", "HAS_PRESSURE", forces.pressure);
+    add_effect(source, "surface.membrane", "HAS_MEMBRANE", forces.membrane);
+    add_effect(source, "surface.sliding", "HAS_SLIDING", forces.sliding);
+    return source;
+}
+
 ProgramSource node_step_program(const NodeEffects& effects, StoreResidual store) {
     ProgramSource source = node_program("node_step", effects);
+    add_contact(source, effects);
     source.defines["STORES_RESIDUAL"] = flag(store == StoreResidual::Yes);
     return source;
 }
@@ -192,8 +216,8 @@ ProgramSource patch_step_program(const PatchTissue& tissue, const NodeEffects& e
         add_law(source, tissue.law);
         define("USES_SHEAR", flag(stages.forces));
     }
-    if (effects.springs) add("node.springs");
-    if (effects.external_force) add("node.external_force");
+    add_nodal_forces(source, effects);
+    add_contact(source, effects);
     for (const char* chunk : {"patch", "patch.exchange", "patch.nodes", "patch.units", "patch.fans"}) add(chunk);
     if (stages.averages) add("patch.pressure.averaged");
     const bool stays = stages.persists && sizes.each_has_one;
@@ -211,8 +235,6 @@ ProgramSource patch_step_program(const PatchTissue& tissue, const NodeEffects& e
     define("PERSISTS", flag(stages.persists));
     define("STAYS", flag(stays));
     define("STRESSES_STAY", flag(stresses_stay));
-    define("HAS_SPRINGS", flag(effects.springs));
-    define("HAS_EXTERNAL_FORCE", flag(effects.external_force));
     define("COHERENT", stages.persists ? "coherent" : "");
     define("SLOTS", std::to_string(sizes.slots) + "u");
     return source;
@@ -314,17 +336,53 @@ ProgramSource fma_rate_program() {
 
 namespace {
 
-/// Every law in every stage, and viscous in those where that makes a difference, with all effects on nodes or none.
-void add_patch_steps(std::vector<ProgramSource>& all, const NodeEffects& effects) {
-    all.push_back(patch_step_program({}, effects, {}, {.advances = true}));
-    for (int index = 0; index < law_count; ++index) {
-        const auto law = static_cast<Law>(index);
-        for (const PatchStages& stages : every_patch_stages) {
-            all.push_back(patch_step_program({law}, effects, {}, stages));
-            if (!stages.forces || effects.springs != effects.external_force) continue;
-            all.push_back(patch_step_program({law, 3}, effects, {}, stages));
-            if (stages.persists) all.push_back(patch_step_program({law, 3}, effects, {.places = 64}, stages));
-        }
+/// None of these flags, each alone, each pair and all: what one effect's chunk takes from another's, a name or a
+/// binding, shows in a pair.
+template <class Effects, std::size_t count>
+std::vector<Effects> combinations(const std::array<bool Effects::*, count>& flags) {
+    std::vector<Effects> all;
+    for (unsigned chosen = 0; chosen < 1U << count; ++chosen) {
+        if (const int size = std::popcount(chosen); size > 2 && size < static_cast<int>(count)) continue;
+        Effects& effects = all.emplace_back();
+        for (std::size_t i = 0; i < count; ++i) effects.*flags[i] = (chosen >> i & 1U) != 0;
+    }
+    return all;
+}
+
+void add_node_passes(std::vector<ProgramSource>& all) {
+    using E = NodeEffects;
+    for (const NodeEffects& effects :
+         combinations<E, 5>({&E::springs, &E::external_force, &E::surface_force, &E::fluid, &E::contact}))
+        for (const StoreResidual store : {StoreResidual::No, StoreResidual::Yes})
+            all.push_back(node_step_program(effects, store));
+    for (const NodeEffects& effects :
+         combinations<E, 4>({&E::springs, &E::external_force, &E::surface_force, &E::fluid}))
+        for (const MaskConstrained mask : {MaskConstrained::No, MaskConstrained::Yes})
+            all.push_back(node_residual_program(effects, mask));
+    using S = SurfaceForces;
+    for (const SurfaceForces& forces : combinations<S, 3>({&S::pressure, &S::membrane, &S::sliding}))
+        if (forces.pressure || forces.membrane || forces.sliding) all.push_back(surface_force_program(forces));
+}
+
+/// Laws and effects do not meet in the code of a patch: every law, elastic and viscous, with no effect and with all of
+/// them, one law with the other combinations. Viscosity is in stages with forces, and may stay in shared memory where
+/// they go on.
+void add_patch_steps(std::vector<ProgramSource>& all) {
+    using E = NodeEffects;
+    const std::vector<NodeEffects> effects =
+        combinations<E, 4>({&E::springs, &E::external_force, &E::fluid, &E::contact});
+    for (const NodeEffects& each : effects) all.push_back(patch_step_program({}, each, {}, {.advances = true}));
+    for (const PatchStages& stages : every_patch_stages) {
+        for (int law = 0; law < law_count; ++law)
+            for (const NodeEffects& each : {effects.front(), effects.back()}) {
+                const PatchTissue elastic{static_cast<Law>(law)}, viscous{static_cast<Law>(law), 3};
+                all.push_back(patch_step_program(elastic, each, {}, stages));
+                if (stages.forces) all.push_back(patch_step_program(viscous, each, {}, stages));
+                if (stages.forces && stages.persists)
+                    all.push_back(patch_step_program(viscous, each, {.places = 64}, stages));
+            }
+        for (std::size_t i = 1; i + 1 < effects.size(); ++i)
+            all.push_back(patch_step_program({Law::NeoHookeanIso}, effects[i], {}, stages));
     }
 }
 
@@ -344,15 +402,8 @@ std::vector<ProgramSource> every_program() {
             all.push_back(hexahedron_force_program({law, PressureRule::Element, viscosity, 3}));
         all.push_back(nodal_pressure_program(law));
     }
-    for (const bool springs : {false, true})
-        for (const bool external_force : {false, true}) {
-            const NodeEffects effects{springs, external_force};
-            for (const StoreResidual store : {StoreResidual::No, StoreResidual::Yes})
-                all.push_back(node_step_program(effects, store));
-            for (const MaskConstrained mask : {MaskConstrained::No, MaskConstrained::Yes})
-                all.push_back(node_residual_program(effects, mask));
-            add_patch_steps(all, effects);
-        }
+    add_node_passes(all);
+    add_patch_steps(all);
     for (const bool fibres : {false, true})
         for (const PatchStresses direction : {PatchStresses::Load, PatchStresses::Store})
             all.push_back(

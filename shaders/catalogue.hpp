@@ -45,7 +45,20 @@ enum class Cell { Tetrahedron, Hexahedron };
 struct NodeEffects {
     bool springs = false;
     bool external_force = false;
+    bool surface_force = false;  ///< what surface_force_program leaves
+    bool fluid = false;
+    bool contact = false;
 };
+
+/// Effects whose force on a node depends on where others are: chunks surface.*.glsl.
+struct SurfaceForces {
+    bool pressure = false;
+    bool membrane = false;
+    bool sliding = false;
+};
+
+/// The most that a pass over elements or nodes declares; those over patches are counted in tled/detail/gpu_patches.cpp.
+inline constexpr int storage_blocks_of_passes = 11;
 
 enum class StoreResidual { No, Yes };
 enum class MaskConstrained { No, Yes };
@@ -55,7 +68,9 @@ ProgramSource element_force_program(const ElementForces& forces);
 ProgramSource hexahedron_force_program(const ElementForces& forces);
 ProgramSource element_volume_program();
 ProgramSource nodal_pressure_program(Law law);
+ProgramSource surface_force_program(const SurfaceForces& forces);
 ProgramSource node_step_program(const NodeEffects& effects, StoreResidual store);
+/// Does not know contact.
 ProgramSource node_residual_program(const NodeEffects& effects, MaskConstrained mask);
 
 /// Sizes that are constants of the programs over patches; those of the mesh are uniforms (chunks/patch.glsl).
@@ -76,7 +91,7 @@ struct PatchTissue {
     Law law = Law::NeoHookeanIso;
     int prony_terms = 0;  ///< of the scene's materials, the most; 0: elastic
 };
-/// One workgroup for each patch; springs and forces as effects name them.
+/// One workgroup for each patch; all effects but surface forces, whose nodes other patches may hold.
 ProgramSource patch_step_program(const PatchTissue& tissue, const NodeEffects& effects, const PatchSizes& sizes,
                                  const PatchStages& stages);
 bool has_fibres(Law law);

@@ -4,6 +4,7 @@
 
 #include "core/errors.hpp"
 #include "shaders/catalogue.hpp"
+#include "tled/detail/gpu_effects.hpp"
 #include "tled/detail/gpu_force.hpp"
 #include "tled/detail/gpu_patches.hpp"
 #include "tled/detail/hexahedra.hpp"
@@ -50,20 +51,14 @@ void require_shape(const Matrix3Xd& matrix, int node_count, const char* what) {
 }
 
 void require_limits(const shaders::Device& device) {
-    // node_step with all effects declares nine blocks; chunks/bindings.glsl counts to 24.
-    if (device.limits().storage_blocks < 9 || device.limits().storage_bindings < 24)
-        throw GpuUnavailable(device.renderer() + " offers " + std::to_string(device.limits().storage_blocks) +
-                             " storage blocks per shader and " + std::to_string(device.limits().storage_bindings) +
-                             " bindings; the solver needs 9 and 24; take the CPU engine");
+    const auto offers = [&](int count, const char* what, int needed) {
+        if (count >= needed) return;
+        throw GpuUnavailable(device.renderer() + " offers " + std::to_string(count) + " " + what +
+                             "; the solver needs " + std::to_string(needed) + "; take the CPU engine");
+    };
+    offers(device.limits().storage_blocks, "storage blocks per shader", shaders::storage_blocks_of_passes);
+    offers(device.limits().storage_bindings, "storage bindings", 24);  // to which chunks/bindings.glsl counts
 }
-
-/// Springs and external forces on the device, each only when the scene has it.
-struct Effects {
-    NodeEffects flags;
-    std::optional<Buffer<Float4>> external_force;
-    std::optional<Buffer<std::int32_t>> spring_index;
-    std::optional<Buffer<detail::GpuSpring>> springs;
-};
 
 class GpuEngine final : public Engine {
 public:
@@ -75,6 +70,7 @@ public:
           hex_(rest.hexahedra.hex),
           admits_inversion_(tled::admits_inversion(rest)),
           force_(device_, programs_, rest, blocks_),
+          effects_(device_, programs_, rest),
           displacement_(node_vectors("displacements")),
           increment_(node_vectors("increments")),
           inverse_mass_(node_vectors("inverse masses")),
@@ -97,6 +93,7 @@ public:
         upload_inverse_mass();
         if (shape.patch_tets > 0 && detail::GpuPatches::suit(rest, device_))
             patches_.emplace(device_, programs_, rest, shape, blocks_);
+        over_patches_ = patches_.has_value();
     }
 
     void set_conditions(const NodalConditions& conditions) override {
@@ -105,7 +102,8 @@ public:
                                " nodes; the model has " + std::to_string(node_count_));
         require_shape(conditions.imposed, node_count_, "the imposed displacement");
         const CurrentContext current = device_.make_current();
-        set_effects(conditions);
+        effects_.set(conditions, blocks_);
+        over_patches_ = patches_ && patches_->take(effects_.on_nodes());
         constrained_ = conditions.constrained;
         upload_inverse_mass();
         imposed_.upload(detail::packed(conditions.imposed));
@@ -163,14 +161,14 @@ public:
         if (steps <= 0) return;
         const CurrentContext current = device_.make_current();
         force_.set_time_step(coefficients.time_step);
-        if (patches_) {
+        if (over_patches_) {
             blocks_.set("Displacement", displacement_);
-            patches_->run(steps, coefficients, effects_.flags, blocks_);
+            patches_->run(steps, coefficients, effects_.on_nodes(), blocks_);
             previous_residual_known_ = false;
             return;
         }
-        const Program& step = node_program(shaders::node_step_program(effects_.flags, StoreResidual::No));
-        const Program& last = node_program(shaders::node_step_program(effects_.flags, StoreResidual::Yes));
+        const Program& step = node_program(shaders::node_step_program(effects_.on_nodes(), StoreResidual::No));
+        const Program& last = node_program(shaders::node_step_program(effects_.on_nodes(), StoreResidual::Yes));
         for (const Program* program : {&step, &last}) {
             program->set(1, static_cast<float>(coefficients.momentum));
             program->set(2, static_cast<float>(coefficients.gain));
@@ -178,8 +176,10 @@ public:
         blocks_.set("Displacement", displacement_);
         blocks_.set("Residual", previous_residual_);
         force_.bind(blocks_);
+        effects_.bind(blocks_);
         blocks_.bind(last);
         for (int i = 1; i <= steps; ++i) {
+            effects_.dispatch();
             force_.dispatch(detail::Advance::Yes);
             (i < steps ? step : last).dispatch(nodes());
             shaders::storage_barrier();
@@ -194,7 +194,7 @@ public:
 
     [[nodiscard]] Matrix3Xd residual() override {
         const CurrentContext current = device_.make_current();
-        evaluate(displacement_, effects_.flags, MaskConstrained::Yes, residual_);
+        evaluate(displacement_, effects_.on_nodes(), MaskConstrained::Yes, residual_);
         return downloaded(residual_);
     }
 
@@ -207,7 +207,7 @@ public:
     [[nodiscard]] Observation observe() override {
         const CurrentContext current = device_.make_current();
         if (!previous_residual_known_) find_previous_residual();
-        evaluate(displacement_, effects_.flags, MaskConstrained::Yes, residual_);
+        evaluate(displacement_, effects_.on_nodes(), MaskConstrained::Yes, residual_);
         reduce(node_program(shaders::observe_nodes_program()), node_partials_);
         Observation seen;
         const SmallestJacobian smallest = smallest_jacobian();
@@ -239,7 +239,7 @@ public:
     }
 
     [[nodiscard]] std::string description() const override {
-        const std::string steps = patches_ ? "patches " + name_of(patches_->shape()) : name_of(GpuStepShape{});
+        const std::string steps = over_patches_ ? "patches " + name_of(patches_->shape()) : name_of(GpuStepShape{});
         return "GPU " + device_.renderer() + " (OpenGL " + device_.version().substr(0, 3) + "), " + steps;
     }
 
@@ -275,27 +275,6 @@ private:
         inverse_mass_.upload(detail::packed(inverse));
     }
 
-    void set_effects(const NodalConditions& conditions) {
-        const Matrix3Xd& force = conditions.external_force;
-        effects_.external_force.reset();
-        effects_.spring_index.reset();
-        effects_.springs.reset();
-        effects_.flags.springs = !conditions.spring_node.empty();
-        effects_.flags.external_force = force.size() > 0 && !force.isZero(0.0);
-        if (effects_.flags.external_force) {
-            require_shape(force, node_count_, "the external force");
-            effects_.external_force.emplace(device_, detail::packed(force), "external forces");
-            blocks_.set("ExternalForce", *effects_.external_force);
-        }
-        if (effects_.flags.springs) {
-            const detail::GpuSprings springs = detail::gpu_springs(conditions, node_count_);
-            effects_.spring_index.emplace(device_, springs.index, "springs of nodes");
-            effects_.springs.emplace(device_, springs.springs, "springs");
-            blocks_.set("SpringIndex", *effects_.spring_index);
-            blocks_.set("Springs", *effects_.springs);
-        }
-    }
-
     void run_over_nodes(const Program& program) {
         blocks_.bind(program);
         program.dispatch(nodes());
@@ -315,6 +294,10 @@ private:
         blocks_.set("Displacement", displacement);
         blocks_.set("Residual", result);
         force_.bind(blocks_);
+        if (effects.surface_force) {
+            effects_.bind(blocks_);
+            effects_.dispatch();
+        }
         force_.dispatch();
         run_over_nodes(node_program(shaders::node_residual_program(effects, mask)));
         shaders::check_errors("residual");
@@ -324,7 +307,7 @@ private:
     void find_previous_residual() {
         blocks_.set("Displacement", displacement_);
         run_over_nodes(node_program(shaders::previous_displacement_program()));
-        evaluate(previous_displacement_, effects_.flags, MaskConstrained::Yes, previous_residual_);
+        evaluate(previous_displacement_, effects_.on_nodes(), MaskConstrained::Yes, previous_residual_);
         previous_residual_known_ = true;
     }
 
@@ -381,13 +364,14 @@ private:
     bool admits_inversion_;
     BlockBuffers blocks_;
     detail::GpuForce force_;
+    detail::GpuEffects effects_;
     std::optional<detail::GpuPatches> patches_;  ///< absent where patches do not know the scene
     Buffer<Float4> displacement_, increment_, inverse_mass_, residual_, previous_residual_, previous_displacement_,
         imposed_, kept_displacement_, kept_increment_;
     Buffer<NodePartial> node_partials_;
     Buffer<ElementPartial> element_partials_;
-    Effects effects_;
-    Matrix3Xd mass_;  ///< 3 × N
+    bool over_patches_ = false;  ///< whether steps take patches, which do not know all effects
+    Matrix3Xd mass_;             ///< 3 × N
     Mask constrained_;
     bool previous_residual_known_ = false;
 };

@@ -10,8 +10,7 @@
 #define BINDING_CORNER_FORCE 5         // mN
 #define BINDING_NODE_INCIDENCE 6
 #define BINDING_EXTERNAL_FORCE 7       // mN, xyz of node
-#define BINDING_SPRING_INDEX 8
-#define BINDING_SPRINGS 9
+#define BINDING_SPRINGS 8
 #define BINDING_RESIDUAL 10            // mN, xyz of node, zero where constrained
 #define BINDING_VOLUME_CHANGE 11
 #define BINDING_PRESSURE 12            // kPa
@@ -22,16 +21,17 @@
 #define BINDING_FIBRE 17               // unit vector of element
 #define BINDING_PRONY 18
 #define BINDING_VISCOUS_STRESS 19      // kPa
-#define BINDING_HEX_NODES 20
-#define BINDING_HEX_REST 21
+#define BINDING_SURFACE_EFFECTS 20
+#define BINDING_SURFACE_FORCE 21       // mN, xyz of node
+#define BINDING_FLUID 22
+#define BINDING_CONTACT 23
 
-// Steps over patches, whose programs share displacements, springs, external forces and materials with the others.
+// Steps over patches, whose programs share materials and the effects on nodes with the others.
 #define BINDING_PATCH_HEAD 3
 #define BINDING_PATCH_REST 4
 #define BINDING_PATCH_STATE 5
 #define BINDING_PATCH_FORCES 6
 #define BINDING_PATCH_SOURCES 10
-#define BINDING_PATCH_FANS 11
 #define BINDING_PATCH_LARGEST 12
 #define BINDING_PATCH_NEIGHBOURS 13
 #define BINDING_PATCH_PROGRESS 14

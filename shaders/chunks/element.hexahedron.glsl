@@ -1,5 +1,5 @@
 // Needs: bindings, deformation. Uniforms 0 and 1 are the range of hexahedra of the dispatch, uniform 2 the number of all
-// hexahedra, uniform 3 the number of tetrahedra, which come first in buffers of both.
+// hexahedra, uniform 3 the number of tetrahedra, which come first in buffers of both (element.glsl).
 // Gives: rest data and kinematics of the one-point hexahedron (tled/hex_state.hpp) in terms of H = F - I, and its hourglass
 // displacements. In place of element: kernels that need rest_element and displacement_gradient alone take either.
 
@@ -9,11 +9,12 @@ layout(location = 2) uniform uint element_count;
 layout(location = 3) uniform uint tetrahedron_count;
 
 layout(std430, binding = BINDING_DISPLACEMENT) readonly buffer Displacement { vec4 displacement[]; };
-/// Two planes of element_count entries: the corners 0 to 3 and 4 to 7.
-layout(std430, binding = BINDING_HEX_NODES) readonly buffer HexNodes { uvec4 hex_nodes[]; };
-/// Ten planes of element_count entries: seven gradients of N1 to N7 (1/mm) with volume, material, volumetric modulus and
-/// hourglass stiffness beside the first four (mm³, index, kPa, mN/mm), then the rows of XG, mm.
-layout(std430, binding = BINDING_HEX_REST) readonly buffer HexRest { vec4 hex_rest[]; };
+/// Behind the tetrahedra two planes of element_count entries: the corners 0 to 3 and 4 to 7.
+layout(std430, binding = BINDING_ELEMENT_NODES) readonly buffer ElementNodes { uvec4 element_nodes[]; };
+/// Behind the three planes of tetrahedra ten of element_count entries: seven gradients of N1 to N7 (1/mm) with volume,
+/// material, volumetric modulus and hourglass stiffness beside the first four (mm³, index, kPa, mN/mm), then the rows of
+/// XG, mm.
+layout(std430, binding = BINDING_ELEMENT_REST) readonly buffer ElementRest { vec4 element_rest[]; };
 
 struct RestElement {
     vec3 gradient[7];  // mean gradients of N1 to N7; that of N0 is minus their sum
@@ -25,17 +26,18 @@ struct RestElement {
 };
 
 RestElement rest_element(uint e) {
+    uint first = 3u * tetrahedron_count + e;
     RestElement rest;
     vec4 planes[7];
     for (uint k = 0u; k < 7u; ++k) {
-        planes[k] = hex_rest[k * element_count + e];
+        planes[k] = element_rest[first + k * element_count];
         rest.gradient[k] = planes[k].xyz;
     }
     rest.volume = planes[0].w;
     rest.material = planes[1].w;
     rest.volumetric_modulus = planes[2].w;
     rest.hourglass_stiffness = planes[3].w;
-    for (uint j = 0u; j < 3u; ++j) rest.rest_hourglass[j] = hex_rest[(7u + j) * element_count + e];
+    for (uint j = 0u; j < 3u; ++j) rest.rest_hourglass[j] = element_rest[first + (7u + j) * element_count];
     return rest;
 }
 
@@ -45,8 +47,8 @@ struct Motion {
 };
 
 Motion motion(uint e) {
-    uvec4 bottom = hex_nodes[e];
-    uvec4 top = hex_nodes[element_count + e];
+    uvec4 bottom = element_nodes[tetrahedron_count + e];
+    uvec4 top = element_nodes[tetrahedron_count + element_count + e];
     vec3 u0 = displacement[bottom.x].xyz;
     return Motion(vec3[7](displacement[bottom.y].xyz - u0, displacement[bottom.z].xyz - u0,
                           displacement[bottom.w].xyz - u0, displacement[top.x].xyz - u0, displacement[top.y].xyz - u0,

@@ -1,12 +1,13 @@
 // Needs: bindings, index, patch, patch.nodes.
 // Gives: fans, tetrahedra around a common edge a b, which load and leave each node once.
 
-/// fan_room for each patch: nodes a, b, c_0, c_1 … of a fan, 16 bits each, 0xffff behind the last: tetrahedra (a, b, c_i, c_(i+1)).
-layout(std430, binding = BINDING_PATCH_FANS) readonly buffer PatchFans { uvec4 patch_fans[]; };
-
 const uint no_node = 0xffffu;
 
-uvec4 fan_of(Patch here, uint f) { return patch_fans[here.index * fan_room + min(f, fan_room - 1u)]; }
+/// Nodes a, b, c_0, c_1 … of a fan, 16 bits each, no_node behind the last: tetrahedra (a, b, c_i, c_(i+1)). fan_room for each
+/// patch, behind the heads of all.
+uvec4 fan_of(Patch here, uint f) {
+    return patch_head[3u * patch_count + here.index * fan_room + min(f, fan_room - 1u)];
+}
 
 /// The nodes of the ring behind c_0 in the order of the fan; next_of_ring takes the first away.
 struct Ring {

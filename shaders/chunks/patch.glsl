@@ -14,7 +14,7 @@ layout(location = 11) uniform uint workgroup_count;
 layout(location = 12) uniform float contributions;  // most nodes of fans that are one node
 
 /// Three for each patch: (slots | fans << 16; material | entries of sources before the pairs << 16; bits of the volumetric modulus, kPa; neighbours | shared slots << 16),
-/// then the slots of the planes 0 to 15 of its sources, 16 bits each.
+/// then the slots of the planes 0 to 15 of its sources, 16 bits each. Behind those of all patches their fans (patch.fans).
 layout(std430, binding = BINDING_PATCH_HEAD) readonly buffer PatchHead { uvec4 patch_head[]; };
 /// source_room for each patch, in planes: plane j holds the slot of the j-th of the patches that share the node of a slot, for
 /// as many slots as have so many sharers, three at least. Behind them, of each node that two share, the other's slot.

@@ -1,15 +1,17 @@
-// Needs: bindings, patch; node.springs and node.external_force where their flags are 1.
+// Needs: bindings, patch; the chunks node.* of the effects whose flags are 1.
 // Gives: the nodes of a patch in shared memory: load_node, node, advance_node, store_displacement.
 //! define STAYS
 //! define HAS_SPRINGS
 //! define HAS_EXTERNAL_FORCE
+//! define HAS_FLUID
+//! define HAS_CONTACT
 
 /// Planes of all slots: X.x, X.y, X.z (mm, from a point of the patch), inverse mass or, where its components differ, a
 /// negative number, its components, and 1 / V_a (1/mm³) of the averaged pressure.
 layout(std430, binding = BINDING_PATCH_REST) readonly buffer PatchRest { float patch_rest[]; };
 /// Planes of all slots: u.x, u.y, u.z, v.x, v.y, v.z, mm.
 layout(std430, binding = BINDING_PATCH_STATE) buffer PatchState { float patch_state[]; };
-#if HAS_SPRINGS || HAS_EXTERNAL_FORCE
+#if HAS_SPRINGS || HAS_EXTERNAL_FORCE || HAS_FLUID || HAS_CONTACT
 layout(std430, binding = BINDING_PATCH_NODE) readonly buffer PatchNode { uint node_of_slot[]; };
 #endif
 
@@ -68,8 +70,15 @@ void advance_node(uint s, uint i, vec3 f, float momentum, float gain) {
 #if HAS_EXTERNAL_FORCE
     residual += external_force(node_of_slot[s]);
 #endif
-    vec3 v = momentum * state_plane(s, 3u) + gain * (residual * inverse_mass(s));
+#if HAS_FLUID
+    residual += fluid_force(node_of_slot[s], u);
+#endif
+    vec3 weight = inverse_mass(s);
+    vec3 v = momentum * state_plane(s, 3u) + gain * (residual * weight);
     u += v;
+#if HAS_CONTACT
+    settle(node_of_slot[s], equal(weight, vec3(0.0)), u, v);
+#endif
     store_state(s, 3u, v);
     node_b[i].y = u.x;
     node_c[i] = u.yz;

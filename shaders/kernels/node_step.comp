@@ -3,6 +3,7 @@
 // Needs: index, bindings, node, the effects' chunks, node.residual. The element_force pass has run.
 // STORES_RESIDUAL 1 leaves the residual that the step used, zero where constrained.
 //! define STORES_RESIDUAL
+//! define HAS_CONTACT
 
 layout(location = 1) uniform float momentum;
 layout(location = 2) uniform float gain;
@@ -21,7 +22,11 @@ void main() {
     vec3 weight = inverse_mass[a].xyz;
     vec3 residual = nodal_residual(a, u);
     vec3 v = momentum * increment[a].xyz + gain * (residual * weight);
-    displacement[a] = vec4(u + v, 0.0);
+    u += v;
+#if HAS_CONTACT
+    settle(a, equal(weight, vec3(0.0)), u, v);
+#endif
+    displacement[a] = vec4(u, 0.0);
     increment[a] = vec4(v, 0.0);
 #if STORES_RESIDUAL
     residual_of_node[a] = vec4(mix(residual, vec3(0.0), equal(weight, vec3(0.0))), 0.0);

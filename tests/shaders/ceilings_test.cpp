@@ -52,8 +52,8 @@ TEST_F(CeilingsTest, AChainTakesEveryMultiplyAdd) {
     }
 }
 
-// Units: a rate that is off by a factor of a thousand is no rate of any device of OpenGL 4.5. A software rasteriser under
-// sanitizers on a busy machine has been seen to copy 9e7 bytes a second.
+// Units: a rate that is off by a factor of a thousand is no rate of any device of OpenGL 4.5. A software rasteriser
+// under sanitizers on a busy machine has been seen to copy 9e7 bytes a second.
 TEST_F(CeilingsTest, RatesAreThoseOfSomeDevice) {
     const Ceilings ceilings = measured_ceilings(device, 0.0);
     EXPECT_GT(ceilings.copy_bytes_per_second, 1e7);

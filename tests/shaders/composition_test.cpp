@@ -2,16 +2,18 @@
 #include "core/errors.hpp"
 #include "shaders/catalogue.hpp"
 #include "shaders/program_source.hpp"
+#include "tests/shaders/effect_chunks.hpp"
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <set>
 
 namespace tissuewarp::shaders {
 namespace {
 
 using ::testing::HasSubstr;
-using ::testing::Not;
+using namespace effect_chunks;
 
 const SourceLibrary library{
     {"kernels/k.comp", "//! define WITH_A\n#if WITH_A\nint x = a();\n#endif\nvoid main() {}\n"},
@@ -103,15 +105,33 @@ TEST(Composition, EveryEmbeddedFileOpensWithItsContract) {
     for (const auto& [name, text] : embedded_sources()) EXPECT_TRUE(text.starts_with("//")) << name;
 }
 
+/// Whether an effect's file, its storage block and its flag are all there, or none of them; any mixture fails.
+template <class Flags>
+void expect_effect(bool present, const EffectChunk<Flags>& effect, const ProgramSource& source) {
+    const ComposedSource composed = compose(source);
+    SCOPED_TRACE(source.kernel + (present ? " with " : " without ") + effect.file);
+    EXPECT_EQ(std::count(composed.files.begin(), composed.files.end(), effect.file), present ? 1 : 0);
+    EXPECT_THAT(composed.text, HasSubstr(std::string("#define ") + effect.name + (present ? " 1\n" : " 0\n")));
+    const bool has_block = present || effect.block == std::string("SurfaceEffects");  // which they share
+    EXPECT_EQ(composed.text.find(std::string("buffer ") + effect.block + " ") != std::string::npos, has_block);
+}
+
 TEST(Composition, ChunksOfAbsentEffectsAreAbsent) {
-    const std::string text = compose(node_step_program({}, StoreResidual::No)).text;
-    EXPECT_THAT(text, Not(HasSubstr("buffer Springs")));
-    EXPECT_THAT(text, Not(HasSubstr("buffer ExternalForce")));
-    EXPECT_THAT(text, HasSubstr("#define HAS_SPRINGS 0\n"));
-    const std::string with = compose(node_step_program({true, true}, StoreResidual::No)).text;
-    EXPECT_THAT(with, HasSubstr("buffer Springs"));
-    EXPECT_THAT(with, HasSubstr("buffer ExternalForce"));
-    EXPECT_THAT(with, HasSubstr("#define HAS_SPRINGS 1\n"));
+    for (const EffectChunk<NodeEffects>& effect : on_nodes) {
+        const bool in_residuals = effect.flag != &NodeEffects::contact;
+        const bool in_patches = effect.flag != &NodeEffects::surface_force;
+        for (const bool present : {false, true}) {
+            const NodeEffects effects = present ? all_on_nodes : without(all_on_nodes, effect);
+            expect_effect(present, effect, node_step_program(effects, StoreResidual::Yes));
+            if (in_residuals) expect_effect(present, effect, node_residual_program(effects, MaskConstrained::Yes));
+            if (in_patches)
+                expect_effect(present, effect, patch_step_program({Law::NeoHookeanIso}, effects, {}, whole_step));
+        }
+    }
+    for (const EffectChunk<SurfaceForces>& effect : on_surfaces) {
+        expect_effect(true, effect, surface_force_program(all_on_surfaces));
+        expect_effect(false, effect, surface_force_program(without(all_on_surfaces, effect)));
+    }
 }
 
 // Elastic tissue without fibres pays for neither.
@@ -119,10 +139,10 @@ TEST(Composition, StepsOverPatchesHoldNoTraceOfAbsentTissue) {
     const PatchStages stages{.advances = true, .forces = true};
     const ComposedSource plain = compose(patch_step_program({Law::NeoHookeanLnJ}, {}, {}, stages));
     for (const std::string& file : plain.files) {
-        EXPECT_THAT(file, Not(HasSubstr("fibre")));
-        EXPECT_THAT(file, Not(HasSubstr("viscosity")));
-        EXPECT_THAT(file, Not(HasSubstr("patch.tissue")));
-        EXPECT_THAT(file, Not(HasSubstr("patch.stresses")));
+        EXPECT_THAT(file, ::testing::Not(HasSubstr("fibre")));
+        EXPECT_THAT(file, ::testing::Not(HasSubstr("viscosity")));
+        EXPECT_THAT(file, ::testing::Not(HasSubstr("patch.tissue")));
+        EXPECT_THAT(file, ::testing::Not(HasSubstr("patch.stresses")));
     }
     EXPECT_THAT(plain.text, HasSubstr("#define HAS_FIBRES 0\n"));
     EXPECT_THAT(plain.text, HasSubstr("#define HAS_VISCOSITY 0\n"));
@@ -131,9 +151,9 @@ TEST(Composition, StepsOverPatchesHoldNoTraceOfAbsentTissue) {
     };
     using ::testing::Contains;
     EXPECT_THAT(files({Law::TransverselyIsotropic}), Contains("chunks/patch.fibre.glsl"));
-    EXPECT_THAT(files({Law::TransverselyIsotropic}), Not(Contains("chunks/patch.viscosity.glsl")));
+    EXPECT_THAT(files({Law::TransverselyIsotropic}), ::testing::Not(Contains("chunks/patch.viscosity.glsl")));
     EXPECT_THAT(files({Law::NeoHookeanLnJ, 1}), Contains("chunks/patch.viscosity.glsl"));
-    EXPECT_THAT(files({Law::NeoHookeanLnJ, 1}), Not(Contains("chunks/patch.fibre.glsl")));
+    EXPECT_THAT(files({Law::NeoHookeanLnJ, 1}), ::testing::Not(Contains("chunks/patch.fibre.glsl")));
 }
 
 // Room that no program uses would take other workgroups' place.

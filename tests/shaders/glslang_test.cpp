@@ -1,5 +1,6 @@
 /// Every program against the reference compiler of the GLSL standard.
 #include "shaders/catalogue.hpp"
+#include "tests/shaders/effect_chunks.hpp"
 
 #include <gmock/gmock.h>
 
@@ -13,6 +14,8 @@
 
 namespace tissuewarp::shaders {
 namespace {
+
+using namespace effect_chunks;
 
 /// Output and exit status of glslangValidator on the composed text.
 std::pair<std::string, int> glslang(const std::string& text, const std::string& options) {
@@ -58,34 +61,50 @@ TEST(Glslang, RefusesAWrongProgram) {
     EXPECT_THAT(output, ::testing::HasSubstr("nonsense"));
 }
 
+/// Whether the word of an effect is left behind the preprocessor, which takes comments and flags away.
+void expect_word(bool present, const std::string& word, const ProgramSource& source) {
+    const auto [text, status] = glslang(compose(source).text, "-S comp -E");
+    ASSERT_EQ(status, 0) << text;
+    EXPECT_THAT(text, ::testing::HasSubstr("void main()"));
+    EXPECT_EQ(lower(text).find(word) != std::string::npos, present) << word << " in " << program_key(source);
+}
+
 TEST(Glslang, NothingOfAnAbsentEffectIsLeftBehindThePreprocessor) {
-    for (const StoreResidual store : {StoreResidual::No, StoreResidual::Yes}) {
-        const auto [bare, status] = glslang(compose(node_step_program({}, store)).text, "-S comp -E");
-        ASSERT_EQ(status, 0) << bare;
-        EXPECT_THAT(bare, ::testing::HasSubstr("gathered_force"));
-        EXPECT_THAT(lower(bare), ::testing::Not(::testing::HasSubstr("spring")));
-        EXPECT_THAT(lower(bare), ::testing::Not(::testing::HasSubstr("external")));
+    for (const EffectChunk<NodeEffects>& effect : on_nodes) {
+        const bool in_residuals = effect.flag != &NodeEffects::contact;
+        const bool in_patches = effect.flag != &NodeEffects::surface_force;
+        for (const bool present : {false, true}) {
+            const NodeEffects effects = present ? all_on_nodes : without(all_on_nodes, effect);
+            for (const StoreResidual store : {StoreResidual::No, StoreResidual::Yes})
+                expect_word(present, effect.word, node_step_program(effects, store));
+            expect_word(present && in_residuals, effect.word, node_residual_program(effects, MaskConstrained::Yes));
+            expect_word(present && in_patches, effect.word,
+                        patch_step_program({Law::NeoHookeanIso}, effects, {}, whole_step));
+        }
     }
-    const auto [full, status] = glslang(compose(node_step_program({true, true}, StoreResidual::No)).text, "-S comp -E");
-    ASSERT_EQ(status, 0) << full;
-    EXPECT_THAT(full, ::testing::HasSubstr("spring_force"));
-    EXPECT_THAT(full, ::testing::HasSubstr("external_force"));
+    for (const EffectChunk<SurfaceForces>& effect : on_surfaces) {
+        expect_word(true, effect.word, surface_force_program(all_on_surfaces));
+        expect_word(false, effect.word, surface_force_program(without(all_on_surfaces, effect)));
+    }
 }
 
 TEST(Glslang, NothingOfAbsentTissueIsLeftInStepsOverPatches) {
+    const PatchTissue plain{Law::NeoHookeanLnJ}, fibres{Law::TransverselyIsotropic}, viscous{Law::NeoHookeanLnJ, 2};
     for (const bool persists : {false, true}) {
         const PatchStages stages{.advances = true, .forces = true, .persists = persists};
-        const auto [bare, status] =
-            glslang(compose(patch_step_program({Law::NeoHookeanLnJ}, {}, {}, stages)).text, "-S comp -E");
-        ASSERT_EQ(status, 0) << bare;
-        EXPECT_THAT(bare, ::testing::HasSubstr("add_fan"));
-        for (const char* trace : {"fibre", "visc", "prony", "tissue", "place", "stresses"})
-            EXPECT_THAT(lower(bare), ::testing::Not(::testing::HasSubstr(trace)));
-        const auto [full, full_status] =
-            glslang(compose(patch_step_program({Law::TransverselyIsotropic, 2}, {}, {}, stages)).text, "-S comp -E");
-        ASSERT_EQ(full_status, 0) << full;
-        for (const char* trace : {"fibre", "visc", "prony", "tissue", "place"})
-            EXPECT_THAT(lower(full), ::testing::HasSubstr(trace));
+        const auto expect = [&](bool present, const char* word, const PatchTissue& tissue) {
+            expect_word(present, word, patch_step_program(tissue, {}, {}, stages));
+        };
+        for (const char* word : {"patch_tissue", "next_place", "begin_fan("}) {
+            expect(false, word, plain);
+            expect(true, word, fibres);
+            expect(true, word, viscous);
+        }
+        expect(true, "fibre", fibres);
+        for (const char* word : {"visc", "prony", "stresses"}) expect(true, word, viscous);
+        for (const char* word : {"fibre", "visc", "prony", "stresses"}) expect(false, word, plain);
+        for (const char* word : {"visc", "prony", "stresses"}) expect(false, word, fibres);
+        expect(false, "fibre", viscous);
     }
 }
 

@@ -90,11 +90,6 @@ GpuForce::GpuForce(const shaders::Device& device, shaders::ProgramCache& program
     blocks.set("CornerForce", corner_force_);
     blocks.set("MaterialParameters", *materials_);
     if (fibre_) blocks.set("Fibre", *fibre_);
-    if (hex_count_ > 0) {
-        hexahedra_.emplace(device, gpu_hexahedra(rest.hexahedra));
-        blocks.set("HexNodes", hexahedra_->nodes);
-        blocks.set("HexRest", hexahedra_->rest);
-    }
     std::vector<MaterialBlock> pressure_blocks;
     if (rest.pressure.count() > 0) {
         const GpuPressure layout = gpu_pressure(rest);

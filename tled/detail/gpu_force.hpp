@@ -71,16 +71,7 @@ private:
         shaders::Buffer<std::uint32_t> incidence;
     };
 
-    /// Rest data of hexahedra; absent in scenes without them.
-    struct Hexahedra {
-        Hexahedra(const shaders::Device& device, const GpuHexahedra& layout)
-            : nodes(device, layout.nodes, "nodes of hexahedra"), rest(device, layout.rest, "rest data of hexahedra") {}
-        shaders::Buffer<Uint4> nodes;
-        shaders::Buffer<Float4> rest;
-    };
-
     std::size_t element_count_, hex_count_;
-    std::optional<Hexahedra> hexahedra_;
     std::optional<shaders::Buffer<Uint4>> nodes_;
     std::optional<shaders::Buffer<Float4>> rest_, materials_, fibre_;
     std::optional<shaders::Buffer<std::uint32_t>> incidence_;

@@ -50,6 +50,39 @@ std::vector<std::uint32_t> node_incidence(const RestState& rest) {
     return result;
 }
 
+/// What chunks/element.hexahedron.glsl reads behind the data of tetrahedra.
+void append_hexahedra(const HexState& hexahedra, GpuElements& elements) {
+    const auto plane = static_cast<std::size_t>(hexahedra.count());
+    const std::size_t first_node = elements.nodes.size(), first_rest = elements.rest.size();
+    elements.nodes.resize(first_node + 2 * plane);
+    elements.rest.resize(first_rest + 10 * plane);
+    const std::vector<int> material = material_of_elements(hexahedra.blocks);
+    for (int e = 0; e < hexahedra.count(); ++e) {
+        const auto at = static_cast<std::size_t>(e);
+        for (int corner = 0; corner < 8; ++corner)
+            elements.nodes[first_node + static_cast<std::size_t>(corner / 4) * plane + at]
+                          [static_cast<std::size_t>(corner % 4)] =
+                static_cast<std::uint32_t>(hexahedra.nodes(corner, e));
+        const std::array<double, 7> last{hexahedra.volume[e],
+                                         static_cast<double>(material[at]),
+                                         hexahedra.volumetric_modulus[e],
+                                         hexahedra.hourglass_stiffness[e],
+                                         0,
+                                         0,
+                                         0};
+        for (std::size_t k = 0; k < 7; ++k) {
+            const auto row = static_cast<Eigen::Index>(3 * k);
+            elements.rest[first_rest + k * plane + at] = {single(hexahedra.gradient(row, e)),
+                                                          single(hexahedra.gradient(row + 1, e)),
+                                                          single(hexahedra.gradient(row + 2, e)), single(last[k])};
+        }
+        for (std::size_t j = 0; j < 3; ++j)
+            for (std::size_t alpha = 0; alpha < 4; ++alpha)
+                elements.rest[first_rest + (7 + j) * plane + at][alpha] =
+                    single(hexahedra.rest_hourglass(static_cast<Eigen::Index>(3 * alpha + j), e));
+    }
+}
+
 }  // namespace
 
 GpuElements gpu_elements(const RestState& rest) {
@@ -73,39 +106,9 @@ GpuElements gpu_elements(const RestState& rest) {
                                              single(rest.gradient(row + 2, e)), single(last[k])};
         }
     }
+    append_hexahedra(rest.hexahedra, elements);
     elements.node_incidence = node_incidence(rest);
     return elements;
-}
-
-GpuHexahedra gpu_hexahedra(const HexState& hexahedra) {
-    const auto plane = static_cast<std::size_t>(hexahedra.count());
-    GpuHexahedra result;
-    result.nodes.resize(2 * plane);
-    result.rest.resize(10 * plane);
-    const std::vector<int> material = material_of_elements(hexahedra.blocks);
-    for (int e = 0; e < hexahedra.count(); ++e) {
-        const auto at = static_cast<std::size_t>(e);
-        for (int corner = 0; corner < 8; ++corner)
-            result.nodes[static_cast<std::size_t>(corner / 4) * plane + at][static_cast<std::size_t>(corner % 4)] =
-                static_cast<std::uint32_t>(hexahedra.nodes(corner, e));
-        const std::array<double, 7> last{hexahedra.volume[e],
-                                         static_cast<double>(material[at]),
-                                         hexahedra.volumetric_modulus[e],
-                                         hexahedra.hourglass_stiffness[e],
-                                         0,
-                                         0,
-                                         0};
-        for (std::size_t k = 0; k < 7; ++k) {
-            const auto row = static_cast<Eigen::Index>(3 * k);
-            result.rest[k * plane + at] = {single(hexahedra.gradient(row, e)), single(hexahedra.gradient(row + 1, e)),
-                                           single(hexahedra.gradient(row + 2, e)), single(last[k])};
-        }
-        for (std::size_t j = 0; j < 3; ++j)
-            for (std::size_t alpha = 0; alpha < 4; ++alpha)
-                result.rest[(7 + j) * plane + at][alpha] =
-                    single(hexahedra.rest_hourglass(static_cast<Eigen::Index>(3 * alpha + j), e));
-    }
-    return result;
 }
 
 GpuPressure gpu_pressure(const RestState& rest) {
@@ -122,18 +125,6 @@ GpuPressure gpu_pressure(const RestState& rest) {
     for (const int entry : nodes.incidence.entry) pressure.incidence.push_back(static_cast<std::uint32_t>(entry / 4));
     for (int e = 0; e < rest.element_count(); ++e) pressure.corners.push_back(column(nodes.of_element, e));
     return pressure;
-}
-
-GpuSprings gpu_springs(const NodalConditions& conditions, int node_count) {
-    GpuSprings result;
-    result.index.assign(static_cast<std::size_t>(node_count), -1);
-    for (std::size_t s = 0; s < conditions.spring_node.size(); ++s) {
-        result.index[static_cast<std::size_t>(conditions.spring_node[s])] = static_cast<std::int32_t>(s);
-        const auto k = [&](int row) { return single(conditions.spring_stiffness(row, static_cast<Eigen::Index>(s))); };
-        const auto f = [&](int row) { return single(conditions.spring_force(row, static_cast<Eigen::Index>(s))); };
-        result.springs.push_back({{k(0), k(1), k(2), k(3)}, {k(4), k(5), f(0), f(1)}, {f(2), 0.0F, 0.0F, 0.0F}});
-    }
-    return result;
 }
 
 std::vector<Float4> packed(const Eigen::Matrix3Xd& vectors) {

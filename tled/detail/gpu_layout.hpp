@@ -16,20 +16,13 @@ using Float4 = std::array<float, 4>;
 using Uint4 = std::array<std::uint32_t, 4>;
 
 struct GpuElements {
-    std::vector<Uint4> nodes;                   ///< M
-    std::vector<Float4> rest;                   ///< 3 M
+    std::vector<Uint4> nodes;                   ///< M, then 2 of each hexahedron
+    std::vector<Float4> rest;                   ///< 3 M, then 10 of each hexahedron
     std::vector<Float4> materials;              ///< two for each material
     std::vector<Float4> fibre;                  ///< M, then those of hexahedra; or empty
     std::vector<std::uint32_t> node_incidence;  ///< N + 1 offsets, 4 M (+ 8 hexahedra) positions of corner forces
 };
 GpuElements gpu_elements(const RestState& rest);
-
-/// What chunks/element.hexahedron.glsl reads.
-struct GpuHexahedra {
-    std::vector<Uint4> nodes;  ///< 2 M
-    std::vector<Float4> rest;  ///< 10 M
-};
-GpuHexahedra gpu_hexahedra(const HexState& hexahedra);
 
 struct GpuPressure {
     std::vector<Uint4> corners;            ///< M
@@ -38,16 +31,6 @@ struct GpuPressure {
     std::vector<MaterialBlock> blocks;     ///< ranges of pressure nodes
 };
 GpuPressure gpu_pressure(const RestState& rest);
-
-/// One spring of node.springs.glsl.
-struct GpuSpring {
-    Float4 stiffness_a, stiffness_b, force_z;
-};
-struct GpuSprings {
-    std::vector<std::int32_t> index;  ///< N, spring of the node or −1
-    std::vector<GpuSpring> springs;
-};
-GpuSprings gpu_springs(const NodalConditions& conditions, int node_count);
 
 /// 3 × N in float64 to N float32 vectors of four, and back.
 std::vector<Float4> packed(const Eigen::Matrix3Xd& vectors);

@@ -40,9 +40,10 @@ bool keeps_a_part(const RestState& rest) {
     return rest.pressure.count() > 0 && rest.volumetric_modulus.cwiseAbs().maxCoeff() > 0;
 }
 
-/// Storage blocks of patch_step with all effects.
-int storage_blocks(const RestState& rest) {
-    return 14 + (rest.pressure.count() > 0 ? 1 : 0) + (rest.fibre.cols() > 0 || !rest.viscosity.empty() ? 1 : 0);
+/// Most storage blocks of the patches' programs.
+int storage_blocks(bool averages, bool tissue, const shaders::NodeEffects& effects) {
+    return 10 + int{averages} + int{tissue} + int{effects.springs} + int{effects.external_force} + int{effects.fluid} +
+           int{effects.contact};
 }
 
 /// Bytes of shared memory that the patches' programs take.
@@ -96,8 +97,9 @@ constexpr std::array<PatchStages, 1> averaged_many_steps{
 }  // namespace
 
 bool GpuPatches::suit(const RestState& rest, const shaders::Device& device) {
+    const bool tissue = rest.fibre.cols() > 0 || !rest.viscosity.empty();
     if (rest.blocks.empty() || rest.hexahedra.count() > 0 || keeps_a_part(rest) ||
-        device.limits().storage_blocks < storage_blocks(rest))
+        device.limits().storage_blocks < storage_blocks(rest.pressure.count() > 0, tissue, {}))
         return false;
     const auto follows_the_law = [&](const MaterialBlock& block) {
         return rest.materials[static_cast<std::size_t>(block.material)].index() ==
@@ -112,6 +114,7 @@ GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& pro
     : programs_(programs),
       shape_(shape),
       averages_(rest.pressure.count() > 0),
+      storage_blocks_(device.limits().storage_blocks),
       node_count_(static_cast<std::size_t>(rest.node_count)) {
     const PatchLayout layout = fitting_layout(rest, shape, device.limits().shared_memory_bytes);
     const PatchCapacity& c = layout.capacity;
@@ -123,8 +126,9 @@ GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& pro
     if (many_steps_ && sizes_.each_has_one)
         sizes_.places = places_that_stay(*tissue_, c, averages_, workgroups_, device.limits());
     slot_count_ = layout.node_of_slot.size();
-    head_.emplace(device, layout.head, "heads of patches");
-    fans_.emplace(device, layout.fans, "fans of patches");
+    std::vector<Uint4> head = layout.head;
+    head.insert(head.end(), layout.fans.begin(), layout.fans.end());
+    head_.emplace(device, head, "heads and fans of patches");
     rest_.emplace(device, layout.rest, "rest data of patches");
     state_.emplace(device, 6 * slot_count_, "state of patches");
     sources_.emplace(device, layout.sources, "sources of forces");
@@ -136,7 +140,6 @@ GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& pro
     slot_of_node_.emplace(device, layout.slot_of_node, "slots of nodes");
     forces_.emplace(device, 2 * slot_count_ + 1, "forces of patches");
     blocks.set("PatchHead", *head_);
-    blocks.set("PatchFans", *fans_);
     blocks.set("PatchRest", *rest_);
     blocks.set("PatchState", *state_);
     blocks.set("PatchSources", *sources_);
@@ -147,6 +150,10 @@ GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& pro
     blocks.set("PatchSlot", *slot_of_node_);
     blocks.set("PatchForces", *forces_);
     blocks.set("PatchVolumes", *volumes_);
+}
+
+bool GpuPatches::take(const shaders::NodeEffects& effects) const {
+    return !effects.surface_force && storage_blocks(averages_, !tissue_->empty(), effects) <= storage_blocks_;
 }
 
 void GpuPatches::run(int steps, const StepCoefficients& coefficients, const shaders::NodeEffects& effects,

@@ -20,6 +20,9 @@ public:
     GpuPatches(const shaders::Device& device, shaders::ProgramCache& programs, const RestState& rest,
                const GpuStepShape& shape, BlockBuffers& blocks);
 
+    /// Whether steps over patches know these effects, and the device has storage blocks for them.
+    [[nodiscard]] bool take(const shaders::NodeEffects& effects) const;
+
     /// Advances what is bound as Displacement and Increment, and as ViscousStress where tissue is viscous.
     void run(int steps, const StepCoefficients& coefficients, const shaders::NodeEffects& effects,
              const BlockBuffers& blocks);
@@ -53,11 +56,12 @@ private:
     std::optional<TissueOfPatches> tissue_;
     GpuStepShape shape_;
     bool averages_, many_steps_;
+    int storage_blocks_;  ///< that the device offers a program
     std::size_t node_count_, slot_count_;
     PatchCapacity capacity_;
     int workgroups_;  ///< of a dispatch that persists
     shaders::PatchSizes sizes_;
-    std::optional<shaders::Buffer<Uint4>> head_, fans_;
+    std::optional<shaders::Buffer<Uint4>> head_;
     std::optional<shaders::Buffer<float>> rest_, state_, volumes_;
     std::optional<shaders::Buffer<std::uint32_t>> sources_, neighbours_, progress_, node_of_slot_, slot_of_node_;
     std::optional<shaders::Buffer<std::array<std::uint32_t, 2>>> largest_;

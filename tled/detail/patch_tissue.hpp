@@ -20,6 +20,8 @@ public:
 
     /// The law, and the most terms of viscosity.
     [[nodiscard]] const shaders::PatchTissue& kind() const { return kind_; }
+    /// Neither fibres nor viscosity.
+    [[nodiscard]] bool empty() const { return !tissue_; }
     [[nodiscard]] bool viscous() const { return kind_.prony_terms > 0; }
     /// Bytes of shared memory of `places` tetrahedra's viscous stresses.
     [[nodiscard]] std::size_t stress_bytes(std::size_t places) const;

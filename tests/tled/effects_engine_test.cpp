@@ -1,0 +1,335 @@
+/// Effects in every engine, alone, in pairs and all at once, against their plain float64 forces and the step written
+/// out.
+#include "meshing/primitives.hpp"
+#include "tests/tled/engine_scene.hpp"
+#include "tled/detail/interpolation_reach.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+#include <string>
+#include <tuple>
+
+namespace tissuewarp::tled {
+namespace {
+
+using namespace scene;
+using Eigen::Matrix3Xi;
+using ::testing::HasSubstr;
+
+/// As in engine_scene.hpp, and a GPU whose one workgroup takes many steps over all patches in a dispatch, which a
+/// software rasteriser runs too.
+struct EngineUnderTest {
+    const char* name;
+    std::unique_ptr<Engine> (*make)(const RestState&);
+};
+constexpr GpuStepShape many_steps_at_once{.patch_tets = 100, .longest_fan = 5, .workgroup = 64, .at_once = 1};
+const std::array<EngineUnderTest, 5> engines{{
+    {"CpuFloat64", [](const RestState& rest) { return make_engine(Kind::CpuFloat64, rest); }},
+    {"CpuFloat32", [](const RestState& rest) { return make_engine(Kind::CpuFloat32, rest); }},
+    {"Gpu", [](const RestState& rest) { return make_gpu_engine(rest, -1, GpuStepShape{}); }},
+    {"GpuPatches", [](const RestState& rest) { return make_engine(Kind::GpuPatches, rest); }},
+    {"GpuPatchesManySteps", [](const RestState& rest) { return make_gpu_engine(rest, -1, many_steps_at_once); }},
+}};
+
+enum Effect : unsigned { Pressures = 1, Membranes = 2, Sliding = 4, Fluids = 8, Contacts = 16 };
+constexpr unsigned every_effect = 31;
+
+std::string name_of_effects(unsigned effects) {
+    std::string name;
+    for (const auto& [effect, word] :
+         {std::pair{Pressures, "Pressure"}, std::pair{Membranes, "Membrane"}, std::pair{Sliding, "Sliding"},
+          std::pair{Fluids, "Fluid"}, std::pair{Contacts, "Contact"}})
+        if (effects & effect) name += word;
+    return name.empty() ? "None" : name;
+}
+
+/// Each alone, every pair, all at once.
+std::vector<unsigned> combinations() {
+    std::vector<unsigned> all;
+    for (unsigned effects = 1; effects <= every_effect; ++effects)
+        if (std::popcount(effects) <= 2 || effects == every_effect) all.push_back(effects);
+    return all;
+}
+
+/// A body's distance on a grid of oblique steps of about 2 mm over the cube at `centre` and 12 mm around.
+DistanceGrid sampled(const Vector3d& centre, const std::function<double(const Vector3d&)>& distance) {
+    DistanceGrid grid;
+    grid.steps << 2, 0.2, 0, -0.1, 1.9, 0.1, 0.15, 0, 2.1;
+    grid.size = {28, 27, 26};
+    grid.origin = centre - grid.steps * (0.5 * (grid.size.cast<double>() - Vector3d::Ones()));
+    for (int k = 0; k < grid.size[2]; ++k)
+        for (int j = 0; j < grid.size[1]; ++j)
+            for (int i = 0; i < grid.size[0]; ++i)
+                grid.distance.push_back(static_cast<float>(distance(grid.origin + grid.steps * Vector3d(i, j, k))));
+    return grid;
+}
+
+/// A jittered cube of 30 mm a metre from the origin, where float32 positions would lose the last 0.06 µm.
+struct Scene {
+    Vector3d corner{1000, -700, 400};
+    Model model;
+    Matrix3Xd local;  ///< positions from the corner
+    Conditions plain;
+    RestState rest;
+
+    explicit Scene(Cells cells) : model(cube(4, cells, Laws::Iso)), local(model.mesh.nodes) {
+        plain = mixed_conditions(model.mesh);
+        model.mesh.nodes.colwise() += corner;
+        rest = rest_state(model);
+    }
+
+    [[nodiscard]] Matrix3Xi boundary_faces() const {
+        const meshing::BoundarySurface boundary = meshing::boundary_surface(model.mesh);
+        Matrix3Xi faces = boundary.surface.triangles;
+        for (int& node : faces.reshaped()) node = boundary.node_of[static_cast<std::size_t>(node)];
+        return faces;
+    }
+
+    [[nodiscard]] Matrix3Xd start() const { return wavy(local, 0.3); }
+
+    /// A body by its distance up to a constant, grown until it is 0.02 mm from where the tissue starts: a node that
+    /// starts inside would be thrown out at its depth a step.
+    [[nodiscard]] Obstacle touching(const std::function<double(const Vector3d&)>& distance, const Vector3d& shift,
+                                    double friction) const {
+        double least = std::numeric_limits<double>::infinity();
+        const Matrix3Xd x = model.mesh.nodes + start();
+        for (Eigen::Index a = 0; a < x.cols(); ++a) least = std::min(least, distance(x.col(a)));
+        const Vector3d middle = corner + Vector3d(15, 15, 15);
+        return {sampled(middle - shift, [&](const Vector3d& at) { return distance(at + shift) - least + 0.02; }), shift,
+                friction};
+    }
+
+    /// A slightly oblique wall with friction that the tissue bulges into, and a ball without that was moved to its
+    /// place.
+    [[nodiscard]] RigidContact contact() const {
+        RigidContact contact;
+        for (int node = 0; node < rest.node_count; ++node) contact.nodes.push_back(node);
+        const Vector3d n = Vector3d(0.05, -1, 0.02).normalized(), ball = corner + Vector3d(45, 17, 16);
+        contact.obstacles.push_back(touching([&](const Vector3d& x) { return n.dot(x); }, Vector3d::Zero(), 0.3));
+        contact.obstacles.push_back(touching([&](const Vector3d& x) { return (x - ball).norm(); }, {4, -1, 2}, 0.0));
+        return contact;
+    }
+
+    [[nodiscard]] Conditions conditions(unsigned effects) const {
+        Conditions conditions = plain;
+        const Matrix3Xi faces = boundary_faces(), half = faces.leftCols(faces.cols() / 2);
+        if (effects & Pressures) conditions.effects.pressures = {{faces, 0.4}, {half, -0.3}};
+        if (effects & Membranes) conditions.effects.membranes = {{faces, 12.0, 0.5}, {half, 20.0, 0.2}};
+        const Vector3d n = Vector3d(1, -2, 0.5).normalized();
+        if (effects & Sliding)
+            conditions.effects.sliding = {{60, 62, n, 6.0}, {62, 87, Vector3d::UnitZ(), 5.0}, {90, 60, n, 4.0}};
+        if (effects & Fluids)
+            conditions.effects.fluid =
+                Fluid{1e-6,
+                      {1000, 2000, -9500},
+                      Vector3d(-1000, -2000, 9500).normalized().dot(corner + Vector3d(15, 15, 17))};
+        if (effects & Contacts) conditions.effects.contact = contact();
+        return conditions;
+    }
+
+    [[nodiscard]] NodalConditions nodal(unsigned effects) const { return nodal_conditions(conditions(effects), rest); }
+};
+
+Matrix3Xd effect_force(const RestState& rest, const NodalConditions& conditions, const Matrix3Xd& u) {
+    Matrix3Xd force = surface_force(conditions.effects.surface, rest.position, u);
+    if (conditions.effects.fluid) force += fluid_force(*conditions.effects.fluid, u);
+    return force;
+}
+
+/// f_ext + f_spring + effects − f_int in plain float64.
+Matrix3Xd whole_residual(const RestState& rest, const NodalConditions& conditions, const Matrix3Xd& u) {
+    const Matrix3Xd zero = Matrix3Xd::Zero(3, rest.node_count);
+    return plain_residual(rest, conditions, u) + conditions.constrained.select(zero, effect_force(rest, conditions, u));
+}
+
+void settle(const NodalConditions& conditions, PlainState& state) {
+    if (!conditions.effects.contact) return;
+    const NodalContact& contact = *conditions.effects.contact;
+    for (std::size_t i = 0; i < contact.node.size(); ++i) {
+        const int a = contact.node[i];
+        const Motion motion = in_contact(contact.obstacles, contact.rest_position.col(static_cast<Eigen::Index>(i)),
+                                         {state.u.col(a), state.v.col(a)});
+        for (int c = 0; c < 3; ++c) {
+            if (conditions.constrained(c, a)) continue;
+            state.u(c, a) = motion.u[c];
+            state.v(c, a) = motion.v[c];
+        }
+    }
+}
+
+/// u⁺ = u + ρ v + c M⁻¹ r, then contact.
+void plain_steps(const RestState& rest, const NodalConditions& conditions, int steps,
+                 const StepCoefficients& coefficients, PlainState& state) {
+    state.u = conditions.constrained.select(conditions.imposed, state.u).eval();
+    state.v = conditions.constrained.select(Matrix3Xd::Zero(3, rest.node_count), state.v).eval();
+    for (int step = 0; step < steps; ++step) {
+        const Matrix3Xd residual = whole_residual(rest, conditions, state.u);
+        state.v = coefficients.momentum * state.v + coefficients.gain * residual.cwiseQuotient(lumped(rest)).eval();
+        state.u += state.v;
+        settle(conditions, state);
+    }
+}
+
+class EffectsInEngines : public ::testing::TestWithParam<std::tuple<EngineUnderTest, Cells, unsigned>> {
+protected:
+    unsigned effects = std::get<2>(GetParam());
+    Scene scene{std::get<1>(GetParam())};
+    const RestState& rest = scene.rest;
+    Matrix3Xd zero = Matrix3Xd::Zero(3, rest.node_count);
+    NodalConditions conditions = scene.nodal(effects);
+    StepCoefficients coefficients = stable_coefficients(scene.model, rest);
+    Matrix3Xd start = scene.start();
+
+    [[nodiscard]] std::unique_ptr<Engine> fresh_engine() const { return std::get<0>(GetParam()).make(rest); }
+    std::unique_ptr<Engine> engine = fresh_engine();
+};
+
+std::string name_of_case(const ::testing::TestParamInfo<EffectsInEngines::ParamType>& each) {
+    return std::string(std::get<0>(each.param).name) + name_of(std::get<1>(each.param)) +
+           name_of_effects(std::get<2>(each.param));
+}
+
+INSTANTIATE_TEST_SUITE_P(T4, EffectsInEngines,
+                         ::testing::Combine(::testing::ValuesIn(engines), ::testing::Values(Cells::T4),
+                                            ::testing::ValuesIn(combinations())),
+                         name_of_case);
+// Other dispatches of patches, and elements that gather in another way.
+INSTANTIATE_TEST_SUITE_P(OtherCells, EffectsInEngines,
+                         ::testing::Combine(::testing::ValuesIn(engines),
+                                            ::testing::Values(Cells::AveragedPressure, Cells::Mixed),
+                                            ::testing::Values(Fluids | Contacts, every_effect)),
+                         name_of_case);
+
+// A wrong sign or node looks like an error of the order of the force itself, 10 to 100 %.
+TEST_P(EffectsInEngines, ResidualIsThePlainOne) {
+    engine->set_conditions(conditions);
+    std::mt19937 random(7);
+    std::uniform_real_distribution<double> noise(-0.3, 0.3);
+    const Matrix3Xd bent = wavy(scene.local), u = bent + zero.unaryExpr([&](double) { return noise(random); });
+    for (const Matrix3Xd& at : {u, bent}) {
+        engine->set_state(at, zero);
+        const Matrix3Xd held = conditions.constrained.select(conditions.imposed, at);
+        const Matrix3Xd expected = whole_residual(rest, conditions, held);
+        EXPECT_LT(largest(engine->residual() - expected), 1e-5 * largest(internal_force(rest, held)));
+        // Reactions are of the tissue alone.
+        const Matrix3Xd internal = internal_force(rest, held);
+        EXPECT_LT(largest(engine->internal_force() - internal), 1e-5 * largest(internal));
+    }
+}
+
+// Edges of float32 positions a metre away would be off by 6e-5 mm, a tenth of the strain here; a membrane that takes
+// the difference of F and F C⁻¹/det C loses four of seven digits.
+TEST_P(EffectsInEngines, SmallStrainsKeepTheirDigits) {
+    const Matrix3Xd u = wavy(scene.local, 1e-3);
+    const auto force_of = [&](const NodalConditions& each) -> Matrix3Xd {
+        engine->set_conditions(each);
+        engine->set_state(u, zero);
+        return engine->residual();
+    };
+    // Nothing but effects acts, next to internal forces that are as small.
+    const NodalConditions bare = nodal_conditions({}, rest);
+    NodalConditions with = bare;
+    with.effects = conditions.effects;
+    const Matrix3Xd expected = effect_force(rest, with, u);
+    const Matrix3Xd force = force_of(with) - force_of(bare);
+    EXPECT_LT(largest(force - expected), 1e-5 * largest(expected) + 1e-6 * largest(internal_force(rest, u)));
+}
+
+TEST_P(EffectsInEngines, AHundredStepsFollowThePlainLoop) {
+    engine->set_conditions(conditions);
+    engine->set_state(start, zero);
+    engine->run(100, coefficients);
+    PlainState plain{start, zero, zero};
+    plain_steps(rest, conditions, 100, coefficients, plain);
+    PlainState without{start, zero, zero};
+    plain_steps(rest, scene.nodal(0), 100, coefficients, without);
+    EXPECT_GT(largest(plain.u - without.u), 0.01 * largest(plain.u)) << "the effects do not matter here";
+    EXPECT_LT(largest(engine->displacement() - plain.u), 1e-5 * largest(plain.u));
+    EXPECT_LT(largest(engine->increment() - plain.v), 2e-4 * largest(plain.v));
+}
+
+TEST_P(EffectsInEngines, RepeatsBitByBitAndInPortions) {
+    const auto run = [&](Engine& each, std::initializer_list<int> portions) {
+        each.set_conditions(conditions);
+        each.set_state(start, zero);
+        for (const int steps : portions) {
+            each.run(steps, coefficients);
+            each.residual();
+        }
+        return std::pair{each.displacement(), each.increment()};
+    };
+    const auto first = run(*engine, {60});
+    EXPECT_EQ(run(*engine, {60}), first);
+    EXPECT_EQ(run(*engine, {1, 12, 47}), first);
+    EXPECT_EQ(run(*fresh_engine(), {60}), first);
+}
+
+TEST_P(EffectsInEngines, NothingIsLeftOfEffectsThatAreGone) {
+    const auto plain_run = [&](Engine& each) {
+        each.set_conditions(scene.nodal(0));
+        each.set_state(start, zero);
+        each.run(40, coefficients);
+        return std::tuple{each.displacement(), each.increment(), each.observe().increment_stiffness};
+    };
+    engine->set_conditions(conditions);
+    engine->set_state(start, zero);
+    engine->run(20, coefficients);
+    EXPECT_EQ(plain_run(*engine), plain_run(*fresh_engine()));
+}
+
+// Where some effects take other passes than the rest, each goes on from where the other stopped.
+TEST_P(EffectsInEngines, EffectsMayComeAndGoBetweenRuns) {
+    PlainState plain{start, zero, zero};
+    engine->set_state(start, zero);
+    const unsigned contact = effects & Contacts;  // nodes must not have entered before it begins
+    for (const unsigned now : {contact, effects, contact, contact | Fluids, effects, 0U}) {
+        const NodalConditions here = scene.nodal(now);
+        engine->set_conditions(here);
+        engine->run(25, coefficients);
+        plain_steps(rest, here, 25, coefficients, plain);
+    }
+    EXPECT_LT(largest(engine->displacement() - plain.u), 1e-5 * largest(plain.u));
+}
+
+TEST(GpuEffects, SurfaceEffectsTakeTwoPassesWhileTheyLast) {
+    const Scene scene(Cells::T4);
+    const auto engine = make_engine(Kind::GpuPatches, scene.rest);
+    EXPECT_THAT(engine->description(), HasSubstr("patches"));
+    for (const unsigned effect : {Pressures, Membranes, Sliding}) {
+        engine->set_conditions(scene.nodal(effect));
+        EXPECT_THAT(engine->description(), HasSubstr("two passes")) << name_of_effects(effect);
+        engine->set_conditions(scene.nodal(Fluids | Contacts));
+        EXPECT_THAT(engine->description(), HasSubstr("patches"));
+    }
+}
+
+// Contact looks at one sample before it takes 64. Too small a reach looks like a node deep inside an obstacle.
+TEST(GpuEffects, NoInterpolationIsFurtherBelowTheNearestSampleThanTheReach) {
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> noise(-1, 1), part(0, 1);
+    double closest = 0;
+    for (int trial = 0; trial < 200; ++trial) {
+        Obstacle obstacle;
+        obstacle.surface.size = {4, 4, 4};
+        // Samples that alternate come closest to the bound.
+        for (int i = 0; i < 64; ++i)
+            obstacle.surface.distance.push_back(
+                static_cast<float>(((i + i / 4 + i / 16) % 2 == 0 ? 1 : -1) + 0.3 * noise(random)));
+        const double reach = detail::interpolation_reach(obstacle.surface);
+        for (int point = 0; point < 50; ++point) {
+            const Vector3d x(1 + part(random), 1 + part(random), 1 + part(random));
+            const auto nearest = [&](int axis) { return static_cast<std::size_t>(std::lround(x[axis])); };
+            const double sample = double{obstacle.surface.distance[nearest(0) + 4 * (nearest(1) + 4 * nearest(2))]};
+            const double below = sample - distance_to(obstacle, x).value;
+            ASSERT_LT(below, reach);
+            closest = std::max(closest, below / reach);
+        }
+    }
+    EXPECT_GT(closest, 0.1) << "the test does not come near the bound";
+}
+
+}  // namespace
+}  // namespace tissuewarp::tled

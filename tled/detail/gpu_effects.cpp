@@ -1,0 +1,83 @@
+#include "tled/detail/gpu_effects.hpp"
+
+#include "core/errors.hpp"
+
+#include <string>
+
+namespace tissuewarp::tled::detail {
+
+GpuEffects::GpuEffects(const shaders::Device& device, shaders::ProgramCache& programs, const RestState& rest)
+    : device_(device), programs_(programs), position_(rest.position) {}
+
+void GpuEffects::set(const NodalConditions& conditions, BlockBuffers& blocks) {
+    set_springs(conditions, blocks);
+    set_external_force(conditions.external_force, blocks);
+    set_surface(conditions.effects.surface, blocks);
+    set_fluid(conditions.effects.fluid, blocks);
+    set_contact(conditions.effects.contact, blocks);
+    on_nodes_ = {.springs = springs_.has_value(),
+                 .external_force = external_force_.has_value(),
+                 .surface_force = surface_.has_value(),
+                 .fluid = fluid_.has_value(),
+                 .contact = contact_.has_value()};
+}
+
+void GpuEffects::set_springs(const NodalConditions& conditions, BlockBuffers& blocks) {
+    springs_.reset();
+    if (conditions.spring_node.empty()) return;
+    springs_.emplace(device_, gpu_springs(conditions, static_cast<int>(position_.cols())), "springs");
+    blocks.set("Springs", *springs_);
+}
+
+void GpuEffects::set_external_force(const Eigen::Matrix3Xd& force, BlockBuffers& blocks) {
+    external_force_.reset();
+    if (force.size() == 0 || force.isZero(0.0)) return;
+    if (force.cols() != position_.cols())
+        throw InvalidInput("the external force has " + std::to_string(force.cols()) + " columns; the model has " +
+                           std::to_string(position_.cols()) + " nodes");
+    external_force_.emplace(device_, packed(force), "external forces");
+    blocks.set("ExternalForce", *external_force_);
+}
+
+void GpuEffects::set_surface(const SurfaceEffects& effects, BlockBuffers& blocks) {
+    surface_pass_.reset();
+    surface_.reset();
+    if (effects.empty()) return;
+    const GpuSurface layout = gpu_surface(effects, position_);
+    surface_.emplace(device_, layout, static_cast<std::size_t>(position_.cols()));
+    blocks.set("SurfaceEffects", surface_->words);
+    blocks.set("SurfaceForce", surface_->force);
+    const shaders::SurfaceForces forces{.pressure = layout.pressure_lists > 0,
+                                        .membrane = layout.membrane_lists > 0,
+                                        .sliding = layout.sliding_lists > 0};
+    const shaders::Program& program = programs_.get(shaders::surface_force_program(forces));
+    program.set(0, static_cast<std::uint32_t>(effects.node.size()));
+    if (forces.pressure) program.set(1, layout.pressure_lists);
+    if (forces.membrane) program.set(2, layout.membrane_lists);
+    if (forces.sliding) program.set(3, layout.sliding_lists);
+    surface_pass_ = Pass{&program, effects.node.size()};
+}
+
+void GpuEffects::set_fluid(const std::optional<NodalFluid>& fluid, BlockBuffers& blocks) {
+    fluid_.reset();
+    if (!fluid) return;
+    fluid_.emplace(device_, gpu_fluid(*fluid), "columns of the fluid");
+    blocks.set("Fluid", *fluid_);
+}
+
+void GpuEffects::set_contact(const std::optional<NodalContact>& contact, BlockBuffers& blocks) {
+    contact_.reset();
+    if (!contact) return;
+    contact_.emplace(device_, gpu_contact(*contact, static_cast<int>(position_.cols())), "obstacles");
+    blocks.set("Contact", *contact_);
+}
+
+void GpuEffects::bind(const BlockBuffers& blocks) const {
+    if (surface_pass_) blocks.bind(*surface_pass_->program);
+}
+
+void GpuEffects::dispatch() const {
+    if (surface_pass_) surface_pass_->program->dispatch(surface_pass_->invocations);
+}
+
+}  // namespace tissuewarp::tled::detail

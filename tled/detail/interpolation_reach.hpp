@@ -1,0 +1,12 @@
+#pragma once
+/// How little of a distance grid must be read where contact is far.
+
+#include "tled/effects.hpp"
+
+namespace tissuewarp::tled::detail {
+
+/// The most by which the sample nearest to a point exceeds the interpolated distance there (distance_to), mm: where
+/// that sample is larger, the point is outside the obstacle.
+double interpolation_reach(const DistanceGrid& grid);
+
+}  // namespace tissuewarp::tled::detail
