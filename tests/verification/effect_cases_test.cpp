@@ -3,6 +3,7 @@
 #include "tests/verification/problems.hpp"
 #include "tests/verification/solution.hpp"
 #include "tled/contact.hpp"
+#include "tled/step_shape_cache.hpp"
 
 #include "core/errors.hpp"
 
@@ -25,6 +26,7 @@ const NamedEngine float64{
 const NamedEngine float32{
     "CpuFloat32", [](const tled::RestState& rest) { return tled::make_cpu_engine(rest, tled::Scalar::Float32); }};
 
+const NamedEngine gpu{"Gpu", [](const tled::RestState& rest) { return tled::make_gpu_engine(rest); }};
 void PrintTo(const NamedEngine& engine, std::ostream* out) {
     *out << engine.name;
 }
@@ -38,11 +40,14 @@ std::string name_of(const ::testing::TestParamInfo<Effects::ParamType>& each) {
     return name;
 }
 INSTANTIATE_TEST_SUITE_P(All, Effects,
-                         ::testing::Combine(::testing::Values(float64, float32), ::testing::ValuesIn(effect_cases())),
+                         ::testing::Combine(::testing::Values(float64, float32, gpu),
+                                            ::testing::ValuesIn(effect_cases())),
                          name_of);
 
 TEST_P(Effects, AnswersAsTheReference) {
     const auto& [engine, effect] = GetParam();
+    if (engine.name == gpu.name && effect.effect == "pressure" && !tled::step_device(-1).hardware)
+        GTEST_SKIP() << "some minutes on a software rasteriser; effects_engine_test.cpp has its forces there";
     EXPECT_NEAR(effect.measure(engine.make), effect.reference, effect.bound)
         << effect.scene << ", " << effect.quantity << " (" << effect.unit << "), from " << effect.source;
 }
