@@ -188,8 +188,11 @@ void measure_tissue(const meshing::TetMesh& mesh, const std::string& mesh_name, 
     for (const char* element : {"t4", "averaged"}) {
         if (!options.element.empty() && options.element != element) continue;
         const std::vector<Variant> variants = tissues(scene, element);
-        for (const tled::GpuStepShape& shape : tissue_shapes(variants.front().rest, options))
-            report_tissues(variants, scene, shape, std::string(element) + " " + mesh_name, options);
+        for (const tled::GpuStepShape& shape : tissue_shapes(variants.front().rest, options)) try {
+                report_tissues(variants, scene, shape, std::string(element) + " " + mesh_name, options);
+            } catch (const GpuUnavailable& reason) {  // of this shape: the others may still run
+                std::printf("| | %s | | %s | %s |\n", mesh_name.c_str(), name_of(shape).c_str(), reason.what());
+            }
     }
 }
 

@@ -13,8 +13,8 @@ layout(std430, binding = BINDING_PATCH_TISSUE) buffer PatchTissue { vec2 patch_t
 layout(std430, binding = BINDING_PATCH_TISSUE) readonly buffer PatchTissue { vec2 patch_tissue[]; };
 #endif
 
-uint place;        // of the tetrahedron in hand
-uint place_here;   // the same among those of the patch, where fans have fan_room places in each turn
+uint place;       // of the tetrahedron in hand
+uint place_here;  // the same among those of the patch, where fans have fan_room places in each turn
 
 /// Before the first tetrahedron of fan f.
 void begin_fan(Patch here, uint f) {
