@@ -114,6 +114,7 @@ public:
                 displacement_[at] = T(displacement(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(node)));
                 increment_[at] = T(increment(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(node)));
             }
+        if (contact_) contact_->forget_clearances();
         for (detail::ViscousBatches<T>& viscous : viscous_)
             std::fill(viscous.stress.begin(), viscous.stress.end(), T(0));
     }
@@ -134,6 +135,7 @@ public:
         displacement_ = kept_.displacement;
         increment_ = kept_.increment;
         viscous_ = kept_.viscous;
+        if (contact_) contact_->forget_clearances();
     }
 
     void run(int steps, const StepCoefficients& coefficients) override {

@@ -159,20 +159,27 @@ Distance distance_to(const Obstacle& obstacle, const Vector3d& position) {
     const Eigen::Vector3i first = corner.cast<int>() - Eigen::Vector3i::Ones();
     const CubicWeights x = cubic_weights(at[0] - corner[0]), y = cubic_weights(at[1] - corner[1]),
                        z = cubic_weights(at[2] - corner[2]);
+    const auto nx = static_cast<std::size_t>(grid.size[0]), ny = static_cast<std::size_t>(grid.size[1]);
+    const float* d = grid.distance.data() + static_cast<std::size_t>(first[0]) +
+                     nx * (static_cast<std::size_t>(first[1]) + ny * static_cast<std::size_t>(first[2]));
     double value = 0;
     Vector3d slope = Vector3d::Zero();
-    for (std::size_t k = 0; k < 4; ++k)
-        for (std::size_t j = 0; j < 4; ++j)
+    for (std::size_t k = 0; k < 4; ++k) {
+        double of_layer = 0, along_x = 0, along_y = 0;
+        for (std::size_t j = 0; j < 4; ++j) {
+            const float* row = d + nx * (j + ny * k);
+            double of_row = 0, slope_of_row = 0;
             for (std::size_t i = 0; i < 4; ++i) {
-                const auto sample = [&](int axis, std::size_t n) { return static_cast<std::size_t>(first[axis]) + n; };
-                const std::size_t nx = static_cast<std::size_t>(grid.size[0]),
-                                  ny = static_cast<std::size_t>(grid.size[1]);
-                const double d = grid.distance[sample(0, i) + nx * (sample(1, j) + ny * sample(2, k))];
-                value += x.value[i] * y.value[j] * z.value[k] * d;
-                slope += Vector3d(x.slope[i] * y.value[j] * z.value[k], x.value[i] * y.slope[j] * z.value[k],
-                                  x.value[i] * y.value[j] * z.slope[k]) *
-                         d;
+                of_row += x.value[i] * double{row[i]};
+                slope_of_row += x.slope[i] * double{row[i]};
             }
+            of_layer += y.value[j] * of_row;
+            along_x += y.value[j] * slope_of_row;
+            along_y += y.slope[j] * of_row;
+        }
+        value += z.value[k] * of_layer;
+        slope += Vector3d(z.value[k] * along_x, z.value[k] * along_y, z.slope[k] * of_layer);
+    }
     return {value, to_grid.transpose() * slope};
 }
 

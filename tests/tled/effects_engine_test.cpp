@@ -319,12 +319,14 @@ TEST(GpuEffects, NoInterpolationIsFurtherBelowTheNearestSampleThanTheReach) {
             obstacle.surface.distance.push_back(
                 static_cast<float>(((i + i / 4 + i / 16) % 2 == 0 ? 1 : -1) + 0.3 * noise(random)));
         const double reach = detail::interpolation_reach(obstacle.surface);
+        const double steepness = detail::interpolation_steepness(obstacle.surface);
         for (int point = 0; point < 50; ++point) {
             const Vector3d x(1 + part(random), 1 + part(random), 1 + part(random));
             const auto nearest = [&](int axis) { return static_cast<std::size_t>(std::lround(x[axis])); };
             const double sample = double{obstacle.surface.distance[nearest(0) + 4 * (nearest(1) + 4 * nearest(2))]};
             const double below = sample - distance_to(obstacle, x).value;
             ASSERT_LT(below, reach);
+            ASSERT_LT(distance_to(obstacle, x).gradient.norm(), steepness);
             closest = std::max(closest, below / reach);
         }
     }

@@ -2,6 +2,7 @@
 /// Effects (nodal_effects.hpp) by the internal numbers of the CPU engine. Nodal vectors are records.
 
 #include "tled/detail/cpu_kernels.hpp"
+#include "tled/detail/interpolation_reach.hpp"
 #include "tled/detail/parallel.hpp"
 #include "tled/nodal_effects.hpp"
 
@@ -10,18 +11,22 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <limits>
+#include <utility>
 #include <vector>
 
 namespace tissuewarp::tled::detail {
 
 /// The part of a list sorted by internal node that belongs to [begin, end).
-template <class Entry>
-std::pair<const Entry*, const Entry*> of_nodes(const std::vector<Entry>& list, std::size_t begin, std::size_t end) {
+template <class List>
+auto of_nodes(List& list, std::size_t begin, std::size_t end) {
+    using Entry = typename List::value_type;
     const auto before = [](const Entry& each, std::size_t node) { return each.node < node; };
     const auto first = std::lower_bound(list.begin(), list.end(), begin, before);
     const auto last = std::lower_bound(first, list.end(), end, before);
-    return {list.data() + (first - list.begin()), list.data() + (last - list.begin())};
+    return std::pair{list.data() + (first - list.begin()), list.data() + (last - list.begin())};
 }
 
 /// Pressures, membranes and sliding pairs. Every node sums what its own faces and pairs do to it, in a fixed order.
@@ -44,6 +49,7 @@ public:
             membrane_basis_.push_back(
                 (rest_edges(position, effects.membrane_faces.col(f)) * to_rest).template cast<T>());
         }
+        tension_.resize(membrane_map_.size());
         for (std::size_t i = 0; i < effects.node.size(); ++i)
             place_.push_back({internal[static_cast<std::size_t>(effects.node[i])], i});
         std::sort(place_.begin(), place_.end(), [](const Place& x, const Place& y) { return x.node < y.node; });
@@ -51,6 +57,9 @@ public:
 
     /// Forces at displacement `u`, mN, to be taken off once no node has moved yet.
     void evaluate(const T* u) {
+        parallel_ranges(0, tension_.size(), 256, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t f = begin; f != end; ++f) tension_[f] = tension(f, u);
+        });
         parallel_ranges(0, force_.size(), 256, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i != end; ++i) force_[i] = force_on(i, u);
         });
@@ -93,7 +102,7 @@ private:
     [[nodiscard]] Vector force_on(std::size_t i, const T* u) const {
         Vector force = Vector::Zero();
         for_entries(effects_.pressure_incidence, i, [&](int entry) { force += pressure_on(entry / 3, u); });
-        for_entries(effects_.membrane_incidence, i, [&](int entry) { force += tension_on(entry / 3, entry % 3, u); });
+        for_entries(effects_.membrane_incidence, i, [&](int entry) { force += tension_on(entry / 3, entry % 3); });
         for_entries(effects_.sliding_incidence, i, [&](int entry) { force += pull_on(entry / 2, entry % 2, u); });
         return force;
     }
@@ -103,17 +112,23 @@ private:
         return -T(effects_.pressure[f] / 6) * e.col(0).cross(e.col(1));
     }
 
-    /// P = μ F (I − C⁻¹/det C), with F = Q + H and C = I + A written such that nothing cancels near rest: with d =
-    /// tr A + det A, the bracket is ((d (2 + d) − tr A) I + A) / (1 + d)².
-    [[nodiscard]] Vector tension_on(int f, int corner, const T* u) const {
-        const Edges& Q = membrane_basis_[static_cast<std::size_t>(f)];
-        const Matrix2& to_rest = membrane_map_[static_cast<std::size_t>(f)];
+    /// Internal forces of corners 1 and 2, as columns; that of corner 0 is the rest to zero. P = μ F (I − C⁻¹/det C),
+    /// with F = Q + H and C = I + A written such that nothing cancels near rest: with d = tr A + det A, the bracket is
+    /// ((d (2 + d) − tr A) I + A) / (1 + d)².
+    [[nodiscard]] Edges tension(std::size_t face, const T* u) const {
+        const auto f = static_cast<Eigen::Index>(face);
+        const Edges& Q = membrane_basis_[face];
+        const Matrix2& to_rest = membrane_map_[face];
         const Edges H = stretch(u, effects_.membrane_faces.col(f)) * to_rest;
         const Matrix2 QH = Q.transpose() * H;
         const Matrix2 A = QH + QH.transpose() + H.transpose() * H;
         const T trace = A.trace(), d = trace + A.determinant();
         const Matrix2 bracket = ((d * (2 + d) - trace) * Matrix2::Identity() + A) / ((1 + d) * (1 + d));
-        const Edges internal = T(effects_.membrane_stiffness[f]) * ((Q + H) * bracket) * to_rest.transpose();
+        return T(effects_.membrane_stiffness[f]) * ((Q + H) * bracket) * to_rest.transpose();
+    }
+
+    [[nodiscard]] Vector tension_on(int f, int corner) const {
+        const Edges& internal = tension_[static_cast<std::size_t>(f)];
         if (corner == 0) return internal.rowwise().sum();
         return -internal.col(corner - 1);
     }
@@ -129,8 +144,9 @@ private:
     const std::vector<std::uint32_t>& internal_;
     std::vector<Edges> pressure_edges_, membrane_basis_;
     std::vector<Matrix2> membrane_map_;
-    std::vector<Vector> force_;  // by entry of SurfaceEffects::node
-    std::vector<Place> place_;   // ascending by node
+    std::vector<Edges> tension_;  // of each membrane face
+    std::vector<Vector> force_;   // by entry of SurfaceEffects::node
+    std::vector<Place> place_;    // ascending by node
 };
 
 template <class T>
@@ -165,30 +181,38 @@ private:
 };
 
 /// In float64 whatever the engine computes in: few nodes are near an obstacle, and its surface is a matter of
-/// micrometres.
+/// micrometres. The others know how far they may go before they need to look again.
 class CpuContact {
 public:
     CpuContact(const NodalContact& contact, const std::vector<std::uint32_t>& internal)
         : obstacles_(contact.obstacles) {
+        for (const Obstacle& obstacle : obstacles_)
+            steepness_.push_back(std::max(interpolation_steepness(obstacle.surface), 1e-9));
         for (std::size_t i = 0; i < contact.node.size(); ++i)
             point_.push_back({internal[static_cast<std::size_t>(contact.node[i])],
-                              contact.rest_position.col(static_cast<Eigen::Index>(i))});
+                              contact.rest_position.col(static_cast<Eigen::Index>(i)), 0.0});
         std::sort(point_.begin(), point_.end(), [](const Point& x, const Point& y) { return x.node < y.node; });
+    }
+
+    /// To be called where nodes have moved otherwise than by steps.
+    void forget_clearances() {
+        for (Point& point : point_) point.clearance = 0;
     }
 
     /// Puts internal nodes [begin, end) that have entered an obstacle back, in components that are free.
     template <class T>
-    void settle(std::size_t begin, std::size_t end, const T* free, T* v, T* u) const {
+    void settle(std::size_t begin, std::size_t end, const T* free, T* v, T* u) {
         const auto [first, last] = of_nodes(point_, begin, end);
-        for (const Point* point = first; point != last; ++point) {
+        for (Point* point = first; point != last; ++point) {
             const std::size_t at = point->node * std::size_t{record};
-            Motion before;
-            for (int c = 0; c < 3; ++c) {
-                before.u[c] = double(u[at + static_cast<std::size_t>(c)]);
-                before.v[c] = double(v[at + static_cast<std::size_t>(c)]);
-            }
+            const Motion before{vector_at(u + at), vector_at(v + at)};
+            point->clearance -= before.v.norm();
+            if (point->clearance > 0) continue;
             const Motion after = in_contact(obstacles_, point->position, before);
-            if (after.u == before.u) continue;
+            if (after.u == before.u) {
+                point->clearance = clearance(point->position + before.u);
+                continue;
+            }
             for (std::size_t c = 0; c < 3; ++c) {
                 if (free[at + c] == T(0)) continue;
                 u[at + c] = T(after.u[static_cast<Eigen::Index>(c)]);
@@ -201,9 +225,27 @@ private:
     struct Point {
         std::uint32_t node;  // internal
         Eigen::Vector3d position;
+        double clearance;  // mm that it may go without entering an obstacle
     };
+
+    template <class T>
+    static Eigen::Vector3d vector_at(const T* record_of_node) {
+        return {double(record_of_node[0]), double(record_of_node[1]), double(record_of_node[2])};
+    }
+
+    /// None outside of a grid, whose border may lie inside the obstacle.
+    [[nodiscard]] double clearance(const Eigen::Vector3d& x) const {
+        double least = std::numeric_limits<double>::infinity();
+        for (std::size_t o = 0; o < obstacles_.size(); ++o) {
+            const double distance = distance_to(obstacles_[o], x).value;
+            least = std::min(least, std::isfinite(distance) ? distance / steepness_[o] : 0.0);
+        }
+        return least;
+    }
+
     std::vector<Obstacle> obstacles_;
-    std::vector<Point> point_;  // ascending by node
+    std::vector<double> steepness_;  // of each
+    std::vector<Point> point_;       // ascending
 };
 
 }  // namespace tissuewarp::tled::detail

@@ -1,5 +1,7 @@
 #include "tled/detail/interpolation_reach.hpp"
 
+#include <Eigen/LU>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -34,6 +36,15 @@ double interpolation_reach(const DistanceGrid& grid) {
     constexpr double rounding = 1.0001;
     const std::array<float, 3> difference = largest_differences(grid);
     return rounding * 1.25 * 1.25 * 0.75 * static_cast<double>(difference[0] + difference[1] + difference[2]);
+}
+
+/// Between two samples the derivative is a sum of the differences of neighbours whose weights' sizes sum to 1.5 at
+/// most, at the middle; the weights of the other two axes sum to 1.25 each.
+double interpolation_steepness(const DistanceGrid& grid) {
+    constexpr double rounding = 1.0001;
+    const std::array<float, 3> difference = largest_differences(grid);
+    const double per_step = 1.5 * 1.25 * 1.25 * std::hypot(difference[0], difference[1], difference[2]);
+    return rounding * per_step * grid.steps.inverse().norm();
 }
 
 }  // namespace tissuewarp::tled::detail
