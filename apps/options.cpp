@@ -152,6 +152,7 @@ struct Parser {
     EvaluateOptions evaluate;
     InfoOptions info;
     BenchOptions bench;
+    SimulateOptions simulate;
     std::filesystem::path config;
     std::vector<std::string> register_lengths, mesh_lengths, info_files, anchors, rigid_neighbours;
     std::deque<Verb> verbs;
@@ -165,6 +166,7 @@ struct Parser {
         declare_evaluate(verbs.emplace_back(app, "evaluate", "Score label maps, landmarks and fields"));
         declare_info(verbs.emplace_back(app, "info", "Print what a file holds, or the devices of this machine"));
         declare_bench(verbs.emplace_back(app, "bench", "Time the solver's engines on this machine"));
+        declare_simulate(verbs.emplace_back(app, "simulate", "Simulate what a scene file names"));
     }
 
     void declare_register(Verb& verb) {
@@ -359,6 +361,15 @@ struct Parser {
         verb.common(o.common);
     }
 
+    void declare_simulate(Verb& verb) {
+        SimulateOptions& o = simulate;
+        verb.path("scene", o.scene, "Scene file (TOML)")->required();
+        verb.path("-o,--output", o.output, "Folder for the frames")->type_name("FOLDER");
+        verb.text("--device", o.device.name, "auto, cpu, gpu or gpu:<index>; auto: what the scene says")
+            ->check(CLI::Validator(check_device, "", "device"));
+        verb.common(o.common);
+    }
+
     Command result() {
         const std::string verb = app.get_subcommands().front()->get_name();
         if (verb == "register") {
@@ -384,6 +395,7 @@ struct Parser {
         if (verb == "warp") return warp;
         if (verb == "evaluate") return evaluate;
         if (verb == "bench") return bench;
+        if (verb == "simulate") return simulate;
         info.files.assign(info_files.begin(), info_files.end());
         return info;
     }
@@ -412,7 +424,9 @@ struct Parser {
         throw InvalidInput(message + (nearest.empty() ? "; see --help" : "; did you mean '" + nearest + "'?"));
     }
 
-    static std::vector<std::string> verb_names() { return {"register", "mesh", "warp", "evaluate", "info", "bench"}; }
+    static std::vector<std::string> verb_names() {
+        return {"register", "mesh", "warp", "evaluate", "info", "bench", "simulate"};
+    }
 };
 
 /// Puts the file that --config names in front of the other arguments, so that those win.
@@ -447,7 +461,7 @@ Command parse_command_line(std::vector<std::string> arguments) {
         throw HelpRequest{parser.app.version() + "\n"};
     } catch (const CLI::ParseError& error) {
         const bool no_verb = parser.app.get_subcommands().empty();
-        throw InvalidInput(no_verb ? "give a verb: register, mesh, warp, evaluate, info or bench; see --help"
+        throw InvalidInput(no_verb ? "give a verb: register, mesh, warp, evaluate, info, bench or simulate; see --help"
                                    : std::string(error.what()) + "; see --help");
     }
     return parser.result();

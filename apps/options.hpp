@@ -120,7 +120,14 @@ struct BenchOptions {
     DeviceChoice device;
 };
 
-using Command = std::variant<RegisterOptions, MeshOptions, WarpOptions, EvaluateOptions, InfoOptions, BenchOptions>;
+struct SimulateOptions {
+    CommonOptions common;
+    std::filesystem::path scene, output;
+    DeviceChoice device;
+};
+
+using Command = std::variant<RegisterOptions, MeshOptions, WarpOptions, EvaluateOptions, InfoOptions, BenchOptions,
+                             SimulateOptions>;
 
 /// The text that --help or --version asked for; not an error.
 struct HelpRequest {

@@ -11,5 +11,6 @@ void run_warp(const WarpOptions& options);
 void run_evaluate(const EvaluateOptions& options);
 void run_info(const InfoOptions& options);
 void run_bench(const BenchOptions& options);
+void run_simulate(const SimulateOptions& options);
 
 }  // namespace tissuewarp::apps
