@@ -6,18 +6,26 @@
 
 namespace tissuewarp::simulation {
 
+bool has_effects(const Scene& scene) {
+    return scene.fluid || !scene.pressures.empty() || !scene.membranes.empty() || !scene.contacts.empty() ||
+           !scene.sliding.empty();
+}
+
 void require_supported(const Scene& scene) {
-    if (scene.solve.kind == Solve::Kind::Equilibrium && !scene.contacts.empty())
-        throw InvalidInput("an equilibrium in contact is not available; give [solve] kind = \"dynamics\", which is");
+    if (scene.solve.kind == Solve::Kind::Equilibrium)
+        for (const Contact& contact : scene.contacts)
+            if (contact.friction > 0)
+                throw InvalidInput(
+                    "friction depends on the way to an equilibrium; give [solve] kind = \"dynamics\", or "
+                    "no friction");
     for (const auto& [label, tissue] : scene.tissues)
         if (tissue.growth != 1.0)
             throw InvalidInput("growth of label " + std::to_string(label) +
                                " is not available; leave 'growth' out of [label." + std::to_string(label) + "]");
-    const bool effects = scene.fluid || !scene.pressures.empty() || !scene.membranes.empty() ||
-                         !scene.contacts.empty() || !scene.sliding.empty();
-    if (effects)
+    if (scene.solve.device == Device::Gpu && has_effects(scene))
         throw InvalidInput(
-            "no engine takes fluid, pressure, membranes, contact and sliding; leave them out of the scene");
+            "the GPU does not take fluid, pressure, membranes, contact and sliding; give [solve] device = "
+            "\"cpu\"");
 }
 
 }  // namespace tissuewarp::simulation

@@ -5,6 +5,9 @@
 
 namespace tissuewarp::simulation {
 
+/// Whether anything acts on the tissue where it is now (tled/effects.hpp).
+bool has_effects(const Scene& scene);
+
 /// Throws InvalidInput with the remedy.
 void require_supported(const Scene& scene);
 

@@ -3,6 +3,7 @@
 #include "core/errors.hpp"
 #include "simulation/limits.hpp"
 #include "simulation/loads.hpp"
+#include "tled/contact.hpp"
 #include "tled/dynamics.hpp"
 #include "tled/engine_choice.hpp"
 #include "tled/load_path.hpp"
@@ -19,9 +20,10 @@ namespace {
 
 using Eigen::Matrix3Xd;
 
-std::unique_ptr<tled::Engine> engine_for(const Solve& solve, const tled::RestState& rest, Observer& observer) {
+std::unique_ptr<tled::Engine> engine_for(const Scene& scene, const tled::RestState& rest, Observer& observer) {
+    const Solve& solve = scene.solve;
     if (solve.device == Device::Gpu) return tled::make_gpu_engine(rest, solve.gpu_index);
-    if (solve.device == Device::Cpu) return tled::make_cpu_engine(rest, tled::Scalar::Float32);
+    if (solve.device == Device::Cpu || has_effects(scene)) return tled::make_cpu_engine(rest, tled::Scalar::Float32);
     return tled::make_suitable_engine(rest, solve.gpu_index, observer);
 }
 
@@ -93,7 +95,7 @@ private:
         if (shown_ > solve_.frames || (!last && time_of(shown_) >= end)) return;
         LoadsInTime loads(built_, stage, stage.begin);
         const tled::RestStiffness stiffness(stage.rest, loads.at(time_of(shown_)));
-        const auto engine = engine_for(solve_, stage.rest, observer_);
+        const auto engine = engine_for(built_.scene, stage.rest, observer_);
         summary_.engine = engine->description();
         for (; shown_ <= solve_.frames && (last || time_of(shown_) < end);) {
             const double time = time_of(shown_);
@@ -104,14 +106,19 @@ private:
 
     void equilibrium_at(tled::Engine& engine, const tled::RestStiffness& stiffness, const Stage& stage,
                         const tled::NodalConditions& conditions, double time) {
-        tled::LoadPathOptions options;
-        options.equilibrium.tolerance_mm = solve_.tolerance_mm;
-        options.equilibrium.rest = &stage.rest;
+        tled::EquilibriumOptions options;
+        options.tolerance_mm = solve_.tolerance_mm;
+        options.rest = &stage.rest;
+        // The first comes from rest, along its load where that is too much at once.
+        const Matrix3Xd* start = shown_ == 1 ? nullptr : &state_.displacement;
         Part part(observer_, time / solve_.duration, time / solve_.duration);
         try {
-            // The first comes from rest, along its load where that is too much at once.
-            const tled::EquilibriumResult found = tled::equilibrium_along_load(
-                engine, stiffness, conditions, options, shown_ == 1 ? nullptr : &state_.displacement, part);
+            const tled::EquilibriumResult found =
+                conditions.effects.contact ? tled::equilibrium_in_contact(engine, stage.rest, conditions,
+                                                                          {.equilibrium = options}, start, part)
+                                                 .equilibrium
+                                           : tled::equilibrium_along_load(engine, stiffness, conditions,
+                                                                          {.equilibrium = options}, start, part);
             state_.displacement = found.displacement;
             summary_.steps += found.force_evaluations;
             summary_.estimated_error_mm = std::max(summary_.estimated_error_mm, found.estimated_error_mm);
@@ -124,7 +131,7 @@ private:
     void move(std::size_t s, double end) {
         const Stage& stage = built_.stages[s];
         LoadsInTime loads(built_, stage, stage.begin);
-        const auto engine = engine_for(solve_, stage.rest, observer_);
+        const auto engine = engine_for(built_.scene, stage.rest, observer_);
         summary_.engine = engine->description();
         const Matrix3Xd mass = stage.rest.lumped_mass.transpose().replicate(3, 1);
         const bool last = s + 1 == built_.stages.size();

@@ -6,7 +6,8 @@
 #include "meshing/primitives.hpp"
 #include "meshing/quality.hpp"
 
-#include <gmock/gmock.h>
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
 
 #include <set>
 
@@ -163,8 +164,8 @@ TEST(SlidingInterface, RegionsFollowBothSides) {
     EXPECT_EQ(finder.nodes("everything").size(), 80u + 16);
     EXPECT_EQ(finder.outer_faces().cols(), 2 * (2 * 9 + 4 * 12)) << "the interface is no outer surface";
     const std::vector<int> upper = finder.nodes("upper");
-    for (const int node : finder.faces("upper's surface").reshaped())
-        EXPECT_TRUE(std::binary_search(upper.begin(), upper.end(), node));
+    const Eigen::Matrix3Xi surface = finder.faces("upper's surface");
+    for (const int node : surface.reshaped()) EXPECT_TRUE(std::binary_search(upper.begin(), upper.end(), node));
 }
 
 }  // namespace
