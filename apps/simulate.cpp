@@ -1,9 +1,12 @@
 // tissuewarp simulate: what a scene file says, from its mesh to its frames.
 
+#include "apps/ablate.hpp"
 #include "apps/output_folder.hpp"
 #include "apps/progress.hpp"
 #include "apps/report_json.hpp"
 #include "apps/scene_file.hpp"
+#include "apps/scene_templates.hpp"
+#include "apps/text_file.hpp"
 #include "apps/verbs.hpp"
 #include "apps/versions.hpp"
 #include "core/sha256.hpp"
@@ -57,9 +60,35 @@ void apply_device(const DeviceChoice& device, simulation::Solve& solve) {
     if (device.name.starts_with("gpu:")) solve.gpu_index = std::stoi(device.name.substr(4));
 }
 
+/// --init: a scene to begin with.
+void write_template(const SimulateOptions& options) {
+    const fs::path file = options.scene.empty() ? fs::path(options.init + ".toml") : options.scene;
+    const std::string text = scene_template(options.init, file.parent_path());
+    std::error_code failure;
+    if (fs::exists(file, failure)) throw InvalidInput("'" + file.string() + "' is there already; give another name");
+    write_text(text, file);
+    if (!options.common.quiet)
+        fmt::print("{0}; run it with\n    tissuewarp simulate {0} --output {1}\n", file.string(), options.init);
+}
+
+void run_ablation(const SimulateOptions& options) {
+    ProgressLine progress(options.common.quiet);
+    progress.begin("reading", 0.0, 0.02);
+    simulation::Scene scene = read_scene(options.scene);
+    apply_device(options.device, scene.solve);
+    simulation::require_supported(scene);
+    progress.begin("simulating", 0.02, 1.0);
+    const simulation::Ablation ablation = simulation::ablate(scene, progress);
+    progress.clear();
+    print_ablation(ablation, !scene.probes.empty());
+}
+
 }  // namespace
 
 void run_simulate(const SimulateOptions& options) {
+    if (!options.init.empty()) return write_template(options);
+    if (options.scene.empty()) throw InvalidInput("give a scene file, or --init to write one");
+    if (options.ablate) return run_ablation(options);
     ProgressLine progress(options.common.quiet);
     if (options.output.empty()) throw InvalidInput("give --output, the folder for the frames");
     require_could_write(options.output);

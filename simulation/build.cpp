@@ -189,9 +189,14 @@ std::vector<Stage> stages_of(const Scene& scene, const meshing::TetMesh& mesh, c
 
 BuiltScene build(const Scene& scene, Observer& observer) {
     require_valid(scene);
+    return build(scene, mesh_of(scene, observer), observer);
+}
+
+BuiltScene build(const Scene& scene, const meshing::TetMesh& mesh, Observer& observer) {
+    require_valid(scene);
     BuiltScene built;
     built.scene = scene;
-    TissueMesh tissue = closed(mesh_of(scene, observer));
+    TissueMesh tissue = closed(mesh);
     std::vector<tled::SlidingPair> sliding = open_interfaces(scene, tissue);
     const RegionFinder finder(tissue, scene.sets);
     built.held = held_nodes(scene, finder);

@@ -45,5 +45,7 @@ struct BuiltScene {
 /// Meshes and checks. Throws InvalidInput as require_valid(), mesh_of(), RegionFinder and obstacle() do, for probes
 /// outside the tissue, and for a component of a node that is held or moved twice; Cancelled.
 BuiltScene build(const Scene& scene, Observer& observer = silent_observer());
+/// The same on a mesh that mesh_of() has made of the scene before.
+BuiltScene build(const Scene& scene, const meshing::TetMesh& mesh, Observer& observer = silent_observer());
 
 }  // namespace tissuewarp::simulation
