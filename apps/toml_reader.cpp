@@ -24,6 +24,13 @@ std::string in_words(const Range& range) {
     return fmt::format("{} to {}", range.least, with_unit(range.most, range.unit));
 }
 
+/// The name that lacks nothing but its unit, or the nearest in letters.
+std::string meant(const std::string& word, const std::vector<std::string>& names) {
+    for (const std::string& name : names)
+        if (name.starts_with(word + "_")) return name;
+    return nearest_name(word, names);
+}
+
 }  // namespace
 
 TomlReader::TomlReader(const toml::table& table, const std::filesystem::path& path, std::string name)
@@ -238,7 +245,7 @@ void TomlReader::finish() const {
     for (const auto& [key, entry] : table_) {
         const std::string name(key.str());
         if (asked_.contains(name)) continue;
-        const std::string nearest = nearest_name(name, names);
+        const std::string nearest = meant(name, names);
         throw InvalidInput(toml_place(path_, entry) + ": unknown key '" + name + "'" +
                            (name_.empty() ? "" : " in " + name_) +
                            (nearest.empty() ? "; see docs/manual/simulate.md" : "; did you mean '" + nearest + "'?"));

@@ -4,6 +4,7 @@
 #include "simulation/geometry.hpp"
 #include "simulation/obstacles.hpp"
 #include "simulation/region.hpp"
+#include "tled/growth.hpp"
 
 #include <Eigen/Geometry>
 
@@ -27,7 +28,7 @@ tled::Model model_of(const Scene& scene, const meshing::TetMesh& mesh) {
     }
     model.density = scene.density;
     model.element = scene.solve.element.value_or(tled::suggested_element(model.materials));
-    return scene.solve.kind == Solve::Kind::Equilibrium ? tled::relaxed(model) : model;
+    return model;
 }
 
 std::vector<tled::SlidingPair> open_interfaces(const Scene& scene, TissueMesh& tissue) {
@@ -142,12 +143,22 @@ std::vector<meshing::Location> located(const std::vector<Probe>& probes, const m
     return locations;
 }
 
-/// What is left when these tetrahedra of the first stage are gone.
-Stage remaining(const Stage& first, const std::vector<bool>& gone, double begin) {
+void grow(Stage& stage, const Scene& scene) {
+    std::map<int, double> stretch;
+    for (const auto& [label, tissue] : scene.tissues)
+        if (tissue.growth != 1.0 && (stage.model.mesh.labels.array() == label).any()) stretch[label] = tissue.growth;
+    if (stretch.empty()) return;
+    tled::Grown grown = tled::grown(stage.model, stretch);
+    stage.model = std::move(grown.model);
+    stage.growth = std::move(grown.pressures);
+}
+
+/// What is left of a model when these tetrahedra are gone.
+Stage remaining(const tled::Model& model, const Scene& scene, const std::vector<bool>& gone, double begin) {
     Stage stage;
     stage.begin = begin;
-    stage.model = first.model;
-    const meshing::TetMesh& mesh = first.model.mesh;
+    stage.model = model;
+    const meshing::TetMesh& mesh = model.mesh;
     stage.place.assign(static_cast<std::size_t>(mesh.node_count()), -1);
     for (int e = 0; e < mesh.tet_count(); ++e) {
         if (gone[static_cast<std::size_t>(e)]) continue;
@@ -165,22 +176,23 @@ Stage remaining(const Stage& first, const std::vector<bool>& gone, double begin)
     left.tets = Eigen::Matrix4Xi(mesh.tets(Eigen::all, stage.tet));
     left.labels = Eigen::VectorXi(mesh.labels(stage.tet));
     for (int& node : left.tets.reshaped()) node = stage.place[static_cast<std::size_t>(node)];
+    grow(stage, scene);
+    if (scene.solve.kind == Solve::Kind::Equilibrium) stage.model = tled::relaxed(stage.model);
     stage.rest = tled::rest_state(stage.model);
     return stage;
 }
 
 std::vector<Stage> stages_of(const Scene& scene, const meshing::TetMesh& mesh, const RegionFinder& finder) {
-    Stage whole;
-    whole.model = model_of(scene, mesh);
+    const tled::Model whole = model_of(scene, mesh);
     std::vector<bool> gone(static_cast<std::size_t>(mesh.tet_count()), false);
-    std::vector<Stage> stages{remaining(whole, gone, 0.0)};
+    std::vector<Stage> stages{remaining(whole, scene, gone, 0.0)};
     std::vector<Resection> resections = scene.resections;
     std::stable_sort(resections.begin(), resections.end(),
                      [](const Resection& a, const Resection& b) { return a.time < b.time; });
     for (std::size_t r = 0; r < resections.size(); ++r) {
         for (const int tet : finder.tets(resections[r].set)) gone[static_cast<std::size_t>(tet)] = true;
         if (r + 1 < resections.size() && resections[r + 1].time == resections[r].time) continue;
-        stages.push_back(remaining(stages.front(), gone, resections[r].time));
+        stages.push_back(remaining(whole, scene, gone, resections[r].time));
     }
     return stages;
 }

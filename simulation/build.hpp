@@ -18,9 +18,10 @@ struct Stage {
     double begin = 0.0;  ///< s
     tled::Model model;
     tled::RestState rest;
-    std::vector<int> node;   ///< of the first stage's mesh, ascending
-    std::vector<int> tet;    ///< likewise
-    std::vector<int> place;  ///< node of the first stage → node of this one, −1 where it is gone
+    std::vector<tled::SurfacePressure> growth;  ///< what growth comes down to besides moduli (tled/growth.hpp)
+    std::vector<int> node;                      ///< of the first stage's mesh, ascending
+    std::vector<int> tet;                       ///< likewise
+    std::vector<int> place;                     ///< node of the first stage → node of this one, −1 where it is gone
 };
 
 /// Components of a node that are held or moved.

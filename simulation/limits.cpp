@@ -2,12 +2,15 @@
 
 #include "core/errors.hpp"
 
+#include <algorithm>
 #include <string>
 
 namespace tissuewarp::simulation {
 
 bool has_effects(const Scene& scene) {
-    return scene.fluid || !scene.pressures.empty() || !scene.membranes.empty() || !scene.contacts.empty() ||
+    const bool grows = std::any_of(scene.tissues.begin(), scene.tissues.end(),
+                                   [](const auto& entry) { return entry.second.growth != 1.0; });
+    return grows || scene.fluid || !scene.pressures.empty() || !scene.membranes.empty() || !scene.contacts.empty() ||
            !scene.sliding.empty();
 }
 
@@ -18,13 +21,9 @@ void require_supported(const Scene& scene) {
                 throw InvalidInput(
                     "friction depends on the way to an equilibrium; give [solve] kind = \"dynamics\", or "
                     "no friction");
-    for (const auto& [label, tissue] : scene.tissues)
-        if (tissue.growth != 1.0)
-            throw InvalidInput("growth of label " + std::to_string(label) +
-                               " is not available; leave 'growth' out of [label." + std::to_string(label) + "]");
     if (scene.solve.device == Device::Gpu && has_effects(scene))
         throw InvalidInput(
-            "the GPU does not take fluid, pressure, membranes, contact and sliding; give [solve] device = "
+            "the GPU does not take growth, fluid, pressure, membranes, contact and sliding; give [solve] device = "
             "\"cpu\"");
 }
 

@@ -102,14 +102,20 @@ tled::Effects remaining_effects(const BuiltScene& built, const Stage& stage) {
         std::erase_if(effects.contact->nodes, [&](int node) { return place(node) < 0; });
         for (int& node : effects.contact->nodes) node = place(node);
     }
+    effects.pressures.insert(effects.pressures.end(), stage.growth.begin(), stage.growth.end());
     return effects;
 }
 
-void move_effects(const BuiltScene& built, double time, tled::Effects& effects) {
-    for (std::size_t p = 0; p < effects.pressures.size(); ++p) {
-        const Pressure& pressure = built.scene.pressures[p];
-        effects.pressures[p].pressure = part(pressure.curve, built, time) * pressure.pressure;
-    }
+/// kPa, of the scene's pressures and then of what grows, which does so over the whole scene.
+double pressure_at(const BuiltScene& built, const Stage& stage, std::size_t index, double time) {
+    const std::vector<Pressure>& stated = built.scene.pressures;
+    if (index >= stated.size()) return part({}, built, time) * stage.growth[index - stated.size()].pressure;
+    return part(stated[index].curve, built, time) * stated[index].pressure;
+}
+
+void move_effects(const BuiltScene& built, const Stage& stage, double time, tled::Effects& effects) {
+    for (std::size_t p = 0; p < effects.pressures.size(); ++p)
+        effects.pressures[p].pressure = pressure_at(built, stage, p, time);
     if (built.scene.fluid)
         effects.fluid = fluid_of(built, level_at(*built.scene.fluid, built, time),
                                  gravity_at(*built.scene.gravity, time, built.scene.solve.duration));
@@ -150,7 +156,7 @@ tled::Conditions conditions_at(const BuiltScene& built, const Stage& stage, doub
     }
     conditions.external_force = weight_at(built, stage, image_load(built, stage), time);
     conditions.effects = remaining_effects(built, stage);
-    move_effects(built, time, conditions.effects);
+    move_effects(built, stage, time, conditions.effects);
     return conditions;
 }
 
@@ -181,9 +187,7 @@ const tled::NodalConditions& LoadsInTime::at(double time) {
         }
     Eigen::Index face = 0;
     for (std::size_t p = 0; p < pressure_faces_.size(); ++p) {
-        const Pressure& pressure = built_.scene.pressures[p];
-        effects.surface.pressure.segment(face, pressure_faces_[p])
-            .setConstant(part(pressure.curve, built_, time) * pressure.pressure);
+        effects.surface.pressure.segment(face, pressure_faces_[p]).setConstant(pressure_at(built_, stage_, p, time));
         face += pressure_faces_[p];
     }
     return conditions_;
@@ -208,6 +212,7 @@ double hold_interval(const BuiltScene& built, const Stage& stage) {
         limit(small * shortest, motion.displacement.norm() * steepest(motion.curve, duration));
     for (const Contact& contact : scene.contacts)
         limit(small * shortest, contact.motion.norm() * steepest(contact.curve, duration));
+    if (!stage.growth.empty()) limit(small, 1 / duration);
     for (const Pressure& pressure : scene.pressures) limit(small, steepest(pressure.curve, duration));
     if (scene.gravity && scene.gravity->from != scene.gravity->to)
         limit(small, steepest(scene.gravity->curve, duration));

@@ -22,6 +22,7 @@ using Eigen::Vector3d;
 using tled::DistanceGrid;
 
 constexpr double reach = 0.25;      // of the tissue's extent, by which it may move
+constexpr double inwards = 10;      // mm, by which it may enter a body all around it
 constexpr int finest_samples = 48;  // along the longest side of grids that are not given
 
 struct Extent {
@@ -31,7 +32,8 @@ struct Extent {
 
 Extent where_tissue_may_be(const Contact& contact, const Matrix3Xd& tissue) {
     Extent extent{tissue.rowwise().minCoeff(), tissue.rowwise().maxCoeff()};
-    const double margin = reach * extent.size().norm() + contact.motion.norm();
+    const bool around = std::holds_alternative<OutsideOfLabels>(contact.body);
+    const double margin = (around ? inwards : reach * extent.size().norm()) + contact.gap + contact.motion.norm();
     extent.lower.array() -= margin;
     extent.upper.array() += margin;
     return extent;

@@ -50,7 +50,9 @@ struct Tissue {
     std::string name;
     tled::Material material;
     tled::PronySeries viscosity;  ///< for dynamics; an equilibrium takes what is left after long times
-    double growth = 1.0;          ///< g: unloaded, each length of the tissue becomes g times itself
+    /// g: unloaded, each length of the tissue becomes g times itself, over the length of the scene. On the way there
+    /// the pressure of growth rises evenly and the moduli are those of the end (tled/growth.hpp, which names the laws).
+    double growth = 1.0;
 };
 
 /// Displacement components that stay zero.

@@ -55,8 +55,9 @@ side = "-z"
 )";
 
 TEST_F(SceneFiles, SayWhatTheSceneHolds) {
-    const simulation::Scene scene = read(cube + R"(density_kg_m3 = 1050)");
+    const simulation::Scene scene = read("density_kg_m3 = 1050\n" + cube);
     EXPECT_EQ(scene.title, "cube");
+    EXPECT_NEAR(scene.density, 1.05e-6, 1e-15) << "kg/mm³";
     EXPECT_EQ(std::get<simulation::BoxGeometry>(scene.geometry).size.z(), 30);
     EXPECT_NEAR(tled::shear_modulus(scene.tissues.at(1).material), 3.0 / 2.9, 1e-12);
     EXPECT_EQ(scene.sets.at("base").side->axis, 2);

@@ -6,8 +6,8 @@
 #include "meshing/primitives.hpp"
 #include "meshing/quality.hpp"
 
-#include <Eigen/Geometry>
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 
 #include <set>
 

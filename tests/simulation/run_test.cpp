@@ -3,6 +3,7 @@
 #include "simulation/run.hpp"
 
 #include "core/errors.hpp"
+#include "meshing/primitives.hpp"
 #include "tests/simulation/cube.hpp"
 #include "tled/reference.hpp"
 
@@ -207,6 +208,59 @@ TEST(Simulate, ResectionLeavesTheRestWhereItWas) {
         EXPECT_GT(probes[4](2, 0), 0.55 * probes[1](2, 0)) << "and came back when the upper half was taken off";
         EXPECT_LT(probes[4](2, 0), -0.5);
     }
+}
+
+TEST(Simulate, FreeTissueGrowsByItsStretch) {
+    Scene scene = cube();
+    scene.tissues[1].material = tled::neo_hookean_iso(3.0, 0.4);
+    scene.tissues[1].growth = 1.1;
+    test::stand_freely(scene);
+    const BuiltScene built = build(scene);
+    const Result result = run(built);
+    EXPECT_LT((result.displacement - 0.1 * built.mesh().nodes).colwise().norm().maxCoeff(), 5e-3);
+}
+
+TEST(Simulate, BodyInContactStopsTheTissue) {
+    // The top is pushed down by 20 mm, the base meets a table after 5 mm: what is between is pressed evenly.
+    Scene scene = cube();
+    scene.fixed.clear();
+    keep_upright(scene);
+    scene.motions.push_back({"above", {false, false, true}, {0, 0, -20}, {}});
+    Contact table;
+    table.body = HalfSpace{{0, 0, -5}, {0, 0, 1}};
+    scene.contacts.push_back(table);
+    scene.solve.frames = 2;
+    const BuiltScene built = build(scene);
+    const Result result = run(built);
+    for (int n = 0; n < built.mesh().node_count(); ++n) {
+        const double expected = -5 - 15 * built.mesh().nodes(2, n) / 100;
+        EXPECT_NEAR(result.displacement(2, n), expected, 0.05);
+    }
+}
+
+TEST(Simulate, LayersSlideOnOneAnother) {
+    // Joined, the upper layer would drag the lower one along; apart, each keeps its shape.
+    Scene scene = cube();
+    BoxGeometry box = std::get<BoxGeometry>(scene.geometry);
+    meshing::TetMesh mesh = meshing::box_mesh(box.size, box.cells);
+    for (int e = 0; e < mesh.tet_count(); ++e)
+        if (mesh.nodes(2, mesh.tets.col(e)).mean() > 50) mesh.labels[e] = 2;
+    scene.geometry = mesh;
+    scene.tissues[2] = scene.tissues[1];
+    scene.fixed[0].axes = {true, true, true};
+    scene.motions.push_back({"above", {true, true, true}, {8, 0, 0}, {}});
+    const auto largest_strain = [](const Scene& each) {
+        const BuiltScene built = build(each);
+        const Result result = run(built);
+        double shear = 0;  // difference of x along the edges of each layer
+        for (int e = 0; e < built.mesh().tet_count(); ++e)
+            shear = std::max(shear, result.displacement(0, built.mesh().tets.col(e)).maxCoeff() -
+                                        result.displacement(0, built.mesh().tets.col(e)).minCoeff());
+        return shear;
+    };
+    EXPECT_GT(largest_strain(scene), 1.9) << "joined: 8 mm over four cells";
+    scene.sliding.push_back({{1, 2}, 10.0, ""});
+    EXPECT_LT(largest_strain(scene), 0.02);
 }
 
 TEST(Simulate, ProbesLieInTheTissue) {
