@@ -41,9 +41,9 @@ Extent where_tissue_may_be(const Contact& contact, const Matrix3Xd& tissue) {
 
 DistanceGrid sampled(const Extent& extent, double spacing, const std::function<double(const Vector3d&)>& distance) {
     DistanceGrid grid;
-    grid.origin = extent.lower;
+    grid.origin = extent.lower.array() - spacing;  // the outermost samples have no distance of their own
     grid.steps = spacing * Eigen::Matrix3d::Identity();
-    grid.size = (extent.size() / spacing).array().ceil().cast<int>().cwiseMax(3) + 1;
+    grid.size = (extent.size() / spacing).array().ceil().cast<int>() + 4;
     grid.distance.resize(static_cast<std::size_t>(grid.size.cast<long>().prod()));
     tbb::parallel_for(0, grid.size[2], [&](int k) {
         auto at = static_cast<std::size_t>(k) * static_cast<std::size_t>(grid.size[0] * grid.size[1]);
@@ -101,10 +101,10 @@ imaging::Volume mask_around(const imaging::Volume& labels, const Extent& extent,
         last = last.cwiseMax(index);
     }
     imaging::Geometry grid = labels.geometry;
-    const Vector3d start = first.array().floor();
+    const Vector3d start = first.array().floor() - 1;  // the outermost voxels have no distance of their own
     grid.origin = labels.geometry.point(start);
     for (std::size_t axis = 0; axis < 3; ++axis)
-        grid.size[axis] = static_cast<int>(std::ceil(last[static_cast<int>(axis)]) - start[static_cast<int>(axis)]) + 1;
+        grid.size[axis] = static_cast<int>(std::ceil(last[static_cast<int>(axis)]) - start[static_cast<int>(axis)]) + 3;
     imaging::Volume mask(grid, CV_8UC1);
     const auto& size = labels.geometry.size;
     std::size_t at = 0;
