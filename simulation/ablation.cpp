@@ -132,8 +132,8 @@ std::vector<Removable> removable(const Scene& scene) {
 
 Ablation ablate(const Scene& scene, Observer& observer) {
     const std::vector<Removable> effects = removable(scene);
-    const meshing::TetMesh mesh = mesh_of(scene, observer);
     Share first(observer, 0, effects.size() + 1);
+    const meshing::TetMesh mesh = mesh_of(scene, first);
     const Outcome whole = run(scene, mesh, first);
     Ablation ablation;
     ablation.seconds = whole.summary.seconds;

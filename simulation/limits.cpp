@@ -7,7 +7,7 @@
 
 namespace tissuewarp::simulation {
 
-bool has_effects(const Scene& scene) {
+bool needs_cpu(const Scene& scene) {
     const bool grows = std::any_of(scene.tissues.begin(), scene.tissues.end(),
                                    [](const auto& entry) { return entry.second.growth != 1.0; });
     return grows || scene.fluid || !scene.pressures.empty() || !scene.membranes.empty() || !scene.contacts.empty() ||
@@ -21,7 +21,7 @@ void require_supported(const Scene& scene) {
                 throw InvalidInput(
                     "friction depends on the way to an equilibrium; give [solve] kind = \"dynamics\", or "
                     "no friction");
-    if (scene.solve.device == Device::Gpu && has_effects(scene))
+    if (scene.solve.device == Device::Gpu && needs_cpu(scene))
         throw InvalidInput(
             "the GPU does not take growth, fluid, pressure, membranes, contact and sliding; give [solve] device = "
             "\"cpu\"");

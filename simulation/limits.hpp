@@ -5,8 +5,8 @@
 
 namespace tissuewarp::simulation {
 
-/// Whether anything acts on the tissue where it is now (tled/effects.hpp).
-bool has_effects(const Scene& scene);
+/// Whether the scene holds what only the CPU's engine takes: effects on tissue where it is now (tled/effects.hpp).
+bool needs_cpu(const Scene& scene);
 
 /// Throws InvalidInput with the remedy.
 void require_supported(const Scene& scene);

@@ -23,7 +23,7 @@ using Eigen::Matrix3Xd;
 std::unique_ptr<tled::Engine> engine_for(const Scene& scene, const tled::RestState& rest, Observer& observer) {
     const Solve& solve = scene.solve;
     if (solve.device == Device::Gpu) return tled::make_gpu_engine(rest, solve.gpu_index);
-    if (solve.device == Device::Cpu || has_effects(scene)) return tled::make_cpu_engine(rest, tled::Scalar::Float32);
+    if (solve.device == Device::Cpu || needs_cpu(scene)) return tled::make_cpu_engine(rest, tled::Scalar::Float32);
     return tled::make_suitable_engine(rest, solve.gpu_index, observer);
 }
 
