@@ -4,12 +4,14 @@
 
 #include "apps/scene_file.hpp"
 #include "core/errors.hpp"
-#include "simulation/limits.hpp"
+#include "simulation/presets.hpp"
 #include "simulation/run.hpp"
 
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
+#include <sstream>
 
 namespace tissuewarp::apps {
 namespace {
@@ -68,6 +70,18 @@ TEST(SceneTemplates, CavityChangesItsWalls) {
     EXPECT_TRUE(std::isnan(with(0, 1))) << "the tumour is gone";
     scene.resections.clear();
     EXPECT_GT((with - last_probes(scene)).col(0).norm(), 0.05);
+}
+
+TEST(Presets, StandInTheManualWithTheirSources) {
+    std::ostringstream manual;
+    manual << std::ifstream(std::filesystem::path(TISSUEWARP_SOURCE_DIR) / "docs/manual/simulate.md").rdbuf();
+    for (const simulation::Preset& preset : simulation::presets()) {
+        EXPECT_NE(manual.str().find('`' + preset.name + '`'), std::string::npos) << preset.name;
+        EXPECT_NO_THROW(tled::require_valid(preset.material, preset.name));
+        EXPECT_GT(tled::poisson_ratio(preset.material), 0.4) << preset.name << ": kPa and kPa";
+        EXPECT_FALSE(preset.source.empty());
+    }
+    EXPECT_THROW((void)simulation::preset("brain"), InvalidInput);
 }
 
 TEST(SceneTemplates, AreWrittenAsTheyAre) {
