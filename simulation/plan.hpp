@@ -28,7 +28,7 @@ struct Plan {
     Work cpu, gpu;                       ///< of the elements, as if all were neo-Hookean
     std::vector<PlannedEffect> effects;  ///< that the scene has, and no other
     double memory = 0;                   ///< bytes of the arrays of a float32 engine, grids of obstacles included
-    double time_step = 0;  ///< s, a bound from below that dynamics will exceed by 1.1 to 2.7; 0 for equilibria
+    double time_step = 0;                ///< s, a bound from below of the one that dynamics finds; 0 for equilibria
 };
 
 Plan plan_of(const BuiltScene& built);

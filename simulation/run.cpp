@@ -20,10 +20,9 @@ namespace {
 
 using Eigen::Matrix3Xd;
 
-std::unique_ptr<tled::Engine> engine_for(const Scene& scene, const tled::RestState& rest, Observer& observer) {
-    const Solve& solve = scene.solve;
+std::unique_ptr<tled::Engine> engine_for(const Solve& solve, const tled::RestState& rest, Observer& observer) {
     if (solve.device == Device::Gpu) return tled::make_gpu_engine(rest, solve.gpu_index);
-    if (solve.device == Device::Cpu || needs_cpu(scene)) return tled::make_cpu_engine(rest, tled::Scalar::Float32);
+    if (solve.device == Device::Cpu) return tled::make_cpu_engine(rest, tled::Scalar::Float32);
     return tled::make_suitable_engine(rest, solve.gpu_index, observer);
 }
 
@@ -95,7 +94,7 @@ private:
         if (shown_ > solve_.frames || (!last && time_of(shown_) >= end)) return;
         LoadsInTime loads(built_, stage, stage.begin);
         const tled::RestStiffness stiffness(stage.rest, loads.at(time_of(shown_)));
-        const auto engine = engine_for(built_.scene, stage.rest, observer_);
+        const auto engine = engine_for(solve_, stage.rest, observer_);
         summary_.engine = engine->description();
         for (; shown_ <= solve_.frames && (last || time_of(shown_) < end);) {
             const double time = time_of(shown_);
@@ -131,7 +130,7 @@ private:
     void move(std::size_t s, double end) {
         const Stage& stage = built_.stages[s];
         LoadsInTime loads(built_, stage, stage.begin);
-        const auto engine = engine_for(built_.scene, stage.rest, observer_);
+        const auto engine = engine_for(solve_, stage.rest, observer_);
         summary_.engine = engine->description();
         const Matrix3Xd mass = stage.rest.lumped_mass.transpose().replicate(3, 1);
         const bool last = s + 1 == built_.stages.size();

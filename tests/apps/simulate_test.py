@@ -53,7 +53,7 @@ class Simulate(unittest.TestCase):
         self.assertEqual(displacement.shape, (3, 64, 3))
         self.assertTrue((displacement[0] == 0).all())
         self.assertTrue((displacement[2][nodes[:, 2] == 0] == 0).all())
-        rows = list(csv.DictReader(open(self.folder / "out" / "probes.csv")))
+        rows = list(csv.DictReader((self.folder / "out" / "probes.csv").read_text().splitlines()))
         top = numpy.argmin(numpy.linalg.norm(nodes - [50, 50, 100], axis=1))
         self.assertEqual([row["time_s"] for row in rows], ["0", "0.5", "1"])
         self.assertLess(float(rows[2]["dz_mm"]), -10)

@@ -285,6 +285,15 @@ TEST(Simulate, RefusesContradictions) {
     EXPECT_THROW(simulate(build(scene)), InvalidInput) << "nothing holds it";
 }
 
+TEST(Simulate, RefusesFrictionInEquilibrium) {
+    Scene scene = cube();
+    Contact table;
+    table.body = HalfSpace{{0, 0, -5}, {0, 0, 1}};
+    table.friction = 0.3;
+    scene.contacts.push_back(table);
+    EXPECT_THROW(simulate(build(scene)), InvalidInput);
+}
+
 struct Cancelling : Observer {
     int looks = 0;
     bool cancel_requested() override { return ++looks > 2; }
