@@ -165,6 +165,7 @@ TEST_P(Dynamics, ConditionsThatStayTheSameChangeNothing) {
         return bar.conditions;
     };
     const ChangingConditions changing{always, 15 * once.step};
+    engine = make_engine(GetParam(), bar.rest);  // the first force of another would be read after a step's relaxation
     const auto again = dynamics(*engine, bar.rest, mass, changing, bar.first_mode(0.1), 0.1, options);
     EXPECT_EQ(again.state.displacement, once.state.displacement);
     EXPECT_EQ(again.steps, once.steps);
