@@ -25,6 +25,8 @@ struct RunVerb {
     void operator()(const apps::EvaluateOptions& options) const { apps::run_evaluate(options); }
     void operator()(const apps::InfoOptions& options) const { apps::run_info(options); }
     void operator()(const apps::BenchOptions& options) const { apps::run_bench(options); }
+    void operator()(const apps::SimulateOptions& options) const { apps::run_simulate(options); }
+    void operator()(const apps::ExplainOptions& options) const { apps::run_explain(options); }
 };
 
 int report(const std::vector<std::string>& arguments, int code, std::string message) {

@@ -152,6 +152,8 @@ struct Parser {
     EvaluateOptions evaluate;
     InfoOptions info;
     BenchOptions bench;
+    SimulateOptions simulate;
+    ExplainOptions explain;
     std::filesystem::path config;
     std::vector<std::string> register_lengths, mesh_lengths, info_files, anchors, rigid_neighbours;
     std::deque<Verb> verbs;
@@ -165,6 +167,8 @@ struct Parser {
         declare_evaluate(verbs.emplace_back(app, "evaluate", "Score label maps, landmarks and fields"));
         declare_info(verbs.emplace_back(app, "info", "Print what a file holds, or the devices of this machine"));
         declare_bench(verbs.emplace_back(app, "bench", "Time the solver's engines on this machine"));
+        declare_simulate(verbs.emplace_back(app, "simulate", "Simulate what a scene file names"));
+        declare_explain(verbs.emplace_back(app, "explain", "Print what a scene will run and what a step costs"));
     }
 
     void declare_register(Verb& verb) {
@@ -359,6 +363,24 @@ struct Parser {
         verb.common(o.common);
     }
 
+    void declare_simulate(Verb& verb) {
+        SimulateOptions& o = simulate;
+        verb.app().footer("Example:\n  tissuewarp simulate --init cube\n  tissuewarp simulate cube.toml --output out");
+        verb.path("scene", o.scene, "Scene file (TOML); with --init the file to write");
+        verb.path("-o,--output", o.output, "Folder for the frames")->type_name("FOLDER");
+        verb.text("--init", o.init, "Write a commented scene: brain-shift, breast, cube, liver, resection, retraction");
+        verb.flag("--ablate", o.ablate, "Run without each effect in turn; print what it changes (mm) and costs (ms)");
+        verb.text("--device", o.device.name, "auto, cpu, gpu or gpu:<index>; auto: what the scene says")
+            ->check(CLI::Validator(check_device, "", "device"));
+        verb.common(o.common);
+    }
+
+    void declare_explain(Verb& verb) {
+        ExplainOptions& o = explain;
+        verb.path("scene", o.scene, "Scene file (TOML)")->required();
+        verb.common(o.common);
+    }
+
     Command result() {
         const std::string verb = app.get_subcommands().front()->get_name();
         if (verb == "register") {
@@ -384,6 +406,8 @@ struct Parser {
         if (verb == "warp") return warp;
         if (verb == "evaluate") return evaluate;
         if (verb == "bench") return bench;
+        if (verb == "simulate") return simulate;
+        if (verb == "explain") return explain;
         info.files.assign(info_files.begin(), info_files.end());
         return info;
     }
@@ -412,7 +436,9 @@ struct Parser {
         throw InvalidInput(message + (nearest.empty() ? "; see --help" : "; did you mean '" + nearest + "'?"));
     }
 
-    static std::vector<std::string> verb_names() { return {"register", "mesh", "warp", "evaluate", "info", "bench"}; }
+    static std::vector<std::string> verb_names() {
+        return {"register", "mesh", "warp", "evaluate", "info", "bench", "simulate", "explain"};
+    }
 };
 
 /// Puts the file that --config names in front of the other arguments, so that those win.
@@ -447,8 +473,9 @@ Command parse_command_line(std::vector<std::string> arguments) {
         throw HelpRequest{parser.app.version() + "\n"};
     } catch (const CLI::ParseError& error) {
         const bool no_verb = parser.app.get_subcommands().empty();
-        throw InvalidInput(no_verb ? "give a verb: register, mesh, warp, evaluate, info or bench; see --help"
-                                   : std::string(error.what()) + "; see --help");
+        throw InvalidInput(
+            no_verb ? "give a verb: register, mesh, warp, evaluate, info, bench, simulate or explain; see --help"
+                    : std::string(error.what()) + "; see --help");
     }
     return parser.result();
 }

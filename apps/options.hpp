@@ -120,7 +120,21 @@ struct BenchOptions {
     DeviceChoice device;
 };
 
-using Command = std::variant<RegisterOptions, MeshOptions, WarpOptions, EvaluateOptions, InfoOptions, BenchOptions>;
+struct SimulateOptions {
+    CommonOptions common;
+    std::filesystem::path scene, output;
+    std::string init;     ///< name of a scene to write
+    bool ablate = false;  ///< what each effect changes, in place of frames
+    DeviceChoice device;
+};
+
+struct ExplainOptions {
+    CommonOptions common;
+    std::filesystem::path scene;
+};
+
+using Command = std::variant<RegisterOptions, MeshOptions, WarpOptions, EvaluateOptions, InfoOptions, BenchOptions,
+                             SimulateOptions, ExplainOptions>;
 
 /// The text that --help or --version asked for; not an error.
 struct HelpRequest {

@@ -16,7 +16,7 @@ std::vector<hsize_t> voxel_shape(const imaging::Geometry& grid) {
     return {static_cast<hsize_t>(grid.size[2]), static_cast<hsize_t>(grid.size[1]), static_cast<hsize_t>(grid.size[0])};
 }
 
-void write_labels(detail::Hdf5Output& file, const imaging::Volume& labels) {
+void write_labels(Hdf5Output& file, const imaging::Volume& labels) {
     if (labels.empty() || labels.channels() != 1)
         throw InvalidInput("the prepared model holds no label map of one component");
     const imaging::Volume integers = labels.as(CV_32S);
@@ -24,7 +24,7 @@ void write_labels(detail::Hdf5Output& file, const imaging::Volume& labels) {
     file.array<int>("moving_labels/voxels", integers.data<int>(), voxel_shape(labels.geometry), "1");
 }
 
-imaging::Volume read_label_map(const detail::Hdf5Input& file) {
+imaging::Volume read_label_map(const Hdf5Input& file) {
     const imaging::Geometry grid = detail::read_grid(file, "moving_labels/grid");
     file.require_shape("moving_labels/voxels", voxel_shape(grid));
     imaging::Volume labels(grid, CV_32SC1);
@@ -32,16 +32,16 @@ imaging::Volume read_label_map(const detail::Hdf5Input& file) {
     return labels;
 }
 
-void write_list(detail::Hdf5Output& file, const std::string& name, const std::vector<int>& list) {
+void write_list(Hdf5Output& file, const std::string& name, const std::vector<int>& list) {
     file.vector<int>(name, Eigen::VectorXi::Map(list.data(), static_cast<Eigen::Index>(list.size())), "1");
 }
 
-std::vector<int> read_list(const detail::Hdf5Input& file, const std::string& name) {
+std::vector<int> read_list(const Hdf5Input& file, const std::string& name) {
     const Eigen::VectorXi list = file.vector<int>(name);
     return {list.begin(), list.end()};
 }
 
-void write_meshing(detail::Hdf5Output& file, const meshing::MeshingOptions& options) {
+void write_meshing(Hdf5Output& file, const meshing::MeshingOptions& options) {
     file.scalar<double>("options/meshing/edge_length", options.edge_length, "mm");
     Eigen::VectorXi label(static_cast<Eigen::Index>(options.label_edge_length.size()));
     Eigen::VectorXd length(label.size());
@@ -62,7 +62,7 @@ void write_meshing(detail::Hdf5Output& file, const meshing::MeshingOptions& opti
     write_list(file, "options/meshing/labels", options.labels);
 }
 
-meshing::MeshingOptions read_meshing(const detail::Hdf5Input& file) {
+meshing::MeshingOptions read_meshing(const Hdf5Input& file) {
     meshing::MeshingOptions options;
     options.edge_length = file.scalar<double>("options/meshing/edge_length");
     const Eigen::VectorXi label = file.vector<int>("options/meshing/label_edge_length/label");
@@ -79,7 +79,7 @@ meshing::MeshingOptions read_meshing(const detail::Hdf5Input& file) {
     return options;
 }
 
-tled::Material only_material(const detail::Hdf5Input& file, const std::string& group) {
+tled::Material only_material(const Hdf5Input& file, const std::string& group) {
     const tled::MaterialTable table = detail::read_materials(file, group);
     if (table.size() != 1)
         throw InvalidInput("'" + group + "' holds " + std::to_string(table.size()) + " materials, not 1");
@@ -90,7 +90,7 @@ tled::Material only_material(const detail::Hdf5Input& file, const std::string& g
 
 void write_prepared(const PreparedModel& prepared, const std::filesystem::path& path) {
     AtomicFile target(path);
-    detail::Hdf5Output file(target.path(), format, version);
+    Hdf5Output file(target.path(), format, version);
     detail::write_model(file, prepared.model);
     write_labels(file, detail::with_neighbours(prepared));
     write_meshing(file, prepared.options.meshing);
@@ -105,7 +105,7 @@ void write_prepared(const PreparedModel& prepared, const std::filesystem::path& 
 }
 
 PreparedModel read_prepared(const std::filesystem::path& path, Observer& observer) {
-    const detail::Hdf5Input file(path, format, version);
+    const Hdf5Input file(path, format, version);
     tled::Model model = detail::read_model(file);
     PrepareOptions options;
     options.meshing = read_meshing(file);

@@ -35,12 +35,12 @@ void require_consistent(const Deformation& deformation) {
                            ", at most 1e-6)");
 }
 
-void write_matrix(detail::Hdf5Output& file, const std::string& name, const Eigen::Isometry3d& motion) {
+void write_matrix(Hdf5Output& file, const std::string& name, const Eigen::Isometry3d& motion) {
     file.columns<double>(name, motion.matrix().transpose(), "mm");
     file.attribute(name, "meaning", "homogeneous matrix, moving to fixed, LPS mm: y = A x");
 }
 
-void write_rounds(detail::Hdf5Output& file, const std::vector<Round>& rounds) {
+void write_rounds(Hdf5Output& file, const std::vector<Round>& rounds) {
     const auto column = [&](const std::string& name, auto member, const std::string& units) {
         using Value = std::decay_t<decltype(rounds[0].*member)>;
         Eigen::Matrix<Value, Eigen::Dynamic, 1> values(static_cast<Eigen::Index>(rounds.size()));
@@ -57,7 +57,7 @@ void write_rounds(detail::Hdf5Output& file, const std::vector<Round>& rounds) {
     column("estimated_error_mm", &Round::estimated_error_mm, "mm");
 }
 
-void write_info(detail::Hdf5Output& file, const RecordInfo& info) {
+void write_info(Hdf5Output& file, const RecordInfo& info) {
     std::vector<std::string> names, values;
     for (const auto& [name, value] : info.provenance) {
         names.push_back(name);
@@ -68,7 +68,7 @@ void write_info(detail::Hdf5Output& file, const RecordInfo& info) {
     file.texts("parameters_toml", {info.parameters_toml});
 }
 
-void write_result(detail::Hdf5Output& file, const UpdateResult& result) {
+void write_result(Hdf5Output& file, const UpdateResult& result) {
     const Deformation& deformation = result.deformation;
     file.columns<double>("displacement", deformation.displacement, "mm");
     file.attribute("displacement", "frame", "moving image, LPS; elastic part, before the placement");
@@ -100,7 +100,7 @@ void write_record(const PreparedModel& prepared, const UpdateResult& result, con
     if (deformation.mesh.tets != prepared.model.mesh.tets || deformation.mesh.nodes != prepared.model.mesh.nodes)
         throw InvalidInput("the result's mesh is not the prepared model's; pass the model that was updated");
     AtomicFile target(path);
-    detail::Hdf5Output file(target.path(), format, version);
+    Hdf5Output file(target.path(), format, version);
     detail::write_model(file, prepared.model);
     detail::write_grid(file, "moving_grid", prepared.labels.geometry);
     write_result(file, result);
@@ -112,7 +112,7 @@ void write_record(const PreparedModel& prepared, const UpdateResult& result, con
 }
 
 Record read_record(const std::filesystem::path& path) {
-    const detail::Hdf5Input file(path, format, version);
+    const Hdf5Input file(path, format, version);
     Record record;
     record.format_version = version;
     tled::Model model = detail::read_model(file);

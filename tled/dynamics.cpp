@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <string>
 
 #include "core/errors.hpp"
@@ -21,6 +22,7 @@ namespace {
 constexpr int first_iterations = 40, later_iterations = 5, most_cuts = 6;
 constexpr double cutting_margin = 0.97;  // of the critical step: above, the step is cut
 constexpr double loose_tolerance = 1.0;
+constexpr double fewest_held = 10;  // steps between two changes of the conditions
 
 /// Whether something may give energy back or do work that no potential tells: viscous tissue, a pressure on a surface
 /// with a moving rim, an obstacle that moves.
@@ -30,31 +32,31 @@ bool energy_may_grow(const RestState& rest, const NodalEffects& effects) {
 
 class Run {
 public:
-    Run(Engine& engine, const RestState& rest, const Matrix3Xd& mass, const NodalConditions& conditions,
+    Run(Engine& engine, const RestState& rest, const Matrix3Xd& mass, const ChangingConditions& conditions,
         const DynamicsState& start, double duration, const DynamicsOptions& options, Observer& observer)
         : engine_(engine),
           rest_(rest),
           mass_(mass),
-          conditions_(conditions),
+          changing_(conditions),
           options_(options),
           observer_(observer),
-          applied_(detail::applied_force(conditions)),
-          tolerance_(energy_may_grow(rest, conditions.effects) ? loose_tolerance : options.energy_tolerance),
+          tolerance_(options.energy_tolerance),
           start_time_(start.time),
           end_time_(start.time + duration) {
         engine_.set_mass(mass);
-        engine_.set_conditions(conditions);
+        apply(start.time);
+        if (energy_may_grow(rest_, conditions_->effects)) tolerance_ = loose_tolerance;
         choose_step(start.displacement);
         begin(start);
     }
 
     DynamicsResult run() {
         while (end_time_ - result_.state.time > 1e-9 * result_.step) {
-            const double left = end_time_ - result_.state.time;
+            const double left = next_stop() - result_.state.time;
             const int steps =
                 static_cast<int>(std::min<double>(options_.steps_per_check, std::ceil(left / result_.step - 1e-9)));
             if (steps * result_.step > left) change_step(left / steps);
-            engine_.run(steps, coefficients());
+            take(steps);
             result_.steps += steps;
             accept_or_cut(steps);
         }
@@ -65,6 +67,32 @@ private:
     [[nodiscard]] StepCoefficients coefficients() const {
         const double half = 0.5 * options_.damping * result_.step;
         return {(1 - half) / (1 + half), result_.step * result_.step / (1 + half), result_.step};
+    }
+
+    void apply(double time) {
+        conditions_ = &changing_.at(time);
+        applied_ = detail::applied_force(*conditions_);
+        engine_.set_conditions(*conditions_);
+    }
+
+    [[nodiscard]] double next_stop() const {
+        const double now = result_.state.time + 1e-9 * result_.step;
+        const auto stop = std::upper_bound(options_.stops.begin(), options_.stops.end(), now);
+        return stop == options_.stops.end() ? end_time_ : std::min(*stop, end_time_);
+    }
+
+    /// Steps of the present length, under conditions that change now and then.
+    void take(int steps) {
+        if (!(changing_.interval > 0)) return engine_.run(steps, coefficients());
+        const double held = std::max<double>(fewest_held, std::floor(changing_.interval / result_.step));
+        const int parts = std::max(1, static_cast<int>(std::ceil(steps / held)));
+        for (int part = 0, done = 0; part < parts; ++part) {
+            const int next = static_cast<int>(std::int64_t{steps} * (part + 1) / parts);
+            apply(result_.state.time + next * result_.step);
+            if (part + 1 == parts) first_total_ = total_energy(engine_.observe()).total;
+            engine_.run(next - done, coefficients());
+            done = next;
+        }
     }
 
     void choose_step(const Matrix3Xd& displacement) {
@@ -104,9 +132,9 @@ private:
 
     [[nodiscard]] double potential(const Matrix3Xd& u) const {
         Matrix3Xd resistance = Matrix3Xd::Zero(3, u.cols());
-        detail::add_spring_resistance(conditions_, u, resistance);
+        detail::add_spring_resistance(*conditions_, u, resistance);
         return elastic_energy(rest_, u) + u.cwiseProduct(0.5 * resistance - applied_).sum() +
-               energy(conditions_.effects, rest_.position, u);
+               energy(conditions_->effects, rest_.position, u);
     }
 
     [[nodiscard]] EnergyBalance total_energy(const Observation& seen) {
@@ -186,7 +214,8 @@ private:
     Engine& engine_;
     const RestState& rest_;
     const Matrix3Xd& mass_;
-    const NodalConditions& conditions_;
+    const ChangingConditions& changing_;
+    const NodalConditions* conditions_ = nullptr;
     const DynamicsOptions& options_;
     Observer& observer_;
     Matrix3Xd applied_;
@@ -206,6 +235,8 @@ void require_options(const DynamicsOptions& options, double duration) {
             "dynamics needs damping and step of at least 0, a safety between 0 and 1, a check at least every step and "
             "a "
             "positive energy tolerance");
+    if (!std::is_sorted(options.stops.begin(), options.stops.end()))
+        throw InvalidInput("the stops of the dynamics are not in the order of time");
 }
 
 }  // namespace
@@ -213,7 +244,15 @@ void require_options(const DynamicsOptions& options, double duration) {
 DynamicsResult dynamics(Engine& engine, const RestState& rest, const Matrix3Xd& mass, const NodalConditions& conditions,
                         const DynamicsState& start, double duration, const DynamicsOptions& options,
                         Observer& observer) {
+    const auto always = [&](double) -> const NodalConditions& { return conditions; };
+    return dynamics(engine, rest, mass, ChangingConditions{always, 0}, start, duration, options, observer);
+}
+
+DynamicsResult dynamics(Engine& engine, const RestState& rest, const Matrix3Xd& mass,
+                        const ChangingConditions& conditions, const DynamicsState& start, double duration,
+                        const DynamicsOptions& options, Observer& observer) {
     require_options(options, duration);
+    if (!(conditions.interval >= 0)) throw InvalidInput("conditions are held for an interval of 0 s or more");
     return Run(engine, rest, mass, conditions, start, duration, options, observer).run();
 }
 

@@ -6,6 +6,7 @@
 #include "tled/engine.hpp"
 
 #include <functional>
+#include <vector>
 
 namespace tissuewarp::tled {
 
@@ -30,7 +31,15 @@ struct DynamicsOptions {
     double safety = 0.9;             ///< part of the critical step; 0.95 has been seen to blow up
     int steps_per_check = 200;       ///< between looks at energy, J, and the critical step, which falls under load
     double energy_tolerance = 0.02;  ///< growth of energy that calls for a smaller step
+    std::vector<double> stops{};     ///< s, ascending: times that a check falls on exactly
     std::function<void(const DynamicsState&, const EnergyBalance&)> watch{};  ///< called at every check
+};
+
+/// Conditions that change while the tissue moves. What is constrained must not.
+struct ChangingConditions {
+    std::function<const NodalConditions&(double time)> at;  ///< valid until the next call
+    /// s, for which they are held, each time as they are at its end; ten steps at least. 0: they stay as at the start.
+    double interval = 0;
 };
 
 struct DynamicsResult {
@@ -51,6 +60,12 @@ struct DynamicsResult {
 /// as growth there.
 DynamicsResult dynamics(Engine& engine, const RestState& rest, const Eigen::Matrix3Xd& mass,
                         const NodalConditions& conditions, const DynamicsState& start, double duration,
+                        const DynamicsOptions& options = {}, Observer& observer = silent_observer());
+
+/// The same under conditions that change. Energy is watched over the last interval before each check, since loads that
+/// change do work.
+DynamicsResult dynamics(Engine& engine, const RestState& rest, const Eigen::Matrix3Xd& mass,
+                        const ChangingConditions& conditions, const DynamicsState& start, double duration,
                         const DynamicsOptions& options = {}, Observer& observer = silent_observer());
 
 }  // namespace tissuewarp::tled

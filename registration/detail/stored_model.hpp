@@ -1,8 +1,8 @@
 #pragma once
 /// The parts that prepared models and records have in common, in HDF5 (docs/record.md).
 
+#include "core/detail/hdf5.hpp"
 #include "imaging/geometry.hpp"
-#include "registration/detail/hdf5.hpp"
 #include "registration/pipeline.hpp"
 
 namespace tissuewarp::registration::detail {

@@ -20,9 +20,10 @@ const std::map<std::string, std::set<std::string>> may_include{
     {"shaders", {"core", "shaders"}},
     {"meshing", {"core", "meshing"}},  // the mesher, see below, knows images too
     {"tled", {"core", "meshing", "shaders", "tled"}},
+    {"simulation", {"core", "imaging", "meshing", "shaders", "tled", "simulation"}},
     {"registration", {"core", "imaging", "meshing", "shaders", "tled", "registration"}},
     {"report", {"core", "imaging", "report"}},
-    {"apps", {"core", "imaging", "meshing", "shaders", "tled", "registration", "report", "apps"}},
+    {"apps", {"core", "imaging", "meshing", "shaders", "tled", "simulation", "registration", "report", "apps"}},
 };
 
 /// Files of meshing that belong to the mesher: they name it, its label field, its seeds or its fidelity.

@@ -130,10 +130,10 @@ TEST_F(Records, HoldEveryLaw) {
         {9, tled::TransverselyIsotropic{1.0, 50.0, 2.0, Eigen::Vector3d::UnitY()}},
     };
     {
-        detail::Hdf5Output file(path, "materials", 1);
+        Hdf5Output file(path, "materials", 1);
         detail::write_materials(file, "materials", materials);
     }
-    const detail::Hdf5Input file(path, "materials", 1);
+    const Hdf5Input file(path, "materials", 1);
     EXPECT_EQ(detail::read_materials(file, "materials"), materials);
 }
 
@@ -143,7 +143,7 @@ TEST_F(Records, RefuseModelsThatTheyCannotHold) {
     fibrous.fibre = Eigen::Matrix3Xd::Constant(3, fibrous.mesh.tet_count(), std::sqrt(1.0 / 3));
     mixed.hexahedra.hexes = Eigen::Matrix<int, 8, 1>::Zero();
     for (const tled::Model& model : {viscous, fibrous, mixed}) {
-        detail::Hdf5Output file(path, "model", 1);
+        Hdf5Output file(path, "model", 1);
         EXPECT_THROW(detail::write_model(file, model), InvalidInput);
     }
 }

@@ -152,6 +152,59 @@ TEST_P(Dynamics, ABlowThatInvertsTissueIsRefusedAndTheLastGoodStateIsLeft) {
 }
 
 // Power iteration against the dense eigenvalue of M⁻¹K.
+// Holding the same conditions again and again must not be felt, by viscous stresses least of all: bit for bit.
+TEST_P(Dynamics, ConditionsThatStayTheSameChangeNothing) {
+    bar.model.viscosity[1] = {{{0.5, 0.05}}};
+    bar.rest = rest_state(bar.model);
+    engine = make_engine(GetParam(), bar.rest);
+    const DynamicsOptions options{.steps_per_check = 50, .stops = {0.04, 0.1}};
+    const auto once = dynamics(*engine, bar.rest, mass, bar.conditions, bar.first_mode(0.1), 0.1, options);
+    int asked = 0;
+    const auto always = [&](double) -> const NodalConditions& {
+        ++asked;
+        return bar.conditions;
+    };
+    const ChangingConditions changing{always, 15 * once.step};
+    engine = make_engine(GetParam(), bar.rest);  // the first force of another would be read after a step's relaxation
+    const auto again = dynamics(*engine, bar.rest, mass, changing, bar.first_mode(0.1), 0.1, options);
+    EXPECT_EQ(again.state.displacement, once.state.displacement);
+    EXPECT_EQ(again.steps, once.steps);
+    EXPECT_GE(asked, once.steps / 15);
+}
+
+// The tip pulled out evenly and slowly: u = v t z/L but for a wave of the start, v z/c at most.
+TEST_P(Dynamics, ATipThatIsPulledSlowlyTakesTheBarWithIt) {
+    const double speed = 5, length = 100, wave_speed = std::sqrt(3.0 / 1e-6);
+    NodalConditions now = bar.conditions;
+    for (int node = 0; node < bar.rest.node_count; ++node)
+        if (bar.rest.position(2, node) == length) now.constrained(2, node) = true;
+    std::vector<double> times;
+    const auto pulled = [&](double time) -> const NodalConditions& {
+        for (int node = 0; node < bar.rest.node_count; ++node)
+            if (bar.rest.position(2, node) == length) now.imposed(2, node) = speed * time;
+        times.push_back(time);
+        return now;
+    };
+    std::vector<double> seen;
+    DynamicsOptions options{.damping = 20.0, .stops = {0.13, 0.2}};
+    options.watch = [&](const DynamicsState& state, const EnergyBalance&) { seen.push_back(state.time); };
+    const DynamicsState rest{Matrix3Xd::Zero(3, bar.rest.node_count), Matrix3Xd::Zero(3, bar.rest.node_count), 0};
+    const auto result = dynamics(*engine, bar.rest, mass, ChangingConditions{pulled, 1e-3}, rest, 0.4, options);
+    for (int node = 0; node < bar.rest.node_count; ++node)
+        EXPECT_NEAR(result.state.displacement(2, node), speed * 0.4 * bar.rest.position(2, node) / length,
+                    speed * length / wave_speed);
+    EXPECT_NEAR(result.state.displacement(2, bar.tip()), 2.0, 1e-6) << "the tip is where it was last told to be";
+    for (const double stop : options.stops)
+        EXPECT_TRUE(std::any_of(seen.begin(), seen.end(), [&](double t) { return std::abs(t - stop) < 1e-9; })) << stop;
+    for (std::size_t i = 1; i < times.size(); ++i)
+        EXPECT_LT(times[i] - times[i - 1], 1e-3 + 11 * result.step) << "held no longer than told";
+}
+
+TEST_P(Dynamics, StopsOutOfOrderAreRefused) {
+    EXPECT_THROW(dynamics(*engine, bar.rest, mass, bar.conditions, bar.first_mode(0.1), 0.1, {.stops = {0.1, 0.05}}),
+                 InvalidInput);
+}
+
 TEST_P(Dynamics, HighestModeIsThatOfTheTangent) {
     const Bar small(3, 0.3);
     const auto small_engine = make_engine(GetParam(), small.rest);

@@ -1,4 +1,4 @@
-#include "registration/detail/hdf5.hpp"
+#include "core/detail/hdf5.hpp"
 
 #include "core/errors.hpp"
 
@@ -7,7 +7,7 @@
 #include <limits>
 #include <numeric>
 
-namespace tissuewarp::registration::detail {
+namespace tissuewarp {
 
 namespace {
 
@@ -76,6 +76,20 @@ Hdf5Handle new_dataset(hid_t file, const std::string& name, hid_t type, const st
     H5Pset_create_intermediate_group(links, 1);
     return {H5Dcreate2(file, name.c_str(), type, simple_space(shape), links, creation(shape, value_bytes), H5P_DEFAULT),
             H5Dclose};
+}
+
+/// Float64, one entry of the shape `one` (which begins with 1) to a chunk.
+Hdf5Handle new_growing(hid_t file, const std::string& name, const std::vector<hsize_t>& one) {
+    std::vector<hsize_t> most = one;
+    most[0] = H5S_UNLIMITED;
+    const Hdf5Handle space(H5Screate_simple(static_cast<int>(one.size()), one.data(), most.data()), H5Sclose);
+    const Hdf5Handle list(H5Pcreate(H5P_DATASET_CREATE), H5Pclose), links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
+    H5Pset_create_intermediate_group(links, 1);
+    H5Pset_chunk(list, static_cast<int>(one.size()), one.data());
+    H5Pset_shuffle(list);
+    H5Pset_deflate(list, 3);
+    H5Pset_fletcher32(list);
+    return {H5Dcreate2(file, name.c_str(), H5T_IEEE_F64LE, space, links, list, H5P_DEFAULT), H5Dclose};
 }
 
 bool write_text_attribute(hid_t object, const std::string& name, const std::string& value) {
@@ -171,6 +185,27 @@ void Hdf5Output::texts(const std::string& name, const std::vector<std::string>& 
     }
     if (!data.valid() || (!values.empty() && H5Dwrite(data, type, H5S_ALL, H5S_ALL, H5P_DEFAULT,
                                                       static_cast<const void*>(pointers.data())) < 0))
+        throw IoError("cannot write '" + name + "' to '" + path_.string() + "'; is the disk full?");
+}
+
+void Hdf5Output::append(const std::string& name, const double* values, const std::vector<hsize_t>& shape,
+                        const std::string& units) {
+    std::vector<hsize_t> size{1}, start(shape.size() + 1, 0);
+    size.insert(size.end(), shape.begin(), shape.end());
+    const std::vector<hsize_t> one = size;
+    const bool first = H5Lexists(file_, name.c_str(), H5P_DEFAULT) <= 0;
+    const Hdf5Handle data =
+        first ? new_growing(file_, name, one) : Hdf5Handle(H5Dopen2(file_, name.c_str(), H5P_DEFAULT), H5Dclose);
+    if (!first) {
+        const Hdf5Handle before(H5Dget_space(data), H5Sclose);
+        H5Sget_simple_extent_dims(before, size.data(), nullptr);
+        start[0] = size[0]++;
+    }
+    const bool grown = data.valid() && H5Dset_extent(data, size.data()) >= 0;
+    const Hdf5Handle space(grown ? H5Dget_space(data) : H5I_INVALID_HID, H5Sclose), entry = simple_space(one);
+    if (!grown || H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), nullptr, one.data(), nullptr) < 0 ||
+        H5Dwrite(data, H5T_NATIVE_DOUBLE, entry, space, H5P_DEFAULT, values) < 0 ||
+        (first && !write_text_attribute(data, "units", units)))
         throw IoError("cannot write '" + name + "' to '" + path_.string() + "'; is the disk full?");
 }
 
@@ -318,4 +353,4 @@ template Eigen::VectorXi Hdf5Input::vector<int>(const std::string&, Eigen::Index
 template double Hdf5Input::scalar<double>(const std::string&) const;
 template int Hdf5Input::scalar<int>(const std::string&) const;
 
-}  // namespace tissuewarp::registration::detail
+}  // namespace tissuewarp

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace tissuewarp::registration::detail {
+namespace tissuewarp {
 
 /// An HDF5 identifier and the function that gives it back.
 class Hdf5Handle {
@@ -66,6 +66,9 @@ public:
     template <class T>
     void array(const std::string& name, const T* values, const std::vector<hsize_t>& shape, const std::string& units);
     void texts(const std::string& name, const std::vector<std::string>& values);
+    /// Adds one entry of this shape to a dataset (entries × shape) that grows; the first makes it.
+    void append(const std::string& name, const double* values, const std::vector<hsize_t>& shape,
+                const std::string& units);
     /// A text about a dataset.
     void attribute(const std::string& object, const std::string& name, const std::string& value);
     /// Throws IoError when not everything reached the disk.
@@ -110,4 +113,4 @@ private:
     Hdf5Handle file_;
 };
 
-}  // namespace tissuewarp::registration::detail
+}  // namespace tissuewarp

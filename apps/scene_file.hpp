@@ -1,0 +1,15 @@
+#pragma once
+/// Scene files (docs/manual/simulate.md).
+
+#include "simulation/scene.hpp"
+
+#include <filesystem>
+
+namespace tissuewarp::apps {
+
+/// Reads a scene with the files that it names, which it looks for beside itself. Throws IoError, and InvalidInput with
+/// file and line for unknown keys, values of the wrong kind or out of range, sets and labels that do not exist; and for
+/// what simulation::require_valid() refuses.
+simulation::Scene read_scene(const std::filesystem::path& path);
+
+}  // namespace tissuewarp::apps

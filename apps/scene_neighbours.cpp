@@ -1,0 +1,61 @@
+// [[contact]] and [[sliding]]: what the tissue touches.
+
+#include "apps/scene_parts.hpp"
+#include "meshing/mesh_io.hpp"
+
+namespace tissuewarp::apps {
+
+using namespace simulation;
+
+namespace {
+
+Body body_of(TomlReader& reader, const std::filesystem::path& folder, NameUses& uses) {
+    std::vector<Body> bodies;
+    if (const auto plane = reader.table("plane")) bodies.emplace_back(read_half_space(*plane));
+    if (const auto ball = reader.table("ball")) bodies.emplace_back(read_ball(*ball));
+    if (const auto surface = reader.text("surface")) bodies.emplace_back(meshing::read_surface(folder / *surface).mesh);
+    if (const auto label = reader.whole("label", 1, 1000000)) {
+        bodies.emplace_back(ObstacleLabel{*label});
+        uses.volume_labels.push_back({*label, reader.place("label"), "is a body in contact"});
+    }
+    if (const std::vector<int> labels = reader.wholes("outside_of", 1, 1000000); !labels.empty()) {
+        bodies.emplace_back(OutsideOfLabels{labels});
+        for (const int label : labels)
+            uses.volume_labels.push_back({label, reader.place("outside_of"), "is within a body in contact"});
+    }
+    if (bodies.size() != 1)
+        throw InvalidInput(reader.place() +
+                           ": a contact takes one of 'plane', 'ball', 'surface', 'label' and 'outside_of'");
+    return bodies.front();
+}
+
+}  // namespace
+
+void read_neighbours(TomlReader& file, const std::filesystem::path& folder, Scene& scene, NameUses& uses) {
+    for (TomlReader& reader : file.tables("contact")) {
+        Contact contact;
+        contact.set = reader.text("set").value_or("");
+        if (!contact.set.empty()) uses.sets.push_back({contact.set, reader.place("set")});
+        contact.gap = reader.number("gap_mm", {0.0, 1000.0, "mm"}).value_or(0.0);
+        contact.friction = reader.number("friction", {0.0, 10.0}).value_or(0.0);
+        contact.motion = reader.vector("displacement_mm", any_length).value_or(Eigen::Vector3d::Zero());
+        contact.curve = reader.curve();
+        contact.body = body_of(reader, folder, uses);
+        reader.finish();
+        scene.contacts.push_back(contact);
+    }
+    for (TomlReader& reader : file.tables("sliding")) {
+        Sliding sliding;
+        const std::vector<int> labels = reader.wholes("labels", 1, 1000000);
+        if (labels.size() != 2) reader.refuse("labels", "a sliding interface lies between two 'labels', [a, b]");
+        sliding.labels = {labels[0], labels[1]};
+        for (const int label : labels) uses.tissue_labels.push_back({label, reader.place("labels"), "slides"});
+        sliding.per_area = reader.number("stiffness_kpa_per_mm", {1e-6, 1e6, "kPa/mm"}).value_or(sliding.per_area);
+        sliding.except = reader.text("except").value_or("");
+        if (!sliding.except.empty()) uses.sets.push_back({sliding.except, reader.place("except")});
+        reader.finish();
+        scene.sliding.push_back(sliding);
+    }
+}
+
+}  // namespace tissuewarp::apps

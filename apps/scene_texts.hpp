@@ -1,0 +1,15 @@
+#pragma once
+/// The files of data/scenes as texts; the source is made by embed_scenes.cmake.
+
+#include <string>
+#include <vector>
+
+namespace tissuewarp::apps {
+
+struct SceneText {
+    std::string name, text;
+};
+
+const std::vector<SceneText>& scene_texts();
+
+}  // namespace tissuewarp::apps

@@ -1,0 +1,52 @@
+#pragma once
+/// A scene on its mesh.
+
+#include "core/observer.hpp"
+#include "meshing/point_location.hpp"
+#include "simulation/scene.hpp"
+#include "simulation/tissue_mesh.hpp"
+#include "tled/conditions.hpp"
+#include "tled/model.hpp"
+#include "tled/rest_state.hpp"
+
+#include <vector>
+
+namespace tissuewarp::simulation {
+
+/// The tissue from a time on, until the next resection. Nodes and tetrahedra count anew in each stage.
+struct Stage {
+    double begin = 0.0;  ///< s
+    tled::Model model;
+    tled::RestState rest;
+    std::vector<tled::SurfacePressure> growth;  ///< what growth comes down to besides moduli (tled/growth.hpp)
+    std::vector<int> node;                      ///< of the first stage's mesh, ascending
+    std::vector<int> tet;                       ///< likewise
+    std::vector<int> place;                     ///< node of the first stage → node of this one, −1 where it is gone
+};
+
+/// Components of a node that are held or moved.
+struct HeldNode {
+    int node = -1;
+    std::array<int, 3> motion{none, none, none};  ///< index into Scene::motions of each component; or one of
+    static constexpr int none = -2, fixed = -1;
+};
+
+/// Everything that does not change with time is found here once. Nodes are those of the first stage.
+struct BuiltScene {
+    Scene scene;
+    std::vector<Stage> stages;   ///< one at least, in the order of time
+    std::vector<HeldNode> held;  ///< by node
+    std::vector<tled::Spring> springs;
+    tled::Effects effects;  ///< pressures and levels where their curves are 1, obstacles where they are at rest
+    std::vector<meshing::Location> probes;  ///< of Scene::probes, in the first stage's mesh
+
+    [[nodiscard]] const meshing::TetMesh& mesh() const { return stages.front().model.mesh; }
+};
+
+/// Meshes and checks. Throws InvalidInput as require_valid(), mesh_of(), RegionFinder and obstacle() do, for probes
+/// outside the tissue, and for a component of a node that is held or moved twice; Cancelled.
+BuiltScene build(const Scene& scene, Observer& observer = silent_observer());
+/// The same on a mesh that mesh_of() has made of the scene before.
+BuiltScene build(const Scene& scene, const meshing::TetMesh& mesh, Observer& observer = silent_observer());
+
+}  // namespace tissuewarp::simulation

@@ -1,0 +1,132 @@
+#include "simulation/series_io.hpp"
+
+#include "core/detail/hdf5.hpp"
+#include "core/errors.hpp"
+#include "meshing/mesh_io.hpp"
+#include "tled/reference.hpp"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <string>
+
+namespace tissuewarp::simulation {
+
+using Eigen::Matrix3Xd;
+
+namespace {
+
+constexpr int format_version = 1;
+
+/// Shortest form that reads back, "nan" for what is gone.
+std::string number(double value) {
+    if (!std::isfinite(value)) return "nan";
+    std::array<char, 32> buffer;
+    return {buffer.data(), std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr};
+}
+
+std::string vtu_name(int frame) {
+    const std::string digits = std::to_string(frame);
+    return "frame_" + std::string(digits.size() < 4 ? 4 - digits.size() : 0, '0') + digits + ".vtu";
+}
+
+/// A name as a CSV field.
+std::string quoted(const std::string& name) {
+    std::string text = "\"";
+    for (const char c : name) text += c == '"' ? "\"\"" : std::string(1, c);
+    return text + "\"";
+}
+
+}  // namespace
+
+struct SeriesWriter::Impl {
+    const BuiltScene& built;
+    std::filesystem::path folder;
+    Hdf5Output record;
+    std::ofstream probes;
+    std::string collection;
+    std::vector<double> times;
+    std::vector<int> stages;
+
+    Impl(const BuiltScene& scene, const std::filesystem::path& where)
+        : built(scene),
+          folder(where),
+          record(folder / "displacement.h5", "tissuewarp simulation", format_version),
+          probes(folder / "probes.csv", std::ios::binary) {
+        record.columns<double>("mesh/nodes", built.mesh().nodes, "mm, LPS");
+        record.columns<int>("mesh/tetrahedra", built.mesh().tets, "");
+        record.vector<int>("mesh/labels", built.mesh().labels, "");
+        probes << "time_s,probe,x_mm,y_mm,z_mm,dx_mm,dy_mm,dz_mm\n";
+        require_written();
+    }
+
+    void require_written() const {
+        if (!probes)
+            throw IoError("cannot write '" + (folder / "probes.csv").string() +
+                          "'; check that the folder exists and the disk has room");
+    }
+
+    void add_vtu(const Frame& frame) {
+        const Stage& stage = built.stages[static_cast<std::size_t>(frame.stage)];
+        const std::string name = vtu_name(frame.index);
+        Eigen::VectorXd in_mesh = tled::jacobians(stage.rest, frame.displacement);
+        meshing::write_vtu(stage.model.mesh, folder / name, {{"displacement", frame.displacement}},
+                           {{"J", in_mesh.transpose()}});
+        collection += "    <DataSet timestep=\"" + number(frame.time) + "\" part=\"0\" file=\"" + name + "\"/>\n";
+    }
+
+    void add_probes(const Frame& frame) {
+        const Matrix3Xd displacement = probe_displacements(built, frame);
+        for (std::size_t p = 0; p < built.probes.size(); ++p) {
+            probes << number(frame.time) << ',' << quoted(built.scene.probes[p].name);
+            for (const double x : built.scene.probes[p].at) probes << ',' << number(x);
+            for (const double d : displacement.col(static_cast<Eigen::Index>(p))) probes << ',' << number(d);
+            probes << '\n';
+        }
+        require_written();
+    }
+};
+
+SeriesWriter::SeriesWriter(const BuiltScene& built, const std::filesystem::path& folder)
+    : impl_(std::make_unique<Impl>(built, folder)) {}
+
+SeriesWriter::~SeriesWriter() = default;
+
+void SeriesWriter::add(const Frame& frame) {
+    impl_->add_vtu(frame);
+    impl_->add_probes(frame);
+    const Matrix3Xd all = on_first_stage(impl_->built, frame);
+    impl_->record.append("displacement", all.data(), {static_cast<hsize_t>(all.cols()), 3}, "mm");
+    impl_->times.push_back(frame.time);
+    impl_->stages.push_back(frame.stage);
+}
+
+void SeriesWriter::finish() {
+    Impl& series = *impl_;
+    series.record.vector<double>(
+        "time", Eigen::Map<const Eigen::VectorXd>(series.times.data(), static_cast<Eigen::Index>(series.times.size())),
+        "s");
+    series.record.vector<int>(
+        "stage",
+        Eigen::Map<const Eigen::VectorXi>(series.stages.data(), static_cast<Eigen::Index>(series.stages.size())), "");
+    for (std::size_t s = 1; s < series.built.stages.size(); ++s) {
+        const std::vector<int>& tets = series.built.stages[s].tet;
+        series.record.vector<int>(
+            "remaining/" + std::to_string(s),
+            Eigen::Map<const Eigen::VectorXi>(tets.data(), static_cast<Eigen::Index>(tets.size())), "");
+    }
+    series.record.close();
+    series.probes.close();
+    series.require_written();
+    std::ofstream pvd(series.folder / "frames.pvd", std::ios::binary);
+    pvd << "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n"
+           "  <Collection>\n"
+        << series.collection << "  </Collection>\n</VTKFile>\n";
+    pvd.close();
+    if (!pvd)
+        throw IoError("cannot write '" + (series.folder / "frames.pvd").string() +
+                      "'; check that the folder exists and the disk has room");
+}
+
+}  // namespace tissuewarp::simulation

@@ -1,0 +1,95 @@
+/// Every scene of data/scenes runs, at a small size, and does what its first line says.
+
+#include "apps/scene_templates.hpp"
+
+#include "apps/scene_file.hpp"
+#include "core/errors.hpp"
+#include "simulation/presets.hpp"
+#include "simulation/run.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+namespace tissuewarp::apps {
+namespace {
+
+using simulation::Scene;
+
+Scene small(const std::string& name) {
+    Scene scene = read_scene(std::filesystem::path(TISSUEWARP_SOURCE_DIR) / "data/scenes" / (name + ".toml"));
+    if (auto* box = std::get_if<simulation::BoxGeometry>(&scene.geometry))
+        for (int& cells : box->cells) cells = (cells + 1) / 2;
+    if (auto* volume = std::get_if<simulation::LabelledVolume>(&scene.geometry)) volume->edge_length *= 1.7;
+    if (auto* shapes = std::get_if<simulation::ShapeGeometry>(&scene.geometry)) shapes->edge_length *= 1.6;
+    scene.solve.device = simulation::Device::Cpu;
+    return scene;
+}
+
+/// Displacements of the probes in the last frame, mm.
+Eigen::Matrix3Xd last_probes(const Scene& scene) {
+    const simulation::BuiltScene built = simulation::build(scene);
+    Eigen::Matrix3Xd probes;
+    const simulation::RunSummary run = simulation::simulate(
+        built, [&](const simulation::Frame& frame) { probes = simulation::probe_displacements(built, frame); });
+    EXPECT_EQ(run.frames, scene.solve.frames + 1);
+    EXPECT_GT(run.min_jacobian, 0);
+    return probes;
+}
+
+TEST(SceneTemplates, CubeSags) {
+    EXPECT_LT(last_probes(small("cube"))(2, 0), -5);
+}
+
+TEST(SceneTemplates, BrainSettlesTowardsGravity) {
+    const Eigen::Matrix3Xd probes = last_probes(small("brain-shift"));
+    EXPECT_GT(probes(0, 0), 1) << "the cortex below the craniotomy, mm to the left";
+    EXPECT_LT(probes.colwise().norm().maxCoeff(), 30);
+}
+
+TEST(SceneTemplates, LiverGivesWayToTheGas) {
+    EXPECT_GT(last_probes(small("liver"))(1, 0), 1) << "to the back";
+}
+
+TEST(SceneTemplates, BreastSinksToTheBack) {
+    const Eigen::Matrix3Xd probes = last_probes(small("breast"));
+    EXPECT_GT(probes(1, 0), 3);
+    EXPECT_LT(probes(1, 0), 40);
+}
+
+TEST(SceneTemplates, SpatulaPushesTissueAside) {
+    const Eigen::Matrix3Xd probes = last_probes(small("retraction"));
+    EXPECT_LT(probes(2, 0), -2);
+}
+
+TEST(SceneTemplates, CavityChangesItsWalls) {
+    Scene scene = small("resection");
+    const Eigen::Matrix3Xd with = last_probes(scene);
+    EXPECT_TRUE(std::isnan(with(0, 1))) << "the tumour is gone";
+    scene.resections.clear();
+    EXPECT_GT((with - last_probes(scene)).col(0).norm(), 0.05);
+}
+
+TEST(Presets, StandInTheManualWithTheirSources) {
+    std::ostringstream manual;
+    manual << std::ifstream(std::filesystem::path(TISSUEWARP_SOURCE_DIR) / "docs/manual/simulate.md").rdbuf();
+    for (const simulation::Preset& preset : simulation::presets()) {
+        EXPECT_NE(manual.str().find('`' + preset.name + '`'), std::string::npos) << preset.name;
+        EXPECT_NO_THROW(tled::require_valid(preset.material, preset.name));
+        EXPECT_GT(tled::poisson_ratio(preset.material), 0.4) << preset.name << ": kPa and kPa";
+        EXPECT_FALSE(preset.source.empty());
+    }
+    EXPECT_THROW((void)simulation::preset("brain"), InvalidInput);
+}
+
+TEST(SceneTemplates, AreWrittenAsTheyAre) {
+    const auto names = scene_template_names();
+    EXPECT_EQ(names, (std::vector<std::string>{"brain-shift", "breast", "cube", "liver", "resection", "retraction"}));
+    for (const std::string& name : names) EXPECT_NE(scene_template(name, ".").find("[geometry]"), std::string::npos);
+    EXPECT_THROW((void)scene_template("brainshift", "."), InvalidInput);
+}
+
+}  // namespace
+}  // namespace tissuewarp::apps

@@ -1,0 +1,112 @@
+"""The verbs simulate and explain: a scene from --init to its files, read with other software."""
+
+import csv
+import json
+import pathlib
+import tempfile
+import unittest
+
+import h5py
+import numpy
+
+from phantom import run
+
+SMALL_CUBE = """
+[geometry]
+box = { size_mm = [100, 100, 100], cells = [3, 3, 3] }
+[label.1]
+youngs_modulus_kpa = 3.0
+poissons_ratio = 0.3
+[set.base]
+side = "-z"
+[[fixed]]
+set = "base"
+[gravity]
+to = [0, 0, -1]
+[solve]
+frames = 2
+[[probe]]
+name = "top"
+at_mm = [50, 50, 100]
+"""
+
+
+class Simulate(unittest.TestCase):
+    def setUp(self):
+        temporary = tempfile.TemporaryDirectory(prefix="tissuewarp-test-")
+        self.addCleanup(temporary.cleanup)
+        self.folder = pathlib.Path(temporary.name)
+        self.scene = self.folder / "scene.toml"
+        self.scene.write_text(SMALL_CUBE)
+
+    def test_files_of_a_run(self):
+        done = run("simulate", self.scene, "-o", self.folder / "out")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        names = sorted(path.name for path in (self.folder / "out").iterdir())
+        self.assertEqual(names, ["displacement.h5", "frame_0000.vtu", "frame_0001.vtu", "frame_0002.vtu", "frames.pvd",
+                                 "probes.csv", "summary.json"])
+        with h5py.File(self.folder / "out" / "displacement.h5") as record:
+            self.assertEqual(record.attrs["format"], "tissuewarp simulation")
+            displacement = record["displacement"][:]
+            nodes = record["mesh/nodes"][:]
+            numpy.testing.assert_allclose(record["time"][:], [0, 0.5, 1])
+        self.assertEqual(displacement.shape, (3, 64, 3))
+        self.assertTrue((displacement[0] == 0).all())
+        self.assertTrue((displacement[2][nodes[:, 2] == 0] == 0).all())
+        rows = list(csv.DictReader((self.folder / "out" / "probes.csv").read_text().splitlines()))
+        top = numpy.argmin(numpy.linalg.norm(nodes - [50, 50, 100], axis=1))
+        self.assertEqual([row["time_s"] for row in rows], ["0", "0.5", "1"])
+        self.assertLess(float(rows[2]["dz_mm"]), -10)
+        self.assertLess(abs(float(rows[2]["dz_mm"]) - displacement[2][top, 2]), 1.5)
+        summary = json.loads((self.folder / "out" / "summary.json").read_text())
+        self.assertEqual(summary["frames"], 3)
+        self.assertAlmostEqual(summary["largest_displacement_mm"],
+                               float(numpy.linalg.norm(displacement[2], axis=1).max()), places=3)
+
+    def test_init_writes_a_scene_that_runs(self):
+        done = run("simulate", "--init", "cube", folder=self.folder)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = run("simulate", "cube.toml", "-o", "out", folder=self.folder)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertTrue((self.folder / "out" / "frames.pvd").exists())
+        again = run("simulate", "--init", "cube", folder=self.folder)
+        self.assertEqual(again.returncode, 2)
+        self.assertIn("there already", again.stderr)
+
+    def test_init_of_an_unknown_scene(self):
+        done = run("simulate", "--init", "brainshift", folder=self.folder)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("brain-shift", done.stderr)
+
+    def test_wrong_scene_is_one_line_and_no_folder(self):
+        self.scene.write_text(SMALL_CUBE.replace("frames", "framse"))
+        done = run("simulate", self.scene, "-o", self.folder / "out")
+        self.assertEqual(done.returncode, 2)
+        self.assertEqual(len(done.stderr.strip().splitlines()), 1)
+        self.assertIn("line 14", done.stderr)
+        self.assertIn("'frames'", done.stderr)
+        self.assertFalse((self.folder / "out").exists())
+
+    def test_output_is_asked_for(self):
+        done = run("simulate", self.scene)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("--output", done.stderr)
+
+    def test_ablate_prints_each_effect(self):
+        done = run("simulate", self.scene, "--ablate")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        line = next(line for line in done.stdout.splitlines() if line.startswith("gravity"))
+        self.assertGreater(float(line.split()[1]), 10)
+
+    def test_explain_names_what_is_there_and_what_is_not(self):
+        done = run("explain", self.scene)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("162 linear tetrahedra", done.stdout)
+        self.assertIn("+ gravity", done.stdout)
+        absent = next(line for line in done.stdout.splitlines() if line.startswith("absent"))
+        self.assertIn("contact", absent)
+        self.assertNotIn("gravity", absent)
+
+
+if __name__ == "__main__":
+    unittest.main()

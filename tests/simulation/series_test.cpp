@@ -1,0 +1,134 @@
+/// Files of a run, what its plan says, and what its effects change.
+
+#include "simulation/series_io.hpp"
+
+#include "core/detail/hdf5.hpp"
+#include "core/errors.hpp"
+#include "meshing/mesh_io.hpp"
+#include "simulation/ablation.hpp"
+#include "simulation/plan.hpp"
+#include "tests/simulation/cube.hpp"
+
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+namespace tissuewarp::simulation {
+namespace {
+
+using testing::HasSubstr;
+namespace fs = std::filesystem;
+
+std::string text_of(const fs::path& path) {
+    std::ostringstream text;
+    text << std::ifstream(path).rdbuf();
+    return text.str();
+}
+
+Scene cut_cube() {
+    Scene scene = test::cube();
+    test::stand_freely(scene);
+    scene.sets["upper half"].half_space = HalfSpace{{0, 0, 50}, {0, 0, -1}};
+    scene.gravity = Gravity{std::nullopt, {0, 0, -1}, 9810.0, {}};
+    scene.resections.push_back({"upper half", 0.75});
+    scene.probes = {{"a \"low\" one", {50, 50, 25}}, {"high", {50, 50, 75}}};
+    scene.solve.frames = 2;
+    return scene;
+}
+
+TEST(Series, HoldsEveryFrameInEveryFormat) {
+    const fs::path folder = fs::temp_directory_path() / ("tissuewarp-series-" + std::to_string(::getpid()));
+    fs::create_directories(folder);
+    const BuiltScene built = build(cut_cube());
+    SeriesWriter series(built, folder);
+    std::vector<Eigen::Matrix3Xd> frames;
+    simulate(built, [&](const Frame& frame) {
+        series.add(frame);
+        frames.push_back(frame.displacement);
+    });
+    series.finish();
+    ASSERT_EQ(frames.size(), 3u);
+    EXPECT_EQ(meshing::read_vtu(folder / "frame_0001.vtu").tet_count(), built.stages[0].rest.element_count());
+    EXPECT_EQ(meshing::read_vtu(folder / "frame_0002.vtu").tet_count(), built.stages[1].rest.element_count());
+    const std::string collection = text_of(folder / "frames.pvd");
+    EXPECT_THAT(collection, HasSubstr("timestep=\"0.5\" part=\"0\" file=\"frame_0001.vtu\""));
+    const std::string probes = text_of(folder / "probes.csv");
+    EXPECT_THAT(probes, HasSubstr("\n0,\"a \"\"low\"\" one\",50,50,25,0,0,0\n"));
+    EXPECT_THAT(probes, HasSubstr("\n1,\"high\",50,50,75,nan,nan,nan\n"));
+
+    const Hdf5Input record(folder / "displacement.h5", "tissuewarp simulation", 1);
+    EXPECT_EQ(record.columns<double>("mesh/nodes", 3), built.mesh().nodes);
+    EXPECT_EQ(record.vector<double>("time", 3), Eigen::Vector3d(0, 0.5, 1));
+    EXPECT_EQ(record.vector<int>("stage", 3), Eigen::Vector3i(0, 0, 1));
+    EXPECT_EQ(record.vector<int>("remaining/1").size(), built.stages[1].rest.element_count());
+    EXPECT_NO_THROW(record.require_shape("displacement", {3, static_cast<hsize_t>(built.mesh().node_count()), 3}));
+    fs::remove_all(folder);
+}
+
+TEST(Series, RefusesAFolderThatIsNotThere) {
+    const BuiltScene built = build(test::cube());
+    EXPECT_THROW(SeriesWriter(built, "/nowhere/at/all"), IoError);
+}
+
+const PlannedEffect* find(const Plan& plan, const std::string& name) {
+    for (const PlannedEffect& effect : plan.effects)
+        if (effect.name == name) return &effect;
+    return nullptr;
+}
+
+TEST(Plan, NamesTheEffectsOfTheSceneAndNoOther) {
+    Scene scene = test::cube();
+    const Plan plain = plan_of(build(scene));
+    ASSERT_EQ(plain.effects.size(), 1u);
+    EXPECT_EQ(plain.effects[0].name, "fixed");
+    EXPECT_EQ(plain.effects[0].detail, "25 nodes");
+    EXPECT_EQ(plain.tetrahedra, 6 * 64);
+    EXPECT_EQ(plain.outer_faces, 6 * 32);
+    EXPECT_GT(plain.cpu.flops, 100 * plain.tetrahedra) << "F, P and forces of a tetrahedron";
+    EXPECT_EQ(plain.time_step, 0) << "an equilibrium has none";
+
+    scene.gravity = Gravity{Eigen::Vector3d(0, 0, -1), {0, 0, -1}, 9810.0, {}};
+    scene.fluid = FluidLevel{1e-6, 90, 30, {}};
+    scene.pressures.push_back({"above", 0.4, {}});
+    scene.contacts.push_back({});
+    scene.contacts[0].body = HalfSpace{{0, 0, -1}, {0, 0, 1}};
+    scene.solve.kind = Solve::Kind::Dynamics;
+    const Plan full = plan_of(build(scene));
+    EXPECT_EQ(full.effects.size(), 5u);
+    EXPECT_EQ(find(full, "pressure")->detail, "32 faces");
+    EXPECT_EQ(find(full, "contact")->detail, "98 nodes with 1 body");
+    EXPECT_EQ(find(full, "membrane"), nullptr);
+    EXPECT_EQ(full.cpu.bytes, plain.cpu.bytes) << "elements do not know of them";
+    EXPECT_GT(full.memory, plain.memory);
+    EXPECT_GT(full.time_step, 0);
+}
+
+TEST(Ablation, SaysWhatEachEffectChanges) {
+    Scene scene = test::cube();
+    test::stand_freely(scene);
+    scene.gravity = Gravity{std::nullopt, {0, 0, -1}, 9810.0, {}};
+    scene.springs.push_back({"above", 0.0, 1e-3, Springs::Along::AllDirections});
+    scene.probes = {{"top", {50, 50, 100}}};
+    const Ablation ablation = ablate(scene);
+    ASSERT_EQ(ablation.changes.size(), 2u);
+    EXPECT_EQ(ablation.changes[0].effect, "springs on 'above'");
+    EXPECT_LT(ablation.changes[0].nodes_max_mm, 0.05) << "far too soft to matter";
+    EXPECT_EQ(ablation.changes[1].effect, "gravity");
+    EXPECT_GT(ablation.changes[1].probes_mean_mm, 10);
+    EXPECT_GE(ablation.changes[1].nodes_max_mm, ablation.changes[1].probes_max_mm);
+    EXPECT_GT(ablation.changes[1].nodes_max_mm, ablation.changes[1].nodes_mean_mm);
+}
+
+TEST(Ablation, SaysWhatASceneCannotDoWithout) {
+    Scene scene = test::cube();
+    scene.fixed.clear();
+    scene.springs.push_back({"below", 1.0, 0.0, Springs::Along::AllDirections});
+    const Ablation ablation = ablate(scene);
+    ASSERT_EQ(ablation.changes.size(), 1u);
+    EXPECT_THAT(ablation.changes[0].failure, HasSubstr("holds"));
+}
+
+}  // namespace
+}  // namespace tissuewarp::simulation
