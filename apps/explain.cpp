@@ -3,12 +3,17 @@
 #include "apps/progress.hpp"
 #include "apps/scene_file.hpp"
 #include "apps/verbs.hpp"
+#include "simulation/loads.hpp"
 #include "simulation/plan.hpp"
+#include "simulation/run.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
+#include <map>
+#include <string>
 
 namespace tissuewarp::apps {
 
@@ -25,6 +30,36 @@ std::string absent_effects(const std::vector<simulation::PlannedEffect>& present
         if (std::none_of(present.begin(), present.end(), [&](const auto& effect) { return effect.name == name; }))
             text += (text.empty() ? "" : ", ") + std::string(name);
     return text;
+}
+
+/// "fluid, contact": chunks without folder and ending, those that every program has left out.
+std::string parts_text(const tled::StepPass& pass) {
+    std::string text;
+    for (const std::string& file : pass.parts) {
+        const std::string part = std::filesystem::path(file).stem().string();
+        if (part == "index" || part == "bindings" || part == "numbers") continue;
+        text += (text.empty() ? "" : ", ") + part;
+    }
+    return text;
+}
+
+/// The programs and buffers of a step under the loads of the scene's end.
+void print_passes(const simulation::BuiltScene& built, Observer& observer) {
+    const simulation::Solve& solve = built.scene.solve;
+    const simulation::Stage& stage = built.stages.back();
+    const auto engine = simulation::engine_for(solve, stage.rest, observer);
+    simulation::LoadsInTime loads(built, stage, solve.duration);
+    engine->set_conditions(loads.at(solve.duration));
+    fmt::print("\na step on {}\n", engine->description());
+    std::map<std::string, std::size_t> buffers;
+    for (const tled::StepPass& pass : engine->step_passes()) {
+        fmt::print("  {:<34}{:>10}  {}\n", std::filesystem::path(pass.program).filename().string(), pass.invocations,
+                   parts_text(pass));
+        for (const tled::StepBuffer& buffer : pass.buffers) buffers[buffer.name] = buffer.bytes;
+    }
+    fmt::print("  buffers:");
+    for (const auto& [name, bytes] : buffers) fmt::print(" {} {:.1f} kB;", name, 1e-3 * static_cast<double>(bytes));
+    fmt::print("\n");
 }
 
 }  // namespace
@@ -54,6 +89,7 @@ void run_explain(const ExplainOptions& options) {
     if (dynamics)
         fmt::print("time step of at least {:.1f} us: at most {:.0f} steps\n", 1e6 * plan.time_step,
                    scene.solve.duration / plan.time_step);
+    print_passes(built, progress);
     for (const std::string& note : progress.notes()) fmt::print("note: {}\n", note);
 }
 

@@ -77,6 +77,7 @@ public:
     }
     [[nodiscard]] tled::SmallestJacobian smallest_jacobian() override { return engine_.smallest_jacobian(); }
     [[nodiscard]] bool admits_inversion() const override { return engine_.admits_inversion(); }
+    [[nodiscard]] std::vector<tled::StepPass> step_passes() override { return engine_.step_passes(); }
     [[nodiscard]] std::string description() const override { return engine_.description(); }
     [[nodiscard]] tled::Processor processor() const override { return engine_.processor(); }
     [[nodiscard]] double precision() const override { return engine_.precision(); }

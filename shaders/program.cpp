@@ -28,7 +28,8 @@ std::vector<StorageBlock> storage_blocks_of(GLuint program) {
 
 }  // namespace
 
-Program::Program(const Device& device, const ComposedSource& source) : device_(device) {
+Program::Program(const Device& device, const ComposedSource& source)
+    : device_(device), files_(source.files.begin() + 1, source.files.end()) {
     const CurrentContext current = device.make_current();
     id_ = detail::linked_program({{GL_COMPUTE_SHADER, &source}});
     std::array<GLint, 3> size{1, 1, 1};

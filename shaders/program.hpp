@@ -37,12 +37,15 @@ public:
 
     [[nodiscard]] const std::vector<StorageBlock>& storage_blocks() const { return blocks_; }
     [[nodiscard]] int workgroup_size() const { return workgroup_size_; }
+    /// What it was composed of: the chunks in order, then the kernel.
+    [[nodiscard]] const std::vector<std::string>& files() const { return files_; }
 
 private:
     const Device& device_;
     unsigned id_ = 0;
     int workgroup_size_ = 1;
     std::vector<StorageBlock> blocks_;
+    std::vector<std::string> files_;
 };
 
 /// The programs of one device, by key.

@@ -20,12 +20,6 @@ namespace {
 
 using Eigen::Matrix3Xd;
 
-std::unique_ptr<tled::Engine> engine_for(const Solve& solve, const tled::RestState& rest, Observer& observer) {
-    if (solve.device == Device::Gpu) return tled::make_gpu_engine(rest, solve.gpu_index);
-    if (solve.device == Device::Cpu) return tled::make_cpu_engine(rest, tled::Scalar::Float32);
-    return tled::make_suitable_engine(rest, solve.gpu_index, observer);
-}
-
 /// Progress of a part of the run.
 class Part final : public Observer {
 public:
@@ -172,6 +166,12 @@ private:
 };
 
 }  // namespace
+
+std::unique_ptr<tled::Engine> engine_for(const Solve& solve, const tled::RestState& rest, Observer& observer) {
+    if (solve.device == Device::Gpu) return tled::make_gpu_engine(rest, solve.gpu_index);
+    if (solve.device == Device::Cpu) return tled::make_cpu_engine(rest, tled::Scalar::Float32);
+    return tled::make_suitable_engine(rest, solve.gpu_index, observer);
+}
 
 RunSummary simulate(const BuiltScene& built, const std::function<void(const Frame&)>& on_frame, Observer& observer) {
     require_supported(built.scene);

@@ -2,8 +2,10 @@
 /// Runs a scene.
 
 #include "simulation/build.hpp"
+#include "tled/engine.hpp"
 
 #include <functional>
+#include <memory>
 #include <string>
 
 namespace tissuewarp::simulation {
@@ -26,6 +28,9 @@ struct RunSummary {
     double seconds = 0;               ///< of the solution, building not included
     std::string engine;
 };
+
+/// The engine that a scene asks for, on a stage of it. Throws GpuUnavailable.
+std::unique_ptr<tled::Engine> engine_for(const Solve& solve, const tled::RestState& rest, Observer& observer);
 
 /// Calls `on_frame` at rest and at every frame of Scene::solve, in the order of time. An equilibrium starts from the
 /// frame before it; after a resection, what is left starts from where it was.

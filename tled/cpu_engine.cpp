@@ -40,6 +40,12 @@ void require_columns(Eigen::Index columns, std::size_t nodes, const char* what) 
                            std::to_string(nodes) + " nodes");
 }
 
+std::vector<std::string> law_names(const RestState& rest) {
+    std::vector<std::string> names;
+    for (const Material& material : rest.materials) names.push_back(law_name(material));
+    return names;
+}
+
 template <class T>
 class CpuEngine final : public Engine {
 public:
@@ -52,6 +58,7 @@ public:
           hex_layout_(detail::batch_layout(rest.hexahedra.blocks)),
           hexahedra_(detail::hex_batches<T>(rest.hexahedra, hex_layout_, fans.internal)),
           materials_(detail::kernel_materials<T>(rest)),
+          law_of_(law_names(rest)),
           kinematics_(rest.pressure.count() > 0 ? Kinematics::AveragedPressure : Kinematics::T4),
           node_count_(static_cast<std::size_t>(rest.node_count)),
           tet_(rest.tet),
@@ -211,6 +218,24 @@ public:
                ", " + std::to_string(tbb::this_task_arena::max_concurrency()) + " threads";
     }
 
+    [[nodiscard]] std::vector<StepPass> step_passes() override {
+        std::vector<StepPass> passes;
+        const StepBuffer u = buffer("displacements", displacement_), f = buffer("nodal forces", force_);
+        if (kinematics_ == Kinematics::AveragedPressure)
+            passes.push_back({"patch_volume_changes", {}, {u}, elements_.count() * batch_width});
+        if (surface_) passes.push_back({"CpuSurface::evaluate", surface_->parts(), {u}, surface_->nodes()});
+        for (const BatchBlock& block : layout_.blocks) add_force_pass("patch_forces", block, 0, passes);
+        for (const BatchBlock& block : hex_layout_.blocks)
+            add_force_pass("hex_forces", block, viscosity_.size(), passes);
+        StepPass advance{"advance_nodes", {}, {u, f, buffer("increments", increment_)}, node_count_};
+        if (!springs_.empty()) advance.parts.push_back("springs");
+        if (surface_) advance.parts.push_back("surface");
+        if (fluid_) advance.parts.push_back("fluid");
+        if (contact_) advance.parts.push_back("contact");
+        passes.push_back(advance);
+        return passes;
+    }
+
     [[nodiscard]] Processor processor() const override { return Processor::Cpu; }
     [[nodiscard]] double precision() const override { return double(std::numeric_limits<T>::epsilon()); }
 
@@ -220,6 +245,7 @@ private:
     detail::BatchLayout hex_layout_;
     detail::HexBatches<T> hexahedra_;
     std::vector<detail::KernelMaterial<T>> materials_;
+    std::vector<std::string> law_of_;  // each of them
     Kinematics kinematics_;
     std::size_t node_count_;
     std::vector<int> tet_, hex_;
@@ -255,6 +281,25 @@ private:
 
     [[nodiscard]] std::size_t place(std::size_t node, std::size_t component) const {
         return internal_[node] * std::size_t{record} + component;
+    }
+
+    static StepBuffer buffer(const char* name, const std::vector<T>& values) {
+        return {name, values.size() * sizeof(T)};
+    }
+
+    void add_force_pass(const char* function, const BatchBlock& block, std::size_t first_viscous,
+                        std::vector<StepPass>& passes) const {
+        const auto m = static_cast<std::size_t>(block.material);
+        StepPass pass{function, {law_of_[m]}, {}, (block.end - block.begin) * batch_width};
+        if (kinematics_ == Kinematics::AveragedPressure && first_viscous == 0)
+            pass.parts.push_back("averaged pressure");
+        pass.buffers.push_back(buffer("displacements", displacement_));
+        pass.buffers.push_back(buffer("forces of shared nodes", contribution_));
+        if (!viscosity_.empty() && !viscosity_[m].terms.empty()) {
+            pass.parts.push_back("viscosity");
+            pass.buffers.push_back({"viscous stresses", viscous_[first_viscous + m].stress.size() * sizeof(T)});
+        }
+        passes.push_back(pass);
     }
 
     template <class Body>

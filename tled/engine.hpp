@@ -6,6 +6,7 @@
 
 #include "tled/conditions.hpp"
 #include "tled/rest_state.hpp"
+#include "tled/step_pass.hpp"
 
 #include <Eigen/Core>
 
@@ -83,6 +84,9 @@ public:
     [[nodiscard]] virtual SmallestJacobian smallest_jacobian() = 0;
     /// Whether every material's energy is finite for det F ≤ 0, so that inverted tissue finds back.
     [[nodiscard]] virtual bool admits_inversion() const = 0;
+
+    /// The passes of a step under the present conditions, in order.
+    [[nodiscard]] virtual std::vector<StepPass> step_passes() = 0;
 
     /// For reports: "CPU float32, AVX-512, 2 threads", "GPU NVIDIA H100 (OpenGL 4.5)".
     [[nodiscard]] virtual std::string description() const = 0;

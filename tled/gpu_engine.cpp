@@ -243,6 +243,23 @@ public:
         return "GPU " + device_.renderer() + " (OpenGL " + device_.version().substr(0, 3) + "), " + steps;
     }
 
+    [[nodiscard]] std::vector<StepPass> step_passes() override {
+        const CurrentContext current = device_.make_current();
+        blocks_.set("Displacement", displacement_);
+        std::vector<detail::Pass> passes;
+        if (over_patches_) {
+            passes = patches_->passes(effects_.on_nodes());
+        } else {
+            if (effects_.surface_pass()) passes.push_back(*effects_.surface_pass());
+            for (const detail::Pass& pass : force_.passes()) passes.push_back(pass);
+            passes.push_back(
+                {&node_program(shaders::node_step_program(effects_.on_nodes(), StoreResidual::No)), nodes()});
+        }
+        std::vector<StepPass> result;
+        for (const detail::Pass& pass : passes) result.push_back(detail::step_pass(pass, blocks_));
+        return result;
+    }
+
     [[nodiscard]] Processor processor() const override { return Processor::Gpu; }
     [[nodiscard]] double precision() const override {
         return static_cast<double>(std::numeric_limits<float>::epsilon());

@@ -294,6 +294,38 @@ TEST_P(EffectsInEngines, EffectsMayComeAndGoBetweenRuns) {
     EXPECT_LT(largest(engine->displacement() - plain.u), 1e-5 * largest(plain.u));
 }
 
+/// Whether any pass names the effect: a chunk of the GPU's programs or an argument of the CPU's.
+bool names(const std::vector<StepPass>& passes, const std::string& effect) {
+    return std::any_of(passes.begin(), passes.end(), [&](const StepPass& pass) {
+        return std::any_of(pass.parts.begin(), pass.parts.end(),
+                           [&](const std::string& part) { return part.find(effect) != std::string::npos; });
+    });
+}
+
+// A failure looks like: a chunk of an effect in the program of a scene that lacks it, or a scene whose effect no pass
+// knows.
+TEST_P(EffectsInEngines, StepPassesNameWhatTheSceneHasAndNothingElse) {
+    engine->set_conditions(conditions);
+    const std::vector<StepPass> passes = engine->step_passes();
+    ASSERT_GE(passes.size(), 1u);
+    for (const auto& [effect, word] :
+         {std::pair{Pressures, "pressure"}, std::pair{Membranes, "membrane"}, std::pair{Sliding, "sliding"},
+          std::pair{Fluids, "fluid"}, std::pair{Contacts, "contact"}}) {
+        const bool gpu = engine->processor() == Processor::Gpu,
+                   on_surface = (effect & (Pressures | Membranes | Sliding)) != 0;
+        const std::string part = !gpu ? word : std::string(on_surface ? "surface." : "node.") + word;
+        if (part == "pressure" && std::get<1>(GetParam()) != Cells::T4) continue;  // averaged pressure is another thing
+        EXPECT_EQ(names(passes, part), (effects & effect) != 0) << part;
+    }
+    for (const StepPass& pass : passes) {
+        EXPECT_GT(pass.invocations, 0u) << pass.program;
+        for (const StepBuffer& buffer : pass.buffers) EXPECT_GT(buffer.bytes, 0u) << buffer.name;
+    }
+    engine->set_conditions(scene.nodal(0));
+    for (const char* word : {"membrane", "sliding", "fluid", "contact", "surface"})
+        EXPECT_FALSE(names(engine->step_passes(), word)) << word;
+}
+
 TEST(GpuEffects, SurfaceEffectsTakeTwoPassesWhileTheyLast) {
     const Scene scene(Cells::T4);
     const auto engine = make_engine(Kind::GpuPatches, scene.rest);

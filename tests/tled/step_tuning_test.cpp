@@ -46,6 +46,7 @@ public:
     [[nodiscard]] Observation observe() override { return engine_->observe(); }
     [[nodiscard]] SmallestJacobian smallest_jacobian() override { return engine_->smallest_jacobian(); }
     [[nodiscard]] bool admits_inversion() const override { return engine_->admits_inversion(); }
+    [[nodiscard]] std::vector<StepPass> step_passes() override { return engine_->step_passes(); }
     [[nodiscard]] std::string description() const override { return "test"; }
     [[nodiscard]] Processor processor() const override { return engine_->processor(); }
     [[nodiscard]] double precision() const override { return engine_->precision(); }

@@ -14,6 +14,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -53,6 +54,16 @@ public:
         for (std::size_t i = 0; i < effects.node.size(); ++i)
             place_.push_back({internal[static_cast<std::size_t>(effects.node[i])], i});
         std::sort(place_.begin(), place_.end(), [](const Place& x, const Place& y) { return x.node < y.node; });
+    }
+
+    [[nodiscard]] std::size_t nodes() const { return force_.size(); }
+    /// Which of the effects there are.
+    [[nodiscard]] std::vector<std::string> parts() const {
+        std::vector<std::string> names;
+        if (!pressure_edges_.empty()) names.push_back("pressure");
+        if (!tension_.empty()) names.push_back("membrane");
+        if (!effects_.sliding.empty()) names.push_back("sliding");
+        return names;
     }
 
     /// Forces at displacement `u`, mN, to be taken off once no node has moved yet.

@@ -44,6 +44,8 @@ public:
         }
     }
 
+    [[nodiscard]] bool empty() const { return springs_.empty(); }
+
 private:
     struct Spring {
         std::uint32_t node;  // internal

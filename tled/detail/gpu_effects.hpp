@@ -27,6 +27,8 @@ public:
     void bind(const BlockBuffers& blocks) const;
     /// Leaves the surface forces of whatever is bound as Displacement, where there are any; a barrier must follow.
     void dispatch() const;
+    /// The pass that dispatch() runs, where there is one.
+    [[nodiscard]] const std::optional<Pass>& surface_pass() const { return surface_pass_; }
 
 private:
     void set_springs(const NodalConditions& conditions, BlockBuffers& blocks);

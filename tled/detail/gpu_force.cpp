@@ -48,11 +48,21 @@ Pass ranged(const shaders::Program& program, int begin, int end, std::size_t tot
 }  // namespace
 
 void BlockBuffers::bind(const shaders::Program& program) const {
-    for (const shaders::StorageBlock& block : program.storage_blocks()) {
-        const auto found = buffers_.find(block.name);
-        if (found == buffers_.end()) throw std::logic_error("no buffer serves the storage block " + block.name);
-        found->second->bind(block.binding);
-    }
+    for (const shaders::StorageBlock& block : program.storage_blocks()) buffer(block.name).bind(block.binding);
+}
+
+const shaders::StorageBuffer& BlockBuffers::buffer(const std::string& block) const {
+    const auto found = buffers_.find(block);
+    if (found == buffers_.end()) throw std::logic_error("no buffer serves the storage block " + block);
+    return *found->second;
+}
+
+StepPass step_pass(const Pass& pass, const BlockBuffers& blocks) {
+    const std::vector<std::string>& files = pass.program->files();
+    StepPass result{files.back(), {files.begin(), files.end() - 1}, {}, pass.invocations};
+    for (const shaders::StorageBlock& block : pass.program->storage_blocks())
+        result.buffers.push_back({block.name, blocks.bytes(block.name)});
+    return result;
 }
 
 GpuForce::Pressure::Pressure(const shaders::Device& device, const GpuPressure& layout, std::size_t element_count)
@@ -176,6 +186,13 @@ void GpuForce::dispatch(Advance advance) const {
     };
     for (const Stage& stage : pressure_stages_) run(stage);
     run(advance == Advance::Yes ? advancing_force_stage_ : force_stage_);
+}
+
+std::vector<Pass> GpuForce::passes() const {
+    std::vector<Pass> all;
+    for (const Stage& stage : pressure_stages_) all.insert(all.end(), stage.begin(), stage.end());
+    all.insert(all.end(), advancing_force_stage_.begin(), advancing_force_stage_.end());
+    return all;
 }
 
 void GpuForce::keep_viscous_stresses() {

@@ -6,6 +6,7 @@
 #include "shaders/catalogue.hpp"
 #include "shaders/program.hpp"
 #include "tled/detail/gpu_layout.hpp"
+#include "tled/step_pass.hpp"
 
 #include <map>
 #include <optional>
@@ -20,8 +21,11 @@ public:
     void set(const std::string& block, const shaders::StorageBuffer& buffer) { buffers_[block] = &buffer; }
     /// Binds what the program declares; throws std::logic_error when a block has no buffer.
     void bind(const shaders::Program& program) const;
+    /// Bytes behind a block; throws as bind().
+    [[nodiscard]] std::size_t bytes(const std::string& block) const { return buffer(block).bytes(); }
 
 private:
+    [[nodiscard]] const shaders::StorageBuffer& buffer(const std::string& block) const;
     std::map<std::string, const shaders::StorageBuffer*> buffers_;
 };
 
@@ -35,6 +39,9 @@ struct Pass {
 };
 using Stage = std::vector<Pass>;
 
+/// The pass in words.
+StepPass step_pass(const Pass& pass, const BlockBuffers& blocks);
+
 class GpuForce {
 public:
     GpuForce(const shaders::Device& device, shaders::ProgramCache& programs, const RestState& rest,
@@ -44,6 +51,8 @@ public:
     /// Corner forces of whatever is bound as Displacement, each stage followed by a barrier. Where time advances the
     /// viscous stresses at the end of the step are kept.
     void dispatch(Advance advance = Advance::No) const;
+    /// Those that dispatch() runs where time advances.
+    [[nodiscard]] std::vector<Pass> passes() const;
     /// Time step (s) of the viscous stresses; 0 leaves them as they are.
     void set_time_step(double time_step);
     void forget_viscous_stresses();

@@ -190,15 +190,28 @@ void GpuPatches::advance(int steps, const StepCoefficients& coefficients, const 
                          const BlockBuffers& blocks) {
     const Run run = next_steps(steps, coefficients);
     const int with_forces = tissue_->viscous() ? steps - 1 : steps;
+    const Stages stages = stages_of_a_step();
     if (many_steps_) {
-        const Stages stages = averages_ ? averaged_many_steps : many_steps;
         dispatch(stages, with_forces / steps_per_dispatch, steps_per_dispatch, run, effects, blocks);
         if (const int left = with_forces % steps_per_dispatch; left > 0)
             dispatch(stages, 1, left, run, effects, blocks);
     } else {
-        dispatch(averages_ ? Stages(averaged_one_step) : one_step, with_forces, 1, run, effects, blocks);
+        dispatch(stages, with_forces, 1, run, effects, blocks);
     }
     if (with_forces < steps) dispatch(last_step, 1, 1, run, effects, blocks);
+}
+
+GpuPatches::Stages GpuPatches::stages_of_a_step() const {
+    if (many_steps_) return averages_ ? averaged_many_steps : many_steps;
+    return averages_ ? Stages(averaged_one_step) : one_step;
+}
+
+std::vector<Pass> GpuPatches::passes(const shaders::NodeEffects& effects) const {
+    std::vector<Pass> result;
+    for (const PatchStages& each : stages_of_a_step())
+        result.push_back({&programs_.get(shaders::patch_step_program(tissue_->kind(), effects, sizes_, each)),
+                          static_cast<std::size_t>(workgroups_of(each)) * static_cast<std::size_t>(sizes_.workgroup)});
+    return result;
 }
 
 int GpuPatches::workgroups_of(const PatchStages& stages) const {

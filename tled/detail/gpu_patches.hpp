@@ -26,6 +26,8 @@ public:
     /// Advances what is bound as Displacement and Increment, and as ViscousStress where tissue is viscous.
     void run(int steps, const StepCoefficients& coefficients, const shaders::NodeEffects& effects,
              const BlockBuffers& blocks);
+    /// Those of a step within a run.
+    [[nodiscard]] std::vector<Pass> passes(const shaders::NodeEffects& effects) const;
     /// As asked for, without many steps in a dispatch once the device has proved unable to run them.
     [[nodiscard]] GpuStepShape shape() const;
     /// Displacement, Increment, masses or conditions were changed from outside.
@@ -33,6 +35,7 @@ public:
 
 private:
     using Stages = std::span<const shaders::PatchStages>;
+    [[nodiscard]] Stages stages_of_a_step() const;
     /// Steps [begin, end) as counted by step_; between them some nodes are ahead of others, after them none.
     struct Run {
         std::uint32_t begin, end;
