@@ -32,7 +32,7 @@ std::string absent_effects(const std::vector<simulation::PlannedEffect>& present
     return text;
 }
 
-/// "fluid, contact": chunks without folder and ending, those that every program has left out.
+/// "node.fluid, node.contact": chunks without folder and ending, less those that every program has.
 std::string parts_text(const tled::StepPass& pass) {
     std::string text;
     for (const std::string& file : pass.parts) {

@@ -1,21 +1,18 @@
 #include "tests/verification/effect_cases.hpp"
 
 #include "meshing/primitives.hpp"
-#include "tests/verification/shapes.hpp"
-#include "tled/contact.hpp"
-#include "tled/dynamics.hpp"
+#include "tests/verification/effect_column.hpp"
 #include "tled/equilibrium.hpp"
 #include "tled/growth.hpp"
-#include "tled/load_path.hpp"
 #include "tled/reference.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 
 namespace tissuewarp::verification {
 namespace {
 
+using namespace effects;
 using Eigen::Matrix3Xd;
 using Eigen::Matrix3Xi;
 using Eigen::Vector3d;
@@ -23,86 +20,6 @@ using tled::Conditions;
 using tled::Model;
 using tled::RestState;
 
-constexpr double gravity = 9810.0;              // mm/s²
-constexpr double density = 1e-6;                // kg/mm³
-constexpr double modulus = 3.0, poisson = 0.3;  // kPa, of columns
-
-// Columns of 100 mm on a square of 10 mm, whose sides cannot move sideways: one stretch λ(X) along z.
-
-constexpr double length = 100.0, side = 10.0;
-
-Model column(int cells) {
-    Model model;
-    model.mesh = meshing::box_mesh({side, side, length}, {1, 1, cells});
-    model.materials = {{1, tled::neo_hookean_iso(modulus, poisson)}};
-    model.element = tled::Element::T4;
-    model.density = density;
-    return model;
-}
-
-/// P of W = μ/2 (λ^(−2/3) (2 + λ²) − 3) + κ/2 (λ − 1)², kPa.
-double column_stress(double stretch) {
-    const auto law = tled::neo_hookean_iso(modulus, poisson);
-    return 0.5 * law.shear_modulus *
-               (-2.0 / 3 * std::pow(stretch, -5.0 / 3) * (2 + stretch * stretch) + 2 * std::cbrt(stretch)) +
-           law.bulk_modulus * (stretch - 1);
-}
-
-double column_stretch(double stress) {
-    double low = 0.2, high = 3.0;
-    for (int i = 0; i < 80; ++i) (column_stress(0.5 * (low + high)) < stress ? low : high) = 0.5 * (low + high);
-    return 0.5 * (low + high);
-}
-
-/// ∫ λ(P(X)) dX over [from, to] by Simpson's rule.
-double deformed_length(const std::function<double(double)>& stress, double from, double to) {
-    constexpr int parts = 400;
-    double sum = 0;
-    for (int i = 0; i <= parts; ++i) {
-        const double weight = i == 0 || i == parts ? 1 : i % 2 == 1 ? 4 : 2;
-        sum += weight * column_stretch(stress(from + (to - from) * i / parts));
-    }
-    return sum * (to - from) / (3 * parts);
-}
-
-/// The column stands on its base, or its base may move upright too.
-void guide(const Model& model, bool base_held, Conditions& conditions) {
-    for (int a = 0; a < model.mesh.node_count(); ++a)
-        conditions.prescribed.push_back({a, {true, true, base_held && model.mesh.nodes(2, a) < 1e-9}, {0, 0, 0}});
-}
-
-Matrix3Xd weight(const RestState& rest, const Vector3d& pull) {
-    return pull * rest.lumped_mass.transpose();
-}
-
-double mean(const Model& model, const Matrix3Xd& u, int component, const std::function<bool(const Vector3d&)>& on) {
-    double sum = 0;
-    int count = 0;
-    for (int a = 0; a < model.mesh.node_count(); ++a)
-        if (on(model.mesh.nodes.col(a))) {
-            sum += u(component, a);
-            ++count;
-        }
-    return sum / count;
-}
-
-bool on_top(const Vector3d& X) {
-    return X.z() > length - 1e-9;
-}
-
-Matrix3Xd settle(const Model& model, const Conditions& conditions, const MakeEngine& make, double tolerance_mm = 1e-3) {
-    const RestState rest = tled::rest_state(model);
-    const tled::NodalConditions nodal = tled::nodal_conditions(conditions, rest);
-    const auto engine = make(rest);
-    tled::LoadPathOptions options;
-    options.equilibrium = {.tolerance_mm = tolerance_mm, .rest = &rest};
-    return tled::equilibrium_along_load(*engine, tled::RestStiffness(rest, nodal), nodal, options).displacement;
-}
-
-// Gravity: P(X) = −ρ g (L − X).
-double sag_of_column() {
-    return deformed_length([](double X) { return -density * gravity * (length - X); }, 0, length) - length;
-}
 double measured_sag(const MakeEngine& make) {
     const Model model = column(50);
     Conditions conditions;
@@ -419,115 +336,13 @@ double measured_relaxation(const MakeEngine& make) {
     return stress_on_top(*engine, rest, 0) / at_once;
 }
 
-// Obstacles.
-
-tled::DistanceGrid half_space(double height, double reach) {
-    constexpr int samples = 11;
-    const double step = 2 * reach / (samples - 1);
-    tled::DistanceGrid grid{{-reach, -reach, height - reach}, step * Eigen::Matrix3d::Identity(), {}, {}};
-    grid.size.setConstant(samples);
-    for (int k = 0; k < samples; ++k)
-        grid.distance.insert(grid.distance.end(), samples * samples, static_cast<float>(k * step - reach));
-    return grid;
-}
-
-tled::RigidContact contact_of_all(const Model& model, double friction, const tled::DistanceGrid& grid) {
-    tled::RigidContact contact;
-    for (int a = 0; a < model.mesh.node_count(); ++a) contact.nodes.push_back(a);
-    contact.obstacles.push_back({grid, Vector3d::Zero(), friction});
-    return contact;
-}
-
-tled::DynamicsState moving(const Model& model, const Vector3d& velocity) {
-    const Eigen::Index nodes = model.mesh.node_count();
-    return {Matrix3Xd::Zero(3, nodes), velocity.replicate(1, nodes), 0};
-}
-
-tled::DynamicsResult moved(const Model& model, const Conditions& conditions, const tled::DynamicsState& start,
-                           double duration, const MakeEngine& make) {
-    const RestState rest = tled::rest_state(model);
-    const tled::NodalConditions nodal = tled::nodal_conditions(conditions, rest);
-    const auto engine = make(rest);
-    const Matrix3Xd mass = rest.lumped_mass.transpose().replicate(3, 1);
-    return tled::dynamics(*engine, rest, mass, nodal, start, duration);
-}
-
-/// v, mm/s: slow against the waves of 2009 mm/s, so that the bar answers linearly.
-constexpr double impact_velocity = 5.0;
-/// Velocity of the centre of mass after the wall has let go.
-double measured_rebound(const MakeEngine& make) {
-    Model model = column(50);
-    Conditions conditions;
-    guide(model, false, conditions);
-    conditions.effects.contact = contact_of_all(model, 0, half_space(0, 20));
-    const auto law = tled::neo_hookean_iso(modulus, poisson);
-    const double contact_time = 2 * length / std::sqrt(tled::p_wave_modulus(law) / density);
-    const auto end = moved(model, conditions, moving(model, {0, 0, -impact_velocity}), 1.5 * contact_time, make).state;
-    const RestState rest = tled::rest_state(model);
-    return end.velocity.row(2).dot(rest.lumped_mass) / rest.lumped_mass.sum();
-}
-/// Mean force of the wall while the bar is shortening, by the change of momentum in half of the time of contact.
-double measured_impact_stress(const MakeEngine& make) {
-    Model model = column(50);
-    Conditions conditions;
-    guide(model, false, conditions);
-    conditions.effects.contact = contact_of_all(model, 0, half_space(0, 20));
-    const auto law = tled::neo_hookean_iso(modulus, poisson);
-    const double time = 0.8 * length / std::sqrt(tled::p_wave_modulus(law) / density);
-    const auto end = moved(model, conditions, moving(model, {0, 0, -impact_velocity}), time, make).state;
-    const RestState rest = tled::rest_state(model);
-    const double momentum = end.velocity.row(2).dot(rest.lumped_mass) + impact_velocity * rest.lumped_mass.sum();
-    return momentum / (time * side * side);
-}
-double impact_stress() {
-    const double wave_modulus = tled::p_wave_modulus(tled::neo_hookean_iso(modulus, poisson));
-    return density * std::sqrt(wave_modulus / density) * impact_velocity;
-}
-
-// A stiff block that slides on a table until friction has stopped it: v²/(2 μ g).
-constexpr double sliding_velocity = 100.0, friction = 0.3;
-double measured_stopping_distance(const MakeEngine& make) {
-    Model model;
-    model.mesh = meshing::box_mesh({10, 10, 4}, {4, 4, 2});
-    model.materials = {{1, tled::neo_hookean_iso(2000.0, poisson)}};
-    model.element = tled::Element::T4;
-    model.density = density;
-    Conditions conditions;
-    conditions.external_force = weight(tled::rest_state(model), {0, 0, -gravity});
-    conditions.effects.contact = contact_of_all(model, friction, half_space(0, 40));
-    const double time = 1.3 * sliding_velocity / (friction * gravity);
-    const auto end = moved(model, conditions, moving(model, {sliding_velocity, 0, 0}), time, make).state;
-    return end.displacement.row(0).mean();
-}
-
-// A column under its weight, hung up by a weak spring, that settles on a table which comes 5 mm up: as gravity on a
-// held base, 5 mm higher.
-double measured_sag_on_table(const MakeEngine& make) {
-    const Model model = column(50);
-    const RestState rest = tled::rest_state(model);
-    Conditions conditions;
-    guide(model, false, conditions);
-    conditions.external_force = weight(rest, {0, 0, -gravity});
-    for (int a = 0; a < model.mesh.node_count(); ++a)
-        conditions.springs.push_back({a, 1e-6 * Eigen::Matrix3d::Identity(), {0, 0, 0}});
-    conditions.effects.contact = contact_of_all(model, 0, half_space(5, 20));
-    const auto engine = make(rest);
-    tled::ContactOptions options;
-    options.equilibrium.tolerance_mm = 1e-3;
-    options.penetration_mm = 1e-3;
-    const Matrix3Xd u = tled::equilibrium_in_contact(*engine, rest, tled::nodal_conditions(conditions, rest), options)
-                            .equilibrium.displacement;
-    return mean(model, u, 2, on_top);
-}
-
 }  // namespace
 
 std::vector<EffectCase> effect_cases() {
-    const double sag = sag_of_column();
     const auto shear = tled::neo_hookean_iso(modulus, poisson).shear_modulus;
-    return {
-        {"gravity", "column under its weight", "sag of the top", "mm", "quadrature of P(λ(X)) = −ρ g (L − X)", sag,
-         0.01, measured_sag},
+    std::vector<EffectCase> cases{
+        {"gravity", "column under its weight", "sag of the top", "mm", "quadrature of P(λ(X)) = −ρ g (L − X)",
+         sag_of_column(), 0.01, measured_sag},
         {"gravity, turned", "layer that shears", "shift of the top", "mm", "ρ g L²/(2 μ)",
          0.2 * density * gravity * length * length / (2 * shear), 0.01, measured_shear},
         {"fluid level", "column in fluid up to 60 mm", "sag of the top", "mm",
@@ -551,15 +366,10 @@ std::vector<EffectCase> effect_cases() {
          1e-4, measured_fibre_stress},
         {"viscosity", "cube sheared and held for τ", "part that is left", "1", "1 − g (1 − 1/e)",
          1 - relaxing_part * (1 - std::exp(-1.0)), 2e-3, measured_relaxation},
-        {"contact, static", "column on a table 5 mm higher", "shift of the top", "mm", "sag + 5", sag + 5, 0.02,
-         measured_sag_on_table},
-        {"contact, dynamic", "bar thrown at a wall", "velocity back", "mm/s", "wave of a linear bar", impact_velocity,
-         0.03 * impact_velocity, measured_rebound},
-        {"contact, dynamic", "bar thrown at a wall", "stress at the wall", "kPa", "ρ c v", impact_stress(),
-         0.03 * impact_stress(), measured_impact_stress},
-        {"friction", "block that slides to rest", "distance", "mm", "v²/(2 μ g)",
-         sliding_velocity * sliding_velocity / (2 * friction * gravity), 0.03, measured_stopping_distance},
     };
+    const std::vector<EffectCase> more = contact_cases();
+    cases.insert(cases.end(), more.begin(), more.end());
+    return cases;
 }
 
 }  // namespace tissuewarp::verification

@@ -23,6 +23,9 @@ inline void PrintTo(const EffectCase& each, std::ostream* out) {
     *out << each.scene << ", " << each.quantity;
 }
 
+/// All of them.
 std::vector<EffectCase> effect_cases();
+/// Those of contact and friction, which are among them.
+std::vector<EffectCase> contact_cases();
 
 }  // namespace tissuewarp::verification
