@@ -1,0 +1,57 @@
+#pragma once
+/// How far the true place of a target may lie from where a registration puts it: what the solver left, what the mesh
+/// cannot follow, and what data and tissue leave open.
+
+#include "core/observer.hpp"
+#include "imaging/volume.hpp"
+#include "registration/pipeline.hpp"
+
+#include <Eigen/Core>
+
+#include <cstdint>
+#include <vector>
+
+namespace tissuewarp::registration {
+
+struct UncertaintyOptions {
+    int samples = 64;        ///< of the posterior; a deviation is known to 1/√(6 · samples), 5 %
+    std::uint64_t seed = 1;  ///< of these
+    bool discretisation = true;  ///< false: leaves the estimate by quadratic tetrahedra out, for speed
+};
+
+/// Errors of one place, mm. Each deviation is the root of the expected square of the error vector's length.
+struct ErrorEstimate {
+    double algebraic_mm = 0;       ///< of the solver: the lifted residual
+    double discretisation_mm = 0;  ///< of linear tetrahedra of this size
+    double data_mm = 0;            ///< of matches, and of tissue between them: 1 σ
+    double deviation_mm = 0;       ///< all together, 1 σ
+    double interval_mm = 0;        ///< with a probability of 95 % the true place lies within
+    bool shown = true;             ///< false: do not trust; the data say next to nothing of this place
+};
+
+/// The estimate at every node of the mesh, and anywhere between.
+class Uncertainty {
+public:
+    /// At the nodes: errors (3 × N mm) of solver and mesh, covariances (6 × N mm²: xx, yy, zz, xy, xz, yz), and what
+    /// part of the prior's variance the data left (N).
+    Uncertainty(meshing::TetMesh mesh, Eigen::Matrix3Xd algebraic, Eigen::Matrix3Xd discretisation,
+                Eigen::Matrix<double, 6, Eigen::Dynamic> covariance, Eigen::VectorXd unexplained);
+
+    /// Of places of the moving frame, 3 × P mm; outside the mesh that of the nearest element.
+    [[nodiscard]] std::vector<ErrorEstimate> at(const Eigen::Matrix3Xd& points) const;
+    /// Of every node.
+    [[nodiscard]] std::vector<ErrorEstimate> at_nodes() const;
+
+private:
+    meshing::TetMesh mesh_;
+    Eigen::Matrix3Xd algebraic_, discretisation_;
+    Eigen::Matrix<double, 6, Eigen::Dynamic> covariance_;
+    Eigen::VectorXd unexplained_;
+};
+
+/// Throws InvalidInput when the result does not belong to the model, SolverFailure where the stiffness cannot be
+/// factorised, Cancelled.
+Uncertainty uncertainty(const PreparedModel& prepared, const UpdateResult& result,
+                        const UncertaintyOptions& options = {}, Observer& observer = silent_observer());
+
+}  // namespace tissuewarp::registration
