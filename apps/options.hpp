@@ -64,6 +64,7 @@ struct RegisterOptions {
     bool match_image = false;                    ///< implied where the fixed image is all there is
     bool no_align = false;
     bool resample_labels = false;
+    bool no_error_estimate = false;
     bool dry_run = false;
     DeviceChoice device;
     std::filesystem::path save_parameters;

@@ -135,6 +135,15 @@ void warp_everything(RegistrationRun& run) {
     }
 }
 
+/// How far off the result may be, and what that says against it.
+void estimate_errors(RegistrationRun& run, ProgressLine& progress) {
+    progress.begin("error estimate", 0.57, 0.65);
+    Products& products = run.products;
+    products.uncertainty = uncertainty(*run.prepared, run.result, {}, progress);
+    products.uncertainty_volumes =
+        uncertainty_on_grid(*products.uncertainty, run.result.deformation, products.fixed_to_moving.geometry);
+}
+
 Scores score(const RegistrationRun& run) {
     Scores scores;
     const auto without_neighbours = [&](const imaging::Volume& labels) {
@@ -190,8 +199,12 @@ void run_register(const RegisterOptions& options) {
     run.times.push_back(clock.lap("fields"));
     warp_everything(run);
     run.times.push_back(clock.lap("warp"));
+    if (!options.no_error_estimate) {
+        estimate_errors(run, progress);
+        run.times.push_back(clock.lap("error estimate"));
+    }
 
-    progress.begin("writing and scoring", 0.57, 0.88);
+    progress.begin("writing and scoring", 0.65, 0.88);
     auto silenced = std::make_unique<SilencedStandardError>();
     tbb::task_group writing;  // compression takes one core per file; the scores run beside it
     start_writing(run, *output, writing, progress);

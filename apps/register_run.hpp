@@ -4,6 +4,7 @@
 #include "apps/inputs.hpp"
 #include "meshing/quality.hpp"
 #include "registration/parameter_fit.hpp"
+#include "registration/uncertainty.hpp"
 
 #include <chrono>
 #include <memory>
@@ -16,6 +17,8 @@ struct Products {
     imaging::Volume moving_to_fixed, fixed_to_moving;  ///< displacement fields, mm, LPS
     imaging::Volume warped, warped_labels;             ///< on the output grid; warped is empty without --moving
     Eigen::Matrix3Xd landmarks, points;                ///< where moving landmarks and points went, mm, LPS
+    std::optional<registration::Uncertainty> uncertainty;
+    registration::UncertaintyVolumes uncertainty_volumes;  ///< on the output grid
     std::optional<meshing::SurfaceMesh> surface;
 };
 

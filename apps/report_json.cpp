@@ -168,6 +168,17 @@ void add_fits(json& report, const registration::UpdateResult& result) {
                                     {"worst_place_mm", vector(expected->worst_place)}};
 }
 
+json to_json(const registration::UncertaintySummary& s) {
+    return {{"algebraic_mm", number(s.algebraic_mm)},
+            {"discretisation_mm", number(s.discretisation_mm)},
+            {"data_mm", number(s.data_mm)},
+            {"deviation_mm", number(s.deviation_mm)},
+            {"interval_95_mm", number(s.interval_mm)},
+            {"worst_interval_95_mm", number(s.worst_interval_mm)},
+            {"worst_place_mm", vector(s.worst_place)},
+            {"unseen_share", number(s.unseen_share)}};
+}
+
 json fitted(const registration::ParameterFit& fit) {
     json list = json::array();
     for (const registration::FittedParameter& each : fit.parameters)
@@ -294,6 +305,8 @@ json report_json(const RegistrationRun& run, double total_seconds) {
     if (!scores.after.empty())
         report["overlap"] = {{"before", to_json(scores.before)}, {"after", to_json(scores.after)}};
     add_fits(report, run.result);
+    if (run.products.uncertainty)
+        report["error_estimate"] = to_json(registration::summarise(*run.products.uncertainty));
     if (!run.fit.parameters.empty()) report["fit"] = fitted(run.fit);
     if (scores.target_error) report["target_registration_error"] = to_json(*scores.target_error);
     return report;
