@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -48,9 +49,10 @@ struct RegisterOptions {
     PointPairFiles point_pairs;
     CurveFiles curves;
     LandmarkFiles landmarks;
-    std::filesystem::path points, surface;    ///< of the moving frame, carried along
-    double edge_length = 0.0;                 ///< mm; 0: from the volume of the organ and what is given
-    std::map<int, double> label_edge_length;  ///< mm
+    std::filesystem::path points, surface;        ///< of the moving frame, carried along
+    std::optional<double> accuracy, time_budget;  ///< mm; s: they choose the mesh
+    double edge_length = 0.0;                     ///< mm; 0: from the volume of the organ and what is given
+    std::map<int, double> label_edge_length;      ///< mm
     std::filesystem::path materials;
     double default_youngs_modulus = 3.0;  ///< kPa
     double default_poissons_ratio = 0.45;
@@ -134,8 +136,15 @@ struct ExplainOptions {
     std::filesystem::path scene;
 };
 
+struct CalibrateOptions {
+    CommonOptions common;
+    std::filesystem::path output;  ///< empty: where register looks
+    bool quick = false;
+    DeviceChoice device;
+};
+
 using Command = std::variant<RegisterOptions, MeshOptions, WarpOptions, EvaluateOptions, InfoOptions, BenchOptions,
-                             SimulateOptions, ExplainOptions>;
+                             SimulateOptions, ExplainOptions, CalibrateOptions>;
 
 /// The text that --help or --version asked for; not an error.
 struct HelpRequest {

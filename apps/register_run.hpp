@@ -3,6 +3,7 @@
 
 #include "apps/inputs.hpp"
 #include "meshing/quality.hpp"
+#include "registration/dial.hpp"
 #include "registration/parameter_fit.hpp"
 #include "registration/uncertainty.hpp"
 
@@ -30,12 +31,17 @@ struct Scores {
 };
 
 struct RegistrationRun {
+    /// `at` is the time of the start, UTC.
+    RegistrationRun(const RegisterOptions& given, std::string at) : options(given), started(std::move(at)) {}
+
     const RegisterOptions& options;
     std::string started;  ///< UTC
     RegistrationInputs inputs;
     std::unique_ptr<registration::PreparedModel> prepared;
     registration::UpdateResult result;
-    registration::ParameterFit fit;  ///< without parameters where none was asked for
+    std::optional<registration::DialChoice> dial;  ///< where an accuracy or a time was asked for
+    double intraoperative_seconds = 0;             ///< from data and model at hand to the warped image
+    registration::ParameterFit fit;                ///< without parameters where none was asked for
     Products products;
     Scores scores;
     std::vector<registration::StageTime> times;
