@@ -13,5 +13,6 @@ void run_info(const InfoOptions& options);
 void run_bench(const BenchOptions& options);
 void run_simulate(const SimulateOptions& options);
 void run_explain(const ExplainOptions& options);
+void run_study(const StudyOptions& options);
 
 }  // namespace tissuewarp::apps

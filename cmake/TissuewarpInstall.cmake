@@ -8,7 +8,7 @@ if(TARGET tissuewarp_app)
   install(TARGETS tissuewarp_app RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 endif()
 
-foreach(folder core imaging meshing shaders tled simulation registration report)
+foreach(folder core imaging meshing shaders tled simulation registration report study)
   if(TARGET tissuewarp_${folder})
     install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/
       DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tissuewarp/${folder}
