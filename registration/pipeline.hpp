@@ -250,6 +250,9 @@ struct LastPulls {
     std::vector<tled::Spring> data, ground;
     std::vector<tled::Spring> supports;                           ///< anchors, and contact with rigid neighbours
     Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();  ///< moving → fixed, as it was in that round
+    Eigen::Matrix3Xd loads;                                       ///< on the nodes, 3 × N, mN
+    double energy = 1;            ///< mN mm that weighs as much as one standard deviation of a datum
+    bool free_placement = false;  ///< nothing but the data says where the organ lies: the ground moves with it
 };
 
 struct UpdateResult {

@@ -176,7 +176,9 @@ private:
         detail::Stopwatch stopwatch;
         const detail::RoundPlan plan = plan_of(round);
         detail::Contribution data = evidence_.contribution(plan, state_);
-        result_.pulls = {data.conditions.springs, evidence_.ground, evidence_.supports(plan, state_), state_.placement};
+        result_.pulls = {data.conditions.springs, evidence_.ground, evidence_.supports(plan, state_),
+                         state_.placement,        loads_,           evidence_.energy,
+                         placement_is_free()};
         data.conditions.external_force = loads_;
         append(data.conditions.springs, result_.pulls.ground);
         append(data.conditions.springs, result_.pulls.supports);

@@ -3,12 +3,13 @@
 /// cannot follow, and what data and tissue leave open.
 
 #include "core/observer.hpp"
-#include "imaging/volume.hpp"
+#include "meshing/point_location.hpp"
 #include "registration/pipeline.hpp"
 
 #include <Eigen/Core>
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace tissuewarp::registration {
@@ -16,7 +17,6 @@ namespace tissuewarp::registration {
 struct UncertaintyOptions {
     int samples = 64;        ///< of the posterior; a deviation is known to 1/√(6 · samples), 5 %
     std::uint64_t seed = 1;  ///< of these
-    bool discretisation = true;  ///< false: leaves the estimate by quadratic tetrahedra out, for speed
 };
 
 /// Errors of one place, mm. Each deviation is the root of the expected square of the error vector's length.
@@ -37,13 +37,14 @@ public:
     Uncertainty(meshing::TetMesh mesh, Eigen::Matrix3Xd algebraic, Eigen::Matrix3Xd discretisation,
                 Eigen::Matrix<double, 6, Eigen::Dynamic> covariance, Eigen::VectorXd unexplained);
 
-    /// Of places of the moving frame, 3 × P mm; outside the mesh that of the nearest element.
-    [[nodiscard]] std::vector<ErrorEstimate> at(const Eigen::Matrix3Xd& points) const;
+    /// Of places of the moving frame, 3 × P mm; nothing for places farther than half an element outside the mesh.
+    [[nodiscard]] std::vector<std::optional<ErrorEstimate>> at(const Eigen::Matrix3Xd& points) const;
     /// Of every node.
     [[nodiscard]] std::vector<ErrorEstimate> at_nodes() const;
 
 private:
     meshing::TetMesh mesh_;
+    meshing::PointLocator locator_;
     Eigen::Matrix3Xd algebraic_, discretisation_;
     Eigen::Matrix<double, 6, Eigen::Dynamic> covariance_;
     Eigen::VectorXd unexplained_;

@@ -2,6 +2,7 @@
 /// Random organs whose deformation is known: made with quadratic tetrahedra and tissue that the registration does not
 /// know, on a mesh of their own.
 
+#include "core/observer.hpp"
 #include "imaging/volume.hpp"
 #include "registration/evaluation.hpp"
 #include "registration/intraoperative.hpp"
@@ -21,12 +22,12 @@ struct PhantomOptions {
 /// One patient: what a registration is given, and what is true.
 struct Phantom {
     std::uint64_t seed = 0;
-    std::string story;                          ///< shape, tissue, what moves it, one line
-    imaging::Volume moving_labels;              ///< 0 outside, 1 organ, 2 inclusion; moving frame
-    imaging::Volume fixed_labels;               ///< the same drawn anew in the fixed frame, with boundary noise
-    registration::SurfacePoints surface;        ///< of a part of the organ's surface, fixed frame
-    registration::PointPairs points;            ///< a few places in the organ
-    registration::Landmarks targets;            ///< moving and true fixed positions, LPS mm
+    std::string story;                    ///< shape, tissue, what moves it, one line
+    imaging::Volume moving_labels;        ///< 0 outside, 1 organ, 2 inclusion; moving frame
+    imaging::Volume fixed_labels;         ///< the same drawn anew in the fixed frame, with boundary noise
+    registration::SurfacePoints surface;  ///< of a part of the organ's surface, fixed frame
+    registration::PointPairs points;      ///< a few places in the organ
+    registration::Landmarks targets;      ///< moving and true fixed positions, LPS mm
 };
 
 /// The same seed gives the same phantom, bit for bit. Throws SolverFailure where its truth does not converge.

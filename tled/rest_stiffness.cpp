@@ -52,6 +52,18 @@ struct RestStiffness::Impl {
         }
         return result;
     }
+    /// `operation` on the free rows of columns (3N × k); zero elsewhere.
+    template <class Operation>
+    [[nodiscard]] MatrixXd on_free(const MatrixXd& columns, const Operation& operation) const {
+        MatrixXd free(free_count, columns.cols()), result = MatrixXd::Zero(columns.rows(), columns.cols());
+        if (free_count == 0) return result;
+        for (std::size_t d = 0; d < index.size(); ++d)
+            if (index[d] >= 0) free.row(index[d]) = columns.row(static_cast<Eigen::Index>(d));
+        const MatrixXd answer = operation(free);
+        for (std::size_t d = 0; d < index.size(); ++d)
+            if (index[d] >= 0) result.row(static_cast<Eigen::Index>(d)) = answer.row(index[d]);
+        return result;
+    }
     [[nodiscard]] Matrix3Xd multiply(const Matrix3Xd& x, const NodalConditions& present) const {
         Matrix3Xd y = elastic->multiply(x);
         detail::add_spring_resistance(present, x, y);
@@ -215,15 +227,11 @@ Matrix3Xd RestStiffness::solve(const Matrix3Xd& force, const NodalConditions& co
 }
 
 MatrixXd RestStiffness::solve_columns(const MatrixXd& forces) const {
-    MatrixXd free(impl_->free_count, forces.cols()), result = MatrixXd::Zero(forces.rows(), forces.cols());
-    if (impl_->free_count == 0) return result;
-    const auto& index = impl_->index;
-    for (std::size_t d = 0; d < index.size(); ++d)
-        if (index[d] >= 0) free.row(index[d]) = forces.row(static_cast<Eigen::Index>(d));
-    const MatrixXd solved = impl_->factor->solve_columns(free);
-    for (std::size_t d = 0; d < index.size(); ++d)
-        if (index[d] >= 0) result.row(static_cast<Eigen::Index>(d)) = solved.row(index[d]);
-    return result;
+    return impl_->on_free(forces, [&](const MatrixXd& free) { return impl_->factor->solve_columns(free); });
+}
+
+MatrixXd RestStiffness::colour_columns(const MatrixXd& white) const {
+    return impl_->on_free(white, [&](const MatrixXd& free) { return impl_->factor->colour_columns(free); });
 }
 
 Matrix3Xd RestStiffness::linear_solution(const NodalConditions& conditions) const {

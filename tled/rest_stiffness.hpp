@@ -38,6 +38,10 @@ public:
     /// K⁻¹ of many forces at once, 3N × k, the nodes' vectors one after the other: several times as fast as one by one.
     [[nodiscard]] Eigen::MatrixXd solve_columns(const Eigen::MatrixXd& forces) const;
 
+    /// Displacements of covariance K⁻¹ from columns of independent numbers of variance 1, both 3N × k, zero on the
+    /// constrained degrees of freedom.
+    [[nodiscard]] Eigen::MatrixXd colour_columns(const Eigen::MatrixXd& white) const;
+
     /// Linear-elastic displacement under the conditions, imposed values included (3 × N, mm).
     [[nodiscard]] Eigen::Matrix3Xd linear_solution(const NodalConditions& conditions) const;
 

@@ -30,6 +30,17 @@ cholmod_sparse view(const Eigen::SparseMatrix<double>& lower) {
     return A;
 }
 
+cholmod_dense view(const Eigen::MatrixXd& columns) {
+    cholmod_dense b{};
+    b.nrow = b.d = columns.rows();
+    b.ncol = columns.cols();
+    b.nzmax = columns.size();
+    b.x = const_cast<double*>(columns.data());
+    b.xtype = CHOLMOD_REAL;
+    b.dtype = CHOLMOD_DOUBLE;
+    return b;
+}
+
 // OpenBLAS's threads wait for each other by spinning: on small supernodes this costs more than it gives, and on busy
 // cores it multiplies the time. One thread while this lives, where `active` and where the BLAS is OpenBLAS.
 class SingleBlasThread {
@@ -103,6 +114,15 @@ struct CholmodFactor::Impl {
     }
     Impl(const Impl&) = delete;
     Impl& operator=(const Impl&) = delete;
+
+    // With the system that CHOLMOD calls `system`.
+    [[nodiscard]] Eigen::MatrixXd solved(int system, const Eigen::MatrixXd& b) const {
+        cholmod_dense right = view(b);
+        const SingleBlasThread single(true);  // a triangular solve is bound by memory
+        cholmod_solve2(system, L, &right, nullptr, &x, nullptr, &y, &e, &common);
+        require_success("solve with");
+        return Eigen::Map<const Eigen::MatrixXd>(static_cast<const double*>(x->x), b.rows(), b.cols());
+    }
 
     void require_success(const char* step) const {
         if (common.status >= CHOLMOD_OK) return;
@@ -183,17 +203,11 @@ Eigen::VectorXd CholmodFactor::solve(const Eigen::VectorXd& b) const {
 }
 
 Eigen::MatrixXd CholmodFactor::solve_columns(const Eigen::MatrixXd& b) const {
-    cholmod_dense right{};
-    right.nrow = right.d = b.rows();
-    right.ncol = b.cols();
-    right.nzmax = b.size();
-    right.x = const_cast<double*>(b.data());
-    right.xtype = CHOLMOD_REAL;
-    right.dtype = CHOLMOD_DOUBLE;
-    const SingleBlasThread single(true);  // a triangular solve is bound by memory
-    cholmod_solve2(CHOLMOD_A, impl_->L, &right, nullptr, &impl_->x, nullptr, &impl_->y, &impl_->e, &impl_->common);
-    impl_->require_success("solve with");
-    return Eigen::Map<const Eigen::MatrixXd>(static_cast<const double*>(impl_->x->x), b.rows(), b.cols());
+    return impl_->solved(CHOLMOD_A, b);
+}
+
+Eigen::MatrixXd CholmodFactor::colour_columns(const Eigen::MatrixXd& white) const {
+    return impl_->solved(CHOLMOD_Pt, impl_->solved(CHOLMOD_Lt, white));
 }
 
 long long CholmodFactor::nonzeros() const {

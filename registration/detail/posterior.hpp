@@ -1,0 +1,49 @@
+#pragma once
+/// What data and tissue leave open of a displacement.
+
+#include "registration/pipeline.hpp"
+#include "tled/conditions.hpp"
+
+#include <Eigen/Core>
+
+#include <cstdint>
+#include <vector>
+
+namespace tissuewarp::registration::detail {
+
+/// Springs of the data and of the prior, each weighed so that `energy` (mN mm) is one standard deviation.
+struct WeighedSprings {
+    std::vector<tled::Spring> data, ground;
+    double energy = 1;
+    bool free_placement = false;  ///< the organ may lie anywhere: the ground moves with it
+};
+
+/// exp(−Π/energy) is Gaussian for small displacements, of covariance energy · K⁻¹, K the stiffness at rest with all
+/// springs (Bayes' rule with strain energy as the prior, e.g. Szeliski 1990). Where the placement is free, the ground
+/// G is G − G R (Rᵀ G R)⁻¹ Rᵀ G, R the six rigid motions: it holds no motion as a whole. Such motions that
+/// the data do not show either are taken to be known to 100 mm.
+class Posterior {
+public:
+    /// Throws InvalidInput where the springs do not hold the tissue.
+    Posterior(const PreparedModel& prepared, const WeighedSprings& springs);
+
+    /// Covariances of the displacements of nodes, mm².
+    [[nodiscard]] std::vector<Eigen::Matrix3d> covariances(const std::vector<int>& nodes) const;
+
+    /// Displacements drawn from it, 3N × count, the nodes' vectors one after the other, mm. The same seed draws the
+    /// same ones.
+    [[nodiscard]] Eigen::MatrixXd samples(int count, std::uint64_t seed) const;
+
+    /// K.
+    [[nodiscard]] const tled::RestStiffness& stiffness() const { return stiffness_; }
+
+private:
+    tled::RestStiffness stiffness_;
+    Eigen::Index rows_;  // 3 N
+    double energy_;
+    // (K − G R A⁻¹ Rᵀ G)⁻¹ = K⁻¹ + K⁻¹ H (A − Hᵀ K⁻¹ H)⁻¹ Hᵀ K⁻¹ with H = G R, A = Rᵀ G R (Woodbury):
+    Eigen::MatrixXd freed_;   // K⁻¹ H, 3N × 6, or 3N × 0 where the placement is not free
+    Eigen::MatrixXd middle_;  // (A − Hᵀ K⁻¹ H)⁻¹
+};
+
+}  // namespace tissuewarp::registration::detail

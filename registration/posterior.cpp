@@ -1,0 +1,109 @@
+#include "registration/detail/posterior.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+
+#include <cmath>
+#include <random>
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+/// Motions of the organ as a whole that no datum shows, such as one along a straight vessel, are known no worse: their
+/// variance stays finite.
+constexpr double least_known_mm = 100;
+
+using Columns = Eigen::MatrixXd;  // 3N × k, nodes' vectors one after the other
+
+tled::RestStiffness stiffness_with(const PreparedModel& prepared, const WeighedSprings& springs) {
+    tled::Conditions all;
+    all.springs = springs.data;
+    all.springs.insert(all.springs.end(), springs.ground.begin(), springs.ground.end());
+    return {prepared.rest, tled::nodal_conditions(all, prepared.rest.node_count), prepared.stiffness};
+}
+
+/// Six fields, 3N × 6: shifts along and turns about the axes.
+Columns rigid_motions(const Eigen::Matrix3Xd& nodes) {
+    const Eigen::Matrix3Xd arms = nodes.colwise() - nodes.rowwise().mean();
+    const double radius = std::sqrt(arms.colwise().squaredNorm().mean());
+    Columns motions(nodes.size(), 6);
+    for (Eigen::Index n = 0; n < nodes.cols(); ++n)
+        for (int axis = 0; axis < 3; ++axis) {
+            const Eigen::Vector3d unit = Eigen::Vector3d::Unit(axis);
+            motions.block<3, 1>(3 * n, axis) = unit;
+            motions.block<3, 1>(3 * n, axis + 3) = unit.cross(Eigen::Vector3d(arms.col(n))) / radius;
+        }
+    return motions;
+}
+
+Columns times(const std::vector<tled::Spring>& springs, const Columns& vectors) {
+    Columns result = Columns::Zero(vectors.rows(), vectors.cols());
+    for (const tled::Spring& spring : springs)
+        result.middleRows<3>(3 * spring.node) += spring.stiffness * vectors.middleRows<3>(3 * spring.node);
+    return result;
+}
+
+/// Unit forces at nodes along the axes, 3N × 3 per node.
+Columns unit_forces(const std::vector<int>& nodes, Eigen::Index rows) {
+    Columns forces = Columns::Zero(rows, 3 * static_cast<Eigen::Index>(nodes.size()));
+    for (Eigen::Index k = 0; k < forces.cols(); ++k) forces(3 * nodes[static_cast<std::size_t>(k / 3)] + k % 3, k) = 1;
+    return forces;
+}
+
+/// Of a symmetric matrix whose eigenvalues are to be no smaller than `least`.
+Columns bounded_inverse(const Columns& matrix, double least) {
+    const Eigen::SelfAdjointEigenSolver<Columns> modes(matrix);
+    return modes.eigenvectors() * modes.eigenvalues().cwiseMax(least).cwiseInverse().asDiagonal() *
+           modes.eigenvectors().transpose();
+}
+
+/// Independent numbers of mean 0 and variance 1 (Box & Muller 1958), the same with every standard library.
+Columns white_noise(Eigen::Index rows, Eigen::Index columns, std::mt19937_64& generator) {
+    const auto uniform = [&] { return (double(generator() >> 11) + 0.5) * 0x1p-53; };
+    Columns noise(rows, columns);
+    for (Eigen::Index k = 0; k < noise.size(); ++k) {
+        const double radius = std::sqrt(-2 * std::log(uniform()));
+        noise.data()[k] = radius * std::cos(2 * EIGEN_PI * uniform());
+    }
+    return noise;
+}
+
+}  // namespace
+
+Posterior::Posterior(const PreparedModel& prepared, const WeighedSprings& springs)
+    : stiffness_(stiffness_with(prepared, springs)),
+      rows_(3 * Eigen::Index(prepared.rest.node_count)),
+      energy_(springs.energy),
+      freed_(rows_, 0) {
+    if (!springs.free_placement) return;
+    const Columns motions = rigid_motions(prepared.model.mesh.nodes), held = times(springs.ground, motions);
+    freed_ = stiffness_.solve_columns(held);
+    middle_ = bounded_inverse(motions.transpose() * held - held.transpose() * freed_,
+                              energy_ / (least_known_mm * least_known_mm));
+}
+
+std::vector<Eigen::Matrix3d> Posterior::covariances(const std::vector<int>& nodes) const {
+    const Columns answers = stiffness_.solve_columns(unit_forces(nodes, rows_));
+    std::vector<Eigen::Matrix3d> result;
+    for (std::size_t n = 0; n < nodes.size(); ++n) {
+        const Eigen::Index row = 3 * Eigen::Index(nodes[n]);
+        result.emplace_back(energy_ * answers.block<3, 3>(row, 3 * Eigen::Index(n)));
+        if (freed_.cols() == 0) continue;
+        const Eigen::Matrix<double, 3, Eigen::Dynamic> share = freed_.middleRows<3>(row);
+        result.back() += energy_ * share * middle_ * share.transpose();
+    }
+    return result;
+}
+
+Eigen::MatrixXd Posterior::samples(int count, std::uint64_t seed) const {
+    std::mt19937_64 generator(seed);
+    Columns drawn = stiffness_.colour_columns(white_noise(rows_, count, generator));
+    if (freed_.cols() > 0) {
+        const Eigen::SelfAdjointEigenSolver<Columns> root(middle_);
+        drawn += freed_ * (root.operatorSqrt() * white_noise(freed_.cols(), count, generator));
+    }
+    return std::sqrt(energy_) * drawn;
+}
+
+}  // namespace tissuewarp::registration::detail
