@@ -2,14 +2,13 @@
 
 #include "meshing/mesher.hpp"
 #include "meshing/primitives.hpp"
+#include "study/label_mesh.hpp"
 #include "tled/critical_step.hpp"
 #include "tled/engine.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <numbers>
-#include <span>
 
 namespace tissuewarp::apps {
 
@@ -33,18 +32,6 @@ BenchScene scene_of(const meshing::TetMesh& mesh, Matrix3Xd start, const tled::C
     model.element = element;
     model.density = 1e-6;
     return {tled::rest_state(model), tled::nodal_conditions(conditions, mesh.node_count()), std::move(start)};
-}
-
-/// Every wanted label 1, everything else 0.
-imaging::Volume one_tissue(const imaging::Volume& label_map, const std::vector<int>& labels) {
-    imaging::Volume tissue = label_map.clone();
-    const std::span<std::int32_t> voxels(tissue.data<std::int32_t>(), tissue.voxels.total());
-    for (std::int32_t& voxel : voxels) {
-        const bool wanted =
-            labels.empty() ? voxel != 0 : std::find(labels.begin(), labels.end(), voxel) != labels.end();
-        voxel = wanted ? 1 : 0;
-    }
-    return tissue;
 }
 
 double highest_step(const BenchScene& scene, const tled::NodalConditions& conditions, const Matrix3Xd& displacement) {
@@ -125,11 +112,9 @@ meshing::TetMesh brain_mesh(const imaging::Volume& label_map, const std::vector<
                             Observer& observer) {
     constexpr int tries = 5;
     constexpr double accepted = 0.03;
-    const imaging::Volume tissue = one_tissue(label_map, labels);
-    const double volume = cv::countNonZero(tissue.voxels.reshape(1, 1)) * tissue.geometry.spacing.prod();  // mm³
+    const imaging::Volume tissue = study::one_tissue(label_map, labels);
     meshing::MeshingOptions options;
-    // An even tetrahedron of that edge has a volume of edge³/8.5; meshes of labels have shorter edges at the surface.
-    options.edge_length = std::cbrt(8.5 * volume / elements);
+    options.edge_length = study::edge_length_for(tissue, elements);  // too large: edges are shorter at the surface
     meshing::TetMesh best;
     const auto error = [&](const meshing::TetMesh& mesh) { return std::abs(double(mesh.tet_count()) / elements - 1); };
     for (int i = 0; i < tries && (i == 0 || error(best) > accepted); ++i) {

@@ -28,6 +28,7 @@ struct RunVerb {
     void operator()(const apps::SimulateOptions& options) const { apps::run_simulate(options); }
     void operator()(const apps::ExplainOptions& options) const { apps::run_explain(options); }
     void operator()(const apps::CalibrateOptions& options) const { apps::run_calibrate(options); }
+    void operator()(const apps::StudyOptions& options) const { apps::run_study(options); }
 };
 
 int report(const std::vector<std::string>& arguments, int code, std::string message) {
@@ -61,6 +62,8 @@ int main(int argc, char** argv) {
         return report(arguments, 4, error.what());
     } catch (const GpuUnavailable& error) {
         return report(arguments, 5, error.what());
+    } catch (const apps::Interrupted& interrupted) {
+        return report(arguments, 130, interrupted.what());
     } catch (const Cancelled&) {
         return report(arguments, 130, "interrupted; nothing was written");
     } catch (const std::bad_alloc&) {

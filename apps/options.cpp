@@ -171,6 +171,7 @@ struct Parser {
     SimulateOptions simulate;
     ExplainOptions explain;
     CalibrateOptions calibrate;
+    StudyOptions study;
     std::filesystem::path config;
     std::string accuracy, time_budget;
     std::vector<std::string> register_lengths, mesh_lengths, info_files, anchors, rigid_neighbours;
@@ -189,6 +190,7 @@ struct Parser {
         declare_explain(verbs.emplace_back(app, "explain", "Print what a scene will run and what a step costs"));
         declare_calibrate(
             verbs.emplace_back(app, "calibrate", "Measure on phantoms what --accuracy and --time-budget choose by"));
+        declare_study(verbs.emplace_back(app, "study", "Measure what accuracy costs in time on this machine"));
     }
 
     void declare_register(Verb& verb) {
@@ -415,6 +417,23 @@ struct Parser {
         verb.common(o.common);
     }
 
+    void declare_study(Verb& verb) {
+        StudyOptions& o = study;
+        verb.app().footer("Example:\n  tissuewarp study accuracy-time --quick --output out/study");
+        verb.text("name", o.name, "accuracy-time")->required();
+        verb.path("-o,--output", o.output, "Folder for measurements and page; a study interrupted there goes on")
+            ->type_name("FOLDER");
+        verb.list("--problems", o.problems, "NAME",
+                  "Of cube, brain, brainshift, liver, phantom:SEED; default: all but liver")
+            ->delimiter(',');
+        verb.path("--data", o.data, "Folder that holds phantom-liver, for the liver")->type_name("FOLDER");
+        verb.number("--repeats", o.repeats, "COUNT", 0, 1000, "Runs of each point; 0: 5, with --quick 2");
+        verb.flag("--quick", o.quick, "Small meshes, few points: whether the study runs, not how fast");
+        verb.text("--device", o.device.name, "auto, cpu, gpu or gpu:<index>; auto: a GPU besides the processor if any")
+            ->check(CLI::Validator(check_device, "", "device"));
+        verb.common(o.common);
+    }
+
     Command result() {
         const std::string verb = app.get_subcommands().front()->get_name();
         if (verb == "register") {
@@ -445,6 +464,7 @@ struct Parser {
         if (verb == "simulate") return simulate;
         if (verb == "explain") return explain;
         if (verb == "calibrate") return calibrate;
+        if (verb == "study") return study;
         info.files.assign(info_files.begin(), info_files.end());
         return info;
     }
@@ -474,7 +494,7 @@ struct Parser {
     }
 
     static std::vector<std::string> verb_names() {
-        return {"register", "mesh", "warp", "evaluate", "info", "bench", "simulate", "explain", "calibrate"};
+        return {"register", "mesh", "warp", "evaluate", "info", "bench", "simulate", "explain", "calibrate", "study"};
     }
 };
 
@@ -512,7 +532,8 @@ Command parse_command_line(std::vector<std::string> arguments) {
         const bool no_verb = parser.app.get_subcommands().empty();
         throw InvalidInput(
             no_verb
-                ? "give a verb: register, mesh, warp, evaluate, info, bench, simulate, explain or calibrate; see --help"
+                ? "give a verb: register, mesh, warp, evaluate, info, bench, simulate, explain, calibrate or study; "
+                  "see --help"
                 : std::string(error.what()) + "; see --help");
     }
     return parser.result();

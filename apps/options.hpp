@@ -143,8 +143,18 @@ struct CalibrateOptions {
     DeviceChoice device;
 };
 
+struct StudyOptions {
+    CommonOptions common;
+    std::string name;                    ///< of the study
+    std::filesystem::path output, data;  ///< folder of results, which an interrupted study goes on in; shared phantoms
+    std::vector<std::string> problems;  ///< "cube", "brain", "brainshift", "liver", "phantom:SEED"; empty: of the study
+    int repeats = 0;                    ///< 0: of the study
+    bool quick = false;
+    DeviceChoice device;
+};
+
 using Command = std::variant<RegisterOptions, MeshOptions, WarpOptions, EvaluateOptions, InfoOptions, BenchOptions,
-                             SimulateOptions, ExplainOptions, CalibrateOptions>;
+                             SimulateOptions, ExplainOptions, CalibrateOptions, StudyOptions>;
 
 /// The text that --help or --version asked for; not an error.
 struct HelpRequest {

@@ -17,6 +17,11 @@ void catch_interrupts();
 /// True once an interrupt arrived.
 bool interrupted();
 
+/// An interrupt after which results remain: its text says which, and how to go on (exit code 130).
+struct Interrupted : Error {
+    using Error::Error;
+};
+
 /// Keeps notes, and draws "stage  percent  time left" on standard error when that is a terminal.
 class ProgressLine final : public Observer {
 public:

@@ -14,5 +14,6 @@ void run_bench(const BenchOptions& options);
 void run_simulate(const SimulateOptions& options);
 void run_calibrate(const CalibrateOptions& options);
 void run_explain(const ExplainOptions& options);
+void run_study(const StudyOptions& options);
 
 }  // namespace tissuewarp::apps

@@ -23,8 +23,9 @@ const std::map<std::string, std::set<std::string>> may_include{
     {"simulation", {"core", "imaging", "meshing", "shaders", "tled", "simulation"}},
     {"registration", {"core", "imaging", "meshing", "shaders", "tled", "registration"}},
     {"report", {"core", "imaging", "report"}},
-    {"study", {"core", "imaging", "meshing", "tled", "registration", "report", "study"}},
-    {"apps", {"core", "imaging", "meshing", "shaders", "tled", "simulation", "registration", "report", "study", "apps"}},
+    {"study", {"core", "imaging", "meshing", "shaders", "tled", "registration", "report", "study"}},
+    {"apps",
+     {"core", "imaging", "meshing", "shaders", "tled", "simulation", "registration", "report", "study", "apps"}},
 };
 
 /// Files of meshing that belong to the mesher: they name it, its label field, its seeds or its fidelity.
