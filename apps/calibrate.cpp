@@ -3,6 +3,7 @@
 #include "apps/progress.hpp"
 #include "apps/update_device.hpp"
 #include "apps/verbs.hpp"
+#include "core/atomic_file.hpp"
 #include "core/errors.hpp"
 #include "registration/fronts_io.hpp"
 #include "study/fronts.hpp"
