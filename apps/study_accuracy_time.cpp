@@ -44,7 +44,7 @@ int gpu_index_of(const DeviceChoice& device) {
 }
 
 study::BodyOptions body_options(const StudyOptions& options) {
-    constexpr int full = 8000, quick = 1500;  // quadratic tetrahedra
+    constexpr int full = 8000, quick = 1000;  // quadratic tetrahedra
     study::BodyOptions body;
     body.reference_tetrahedra = options.quick ? quick : full;
     body.cache = options.output / "references";

@@ -12,6 +12,17 @@ double work_of(const Setting& setting, bool prepared) {
     return prepared ? thousands : 4 * thousands;
 }
 
+/// Progress and interrupts without the solvers' notes, which every run would repeat.
+class WithoutNotes final : public Observer {
+public:
+    explicit WithoutNotes(Observer& observer) : observer_(observer) {}
+    void progress(std::string_view stage, double fraction) override { observer_.progress(stage, fraction); }
+    bool cancel_requested() override { return observer_.cancel_requested(); }
+
+private:
+    Observer& observer_;
+};
+
 /// What of a problem is left to do, with the work that it is.
 struct Left {
     std::vector<Setting> settings;
@@ -37,11 +48,12 @@ std::vector<ProblemSummary> measure_accuracy_time(const std::vector<NamedProblem
                                                   const AccuracyTimeOptions& options, Store& store,
                                                   const PointListener& listener, Observer& observer) {
     std::vector<ProblemSummary> summaries;
+    WithoutNotes quiet(observer);
     for (std::size_t p = 0; p < problems.size(); ++p) {
         const double from = double(p) / double(problems.size()), share = 1.0 / double(problems.size());
         constexpr double making = 0.02;  // of the problem's share
         listener(problems[p].name, from, from + making * share);
-        const std::unique_ptr<Problem> problem = problems[p].make(observer);
+        const std::unique_ptr<Problem> problem = problems[p].make(quiet);
         summaries.push_back(
             {problem->name(), problem->story(), base_of(*problem, options.plan), problem->is_registration()});
         const Left left = left_of(*problem, options.plan, store);
@@ -51,7 +63,7 @@ std::vector<ProblemSummary> measure_accuracy_time(const std::vector<NamedProblem
             const auto at = [&](double work) { return from + share * (making + (1 - making) * work / all); };
             listener(problem->name() + " " + words_of(left.settings[i]), at(done), at(done + left.work[i]));
             done += left.work[i];
-            Point point = problem->measure(left.settings[i], options.runs, observer);
+            Point point = problem->measure(left.settings[i], options.runs, quiet);
             if (!point.solved()) observer.note(point.problem + ", " + words_of(point.setting) + ": " + point.failure);
             store.add(std::move(point));
         }
