@@ -117,7 +117,10 @@ std::string LogPanel::drawn(const std::string& title, const std::string& x_label
         for (const FigurePoint& p : curve.points) points.push_back(at(p));
         svg += drawn_on_page(curve, points);
     }
-    for (const FigureNote& note : notes) svg += svg_text(at(note.at), note.text, "start");
+    for (const FigureNote& note : notes) {
+        const FigurePoint p = at(note.at);
+        svg += svg_text({p.x + 3, p.y - 5}, note.text, "start");
+    }
     return svg;
 }
 

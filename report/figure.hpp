@@ -22,7 +22,7 @@ struct FigureCurve {
     double thickness = 1.8;  ///< pixels
 };
 
-/// Words at a point of a panel.
+/// Words above a point of a panel.
 struct FigureNote {
     FigurePoint at;
     std::string text;

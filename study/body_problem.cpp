@@ -264,7 +264,7 @@ private:
         point.places = body_.samples + found;
         const Reference& own = reference(base().physics, observer);
         const Reference& same = reference(setting.physics, observer);
-        point.total = length_of(found - own.displacement);
+        point.model = length_of(same.displacement - own.displacement);
         point.numerical = length_of(found - same.displacement);
         point.reference_mm = same.uncertainty_mm;
     }

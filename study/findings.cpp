@@ -90,13 +90,13 @@ Findings findings_of(const ProblemSummary& problem, const std::vector<Point>& po
     if (findings.solved.empty()) return findings;
     for (const std::size_t i : pareto_front(costs)) findings.front.push_back(findings.solved[i]);
     findings.best = findings.front.back();
-    findings.knee = findings.solved[knee(costs)];
+    if (problem.registration) findings.knee = findings.solved[knee(costs)];
     if (findings.base != nullptr) {
         findings.comparisons = comparisons_of(problem.base, *findings.base, findings.solved);
         findings.lines.push_back(sentence("base", *findings.base));
     }
     findings.lines.push_back(sentence("most accurate", *findings.best));
-    findings.lines.push_back(sentence("knee, within 5 % of that", *findings.knee));
+    if (findings.knee != nullptr) findings.lines.push_back(sentence("knee, within 5 % of that", *findings.knee));
     return findings;
 }
 

@@ -20,7 +20,7 @@ struct Comparison {
 struct Findings {
     const Point* base = nullptr;
     const Point* best = nullptr;          ///< least error
-    const Point* knee = nullptr;          ///< the quickest within 5 % of the least error
+    const Point* knee = nullptr;          ///< registrations: the quickest within 5 % of the least error
     std::vector<const Point*> solved;     ///< of this problem
     std::vector<const Point*> front;      ///< by rising time
     std::vector<Comparison> comparisons;  ///< one factor at a time, in the order of the factors

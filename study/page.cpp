@@ -57,6 +57,7 @@ json row_of(const Point& point) {
              {"preparation", seconds_text(point.preparation_seconds())},
              {"evaluations", point.force_evaluations}};
     row["numerical"] = perhaps(point.numerical ? std::optional(point.numerical->rms) : std::nullopt);
+    row["model"] = perhaps(point.model ? std::optional(point.model->rms) : std::nullopt);
     row["percentile_95"] = perhaps(point.target ? std::optional(point.target->percentile_95) : std::nullopt);
     return row;
 }

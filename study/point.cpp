@@ -35,7 +35,7 @@ double Point::preparation_seconds() const {
 }
 
 double Point::error_mm() const {
-    return target ? target->mean : total->rms;
+    return target ? target->mean : std::hypot(numerical->rms, model->rms);
 }
 
 }  // namespace tissuewarp::study

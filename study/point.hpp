@@ -48,7 +48,7 @@ struct Point {
     std::optional<double> algebraic_mm;  ///< largest nodal distance to the exact answer of the same mesh
     std::optional<Distance> numerical;   ///< to the reference of the same physics
     std::optional<double> reference_mm;  ///< uncertainty of that reference, root mean square
-    std::optional<Distance> total;       ///< to the reference of the problem's own physics
+    std::optional<Distance> model;       ///< from that reference to the one of the problem's own physics; 0 for this
     std::optional<TargetErrors> target;  ///< against truth
     Eigen::Matrix3Xd places;             ///< where samples or targets go, mm
     std::string failure;                 ///< in words; empty when there was none
@@ -58,7 +58,8 @@ struct Point {
     [[nodiscard]] double median_seconds() const;
     [[nodiscard]] double percentile_95_seconds() const;
     [[nodiscard]] double preparation_seconds() const;
-    /// What the page puts on its axis: the target error where there is truth, the total error otherwise, mm.
+    /// What the page puts on its axis, mm: the mean target error where there is truth; otherwise numerical and model
+    /// error, root mean square, as if independent: no wrong law gains by a coarse mesh that errs the other way.
     [[nodiscard]] double error_mm() const;
 };
 

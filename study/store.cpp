@@ -64,7 +64,7 @@ std::string csv_line(const Point& p) {
     line.value(p.solved() ? of(p.median_seconds()) : std::nullopt);
     line.value(p.solved() ? of(p.percentile_95_seconds()) : std::nullopt);
     line.value(of(p.preparation_seconds())).count(p.force_evaluations).value(of(p.min_jacobian));
-    line.value(of(p.estimated_mm)).value(p.algebraic_mm).distance(p.numerical).value(p.reference_mm).distance(p.total);
+    line.value(of(p.estimated_mm)).value(p.algebraic_mm).distance(p.numerical).value(p.reference_mm).distance(p.model);
     const auto target = [&](double TargetErrors::*member) {
         line.value(p.target ? std::optional((*p.target).*member) : std::nullopt);
     };
@@ -112,7 +112,7 @@ std::string Store::csv() const {
     std::string text =
         "problem,elements_wanted,element,law,poissons_ratio,hold,solver,tolerance_mm,arithmetic,processor,elements,"
         "nodes,runs,median_s,percentile_95_s,preparation_s,force_evaluations,min_jacobian,estimated_mm,algebraic_mm,"
-        "numerical_rms_mm,numerical_largest_mm,reference_uncertainty_mm,total_rms_mm,total_largest_mm,tre_mean_mm,"
+        "numerical_rms_mm,numerical_largest_mm,reference_uncertainty_mm,model_rms_mm,model_largest_mm,tre_mean_mm,"
         "tre_median_mm,tre_95_mm,tre_largest_mm,tre_before_mm,engine,method,preparation_stages_s,operation_stages_s,"
         "failure\n";
     for (const Point& point : points_) text += csv_line(point);

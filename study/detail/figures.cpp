@@ -184,8 +184,10 @@ std::string front_figure(const ProblemSummary& problem, const Findings& findings
         curves.push_back({"#111827", LineStyle::None, Mark::Ring, {place_of(*findings.base)}});
         legend.emplace_back(curves.back(), "base");
     }
-    curves.push_back({"#dc2626", LineStyle::None, Mark::Ring, {place_of(*findings.knee)}});
-    legend.emplace_back(curves.back(), "knee: 5 % from the best");
+    if (findings.knee != nullptr) {
+        curves.push_back({"#dc2626", LineStyle::None, Mark::Ring, {place_of(*findings.knee)}});
+        legend.emplace_back(curves.back(), "knee: 5 % from the best");
+    }
 
     std::vector<FigureNote> notes;
     const FigurePoint last = front.points.back(), first = front.points.front();

@@ -112,7 +112,8 @@ Point made_up(const Setting& setting, double seconds, double error) {
     point.problem = "cube";
     point.setting = setting;
     point.seconds = {seconds};
-    point.total = Distance{error, 2 * error};
+    point.numerical = Distance{error, 2 * error};
+    point.model = Distance{0, 0};
     return point;
 }
 
@@ -134,10 +135,25 @@ TEST(Findings, SayWhatPays) {
     EXPECT_EQ(findings.comparisons[1].verdict, "less accurate, faster");
     EXPECT_EQ(findings.comparisons[2].verdict, "as accurate, slower: does not pay");
     EXPECT_EQ(findings.base, &points[0]);
-    EXPECT_EQ(findings.knee, &points[1]);
+    EXPECT_EQ(findings.best, &points[1]);
+    EXPECT_EQ(findings.knee, nullptr);  // finer meshes always help where there are no data
     EXPECT_EQ(findings.front.size(), 3u);
     ASSERT_EQ(findings.failures.size(), 1u);
     EXPECT_TRUE(findings_of({"brain", "", {}, false}, points).solved.empty());
+}
+
+TEST(Findings, KneeIsForRegistrations) {
+    std::vector<Point> points{made_up({}, 1, 0.1), made_up({}, 4, 0.099)};
+    points[1].setting.elements = 50000;
+    for (Point& point : points) point.target = TargetErrors{point.numerical->rms, 0, 0, 0, 1};
+    EXPECT_EQ(findings_of({"cube", "", {}, true}, points).knee, &points[0]);
+}
+
+// A coarse mesh that errs against the error of a wrong law must not look right.
+TEST(Point, ErrorsOfModelAndMeshDoNotCancel) {
+    Point point = made_up({}, 1, 0.3);
+    point.model = Distance{0.4, 0.4};
+    EXPECT_NEAR(point.error_mm(), 0.5, 1e-12);
 }
 
 }  // namespace

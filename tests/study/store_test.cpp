@@ -78,7 +78,7 @@ TEST_F(StoreTest, EverythingComesBack) {
     EXPECT_EQ(b.stages[0].phase, Phase::Preparation);
     EXPECT_EQ(b.stages[1].seconds, a.stages[1].seconds);
     EXPECT_EQ(b.algebraic_mm, 0.0);
-    EXPECT_FALSE(b.numerical || b.total || b.reference_mm);
+    EXPECT_FALSE(b.numerical || b.model || b.reference_mm);
     ASSERT_TRUE(b.target.has_value());
     EXPECT_EQ(b.target->percentile_95, 2);
     EXPECT_EQ(b.target->before, 8);
