@@ -427,6 +427,7 @@ struct Parser {
                   "Of cube, brain, brainshift, liver, phantom:SEED; default: all but liver")
             ->delimiter(',');
         verb.path("--data", o.data, "Folder that holds phantom-liver, for the liver")->type_name("FOLDER");
+        verb.number("--most-elements", o.most_elements, "COUNT", 1000, 2000000, "Leave larger meshes out");
         verb.number("--repeats", o.repeats, "COUNT", 0, 1000, "Runs of each point; 0: 5, with --quick 2");
         verb.flag("--quick", o.quick, "Small meshes, few points: whether the study runs, not how fast");
         verb.text("--device", o.device.name, "auto, cpu, gpu or gpu:<index>; auto: a GPU besides the processor if any")

@@ -1,12 +1,12 @@
-# cmake -DPAGE=page.html -DOUTPUT=x.cpp -P embed_page.cmake: writes the page as a C++ raw string.
+# cmake -DPAGE=page.html -DOUTPUT=x.cpp -DNAMESPACE=a::b -P embed_page.cmake: writes the page as a C++ raw string,
+# `const char* page_template()` of that namespace.
 file(READ "${PAGE}" text)
-file(WRITE "${OUTPUT}" "#include \"report/detail/template.hpp\"
+file(WRITE "${OUTPUT}" "namespace ${NAMESPACE} {
 
-namespace tissuewarp::report::detail {
-
+const char* page_template();
 const char* page_template() {
     return R\"page(${text})page\";
 }
 
-}  // namespace tissuewarp::report::detail
+}  // namespace ${NAMESPACE}
 ")

@@ -1,24 +1,31 @@
 #pragma once
-/// Measuring what meshes cost and give on this machine.
+/// What measured points say: which of them nothing beats, and where more time stops to buy accuracy.
 
-#include "core/observer.hpp"
-#include "registration/dial.hpp"
-#include "registration/pipeline.hpp"
+#include <Eigen/Core>
 
-#include <cstdint>
+#include <array>
+#include <cstddef>
 #include <vector>
 
 namespace tissuewarp::study {
 
-struct FrontsPlan {
-    std::vector<std::uint64_t> seeds{5001, 5002, 5003, 5004, 5005, 5006, 5007, 5008};  ///< of random_phantom
-    std::vector<double> edges_per_organ{6, 8, 10, 12, 15, 18, 22};
-    std::vector<double> voxel_mm{2.0, 1.25};  ///< two sizes, for the costs that grow with images
-    registration::UpdateOptions update;
+struct Cost {
+    double seconds = 0, error_mm = 0;
 };
 
-/// Registers every phantom with labels, and with its surface points and pairs, with every mesh; a few minutes. Throws
-/// InvalidInput for an empty plan, Cancelled.
-registration::Fronts measure_fronts(const FrontsPlan& plan, Observer& observer = silent_observer());
+/// Those that no other beats in one without losing in the other, by rising time.
+std::vector<std::size_t> pareto_front(const std::vector<Cost>& points);
+
+/// The quickest of all points whose error is within `share` of the least: beyond it time buys nothing worth it.
+/// Precondition: there are points.
+std::size_t knee(const std::vector<Cost>& points, double share = 0.05);
+
+/// A piece of the line on which a quantity is `level`.
+using LevelSegment = std::array<Eigen::Vector2d, 2>;
+
+/// By marching squares, linear in the logarithms of `x` (columns), `y` (rows), values and level, all positive; x and y
+/// ascend. Squares with a value that is not finite are left out.
+std::vector<LevelSegment> level_line(const std::vector<double>& x, const std::vector<double>& y,
+                                     const Eigen::MatrixXd& values, double level);
 
 }  // namespace tissuewarp::study

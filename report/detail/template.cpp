@@ -71,6 +71,10 @@ void fill_into(std::string& result, std::string_view page, Scopes& scopes) {
         if (close == std::string_view::npos) throw std::logic_error("a tag of the page does not close");
         const std::string tag(page.substr(open + 2, close - open - 2));
         at = close + 2;
+        if (tag[0] == '&') {
+            result += value_text(look_up(scopes, tag.substr(1)));
+            continue;
+        }
         if (tag[0] != '#' && tag[0] != '^') {
             result += escaped(value_text(look_up(scopes, tag)));
             continue;

@@ -11,7 +11,8 @@ namespace tissuewarp::report::detail {
 /// report/page.html, embedded at build time.
 const char* page_template();
 
-/// The part of Mustache (mustache(5)) that the page uses: {{name}} is the value with the characters of HTML escaped,
+/// The part of Mustache (mustache(5)) that pages use: {{name}} is the value with the characters of HTML escaped,
+/// {{&name}} the value as it is,
 /// {{.}} the present element; {{#name}}…{{/name}} repeats for each element of a list, enters an object, and stays for
 /// any other value but false, null and empty ones; {{^name}}…{{/name}} stays for those. Names not found inside are
 /// looked up outside. Values are texts or numbers. Throws std::logic_error on a template whose sections do not close.
