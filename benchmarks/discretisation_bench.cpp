@@ -5,7 +5,7 @@
 #include "tled/equilibrium.hpp"
 #include "tled/engine.hpp"
 
-#include "tled/detail/hierarchical_stiffness.hpp"
+#include "tled/detail/hierarchical_product.hpp"
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -26,9 +26,9 @@ int main(int,char**argv){
  double t3=now(); auto z=K.solve(u); double t4=now(); std::printf("equilibrium %.3f solve %.4f\n",t3-t2,t4-t3);
  {auto space=detail::hierarchical_space(rest.nodes,rest.node_count); double t5=now();
  Model m2=model; m2.element=Element::AveragedPressureT4; RestState r2=rest_state(m2); double t6=now();
- detail::HierarchicalStiffness H(space,r2,{nu>0.46},u); double t7=now(); auto b=H.bubble_blocks(); double t8=now();
- Eigen::Matrix3Xd x=Eigen::Matrix3Xd::Random(3,space.size()); double t9=now(); for(int k=0;k<5;++k) x=H.multiply(x); double t10=now();
- std::printf("space %.3f rest %.3f linearise %.3f blocks %.3f multiply %.4f\n",t5-t4,t6-t5,t7-t6,t8-t7,(t10-t9)/5);}
+ auto T=detail::hierarchical_tissue(space,r2,{nu>0.46},u); double t7=now(); auto b=detail::bubble_blocks(T); double t8=now(); detail::HierarchicalProduct H(T);
+ Eigen::Matrix3Xd x=Eigen::Matrix3Xd::Random(3,space.size()); double t9=now(); for(int k=0;k<20;++k) x=H(x)/1e3; double t10=now();
+ std::printf("space %.3f rest %.3f linearise %.3f blocks %.3f multiply %.4f\n",t5-t4,t6-t5,t7-t6,t8-t7,(t10-t9)/20);}
  for(double tol:{1e-2,1e-3}){ auto e=discretisation_error(model,K,nc,u,{},{.relative_tolerance=tol,.max_iterations=3000});
  if(!e.error){std::printf("%s\n",e.reason.c_str());continue;}
  std::printf("tol %g iterations %d seconds %.3f corner max %.4f rms %.5f bubble max %.4f\n",tol,e.error->iterations,e.error->seconds,e.error->corner.colwise().norm().maxCoeff(),e.error->corner.norm()/std::sqrt(double(u.cols())),e.error->bubble.colwise().norm().maxCoeff());}

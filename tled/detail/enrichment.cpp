@@ -1,0 +1,141 @@
+#include "tled/detail/enrichment.hpp"
+
+#include "tled/detail/parallel.hpp"
+#include "tled/detail/springs.hpp"
+
+#include <Eigen/LU>
+
+#include <utility>
+
+namespace tissuewarp::tled::detail {
+
+using Eigen::Matrix3d;
+using Eigen::Matrix3Xd;
+
+namespace {
+
+double dot(const Matrix3Xd& a, const Matrix3Xd& b) {
+    return a.cwiseProduct(b).sum();
+}
+
+}  // namespace
+
+Enrichment::Enrichment(const HierarchicalTissue& tissue, const BubbleConditions& bubbles,
+                       const NodalConditions& conditions, const RestStiffness& corners)
+    : space_(tissue.space),
+      bubbles_(bubbles),
+      conditions_(conditions),
+      corners_(corners),
+      elastic_(tissue),
+      inverse_block_(bubble_blocks(tissue)) {
+    for (const auto& [edge, K] : bubbles.stiffness) inverse_block_[edge] += K;
+    parallel_for(0, space_.edge_count(), [&](int edge) {
+        Matrix3d& block = inverse_block_[edge];
+        for (int c = 0; c < 3; ++c) {
+            if (!bubbles.constrained(c, edge)) continue;
+            block.row(c).setZero();
+            block.col(c).setZero();
+            block(c, c) = 1.0;
+        }
+        block = block.inverse().eval();
+    });
+    largest_ = largest_eigenvalue();
+}
+
+void Enrichment::constrain(Matrix3Xd& x) const {
+    x.leftCols(space_.corner_count) = conditions_.constrained.select(0.0, x.leftCols(space_.corner_count));
+    x.rightCols(space_.edge_count()) = bubbles_.constrained.select(0.0, x.rightCols(space_.edge_count()));
+}
+
+Matrix3Xd Enrichment::multiply(const Matrix3Xd& x) const {
+    Matrix3Xd y = elastic_(x);
+    add_spring_resistance(conditions_, x, y);
+    for (const auto& [edge, K] : bubbles_.stiffness) {
+        y.col(space_.corner_count + edge) += K * x.col(space_.corner_count + edge);
+    }
+    constrain(y);
+    return y;
+}
+
+// Zero on the corners.
+Matrix3Xd Enrichment::divide_by_blocks(const Matrix3Xd& residual) const {
+    Matrix3Xd result(3, space_.size());
+    result.leftCols(space_.corner_count).setZero();
+    parallel_for(0, space_.edge_count(), [&](int edge) {
+        const int i = space_.corner_count + edge;
+        result.col(i) = inverse_block_[edge] * residual.col(i);
+    });
+    return result;
+}
+
+// By the power method from an arbitrary vector, a tenth above what it finds.
+double Enrichment::largest_eigenvalue() const {
+    constexpr int steps = 10;
+    Matrix3Xd x = Matrix3Xd::Zero(3, space_.size());
+    for (int i = space_.corner_count; i < space_.size(); ++i) x.col(i) << 1.0, (i % 2 == 0 ? 1.0 : -1.0), (i % 3) - 1.0;
+    constrain(x);
+    double value = 1.0;
+    for (int k = 0; k < steps && value > 0.0; ++k) {
+        x = divide_by_blocks(multiply(x / value));
+        value = x.norm();
+    }
+    return value > 0.0 ? 1.1 * value : 1.0;
+}
+
+// Two Chebyshev steps for eigenvalues between a quarter and all of the largest one (Saad, Iterative Methods for Sparse
+// Linear Systems, algorithm 12.1).
+void Enrichment::smooth(Matrix3Xd& x, Matrix3Xd& residual) const {
+    const double centre = 0.625 * largest_, radius = 0.375 * largest_, ratio = centre / radius;
+    const auto apply = [&](const Matrix3Xd& step) {
+        x += step;
+        residual -= multiply(step);
+    };
+    const Matrix3Xd first = divide_by_blocks(residual) / centre;
+    apply(first);
+    const double rho = 1.0 / (2.0 * ratio - 1.0 / ratio);
+    apply(rho / ratio * first + 2.0 * rho / radius * divide_by_blocks(residual));
+}
+
+Matrix3Xd Enrichment::precondition(const Matrix3Xd& residual) const {
+    Matrix3Xd z = Matrix3Xd::Zero(3, space_.size()), left = residual;
+    smooth(z, left);
+    Matrix3Xd coarse = Matrix3Xd::Zero(3, space_.size());
+    coarse.leftCols(space_.corner_count) = corners_.solve(left.leftCols(space_.corner_count));
+    z += coarse;
+    left -= multiply(coarse);
+    smooth(z, left);
+    return z;
+}
+
+// Saad, algorithm 9.1. √(r·z) is about the energy norm of the error.
+Enrichment::Solution Enrichment::solve(Matrix3Xd r, const DiscretisationOptions& options) const {
+    constrain(r);
+    Solution result{.x = Matrix3Xd::Zero(3, r.cols()), .failure = {}};
+    Matrix3Xd z = precondition(r), p = z;
+    double rz = dot(r, z);
+    const double limit = options.relative_tolerance * options.relative_tolerance * rz;
+    while (rz > limit) {
+        if (result.iterations == options.max_iterations) {
+            result.failure =
+                "conjugate gradients did not converge in " + std::to_string(options.max_iterations) + " iterations";
+            return result;
+        }
+        ++result.iterations;
+        const Matrix3Xd Kp = multiply(p);
+        const double curvature = dot(p, Kp);
+        if (!(curvature > 0.0)) {
+            result.failure = "the tissue buckles between the nodes: its stiffness there is not positive";
+            return result;
+        }
+        const double step = rz / curvature;
+        result.x += step * p;
+        r -= step * Kp;
+        z = precondition(r);
+        const double next = dot(r, z);
+        p = z + next / rz * p;
+        rz = next;
+    }
+    return result;
+}
+
+}  // namespace tissuewarp::tled::detail
