@@ -18,7 +18,7 @@ int main(int argc, char** argv) {
         if (problem.plane_height || problem.name.find(part) == std::string::npos) continue;
         for (const Elements elements : {Elements::T4, Elements::AveragedPressure}) {
             if (!element.empty() && element != name_of(elements)) continue;
-            for (int k = 0; k < 2; ++k) {
+            for (int k = 0; k < (getenv("LEVELS") ? atoi(getenv("LEVELS")) : 2); ++k) {
                 try {
                 const EffectivityStudy s = effectivity(problem, elements, problem.levels[k]);
                 for (const Effectivity& e : s.quantities)

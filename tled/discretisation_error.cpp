@@ -94,13 +94,16 @@ DiscretisationEstimate discretisation_error(const Model& model, const RestStiffn
         averaged.push_back(suggested_element({{1, material}}) == Element::AveragedPressureT4);
     }
     const detail::HierarchicalSpace space = detail::hierarchical_space(rest.nodes, rest.node_count);
-    const detail::HierarchicalTissue tissue = hierarchical_tissue(space, rest, averaged, displacement);
     const detail::BubbleConditions bubbles =
         bubble_conditions(space, rest.volume, model.mesh, conditions, displacement, loads);
-    Matrix3Xd residual = detail::residual(tissue, model_pressure(model, rest, jacobian));
-    residual.rightCols(space.edge_count()) += bubbles.force;
-    detail::Enrichment::Solution found =
-        detail::Enrichment(tissue, bubbles, conditions, stiffness).solve(std::move(residual), options);
+    const auto step = [&](detail::Moduli moduli) {
+        const detail::HierarchicalTissue tissue = hierarchical_tissue(space, rest, averaged, displacement, moduli);
+        Matrix3Xd residual = detail::residual(tissue, model_pressure(model, rest, jacobian));
+        residual.rightCols(space.edge_count()) += bubbles.force;
+        return detail::Enrichment(tissue, bubbles, conditions, stiffness).solve(std::move(residual), options);
+    };
+    detail::Enrichment::Solution found = step(detail::Moduli::Exact);
+    if (!found.failure.empty()) found = step(detail::Moduli::PositivePart);
     if (!found.failure.empty()) return {std::nullopt, std::move(found.failure)};
     const std::chrono::duration<double> time = std::chrono::steady_clock::now() - start;
     return {DiscretisationError{found.x.leftCols(space.corner_count), found.x.rightCols(space.edge_count()), space.edge,

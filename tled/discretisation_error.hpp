@@ -42,8 +42,8 @@ struct DiscretisationError {
 };
 
 struct DiscretisationOptions {
-    double relative_tolerance = 1e-4;  ///< of conjugate gradients, in the norm of their preconditioner
-    int max_iterations = 3000;
+    double relative_tolerance = 1e-3;  ///< of conjugate gradients, in the norm of their preconditioner
+    int max_iterations = 300;
 };
 
 /// The estimate, or why there is none.

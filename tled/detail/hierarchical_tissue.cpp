@@ -3,6 +3,7 @@
 #include "tled/detail/kinematics.hpp"
 #include "tled/detail/parallel.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
 #include <algorithm>
@@ -29,6 +30,11 @@ Matrix9 in_local_coordinates(const Matrix9& A, const Matrix3d& gradient, double 
         for (int j = 0; j < 3; ++j) result.middleRows<3>(3 * k) += gradient(j, k) * half.middleRows<3>(3 * j);
     }
     return result;
+}
+
+Matrix9 positive_part(const Matrix9& A) {
+    const Eigen::SelfAdjointEigenSolver<Matrix9> modes(A);
+    return modes.eigenvectors() * modes.eigenvalues().cwiseMax(0.0).asDiagonal() * modes.eigenvectors().transpose();
 }
 
 // ∂L_p/∂ξ A ∂L_q/∂ξ.
@@ -71,7 +77,8 @@ Matrix3d block_of_averages(const HierarchicalTissue& tissue, int edge) {
 }  // namespace
 
 HierarchicalTissue hierarchical_tissue(const HierarchicalSpace& space, const RestState& rest,
-                                       const std::vector<bool>& averaged, const Matrix3Xd& displacement) {
+                                       const std::vector<bool>& averaged, const Matrix3Xd& displacement,
+                                       Moduli moduli) {
     const std::vector<VolumetricFunction> nodal = nodal_volumetric(rest, element_jacobians(rest, displacement));
     HierarchicalTissue result{space, rest, std::vector<HierarchicalElement>(rest.tet.size()),
                               VectorXd::Zero(rest.pressure.count())};
@@ -95,7 +102,8 @@ HierarchicalTissue hierarchical_tissue(const HierarchicalSpace& space, const Res
             element.pressure.setConstant(modulus * U.first);
             add_volumetric_tangent(tangent, modulus * U.first, modulus * U.second);
         }
-        element.tangent = in_local_coordinates(tangent.matrix(), gradient, rest.volume[e]);
+        const Matrix9 A = moduli == Moduli::Exact ? tangent.matrix() : positive_part(tangent.matrix());
+        element.tangent = in_local_coordinates(A, gradient, rest.volume[e]);
         element.shear = (rest.volume[e] * shear_stress(material, tangent.F) * gradient).reshaped();
         element.volume_rate = (rest.volume[e] * cofactor(tangent.F) * gradient).reshaped();
     });

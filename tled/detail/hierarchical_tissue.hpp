@@ -29,11 +29,17 @@ struct HierarchicalTissue {
                                     ///< where it is negative
 };
 
+/// Tangent moduli as they are, or without their negative part (Teran, Sifakis, Irving, Fedkiw, SCA 2005, 181): pressed
+/// tissue may be stable although ∂P/∂F of its elements is not positive, and unstable in elements finer than those that
+/// it was brought to equilibrium in.
+enum class Moduli { Exact, PositivePart };
+
 /// At `displacement` (3 × N mm of the corners). `rest` has averaged pressure; where `averaged` (of every material of
 /// `rest`) is false the volumetric energy is that of J in every point instead. Keeps references. Precondition: det F >
 /// 0 or a law that admits inversion.
 HierarchicalTissue hierarchical_tissue(const HierarchicalSpace& space, const RestState& rest,
-                                       const std::vector<bool>& averaged, const Eigen::Matrix3Xd& displacement);
+                                       const std::vector<bool>& averaged, const Eigen::Matrix3Xd& displacement,
+                                       Moduli moduli);
 
 /// Minus the elastic forces on bubbles; on corners, what linear elements with `pressure` (kPa, of every element) bear
 /// more than quadratic ones. mN, 3 × size().
