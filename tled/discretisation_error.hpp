@@ -42,8 +42,8 @@ struct DiscretisationError {
 };
 
 struct DiscretisationOptions {
-    double relative_tolerance = 1e-3;  ///< of conjugate gradients, in the norm of their preconditioner
-    int max_iterations = 300;
+    double relative_tolerance = 0.01;  ///< of conjugate gradients, in the norm of their preconditioner
+    int max_iterations = 1000;
 };
 
 /// The estimate, or why there is none.

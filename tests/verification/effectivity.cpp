@@ -1,7 +1,5 @@
 #include "tests/verification/effectivity.hpp"
 
-#include <cmath>
-
 namespace tissuewarp::verification {
 
 using Eigen::Matrix3Xd;
@@ -25,23 +23,6 @@ tled::DistributedLoads distributed_loads(const Problem& problem, const meshing::
     return loads;
 }
 
-}  // namespace
-
-Solution enriched(const Solution& linear, const tled::DiscretisationError& error) {
-    Solution result;
-    result.mesh = linear.mesh;
-    result.curved = tled::quadratic_mesh(linear.mesh);
-    result.displacement.resize(3, result.curved->node_count());
-    const Matrix3Xd corners = linear.displacement + error.corner;
-    result.displacement.leftCols(corners.cols()) = corners;
-    for (int k = 0; k < error.edge.cols(); ++k) {
-        const int a = error.edge(0, k), b = error.edge(1, k);
-        result.displacement.col(result.curved->middle.at({a, b})) =
-            0.5 * (corners.col(a) + corners.col(b)) + error.bubble.col(k);
-    }
-    return result;
-}
-
 tled::DiscretisationEstimate estimate(const Problem& problem, Elements elements, const Solution& linear) {
     const tled::Model model = linear_model(problem, elements, linear.mesh);
     const tled::NodalConditions conditions = nodal_conditions_of(problem, elements, linear.mesh);
@@ -49,26 +30,50 @@ tled::DiscretisationEstimate estimate(const Problem& problem, Elements elements,
                                       linear.displacement, distributed_loads(problem, linear.mesh));
 }
 
-EffectivityStudy effectivity(const Problem& problem, Elements elements, int level) {
+/// The linear solution with the estimate added, on quadratic tetrahedra with straight edges.
+Solution enriched(const Solution& linear, const tled::DiscretisationError& error) {
+    Solution result;
+    result.mesh = linear.mesh;
+    result.curved = tled::quadratic_mesh(linear.mesh);
+    result.displacement.resize(3, result.curved->node_count());
+    const Matrix3Xd corners = linear.displacement + error.corner;
+    result.displacement.leftCols(corners.cols()) = corners;
+    for (Eigen::Index k = 0; k < error.edge.cols(); ++k) {
+        const int a = error.edge(0, k), b = error.edge(1, k);
+        result.displacement.col(result.curved->middle.at({a, b})) =
+            0.5 * (corners.col(a) + corners.col(b)) + error.bubble.col(k);
+    }
+    return result;
+}
+
+EffectivityStudy compared(const Problem& problem, Elements elements, int level, const Solution* quadratic) {
     const Solution linear = solve(problem, elements, level);
     const tled::DiscretisationEstimate found = estimate(problem, elements, linear);
-    EffectivityStudy result{.nodes = linear.mesh.node_count(),
-                            .tetrahedra = linear.mesh.tet_count(),
-                            .reason = found.reason,
-                            .quantities = {}};
+    EffectivityStudy result{.tetrahedra = linear.mesh.tet_count(), .reason = found.reason, .quantities = {}};
     if (!found.error) return result;
     result.iterations = found.error->iterations;
-    result.seconds = found.error->seconds;
     const Solution better = enriched(linear, *found.error);
     for (const Quantity& quantity : problem.quantities) {
         if (quantity.unit != "mm") continue;
         const VectorXd before = quantity.measure(linear), after = quantity.measure(better);
-        result.quantities.push_back({quantity.name, root_mean_square(after - before),
-                                     root_mean_square(quantity.reference - before),
-                                     root_mean_square(quantity.uncertainty),
-                                     root_mean_square(quantity.reference - after)});
+        Effectivity each{quantity.name, root_mean_square(after - before), root_mean_square(quantity.reference - before),
+                         root_mean_square(quantity.uncertainty), root_mean_square(quantity.reference - after)};
+        if (quadratic != nullptr) each.quadratic = root_mean_square(quantity.measure(*quadratic) - before);
+        result.quantities.push_back(each);
     }
     return result;
+}
+
+}  // namespace
+
+EffectivityStudy effectivity(const Problem& problem, Elements elements, int level) {
+    return compared(problem, elements, level, nullptr);
+}
+
+EffectivityStudy effectivity_beside_quadratic(const Problem& problem, Elements elements, int level) {
+    const bool soft = tled::suggested_element(problem.materials) == tled::Element::T4;
+    const Solution quadratic = solve(problem, soft ? Elements::Quadratic : Elements::QuadraticMixed, level);
+    return compared(problem, elements, level, &quadratic);
 }
 
 }  // namespace tissuewarp::verification
