@@ -46,7 +46,9 @@ Solution enriched(const Solution& linear, const tled::DiscretisationError& error
     return result;
 }
 
-EffectivityStudy compared(const Problem& problem, Elements elements, int level, const Solution* quadratic) {
+}  // namespace
+
+EffectivityStudy effectivity(const Problem& problem, Elements elements, int level, const Solution* quadratic) {
     const Solution linear = solve(problem, elements, level);
     const tled::DiscretisationEstimate found = estimate(problem, elements, linear);
     EffectivityStudy result{.tetrahedra = linear.mesh.tet_count(), .reason = found.reason, .quantities = {}};
@@ -62,18 +64,6 @@ EffectivityStudy compared(const Problem& problem, Elements elements, int level, 
         result.quantities.push_back(each);
     }
     return result;
-}
-
-}  // namespace
-
-EffectivityStudy effectivity(const Problem& problem, Elements elements, int level) {
-    return compared(problem, elements, level, nullptr);
-}
-
-EffectivityStudy effectivity_beside_quadratic(const Problem& problem, Elements elements, int level) {
-    const bool soft = tled::suggested_element(problem.materials) == tled::Element::T4;
-    const Solution quadratic = solve(problem, soft ? Elements::Quadratic : Elements::QuadraticMixed, level);
-    return compared(problem, elements, level, &quadratic);
 }
 
 }  // namespace tissuewarp::verification

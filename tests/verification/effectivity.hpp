@@ -17,7 +17,7 @@ struct Effectivity {
     double actual = 0;       ///< distance from the reference
     double uncertain = 0;    ///< of the reference
     double left = 0;         ///< distance from the reference once the estimate has been added
-    double quadratic = NAN;  ///< distance from quadratic tetrahedra solved on the same mesh, their edges curved
+    double quadratic = NAN;  ///< distance from a solution by quadratic tetrahedra
 
     [[nodiscard]] double index() const { return estimated / actual; }
     /// Does the reference know the error to a fifth?
@@ -32,10 +32,8 @@ struct EffectivityStudy {
     std::vector<Effectivity> quantities;
 };
 
-/// Solves the problem with linear tetrahedra on a level and estimates the error of all its displacements. Precondition:
-/// no contact.
-EffectivityStudy effectivity(const Problem& problem, Elements elements, int level);
-/// The same beside a solution by quadratic tetrahedra.
-EffectivityStudy effectivity_beside_quadratic(const Problem& problem, Elements elements, int level);
+/// Solves the problem with linear tetrahedra on a level and estimates the error of all its displacements; `quadratic`
+/// is a solution on the same level or null. Precondition: no contact.
+EffectivityStudy effectivity(const Problem& problem, Elements elements, int level, const Solution* quadratic = nullptr);
 
 }  // namespace tissuewarp::verification
