@@ -96,23 +96,24 @@ void Enrichment::smooth(Matrix3Xd& x, Matrix3Xd& residual) const {
     apply(rho / ratio * first + 2.0 * rho / radius * divide_by_blocks(residual));
 }
 
-Matrix3Xd Enrichment::precondition(const Matrix3Xd& residual) const {
-    Matrix3Xd z = Matrix3Xd::Zero(3, space_.size()), left = residual;
-    smooth(z, left);
+Matrix3Xd Enrichment::precondition(Matrix3Xd& residual) const {
+    Matrix3Xd z = Matrix3Xd::Zero(3, space_.size());
+    smooth(z, residual);
     Matrix3Xd coarse = Matrix3Xd::Zero(3, space_.size());
-    coarse.leftCols(space_.corner_count) = corners_.solve(left.leftCols(space_.corner_count));
+    coarse.leftCols(space_.corner_count) = corners_.solve(residual.leftCols(space_.corner_count));
     z += coarse;
-    left -= multiply(coarse);
-    smooth(z, left);
+    residual -= multiply(coarse);
+    smooth(z, residual);
     return z;
 }
 
-// Saad, algorithm 9.1. √(r·z) is about the energy norm of the error.
+// Saad, algorithm 9.1; K z is known from the preconditioner, and with it K p = K z + β K p. √(r·z) is about the energy
+// norm of the error.
 Enrichment::Solution Enrichment::solve(Matrix3Xd r, const DiscretisationOptions& options) const {
     constrain(r);
     Solution result{.x = Matrix3Xd::Zero(3, r.cols()), .failure = {}};
-    Matrix3Xd z = precondition(r), p = z;
-    double rz = dot(r, z);
+    Matrix3Xd left = r, p = precondition(left), Kp = r - left;
+    double rz = dot(r, p);
     const double limit = options.relative_tolerance * options.relative_tolerance * rz;
     while (rz > limit) {
         if (result.iterations == options.max_iterations) {
@@ -121,7 +122,6 @@ Enrichment::Solution Enrichment::solve(Matrix3Xd r, const DiscretisationOptions&
             return result;
         }
         ++result.iterations;
-        const Matrix3Xd Kp = multiply(p);
         const double curvature = dot(p, Kp);
         if (!(curvature > 0.0)) {
             result.failure = "the tissue buckles between the nodes: its stiffness there is not positive";
@@ -130,9 +130,11 @@ Enrichment::Solution Enrichment::solve(Matrix3Xd r, const DiscretisationOptions&
         const double step = rz / curvature;
         result.x += step * p;
         r -= step * Kp;
-        z = precondition(r);
-        const double next = dot(r, z);
-        p = z + next / rz * p;
+        left = r;
+        const Matrix3Xd z = precondition(left);
+        const double next = dot(r, z), part = next / rz;
+        p = z + part * p;
+        Kp = (r - left) + part * Kp;
         rz = next;
     }
     return result;

@@ -31,7 +31,8 @@ public:
 
 private:
     [[nodiscard]] Eigen::Matrix3Xd multiply(const Eigen::Matrix3Xd& x) const;
-    [[nodiscard]] Eigen::Matrix3Xd precondition(const Eigen::Matrix3Xd& residual) const;
+    /// Of a residual; takes the forces of the result off it.
+    [[nodiscard]] Eigen::Matrix3Xd precondition(Eigen::Matrix3Xd& residual) const;
     /// Adds to x what the bubbles' steps make of the residual, and takes their forces off it.
     void smooth(Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& residual) const;
     [[nodiscard]] Eigen::Matrix3Xd divide_by_blocks(const Eigen::Matrix3Xd& residual) const;

@@ -72,6 +72,25 @@ HierarchicalProduct::HierarchicalProduct(const HierarchicalTissue& tissue)
         }
     });
     any_averaged_ = (nodal_modulus_.array() > 0.0).any();
+    forces_.resize(batches_.size());
+    place_forces();
+}
+
+// Where the forces on a corner or bubble by its elements lie among those of all batches.
+void HierarchicalProduct::place_forces() {
+    const auto add = [&](const Incidence& incidence, int count, int per_element, int first) {
+        for (int row = 0; row < count; ++row) {
+            for (int k = incidence.offset[row]; k < incidence.offset[row + 1]; ++k) {
+                const int e = incidence.entry[k] / per_element;
+                const int component = first + 3 * (incidence.entry[k] % per_element);
+                force_place_.push_back((30 * (e / lanes) + component) * lanes + e % lanes);
+            }
+            force_offset_.push_back(static_cast<int>(force_place_.size()));
+        }
+    };
+    force_offset_.push_back(0);
+    add(rest_.incidence, space_.corner_count, 4, 0);
+    add(space_.incidence, space_.edge_count(), 6, 12);
 }
 
 // With D_a = ∂x/∂ξ at corner a, which is linear between them, the moments are (D_a + Σ D)/20.
@@ -126,7 +145,6 @@ VectorXf HierarchicalProduct::pressure_rates(const Matrix3Xd& x) const {
 
 Matrix3Xd HierarchicalProduct::operator()(const Matrix3Xd& x) const {
     const VectorXf rates = any_averaged_ ? pressure_rates(x) : VectorXf();
-    std::vector<std::array<Lanes, 30>> forces(batches_.size());
     parallel_for(0, static_cast<int>(batches_.size()), [&](int number) {
         const Batch& batch = batches_[number];
         const std::array<Local9, 4> moment = moments(batch, x);
@@ -151,22 +169,19 @@ Matrix3Xd HierarchicalProduct::operator()(const Matrix3Xd& x) const {
         Local9 whole;
         for (int i = 0; i < 9; ++i) whole[i] = stress[0][i] + stress[1][i] + stress[2][i] + stress[3][i];
         for (int i = 0; i < 3; ++i) {
-            for (int c = 0; c < 4; ++c) forces[number][3 * c + i] = times_hat(whole, c, i);
+            for (int c = 0; c < 4; ++c) forces_[number][3 * c + i] = times_hat(whole, c, i);
             for (int k = 0; k < 6; ++k) {
                 const auto [a, b] = tetrahedron_edges[k];
-                forces[number][12 + 3 * k + i] = 4.0F * (times_hat(stress[a], b, i) + times_hat(stress[b], a, i));
+                forces_[number][12 + 3 * k + i] = 4.0F * (times_hat(stress[a], b, i) + times_hat(stress[b], a, i));
             }
         }
     });
     Matrix3Xd result(3, space_.size());
     parallel_for(0, space_.size(), [&](int i) {
-        const bool is_corner = i < space_.corner_count;
-        const Incidence& incidence = is_corner ? rest_.incidence : space_.incidence;
-        const int row = is_corner ? i : i - space_.corner_count, places = is_corner ? 4 : 6, first = is_corner ? 0 : 12;
         Vector3d sum = Vector3d::Zero();
-        for (int k = incidence.offset[row]; k < incidence.offset[row + 1]; ++k) {
-            const int e = incidence.entry[k] / places, at = first + 3 * (incidence.entry[k] % places);
-            for (int c = 0; c < 3; ++c) sum[c] += static_cast<double>(forces[e / lanes][at + c][e % lanes]);
+        for (int k = force_offset_[i]; k < force_offset_[i + 1]; ++k) {
+            const float* force = forces_.front().front().data() + force_place_[k];
+            sum += Vector3d(force[0], force[lanes], force[2 * lanes]);
         }
         result.col(i) = sum;
     });

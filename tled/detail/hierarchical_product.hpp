@@ -18,7 +18,7 @@ public:
     explicit HierarchicalProduct(const HierarchicalTissue& tissue);
     ~HierarchicalProduct();
 
-    /// K x, 3 × size(), mN for mm; rounded as float32, the same bits for any number of threads.
+    /// K x, 3 × size(), mN for mm; rounded as float32, the same bits for any number of threads. One call at a time.
     [[nodiscard]] Eigen::Matrix3Xd operator()(const Eigen::Matrix3Xd& x) const;
 
 private:
@@ -29,6 +29,7 @@ private:
 
     /// ∫ L_a ∂x/∂ξ / V for the four corners of the elements of a batch.
     static std::array<Local9, 4> moments(const Batch& batch, const Eigen::Matrix3Xd& x);
+    void place_forces();
     /// M_a U'' times the rate of the averaged J along x, kPa.
     [[nodiscard]] Eigen::VectorXf pressure_rates(const Eigen::Matrix3Xd& x) const;
 
@@ -37,6 +38,8 @@ private:
     Eigen::VectorXd nodal_modulus_;
     bool any_averaged_ = false;
     std::vector<Batch> batches_;
+    std::vector<int> force_offset_, force_place_;        // of corners and bubbles: the forces to add up
+    mutable std::vector<std::array<Lanes, 30>> forces_;  // on corners and bubbles of every batch
 };
 
 }  // namespace tissuewarp::tled::detail
