@@ -25,8 +25,8 @@ struct HierarchicalTissue {
     const HierarchicalSpace& space;
     const RestState& rest;
     std::vector<HierarchicalElement> elements;  ///< in the internal order
-    Eigen::VectorXd nodal_modulus;  ///< M_a U''(J_a) / V_a of the pressure nodes, kPa/mm³; 0 where none is averaged, or
-                                    ///< where it is negative
+    Eigen::VectorXd nodal_modulus;  ///< M_a U''(J_a) / V_a of the pressure nodes, kPa/mm³, with M_a U'' between 0 and
+                                    ///< 20 μ; 0 where J is not averaged
 };
 
 /// Tangent moduli as they are, or without their negative part (Teran, Sifakis, Irving, Fedkiw, SCA 2005, 181): pressed
