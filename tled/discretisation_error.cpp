@@ -82,6 +82,7 @@ DiscretisationEstimate discretisation_error(const Model& model, const RestStiffn
                                             const DistributedLoads& loads, const DiscretisationOptions& options) {
     const auto start = std::chrono::steady_clock::now();
     require_sizes(model, conditions, displacement);
+    static_cast<void>(stiffness.diagonal(conditions));  // refuses a factor of other constraints
     if (std::string reason = unsupported(model, conditions); !reason.empty()) return {std::nullopt, std::move(reason)};
     Model with_averages = model;
     with_averages.element = Element::AveragedPressureT4;

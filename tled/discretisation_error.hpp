@@ -25,7 +25,7 @@ struct FaceTraction {
 /// Loads between the nodes. What they put on the nodes is in the external forces of the conditions already.
 struct DistributedLoads {
     Eigen::Vector3d body_force = Eigen::Vector3d::Zero();  ///< mN/mm³ of rest volume
-    std::vector<FaceTraction> tractions;
+    std::vector<FaceTraction> tractions{};
 };
 
 /// u − u_h = Σ corner_a L_a + Σ bubble_ab 4 L_a L_b.
@@ -60,7 +60,8 @@ struct DiscretisationEstimate {
 /// corners.
 ///
 /// No estimate, with the reason: hexahedra; effects other than nodal forces; det F ≤ 0 somewhere; tissue that buckles
-/// between the nodes; no convergence. Throws InvalidInput where sizes do not fit or the model is invalid.
+/// between the nodes; no convergence; loads that are not finite. Throws InvalidInput where sizes or constraints do not
+/// fit, tractions are on no face, or the model is invalid.
 DiscretisationEstimate discretisation_error(const Model& model, const RestStiffness& stiffness,
                                             const NodalConditions& conditions, const Eigen::Matrix3Xd& displacement,
                                             const DistributedLoads& loads = {},

@@ -383,6 +383,20 @@ TEST(DiscretisationError, SaysWhyThereIsNone) {
     EXPECT_THAT(reason(u, {.max_iterations = 1}), testing::HasSubstr("did not converge"));
     EXPECT_THROW(static_cast<void>(reason(Matrix3Xd::Zero(3, 5))), InvalidInput);
 
+    EXPECT_THROW(static_cast<void>(discretisation_error(problem.model, stiffness, conditions, u,
+                                                        {.tractions = {{{0, 1, 100000}, Vector3d::UnitX()}}})),
+                 InvalidInput);
+    EXPECT_THAT(
+        discretisation_error(problem.model, stiffness, conditions, u, {.body_force = Vector3d::Constant(NAN)}).reason,
+        testing::HasSubstr("not finite"));
+    Conditions one_free;
+    for (int i = 1; i < u.cols(); ++i) {
+        if (problem.model.mesh.nodes(2, i) < 1e-9) one_free.prescribed.push_back({i});
+    }
+    EXPECT_THROW(static_cast<void>(discretisation_error(problem.model, stiffness,
+                                                        nodal_conditions(one_free, static_cast<int>(u.cols())), u)),
+                 InvalidInput);
+
     Conditions pressed;
     for (int i = 0; i < u.cols(); ++i) {
         if (problem.model.mesh.nodes(2, i) < 1e-9) pressed.prescribed.push_back({i});

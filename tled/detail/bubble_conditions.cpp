@@ -1,10 +1,12 @@
 #include "tled/detail/bubble_conditions.hpp"
 
+#include "core/errors.hpp"
 #include "tled/detail/springs.hpp"
 
 #include <Eigen/Geometry>
 
 #include <array>
+#include <string>
 
 namespace tissuewarp::tled::detail {
 
@@ -31,6 +33,14 @@ void for_each_edge(const HierarchicalSpace& space, const Face& face, const Visit
     }
 }
 
+void require_face(const HierarchicalSpace& space, const Face& face) {
+    bool is_face = true;
+    for_each_edge(space, face, [&](int edge, auto, auto, auto) { is_face = is_face && edge >= 0; });
+    if (is_face) return;
+    throw InvalidInput("a traction acts on the corners " + std::to_string(face[0]) + ", " + std::to_string(face[1]) +
+                       ", " + std::to_string(face[2]) + ", which are no face of the mesh; give those of one");
+}
+
 // ∫ 4 L_a L_b over a tetrahedron is V/5, over a triangle A/3.
 void add_loads(const HierarchicalSpace& space, const VectorXd& volume, const meshing::TetMesh& mesh,
                const DistributedLoads& loads, BubbleConditions& result) {
@@ -40,6 +50,7 @@ void add_loads(const HierarchicalSpace& space, const VectorXd& volume, const mes
         }
     }
     for (const FaceTraction& each : loads.tractions) {
+        require_face(space, each.corners);
         const Vector3d share = area_of(mesh, each.corners) / 3.0 * each.traction;
         for_each_edge(space, each.corners, [&](int edge, auto, auto, auto) { result.force.col(edge) += share; });
     }

@@ -5,6 +5,7 @@
 
 #include <Eigen/LU>
 
+#include <cmath>
 #include <utility>
 
 namespace tissuewarp::tled::detail {
@@ -115,7 +116,7 @@ Enrichment::Solution Enrichment::solve(Matrix3Xd r, const DiscretisationOptions&
     Matrix3Xd left = r, p = precondition(left), Kp = r - left;
     double rz = dot(r, p);
     const double limit = options.relative_tolerance * options.relative_tolerance * rz;
-    while (rz > limit) {
+    while (!(rz <= limit)) {
         if (result.iterations == options.max_iterations) {
             result.failure =
                 "conjugate gradients did not converge in " + std::to_string(options.max_iterations) + " iterations";
@@ -123,6 +124,10 @@ Enrichment::Solution Enrichment::solve(Matrix3Xd r, const DiscretisationOptions&
         }
         ++result.iterations;
         const double curvature = dot(p, Kp);
+        if (!std::isfinite(curvature)) {
+            result.failure = "loads or springs are not finite";
+            return result;
+        }
         if (!(curvature > 0.0)) {
             result.failure = "the tissue buckles between the nodes: its stiffness there is not positive";
             return result;

@@ -58,7 +58,8 @@ int HierarchicalSpace::edge_between(int a, int b) const {
             last = middle;
         }
     }
-    return first;
+    const bool found = first < edge_count() && edge(0, first) == smaller && edge(1, first) == larger;
+    return found ? first : -1;
 }
 
 }  // namespace tissuewarp::tled::detail

@@ -20,7 +20,7 @@ struct HierarchicalSpace {
 
     [[nodiscard]] int edge_count() const { return static_cast<int>(edge.cols()); }
     [[nodiscard]] int size() const { return corner_count + edge_count(); }
-    /// The edge between two corners of a tetrahedron.
+    /// The edge between two corners, −1 where there is none.
     [[nodiscard]] int edge_between(int a, int b) const;
 };
 
