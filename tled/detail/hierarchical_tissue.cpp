@@ -20,8 +20,9 @@ namespace {
 
 using Matrix9 = Eigen::Matrix<double, 9, 9>;
 
-// Of the volumetric to the shear modulus in the tangent, that of ν = 0.475. Stiffer tissue changes the estimate by 5 %
-// at most and costs conjugate gradients up to ten times as many iterations (docs/decisions/discretisation_error.md).
+// Of the volumetric to the shear modulus in the tangent, that of ν = 0.475. More would change estimates
+// at ν = 0.49 by 5 to 15 % and cost conjugate gradients up to ten times the iterations at 0.4999
+// (docs/decisions/discretisation_error.md).
 constexpr double largest_ratio = 20.0;
 
 // V (G ⊗ 1) A (G ⊗ 1)ᵀ with the columns of `gradient` the rows of G.
