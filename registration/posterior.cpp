@@ -96,6 +96,12 @@ std::vector<Eigen::Matrix3d> Posterior::covariances(const std::vector<int>& node
     return result;
 }
 
+Eigen::MatrixXd Posterior::inverse(const Eigen::MatrixXd& forces) const {
+    Columns result = stiffness_.solve_columns(forces);
+    if (freed_.cols() > 0) result += freed_ * (middle_ * (freed_.transpose() * forces));
+    return result;
+}
+
 Eigen::MatrixXd Posterior::samples(int count, std::uint64_t seed) const {
     std::mt19937_64 generator(seed);
     Columns drawn = stiffness_.colour_columns(white_noise(rows_, count, generator));

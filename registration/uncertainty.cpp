@@ -79,10 +79,9 @@ ErrorEstimate estimate_of(const Eigen::Vector3d& algebraic, const Eigen::Vector3
     result.algebraic_mm = algebraic.norm();
     result.discretisation_mm = discretisation.norm();
     result.data_mm = std::sqrt(covariance.trace());
-    const Eigen::Matrix3d all =
-        covariance + algebraic * algebraic.transpose() + discretisation * discretisation.transpose();
-    result.deviation_mm = std::sqrt(all.trace());
-    result.interval_mm = interval_of(all);
+    result.covariance = covariance + algebraic * algebraic.transpose() + discretisation * discretisation.transpose();
+    result.deviation_mm = std::sqrt(result.covariance.trace());
+    result.interval_mm = interval_of(result.covariance);
     result.shown = unexplained < shown_below;
     return result;
 }

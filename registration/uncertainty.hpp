@@ -26,8 +26,10 @@ struct ErrorEstimate {
     double discretisation_mm = 0;  ///< of linear tetrahedra of this size
     double data_mm = 0;            ///< of matches, and of tissue between them: 1 σ
     double deviation_mm = 0;       ///< all together, 1 σ
-    double interval_mm = 0;        ///< with a probability of 95 % the true place lies within
-    bool shown = true;             ///< false: do not trust; the data say next to nothing of this place
+    /// All together, mm², moving frame before the placement turns it.
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+    double interval_mm = 0;  ///< with a probability of 95 % the true place lies within
+    bool shown = true;       ///< false: do not trust; the data say next to nothing of this place
 };
 
 /// The estimate at every node of the mesh, and anywhere between.
