@@ -32,11 +32,14 @@ struct ErrorEstimate {
     bool shown = true;       ///< false: do not trust; the data say next to nothing of this place
 };
 
+/// With a probability in [0.001, 0.999] the true place lies within this radius, mm.
+double interval_mm(const ErrorEstimate& estimate, double probability);
+
 /// The estimate at every node of the mesh, and anywhere between.
 class Uncertainty {
 public:
     /// At the nodes: errors (3 × N mm) of solver and mesh, covariances (6 × N mm²: xx, yy, zz, xy, xz, yz), and what
-    /// part of the prior's variance the data left (N).
+    /// part of the variance of motions under unknown loads the data left (N).
     Uncertainty(meshing::TetMesh mesh, Eigen::Matrix3Xd algebraic, Eigen::Matrix3Xd discretisation,
                 Eigen::Matrix<double, 6, Eigen::Dynamic> covariance, Eigen::VectorXd unexplained);
 
