@@ -1,7 +1,7 @@
 #include "study/coverage.hpp"
 
 #include "core/errors.hpp"
-#include "registration/field.hpp"
+#include "meshing/point_location.hpp"
 
 #include <chrono>
 #include <string>
@@ -34,15 +34,18 @@ std::vector<CoverageRow> rows_of(const Phantom& phantom, Evidence evidence, cons
     const auto result = registration::update(prepared, seen_of(phantom, evidence), options.update, observer);
     const auto estimates =
         registration::uncertainty(prepared, result, options.uncertainty, observer).at(phantom.targets.moving);
-    const Eigen::Isometry3d back = result.deformation.placement.inverse();
-    const Eigen::Matrix3Xd put = back * registration::PointTransform(result.deformation)(phantom.targets.moving),
-                           is = back * phantom.targets.fixed;
+    const Eigen::Matrix3Xd is = result.deformation.placement.inverse() * phantom.targets.fixed;
+    const meshing::PointLocator locator(prepared.model.mesh);
+    const Eigen::MatrixXd& nodal = result.deformation.displacement;
     std::vector<CoverageRow> rows;
     for (std::size_t k = 0; k < estimates.size(); ++k) {
-        if (!estimates[k]) continue;  // in the organ, out of its mesh
         const auto column = static_cast<Eigen::Index>(k);
-        rows.push_back({phantom.seed, evidence, static_cast<int>(k), put.col(column) - is.col(column),
-                        (put.col(column) - phantom.targets.moving.col(column)).norm(), *estimates[k]});
+        const Eigen::Vector3d X = phantom.targets.moving.col(column);
+        const auto place = locator.find(X);
+        if (!estimates[k] || !place) continue;  // in the organ, out of its mesh
+        const Eigen::Vector3d u = meshing::interpolate(prepared.model.mesh, nodal, *place);
+        rows.push_back({phantom.seed, evidence, static_cast<int>(k), X + u - is.col(column),
+                        static_cast<int>(result.doubts.size()), u.norm(), *estimates[k]});
     }
     return rows;
 }

@@ -36,6 +36,7 @@ struct CoverageRow {
     Evidence evidence = Evidence::Labels;
     int target = 0;
     Eigen::Vector3d error = Eigen::Vector3d::Zero();  ///< where it was put less where it is, moving frame, mm
+    int doubts = 0;                                   ///< of the registration as a whole, which the program names
     double moved_mm = 0;                              ///< elastic displacement that the registration gave it
     registration::ErrorEstimate estimate;
 };

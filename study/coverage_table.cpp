@@ -12,7 +12,8 @@ namespace tissuewarp::study {
 namespace {
 
 constexpr const char* header =
-    "seed,evidence,target,error_x,error_y,error_z,moved,algebraic,discretisation,data,deviation,interval,shown,xx,yy,"
+    "seed,evidence,target,doubts,error_x,error_y,error_z,moved,algebraic,discretisation,data,deviation,interval,shown,"
+    "xx,yy,"
     "zz,"
     "xy,xz,yz";
 
@@ -39,7 +40,7 @@ CoverageRow parsed(const std::string& text, const std::filesystem::path& path, i
     std::istringstream seed_text(seed), numbers(rest);
     seed_text >> row.seed;
     Eigen::Matrix3d& c = row.estimate.covariance;
-    numbers >> row.target >> row.error[0] >> row.error[1] >> row.error[2] >> row.moved_mm >>
+    numbers >> row.target >> row.doubts >> row.error[0] >> row.error[1] >> row.error[2] >> row.moved_mm >>
         row.estimate.algebraic_mm >> row.estimate.discretisation_mm >> row.estimate.data_mm >>
         row.estimate.deviation_mm >> row.estimate.interval_mm >> row.estimate.shown >> c(0, 0) >> c(1, 1) >> c(2, 2) >>
         c(0, 1) >> c(0, 2) >> c(1, 2);
@@ -58,7 +59,7 @@ void write_coverage(const std::filesystem::path& path, const std::vector<Coverag
     for (const CoverageRow& row : rows) {
         const registration::ErrorEstimate& e = row.estimate;
         const Eigen::Matrix3d& c = e.covariance;
-        out << row.seed << ',' << name_of(row.evidence) << ',' << row.target;
+        out << row.seed << ',' << name_of(row.evidence) << ',' << row.target << ',' << row.doubts;
         for (const double value : {row.error[0], row.error[1], row.error[2], row.moved_mm, e.algebraic_mm,
                                    e.discretisation_mm, e.data_mm, e.deviation_mm, e.interval_mm})
             out << ',' << value;

@@ -123,7 +123,7 @@ TEST(PhantomParts, SeenPointsAreAShareOfTheSurfaceWithNoise) {
     constexpr double deviation = 0.7;
     const DeformedOrgan deformed{organ.mesh, organ.deformed};
     const auto seen = seen_surface(deformed, 0.4, deviation, random);
-    EXPECT_NEAR(double(seen.points.cols()), 0.4 * surface_area(organ) / 6, 0.05 * surface_area(organ) / 6);
+    EXPECT_NEAR(double(seen.points.cols()), 0.4 * surface_area(organ) / 6, 0.02 * surface_area(organ) / 6);
     std::vector<double> distances;
     for (const auto& point : seen.points.colwise())
         distances.push_back(std::abs(organ.shape.outer_distance(organ.affine.back(point))));
