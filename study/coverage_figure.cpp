@@ -1,5 +1,6 @@
 // Three panels: estimated against true deviations, nominal against actual shares, and the phantoms one by one.
 
+#include "report/figure.hpp"
 #include "study/coverage_summary.hpp"
 
 #include <algorithm>
@@ -23,9 +24,7 @@ const char* words_for(Evidence evidence) {
     return words[static_cast<std::size_t>(evidence)];
 }
 
-struct Point {
-    double x, y;
-};
+using Point = report::FigurePoint;
 
 std::string number(double value) {
     char text[32];
@@ -37,10 +36,6 @@ std::string label(double value) {
     char text[32];
     std::snprintf(text, sizeof text, "%g", value);
     return text;
-}
-
-std::string text(Point at, const std::string& content, const std::string& more = "text-anchor=\"middle\"") {
-    return "<text x=\"" + number(at.x) + "\" y=\"" + number(at.y) + "\" " + more + ">" + content + "</text>\n";
 }
 
 std::string path(const std::vector<Point>& points, const std::string& style) {
@@ -64,14 +59,14 @@ public:
             const Point across = at(tick, low_), up = at(low_, tick);
             svg += path({at(tick, low_), at(tick, high_)}, "stroke=\"#e5e7eb\"");
             svg += path({at(low_, tick), at(high_, tick)}, "stroke=\"#e5e7eb\"");
-            svg += text({across.x, across.y + 16}, label(tick));
-            svg += text({up.x - 6, up.y + 4}, label(tick), "text-anchor=\"end\"");
+            svg += report::svg_text({across.x, across.y + 16}, label(tick));
+            svg += report::svg_text({up.x - 6, up.y + 4}, label(tick), "end");
         }
-        svg += text({x_ + panel / 2, top - 14}, title, "text-anchor=\"middle\" font-weight=\"bold\"");
-        svg += text({x_ + panel / 2, top + panel + 36}, x_name);
-        const std::string turn =
-            "text-anchor=\"middle\" transform=\"rotate(-90 " + number(x_ - 38) + " " + number(top + panel / 2) + ")\"";
-        return svg + text({x_ - 38, top + panel / 2}, y_name, turn);
+        svg += report::svg_text({x_ + panel / 2, top - 14}, title, "middle", " font-weight=\"bold\"");
+        svg += report::svg_text({x_ + panel / 2, top + panel + 36}, x_name);
+        const Point side{x_ - 38, top + panel / 2};
+        return svg + report::svg_text(side, y_name, "middle",
+                                      " transform=\"rotate(-90 " + number(side.x) + " " + number(side.y) + ")\"");
     }
 
 private:
@@ -135,15 +130,18 @@ std::string phantoms(const std::vector<Coverage>& coverage) {
     return svg;
 }
 
+std::string label_of(const Coverage& c) {
+    return std::string(words_for(c.evidence)) + " (" + std::to_string(c.phantoms) + " phantoms)" +
+           (c.shown_share > 0 ? "" : ": do not trust");
+}
+
 std::string legend(const std::vector<Coverage>& coverage) {
     std::string svg;
     double x = left;
     for (const Coverage& c : coverage) {
         svg += path({{x, height - 20}, {x + 22, height - 20}},
                     std::string("stroke-width=\"3\" stroke=\"") + colour_of(c.evidence) + "\"");
-        svg += text({x + 28, height - 16},
-                    std::string(words_for(c.evidence)) + " (" + std::to_string(c.phantoms) + " phantoms)",
-                    "text-anchor=\"start\"");
+        svg += report::svg_text({x + 28, height - 16}, label_of(c), "start");
         x += 235;
     }
     return svg;
@@ -152,10 +150,8 @@ std::string legend(const std::vector<Coverage>& coverage) {
 }  // namespace
 
 std::string coverage_figure(const std::vector<Coverage>& coverage) {
-    std::string svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " + number(width) + " " +
-                      number(height) + "\" font-family=\"sans-serif\" font-size=\"12\" fill=\"#111827\">\n" +
-                      "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n";
-    return svg + reliability(coverage) + shares(coverage) + phantoms(coverage) + legend(coverage) + "</svg>\n";
+    return report::svg_figure(width, height,
+                              reliability(coverage) + shares(coverage) + phantoms(coverage) + legend(coverage));
 }
 
 }  // namespace tissuewarp::study

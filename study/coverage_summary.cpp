@@ -77,22 +77,28 @@ Coverage summary_of(Evidence evidence, const Rows& rows) {
 std::vector<Coverage> coverage_of(const std::vector<CoverageRow>& rows) {
     std::vector<Coverage> result;
     for (const Evidence evidence : all_evidence) {
-        Rows here;
-        for (const CoverageRow& row : rows)
-            if (row.evidence == evidence && row.doubts == 0) here.push_back(&row);
-        if (!here.empty()) result.push_back(summary_of(evidence, here));
+        Rows all, shown;
+        for (const CoverageRow& row : rows) {
+            if (row.evidence != evidence) continue;
+            all.push_back(&row);
+            if (row.estimate.shown) shown.push_back(&row);
+        }
+        if (all.empty()) continue;
+        result.push_back(summary_of(evidence, shown.empty() ? all : shown));
+        result.back().shown_share = double(shown.size()) / double(all.size());
     }
     return result;
 }
 
 std::string table_of(const std::vector<Coverage>& coverage) {
     std::string table =
-        "evidence            phantoms  targets   within 50 %   80 %   95 %        99 %   true rms  estimated, mm\n";
+        "evidence            phantoms  targets  shown, %   within 50 %   80 %   95 %        99 %   true rms  "
+        "estimated, mm\n";
     for (const Coverage& c : coverage) {
         char line[200];
-        std::snprintf(line, sizeof line, "%-20s %7d %8d %12.1f %6.1f %6.1f ±%4.1f %6.1f %9.2f %9.2f\n",
-                      name_of(c.evidence), c.phantoms, c.targets, 100 * c.held[0], 100 * c.held[1], 100 * c.held[2],
-                      100 * c.held_95_error, 100 * c.held[3], c.true_mm, c.estimated_mm);
+        std::snprintf(line, sizeof line, "%-20s %7d %8d %9.0f %12.1f %6.1f %6.1f ±%4.1f %6.1f %9.2f %9.2f\n",
+                      name_of(c.evidence), c.phantoms, c.targets, 100 * c.shown_share, 100 * c.held[0], 100 * c.held[1],
+                      100 * c.held[2], 100 * c.held_95_error, 100 * c.held[3], c.true_mm, c.estimated_mm);
         table += line;
     }
     return table;

@@ -17,10 +17,11 @@ struct ReliabilityBin {
     double estimated_mm = 0, true_mm = 0;  ///< roots of mean squares
 };
 
-/// Of one kind of evidence.
+/// Of one kind of evidence: of the targets that the data show, or of all where they show none.
 struct Coverage {
     Evidence evidence = Evidence::Labels;
     int phantoms = 0, targets = 0;
+    double shown_share = 1;                            ///< of all targets
     std::array<double, nominal_shares.size()> held{};  ///< share of targets within the interval of each probability
     /// Standard error of the share at 95 %, from how it varies among phantoms: targets of one phantom are not
     /// independent.
@@ -30,7 +31,7 @@ struct Coverage {
     std::vector<ReliabilityBin> bins;      ///< a tenth of the targets each, by falling trust
 };
 
-/// By kind of evidence, of rows that are not doubted. Kinds without rows are left out.
+/// By kind of evidence; kinds without rows are left out.
 std::vector<Coverage> coverage_of(const std::vector<CoverageRow>& rows);
 
 /// A table for a terminal.
