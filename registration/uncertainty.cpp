@@ -4,10 +4,12 @@
 #include "registration/detail/ground.hpp"
 #include "registration/detail/posterior.hpp"
 #include "registration/detail/pull.hpp"
+#include "registration/detail/rigid_part.hpp"
 #include "registration/detail/unknown_loads.hpp"
 #include "registration/detail/white_noise.hpp"
 #include "tled/reference.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
@@ -20,8 +22,8 @@ namespace {
 
 using Covariances = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 
-/// Where the data left more than this share of the motion that unknown loads make they say next to nothing.
-constexpr double shown_below = 0.5;
+/// Where the data left more than this share of the bending that unknown loads make they say next to nothing.
+constexpr double shown_below = 0.9;
 /// Of random phantoms (docs/accuracy-time.md, "Does the interval hold?"). The noise of a datum is far less than its
 /// pull admits, since neighbours share what they say. The size of the loads is known as a variance is from `freedom`
 /// numbers.
@@ -92,6 +94,19 @@ double load_size(const PreparedModel& prepared, const UpdateResult& result, cons
     const auto stiffness = tled::tangent_stiffness(prepared.rest, Eigen::Matrix3Xd::Zero(3, found.cols()));
     const double drawn = 0.5 * visible.cwiseProduct(stiffness * visible).sum() / double(visible.cols());
     return (tled::elastic_energy(prepared.rest, found) + least_energy * result.pulls.energy) / drawn;
+}
+
+/// What part of the variance of bending under the loads drawn the data leave, at each node. Motions of the organ as a
+/// whole are left out: without data they are not known at all.
+Eigen::VectorXd unexplained_share(const Eigen::Matrix3Xd& nodes, const Eigen::MatrixXd& hidden,
+                                  const Eigen::MatrixXd& free) {
+    const Eigen::MatrixXd motions = detail::rigid_motions(nodes);
+    const Eigen::LDLT<Eigen::MatrixXd> squares(motions.transpose() * motions);
+    const auto variance = [&](const Eigen::MatrixXd& moved) {
+        const Covariances c = covariances_of(moved - motions * squares.solve(motions.transpose() * moved));
+        return Eigen::VectorXd(c.topRows<3>().colwise().sum());
+    };
+    return variance(hidden).cwiseQuotient(variance(free));
 }
 
 /// Points of a part of the surface alone: where an organ of smooth shape lies may be told wrong, by more than any
@@ -202,12 +217,10 @@ Uncertainty uncertainty(const PreparedModel& prepared, const UpdateResult& resul
     observer.checkpoint("error estimate", 0.7);
     const Eigen::MatrixXd noise =
         posterior.inverse(noise_forces(seen, loads.rows(), options.samples, options.seed + 1));
-    const Covariances of_loads = covariances_of(hidden), of_free = covariances_of(free);
     const Covariances covariance =
-        load_size(prepared, result, free - hidden) * of_loads + noise_share * covariances_of(noise);
-    Eigen::VectorXd unexplained =
-        of_loads.topRows<3>().colwise().sum().cwiseQuotient(of_free.topRows<3>().colwise().sum()).transpose();
-    if (place_is_uncertain(result)) unexplained.setOnes();
+        load_size(prepared, result, free - hidden) * covariances_of(hidden) + noise_share * covariances_of(noise);
+    Eigen::VectorXd unexplained = unexplained_share(prepared.model.mesh.nodes, hidden, free);
+    if (place_is_uncertain(result)) unexplained.setConstant(2 * shown_below);
     const Eigen::Matrix3Xd displacement = displacement_under_pulls(result);
     const Eigen::Matrix3Xd algebraic = posterior.stiffness().solve(residual(prepared, pulls, displacement));
     const Eigen::Matrix3Xd discretisation = Eigen::Matrix3Xd::Zero(3, displacement.cols());

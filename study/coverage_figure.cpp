@@ -87,10 +87,10 @@ std::string dots(const std::vector<Point>& points, const char* colour) {
 }
 
 std::string reliability(const std::vector<Coverage>& coverage) {
-    const Panel axes(0, 0.2, 10, true);
+    const Panel axes(0, 0.2, 20, true);
     std::string svg = axes.frame("Is an estimate of 1 mm 1 mm?", "estimated deviation, mm",
-                                 "true error, root mean square, mm", {0.2, 0.5, 1, 2, 5, 10});
-    svg += path({axes.at(0.2, 0.2), axes.at(10, 10)}, "stroke=\"#111827\" stroke-dasharray=\"4 3\"");
+                                 "true error, root mean square, mm", {0.2, 0.5, 1, 2, 5, 10, 20});
+    svg += path({axes.at(0.2, 0.2), axes.at(20, 20)}, "stroke=\"#111827\" stroke-dasharray=\"4 3\"");
     for (const Coverage& c : coverage) {
         std::vector<Point> points;
         for (const ReliabilityBin& bin : c.bins) points.push_back(axes.at(bin.estimated_mm, bin.true_mm));
@@ -101,10 +101,10 @@ std::string reliability(const std::vector<Coverage>& coverage) {
 }
 
 std::string shares(const std::vector<Coverage>& coverage) {
-    const Panel axes(1, 40, 100, false);
+    const Panel axes(1, 20, 100, false);
     std::string svg =
-        axes.frame("Do intervals hold?", "probability stated, %", "targets within, %", {40, 50, 60, 70, 80, 90, 100});
-    svg += path({axes.at(40, 40), axes.at(100, 100)}, "stroke=\"#111827\" stroke-dasharray=\"4 3\"");
+        axes.frame("Do intervals hold?", "probability stated, %", "targets within, %", {20, 40, 60, 80, 100});
+    svg += path({axes.at(20, 20), axes.at(100, 100)}, "stroke=\"#111827\" stroke-dasharray=\"4 3\"");
     svg += path({axes.at(95, 92), axes.at(95, 98)}, "stroke=\"#111827\" stroke-width=\"5\" stroke-opacity=\"0.25\"");
     for (const Coverage& c : coverage) {
         std::vector<Point> points;
@@ -131,18 +131,17 @@ std::string phantoms(const std::vector<Coverage>& coverage) {
 }
 
 std::string label_of(const Coverage& c) {
-    return std::string(words_for(c.evidence)) + " (" + std::to_string(c.phantoms) + " phantoms)" +
-           (c.shown_share > 0 ? "" : ": do not trust");
+    return std::string(words_for(c.evidence)) + " (" + std::to_string(c.phantoms) + " phantoms" +
+           (c.shown_share > 0 ? ")" : ", not trusted)");
 }
 
 std::string legend(const std::vector<Coverage>& coverage) {
     std::string svg;
-    double x = left;
+    report::FigurePoint at{left, height - 20};
     for (const Coverage& c : coverage) {
-        svg += path({{x, height - 20}, {x + 22, height - 20}},
-                    std::string("stroke-width=\"3\" stroke=\"") + colour_of(c.evidence) + "\"");
-        svg += report::svg_text({x + 28, height - 16}, label_of(c), "start");
-        x += 235;
+        const report::FigureCurve style{colour_of(c.evidence), report::LineStyle::Solid, report::Mark::Dot};
+        svg += report::svg_legend_entry(at, style, label_of(c));
+        at.x += report::legend_width(label_of(c));
     }
     return svg;
 }

@@ -145,5 +145,31 @@ TEST(PhantomParts, LoadsBringTheMotionThatIsWanted) {
     EXPECT_GT(truth.min_jacobian, 0.3);
 }
 
+// The truth's own error: the same organ under the same loads on a mesh of four times as many elements.
+TEST(PhantomParts, TheTruthIsConverged) {
+    Random random(21);
+    RandomOrgan organ = random_organ(random);
+    TruthMesh mesh = truth_mesh(organ.shape, 2500);
+    organ.loads = sized_loads(organ, mesh, 8);
+    const Truth truth = equilibrium(organ, std::move(mesh));
+    const Truth finer = equilibrium(organ, truth_mesh(organ.shape, 10000));
+    const QuadraticMap map(truth.mesh.quadratic, truth.displacement),
+        finer_map(finer.mesh.quadratic, finer.displacement);
+    double squared = 0, moved = 0;
+    int count = 0;
+    for (int k = 0; k < 1000; ++k) {
+        const Vector3d X = organ.shape.centre() + 0.5 * organ.shape.length() * random.uniform() * random.direction();
+        const auto x = map(X), finer_x = finer_map(X);
+        if (!x || !finer_x) continue;
+        ++count;
+        squared += (*x - *finer_x).squaredNorm();
+        moved += (*x - X).squaredNorm();
+    }
+    ASSERT_GT(count, 200);
+    RecordProperty("rms_um", int(1000 * std::sqrt(squared / count)));
+    EXPECT_GT(std::sqrt(moved / count), 1);
+    EXPECT_LT(std::sqrt(squared / count), 0.05);
+}
+
 }  // namespace
 }  // namespace tissuewarp::study::detail
