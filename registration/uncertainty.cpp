@@ -96,17 +96,19 @@ double load_size(const PreparedModel& prepared, const UpdateResult& result, cons
     return (tled::elastic_energy(prepared.rest, found) + least_energy * result.pulls.energy) / drawn;
 }
 
-/// What part of the variance of bending under the loads drawn the data leave, at each node. Motions of the organ as a
-/// whole are left out: without data they are not known at all.
+/// What part of the variance of bending under the loads drawn the data leave, at each node: of all motion left, or with
+/// motions of the organ as a whole left out, which labels may leave open of a round one; the lesser of both.
 Eigen::VectorXd unexplained_share(const Eigen::Matrix3Xd& nodes, const Eigen::MatrixXd& hidden,
                                   const Eigen::MatrixXd& free) {
     const Eigen::MatrixXd motions = detail::rigid_motions(nodes);
     const Eigen::LDLT<Eigen::MatrixXd> squares(motions.transpose() * motions);
-    const auto variance = [&](const Eigen::MatrixXd& moved) {
-        const Covariances c = covariances_of(moved - motions * squares.solve(motions.transpose() * moved));
-        return Eigen::VectorXd(c.topRows<3>().colwise().sum());
+    const auto variance = [](const Eigen::MatrixXd& moved) {
+        return Eigen::VectorXd(covariances_of(moved).topRows<3>().colwise().sum());
     };
-    return variance(hidden).cwiseQuotient(variance(free));
+    const auto bending = [&](const Eigen::MatrixXd& moved) {
+        return Eigen::MatrixXd(moved - motions * squares.solve(motions.transpose() * moved));
+    };
+    return variance(hidden).cwiseMin(variance(bending(hidden))).cwiseQuotient(variance(bending(free)));
 }
 
 /// Points of a part of the surface alone: where an organ of smooth shape lies may be told wrong, by more than any
