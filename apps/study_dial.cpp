@@ -12,30 +12,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
+#include <tuple>
 
 namespace tissuewarp::apps {
 
 namespace {
 
 using study::DialTrial;
-
-/// "phantom:7001-7050".
-void read_seeds(const StudyOptions& options, study::DialTrialOptions& plan) {
-    if (options.problems.empty()) return;
-    const std::string& text = options.problems.front();
-    const std::string prefix = "phantom:";
-    const char* end = text.data() + text.size();
-    const char* at = text.data() + std::min(prefix.size(), text.size());
-    const auto first = std::from_chars(at, end, plan.first_seed);
-    plan.last_seed = plan.first_seed;
-    auto last = first;
-    if (first.ptr != end && *first.ptr == '-') last = std::from_chars(first.ptr + 1, end, plan.last_seed);
-    if (options.problems.size() > 1 || !text.starts_with(prefix) || first.ec != std::errc() || last.ec != std::errc() ||
-        last.ptr != end || plan.last_seed < plan.first_seed)
-        throw InvalidInput("--problems '" + text + "' are no phantoms; write for instance phantom:7001-7050");
-}
 
 void write_table(const std::vector<DialTrial>& trials, const std::filesystem::path& path) {
     std::vector<Column> columns;
@@ -93,7 +77,7 @@ void print_request(const std::vector<DialTrial>& trials) {
 void run_dial_study(const StudyOptions& options) {
     study::DialTrialOptions plan;
     plan.update = on_device(options.device);
-    read_seeds(options, plan);
+    std::tie(plan.first_seed, plan.last_seed) = phantom_seeds(options.problems, {plan.first_seed, plan.last_seed});
     if (options.quick) plan.last_seed = std::min(plan.last_seed, plan.first_seed + 1);
     if (!options.output.empty()) require_writable_folder(options.output);
     ProgressLine progress(options.common.quiet);

@@ -5,6 +5,7 @@ namespace tissuewarp::registration::detail {
 void add(Contribution& sum, Contribution more) {
     auto& springs = sum.conditions.springs;
     springs.insert(springs.end(), more.conditions.springs.begin(), more.conditions.springs.end());
+    sum.holds.insert(sum.holds.end(), more.holds.begin(), more.holds.end());
     const int matched = sum.matched + more.matched;
     if (matched > 0)
         sum.mean_residual_mm = (sum.matched * sum.mean_residual_mm + more.matched * more.mean_residual_mm) / matched;

@@ -83,7 +83,9 @@ HeldOut::HeldOut(const PreparedModel& prepared, const UpdateResult& result, cons
     const double edge = std::max(options.cube_mm, 3 * mean_edge(mesh));
     const std::vector<Block> blocks = blocks_of(mesh, edge), parts = blocks_of(mesh, edge / 2);
     const Eigen::Isometry3d motion = result.deformation.placement.inverse() * result.pulls.placement;
-    const std::vector<tled::Spring> data = carried_along(strong(result.pulls.data), mesh, motion);
+    std::vector<tled::Spring> pulls = result.pulls.data;
+    pulls.insert(pulls.end(), result.pulls.holds.begin(), result.pulls.holds.end());
+    const std::vector<tled::Spring> data = carried_along(strong(std::move(pulls)), mesh, motion);
     std::map<Block, int> numbers;
     std::vector<double> weights;  // of blocks
     for (int half = 0; half < 2; ++half) {

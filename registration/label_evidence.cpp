@@ -25,6 +25,7 @@ Contribution LabelEvidence::contribution(const RoundPlan& plan, const State& sta
     std::vector<Match> matches = match_interfaces(prepared_, fixed_, state, normals, plan, options_.max_angle_deg);
     if (plan.last) trim(matches, options_.trimmed_share, options_.residual_scale_mm);
     Contribution result{matched_springs(interfaces, matches, normals, state.displacement, prepared_.options),
+                        holding_springs(interfaces, state.displacement, prepared_.options),
                         static_cast<int>(matches.size()), 0, 0, mean_residual(matches)};
     for (const Match& match : matches) {
         result.matched += match.found;

@@ -253,7 +253,9 @@ struct ExpectedError {
 
 /// What pulled at the tissue in the last round.
 struct LastPulls {
-    std::vector<tled::Spring> data, ground;
+    std::vector<tled::Spring> data;
+    std::vector<tled::Spring> holds;  ///< where labels pull: to where nodes were before the round, which is no datum
+    std::vector<tled::Spring> ground;
     std::vector<tled::Spring> supports;                           ///< anchors, and contact with rigid neighbours
     Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();  ///< moving → fixed, as it was in that round
     Eigen::Matrix3Xd loads;                                       ///< on the nodes, 3 × N, mN

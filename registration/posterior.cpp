@@ -1,7 +1,9 @@
 #include "registration/detail/posterior.hpp"
 
+#include "registration/detail/rigid_part.hpp"
+#include "registration/detail/white_noise.hpp"
+
 #include <Eigen/Eigenvalues>
-#include <Eigen/Geometry>
 
 #include <cmath>
 #include <random>
@@ -23,20 +25,6 @@ tled::RestStiffness stiffness_with(const PreparedModel& prepared, const WeighedS
     return {prepared.rest, tled::nodal_conditions(all, prepared.rest.node_count), prepared.stiffness};
 }
 
-/// Six fields, 3N × 6: shifts along and turns about the axes.
-Columns rigid_motions(const Eigen::Matrix3Xd& nodes) {
-    const Eigen::Matrix3Xd arms = nodes.colwise() - nodes.rowwise().mean();
-    const double radius = std::sqrt(arms.colwise().squaredNorm().mean());
-    Columns motions(nodes.size(), 6);
-    for (Eigen::Index n = 0; n < nodes.cols(); ++n)
-        for (int axis = 0; axis < 3; ++axis) {
-            const Eigen::Vector3d unit = Eigen::Vector3d::Unit(axis);
-            motions.block<3, 1>(3 * n, axis) = unit;
-            motions.block<3, 1>(3 * n, axis + 3) = unit.cross(Eigen::Vector3d(arms.col(n))) / radius;
-        }
-    return motions;
-}
-
 Columns times(const std::vector<tled::Spring>& springs, const Columns& vectors) {
     Columns result = Columns::Zero(vectors.rows(), vectors.cols());
     for (const tled::Spring& spring : springs)
@@ -56,17 +44,6 @@ Columns bounded_inverse(const Columns& matrix, double least) {
     const Eigen::SelfAdjointEigenSolver<Columns> modes(matrix);
     return modes.eigenvectors() * modes.eigenvalues().cwiseMax(least).cwiseInverse().asDiagonal() *
            modes.eigenvectors().transpose();
-}
-
-/// Independent numbers of mean 0 and variance 1 (Box & Muller 1958), the same with every standard library.
-Columns white_noise(Eigen::Index rows, Eigen::Index columns, std::mt19937_64& generator) {
-    const auto uniform = [&] { return (double(generator() >> 11) + 0.5) * 0x1p-53; };
-    Columns noise(rows, columns);
-    for (Eigen::Index k = 0; k < noise.size(); ++k) {
-        const double radius = std::sqrt(-2 * std::log(uniform()));
-        noise.data()[k] = radius * std::cos(2 * EIGEN_PI * uniform());
-    }
-    return noise;
 }
 
 }  // namespace
@@ -93,6 +70,12 @@ std::vector<Eigen::Matrix3d> Posterior::covariances(const std::vector<int>& node
         const Eigen::Matrix<double, 3, Eigen::Dynamic> share = freed_.middleRows<3>(row);
         result.back() += energy_ * share * middle_ * share.transpose();
     }
+    return result;
+}
+
+Eigen::MatrixXd Posterior::inverse(const Eigen::MatrixXd& forces) const {
+    Columns result = stiffness_.solve_columns(forces);
+    if (freed_.cols() > 0) result += freed_ * (middle_ * (freed_.transpose() * forces));
     return result;
 }
 

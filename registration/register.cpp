@@ -188,10 +188,10 @@ private:
         detail::Stopwatch stopwatch;
         const detail::RoundPlan plan = plan_of(round);
         detail::Contribution data = evidence_.contribution(plan, state_);
-        result_.pulls = {data.conditions.springs, evidence_.ground, evidence_.supports(plan, state_),
-                         state_.placement,        loads_,           evidence_.energy,
-                         placement_is_free()};
+        result_.pulls = {data.conditions.springs, data.holds, evidence_.ground, evidence_.supports(plan, state_),
+                         state_.placement,        loads_,     evidence_.energy, placement_is_free()};
         data.conditions.external_force = loads_;
+        append(data.conditions.springs, result_.pulls.holds);
         append(data.conditions.springs, result_.pulls.ground);
         append(data.conditions.springs, result_.pulls.supports);
         const auto conditions = tled::nodal_conditions(data.conditions, prepared_.rest.node_count);

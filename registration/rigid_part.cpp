@@ -17,6 +17,19 @@ Eigen::Isometry3d closest_motion(const Eigen::Matrix3Xd& x, const Eigen::Matrix3
     return motion;
 }
 
+Eigen::MatrixXd rigid_motions(const Eigen::Matrix3Xd& nodes) {
+    const Eigen::Matrix3Xd arms = nodes.colwise() - nodes.rowwise().mean();
+    const double radius = std::sqrt(arms.colwise().squaredNorm().mean());
+    Eigen::MatrixXd motions(nodes.size(), 6);
+    for (Eigen::Index n = 0; n < nodes.cols(); ++n)
+        for (int axis = 0; axis < 3; ++axis) {
+            const Eigen::Vector3d unit = Eigen::Vector3d::Unit(axis);
+            motions.block<3, 1>(3 * n, axis) = unit;
+            motions.block<3, 1>(3 * n, axis + 3) = unit.cross(Eigen::Vector3d(arms.col(n))) / radius;
+        }
+    return motions;
+}
+
 void give_rigid_part_to_placement(const PreparedModel& prepared, State& state) {
     const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
     Eigen::VectorXd weights = Eigen::VectorXd::Zero(nodes.cols());

@@ -25,16 +25,22 @@ tled::Conditions matched_springs(const Interfaces& interfaces, const std::vector
         const InterfaceNode& node = interfaces.nodes()[i];
         const Eigen::Vector3d normal = normals.col(static_cast<Eigen::Index>(i));
         const Eigen::Vector3d here = displacement.col(node.node);
-        // The floor keeps the system definite where robust weights vanish.
-        const double floor = options.tangential_ratio;
         const Match& match = matches[i];
-        const Eigen::Matrix3d hold = options.data_stiffness * node.area * floor * Eigen::Matrix3d::Identity();
-        conditions.springs.push_back({node.node, hold, here});
         if (!match.found) continue;
         const Eigen::Matrix3d pull = options.data_stiffness * node.area * match.weight * normal * normal.transpose();
         conditions.springs.push_back({node.node, pull, here + match.distance_mm * normal});
     }
     return conditions;
+}
+
+std::vector<tled::Spring> holding_springs(const Interfaces& interfaces, const Eigen::Matrix3Xd& displacement,
+                                          const PrepareOptions& options) {
+    std::vector<tled::Spring> springs;
+    for (const InterfaceNode& node : interfaces.nodes()) {
+        const double stiffness = options.data_stiffness * node.area * options.tangential_ratio;
+        springs.push_back({node.node, stiffness * Eigen::Matrix3d::Identity(), displacement.col(node.node)});
+    }
+    return springs;
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -4,8 +4,15 @@
 #include "registration/detail/ground.hpp"
 #include "registration/detail/posterior.hpp"
 #include "registration/detail/pull.hpp"
+#include "registration/detail/rigid_part.hpp"
+#include "registration/detail/unknown_loads.hpp"
+#include "registration/detail/white_noise.hpp"
 #include "tled/reference.hpp"
 
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -15,8 +22,12 @@ namespace {
 
 using Covariances = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 
-/// Where the data left more than this share of the prior's variance they say next to nothing.
-constexpr double shown_below = 0.5;
+/// Where the data left more than this share of the bending that unknown loads make they say next to nothing.
+constexpr double shown_below = 0.9;
+/// Of random phantoms (docs/accuracy-time.md, "Does the interval hold?"). The noise of a datum is far less than its
+/// pull admits, since neighbours share what they say. The size of the loads is known as a variance is from `freedom`
+/// numbers.
+constexpr double noise_share = 0.05, least_energy = 0.2, freedom_of_size = 6;
 
 void append(std::vector<tled::Spring>& springs, const std::vector<tled::Spring>& others) {
     springs.insert(springs.end(), others.begin(), others.end());
@@ -42,7 +53,7 @@ Eigen::Matrix3Xd displacement_under_pulls(const UpdateResult& result) {
 /// Forces out of balance at the nodes, mN.
 Eigen::Matrix3Xd residual(const PreparedModel& prepared, const LastPulls& pulls, const Eigen::Matrix3Xd& displacement) {
     Eigen::Matrix3Xd force = pulls.loads - tled::internal_force(prepared.rest, displacement);
-    for (const auto* springs : {&pulls.data, &pulls.ground, &pulls.supports})
+    for (const auto* springs : {&pulls.data, &pulls.holds, &pulls.ground, &pulls.supports})
         for (const tled::Spring& spring : *springs)
             force.col(spring.node) += spring.stiffness * (spring.target - displacement.col(spring.node));
     return force;
@@ -63,14 +74,55 @@ Eigen::Matrix3d matrix_of(const Eigen::Matrix<double, 6, 1>& c) {
     return (Eigen::Matrix3d() << c[0], c[3], c[4], c[3], c[1], c[5], c[4], c[5], c[2]).finished();
 }
 
-/// q with P(‖e‖ ≤ q) = 95 % for Gaussian e of mean 0: ‖e‖² as a multiple of χ² of the same mean and variance
-/// (Satterthwaite, Biometrics 2 (1946) 110), its quantile by Wilson & Hilferty, PNAS 17 (1931) 684.
-double interval_of(const Eigen::Matrix3d& covariance) {
-    constexpr double normal_quantile = 1.6448536269514722;
-    const double mean = covariance.trace(), half_variance = covariance.squaredNorm();
-    if (!(mean > 0)) return 0;
-    const double freedom = mean * mean / half_variance, spread = 2 / (9 * freedom);
-    return std::sqrt(mean) * std::pow(1 - spread + normal_quantile * std::sqrt(spread), 1.5);
+/// Forces that the noise of the data exerts through its springs, 3N × count: of covariance energy · K.
+Eigen::MatrixXd noise_forces(const detail::WeighedSprings& springs, Eigen::Index rows, int count, std::uint64_t seed) {
+    std::mt19937_64 generator(seed);
+    Eigen::MatrixXd forces = Eigen::MatrixXd::Zero(rows, count);
+    for (const tled::Spring& spring : springs.data) {
+        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spring.stiffness);
+        const Eigen::Matrix3d root =
+            axes.eigenvectors() * (springs.energy * axes.eigenvalues().cwiseMax(0)).cwiseSqrt().asDiagonal();
+        forces.middleRows<3>(3 * spring.node) += root * detail::white_noise(3, count, generator);
+    }
+    return forces;
+}
+
+/// Square of how large the unknown loads are, over those drawn: as large as the tissue was seen to strain, by strain
+/// energy, where it would be seen to move as `visible` (3N × k, mm) under those drawn.
+double load_size(const PreparedModel& prepared, const UpdateResult& result, const Eigen::MatrixXd& visible) {
+    const Eigen::Matrix3Xd& found = result.deformation.displacement;
+    const auto stiffness = tled::tangent_stiffness(prepared.rest, Eigen::Matrix3Xd::Zero(3, found.cols()));
+    const double drawn = 0.5 * visible.cwiseProduct(stiffness * visible).sum() / double(visible.cols());
+    return (tled::elastic_energy(prepared.rest, found) + least_energy * result.pulls.energy) / drawn;
+}
+
+/// What part of the variance of bending under the loads drawn the data leave, at each node: of all motion left, or with
+/// motions of the organ as a whole left out, which labels may leave open of a round one; the lesser of both.
+Eigen::VectorXd unexplained_share(const Eigen::Matrix3Xd& nodes, const Eigen::MatrixXd& hidden,
+                                  const Eigen::MatrixXd& free) {
+    const Eigen::MatrixXd motions = detail::rigid_motions(nodes);
+    const Eigen::LDLT<Eigen::MatrixXd> squares(motions.transpose() * motions);
+    const auto variance = [](const Eigen::MatrixXd& moved) {
+        return Eigen::VectorXd(covariances_of(moved).topRows<3>().colwise().sum());
+    };
+    const auto bending = [&](const Eigen::MatrixXd& moved) {
+        return Eigen::MatrixXd(moved - motions * squares.solve(motions.transpose() * moved));
+    };
+    return variance(hidden).cwiseMin(variance(bending(hidden))).cwiseQuotient(variance(bending(free)));
+}
+
+/// Points of a part of the surface alone: where an organ of smooth shape lies may be told wrong, by more than any
+/// estimate about the place that was found says.
+bool place_is_uncertain(const UpdateResult& result) {
+    return result.pulls.free_placement && result.surface && !result.points && !result.curves;
+}
+
+/// x with Φ(x) = probability, by Newton's method.
+double normal_quantile(double probability) {
+    double x = 0;
+    for (int iteration = 0; iteration < 30; ++iteration)
+        x -= (0.5 * std::erfc(-x / std::sqrt(2.0)) - probability) * std::sqrt(2 * EIGEN_PI) * std::exp(0.5 * x * x);
+    return x;
 }
 
 ErrorEstimate estimate_of(const Eigen::Vector3d& algebraic, const Eigen::Vector3d& discretisation,
@@ -79,10 +131,9 @@ ErrorEstimate estimate_of(const Eigen::Vector3d& algebraic, const Eigen::Vector3
     result.algebraic_mm = algebraic.norm();
     result.discretisation_mm = discretisation.norm();
     result.data_mm = std::sqrt(covariance.trace());
-    const Eigen::Matrix3d all =
-        covariance + algebraic * algebraic.transpose() + discretisation * discretisation.transpose();
-    result.deviation_mm = std::sqrt(all.trace());
-    result.interval_mm = interval_of(all);
+    result.covariance = covariance + algebraic * algebraic.transpose() + discretisation * discretisation.transpose();
+    result.deviation_mm = std::sqrt(result.covariance.trace());
+    result.interval_mm = interval_mm(result, 0.95);
     result.shown = unexplained < shown_below;
     return result;
 }
@@ -150,25 +201,48 @@ Uncertainty uncertainty(const PreparedModel& prepared, const UpdateResult& resul
                         Observer& observer) {
     require_related(prepared, result);
     const LastPulls& pulls = result.pulls;
-    detail::WeighedSprings prior{pulls.supports, pulls.ground, pulls.energy, pulls.free_placement}, all = prior;
-    append(all.data, pulls.data);
-    if (prior.ground.empty())
-        prior.ground = detail::ground_springs(prepared, pulls.energy,
-                                              [](const InterfaceNode&) { return TissuePrior().free_motion_mm; });
+    detail::WeighedSprings unseen{pulls.supports, pulls.ground, pulls.energy, pulls.free_placement};
+    if (unseen.ground.empty()) {  // labels show where the organ lies, however it turned
+        unseen.ground = detail::ground_springs(prepared, pulls.energy,
+                                               [](const InterfaceNode&) { return TissuePrior().free_motion_mm; });
+        unseen.free_placement = true;
+    }
+    detail::WeighedSprings seen = unseen;
+    append(seen.data, pulls.data);
 
     observer.checkpoint("error estimate", 0.0);
-    const detail::Posterior posterior(prepared, all);
-    const Covariances covariance = covariances_of(posterior.samples(options.samples, options.seed));
+    const detail::Posterior posterior(prepared, seen);
+    const Eigen::MatrixXd loads = detail::unknown_loads(prepared, options.samples, options.seed);
+    const Eigen::MatrixXd hidden = posterior.inverse(loads);
     observer.checkpoint("error estimate", 0.4);
-    const Covariances before =
-        covariances_of(detail::Posterior(prepared, prior).samples(options.samples, options.seed));
+    const Eigen::MatrixXd free = detail::Posterior(prepared, unseen).inverse(loads);
     observer.checkpoint("error estimate", 0.7);
+    const Eigen::MatrixXd noise =
+        posterior.inverse(noise_forces(seen, loads.rows(), options.samples, options.seed + 1));
+    const Covariances covariance =
+        load_size(prepared, result, free - hidden) * covariances_of(hidden) + noise_share * covariances_of(noise);
+    Eigen::VectorXd unexplained = unexplained_share(prepared.model.mesh.nodes, hidden, free);
+    if (place_is_uncertain(result)) unexplained.setConstant(2 * shown_below);
     const Eigen::Matrix3Xd displacement = displacement_under_pulls(result);
     const Eigen::Matrix3Xd algebraic = posterior.stiffness().solve(residual(prepared, pulls, displacement));
     const Eigen::Matrix3Xd discretisation = Eigen::Matrix3Xd::Zero(3, displacement.cols());
     observer.checkpoint("error estimate", 1.0);
-    return {prepared.model.mesh, algebraic, discretisation, covariance,
-            covariance.topRows<3>().colwise().sum().cwiseQuotient(before.topRows<3>().colwise().sum()).transpose()};
+    return {prepared.model.mesh, algebraic, discretisation, covariance, unexplained};
+}
+
+// ‖e‖² over its mean is a multiple of χ² (Satterthwaite, Biometrics 2 (1946) 110) whose scale is itself known from few
+// numbers: F. Its quantile is that of a normal ratio of cube roots (Paulson, Ann Math Statist 13 (1942) 233).
+double interval_mm(const ErrorEstimate& estimate, double probability) {
+    const double mean = estimate.covariance.trace();
+    if (!(mean > 0)) return 0;
+    const double freedom = mean * mean / estimate.covariance.squaredNorm();
+    const double a = 2 / (9 * freedom), b = 2 / (9 * freedom_of_size), z = normal_quantile(probability);
+    // ((1 − b) y − (1 − a))² = z² (b y² + a), the root on z's side
+    const double square = (1 - b) * (1 - b) - z * z * b, middle = (1 - a) * (1 - b),
+                 rest = (1 - a) * (1 - a) - z * z * a;
+    const double root = std::sqrt(std::max(0.0, middle * middle - square * rest));
+    const double y = std::max(0.0, (middle + (z < 0 ? -root : root)) / square);
+    return std::sqrt(mean * (freedom_of_size - 2) / freedom_of_size * y * y * y);
 }
 
 }  // namespace tissuewarp::registration

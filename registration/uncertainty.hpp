@@ -26,15 +26,20 @@ struct ErrorEstimate {
     double discretisation_mm = 0;  ///< of linear tetrahedra of this size
     double data_mm = 0;            ///< of matches, and of tissue between them: 1 σ
     double deviation_mm = 0;       ///< all together, 1 σ
-    double interval_mm = 0;        ///< with a probability of 95 % the true place lies within
-    bool shown = true;             ///< false: do not trust; the data say next to nothing of this place
+    /// All together, mm², moving frame before the placement turns it.
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+    double interval_mm = 0;  ///< with a probability of 95 % the true place lies within
+    bool shown = true;       ///< false: do not trust; the data say next to nothing of this place
 };
+
+/// With a probability in [0.001, 0.999] the true place lies within this radius, mm.
+double interval_mm(const ErrorEstimate& estimate, double probability);
 
 /// The estimate at every node of the mesh, and anywhere between.
 class Uncertainty {
 public:
     /// At the nodes: errors (3 × N mm) of solver and mesh, covariances (6 × N mm²: xx, yy, zz, xy, xz, yz), and what
-    /// part of the prior's variance the data left (N).
+    /// part of the variance of motions under unknown loads the data left (N).
     Uncertainty(meshing::TetMesh mesh, Eigen::Matrix3Xd algebraic, Eigen::Matrix3Xd discretisation,
                 Eigen::Matrix<double, 6, Eigen::Dynamic> covariance, Eigen::VectorXd unexplained);
 

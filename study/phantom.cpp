@@ -53,8 +53,8 @@ std::uint64_t derived(std::uint64_t seed, std::uint64_t part) {
     return z ^ (z >> 31);
 }
 
-std::string told(const detail::OrganShape& shape, const detail::RandomTissue& tissue, const detail::RandomLoads& loads,
-                 const detail::Truth& truth, double seen_share, int pairs) {
+std::string told(const detail::RandomOrgan& organ, const detail::Truth& truth, double seen_share, int pairs) {
+    const auto& [shape, tissue, loads] = organ;
     const auto length = truth.displacement.colwise().norm();
     char text[400];
     std::snprintf(
@@ -71,9 +71,8 @@ Phantom drawn_phantom(std::uint64_t seed, const PhantomOptions& options, Observe
     constexpr int least_elements = 2500, most_elements = 4000;
     constexpr double strain = 0.12;  // largest motion over the organ's length, at most
     detail::Random random(seed);
-    const detail::OrganShape shape(random);
-    const detail::RandomTissue tissue = detail::random_tissue(random);
-    const detail::RandomLoads loads = detail::random_loads(shape, tissue.youngs_modulus_kpa, random);
+    detail::RandomOrgan organ = detail::random_organ(random);
+    const detail::OrganShape& shape = organ.shape;
     const double motion_mm = random.uniform(3, std::min(15.0, strain * shape.length()));
     const int elements = least_elements + random.index(most_elements - least_elements);
     const Eigen::Isometry3d placement = random_motion(shape.centre(), random);
@@ -81,25 +80,27 @@ Phantom drawn_phantom(std::uint64_t seed, const PhantomOptions& options, Observe
     const int pairs = 4 + random.index(7);
 
     observer.checkpoint("Truth", 0);
-    const detail::Truth truth = detail::deformed_organ(shape, tissue, loads, motion_mm, elements, observer);
+    detail::TruthMesh mesh = detail::truth_mesh(shape, elements, observer);
+    organ.loads = detail::sized_loads(organ, mesh, motion_mm);
+    const detail::Truth truth = detail::equilibrium(organ, std::move(mesh), observer);
     const detail::QuadraticMap deform(truth.mesh.quadratic, truth.displacement);
     const auto map = [&](const Vector3d& point) -> std::optional<Vector3d> {
         const auto moved = deform(point);
         if (!moved) return std::nullopt;
         return Vector3d(placement * *moved);
     };
-    const detail::DeformedOrgan organ{truth.mesh, placement * (truth.mesh.quadratic.nodes + truth.displacement)};
+    const detail::DeformedOrgan deformed{truth.mesh, placement * (truth.mesh.quadratic.nodes + truth.displacement)};
 
     observer.checkpoint("Drawing", 0.8);
     Phantom phantom;
     phantom.moving_labels = detail::draw(shape, options.voxel_mm);
-    phantom.fixed_labels = detail::drawn_labels(organ, options.voxel_mm, options.boundary_deviation_mm, random);
-    phantom.surface = detail::seen_surface(organ, seen_share, options.point_deviation_mm, random);
+    phantom.fixed_labels = detail::drawn_labels(deformed, options.voxel_mm, options.boundary_deviation_mm, random);
+    phantom.surface = detail::seen_surface(deformed, seen_share, options.point_deviation_mm, random);
     constexpr double pair_depth_mm = 3, target_depth_mm = 1;
     phantom.points = detail::found_again(detail::places(shape, map, pairs, pair_depth_mm, random),
                                          options.point_deviation_mm, random);
     phantom.targets = detail::places(shape, map, options.targets, target_depth_mm, random);
-    phantom.story = told(shape, tissue, loads, truth, seen_share, pairs);
+    phantom.story = told(organ, truth, seen_share, pairs);
     return phantom;
 }
 

@@ -30,7 +30,8 @@ struct Phantom {
     registration::Landmarks targets;      ///< moving and true fixed positions, LPS mm
 };
 
-/// The same seed gives the same phantom, bit for bit. Throws SolverFailure where its truth does not converge.
+/// The same seed gives the same phantom, bit for bit on one machine; others round differently. Throws SolverFailure
+/// where its truth does not converge.
 Phantom random_phantom(std::uint64_t seed, const PhantomOptions& options = {}, Observer& observer = silent_observer());
 
 }  // namespace tissuewarp::study

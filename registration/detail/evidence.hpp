@@ -24,6 +24,7 @@ struct RoundPlan {
 /// What a datum contributed to a round.
 struct Contribution {
     tled::Conditions conditions;
+    std::vector<tled::Spring> holds;  ///< of labels: pull nodes to where they are, for the sake of the solver
     int candidates = 0, matched = 0;
     int held_back = 0;            ///< matches further away than the round's step bound
     double mean_residual_mm = 0;  ///< weighted, before the round's equilibrium

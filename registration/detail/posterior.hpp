@@ -34,6 +34,10 @@ public:
     /// same ones.
     [[nodiscard]] Eigen::MatrixXd samples(int count, std::uint64_t seed) const;
 
+    /// The inverse of K times forces, 3N × k, mN: displacements, mm. Where the placement is free, the ground's hold on
+    /// motions as a whole is taken out of K.
+    [[nodiscard]] Eigen::MatrixXd inverse(const Eigen::MatrixXd& forces) const;
+
     /// K.
     [[nodiscard]] const tled::RestStiffness& stiffness() const { return stiffness_; }
 

@@ -21,10 +21,15 @@ struct Match {
     double weight = 0;       ///< in [0, 1]
 };
 
-/// Springs from `displacement` (3 × N, moving frame) along `normals` (one column per interface node) to the matches. A
-/// node without a match keeps a spring of tangential stiffness to where it is, so that no piece of tissue floats.
+/// Springs from `displacement` (3 × N, moving frame) along `normals` (one column per interface node) to the matches.
 tled::Conditions matched_springs(const Interfaces& interfaces, const std::vector<Match>& matches,
                                  const Eigen::Matrix3Xd& normals, const Eigen::Matrix3Xd& displacement,
                                  const PrepareOptions& options);
+
+/// Springs of tangential stiffness of every interface node to where it is, so that no piece of tissue floats and the
+/// system stays definite where robust weights vanish. They slow the rounds down and say nothing of where tissue
+/// belongs.
+std::vector<tled::Spring> holding_springs(const Interfaces& interfaces, const Eigen::Matrix3Xd& displacement,
+                                          const PrepareOptions& options);
 
 }  // namespace tissuewarp::registration::detail

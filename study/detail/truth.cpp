@@ -25,26 +25,11 @@ double volume(const imaging::Volume& labels) {
            labels.geometry.voxel_volume();
 }
 
-double largest_motion(const Matrix3Xd& displacement) {
-    return displacement.colwise().norm().maxCoeff();
-}
-
-/// The first step of Newton's method under small loads, scaled to the loads.
-Matrix3Xd linear_answer(const tled::QuadraticTetrahedra& energy, const TruthMesh& mesh, const OrganShape& shape,
-                        const RandomLoads& loads) {
-    constexpr double small = 1e-3, any_mm = 1;
-    const auto conditions = conditions_on(mesh.quadratic, mesh.corners, shape, scaled(loads, small));
-    return tled::newton_equilibrium(energy, conditions, {.tolerance_mm = any_mm}).displacement / small;
-}
-
-void require_sound(const Truth& truth, const Eigen::VectorXd& jacobians, double motion_mm) {
-    if (truth.min_jacobian < least_jacobian || jacobians.maxCoeff() > largest_jacobian)
-        throw SolverFailure("the truth has det F from " + std::to_string(truth.min_jacobian) + " to " +
-                            std::to_string(jacobians.maxCoeff()) + ", which tissue does not survive");
-    const double reached = largest_motion(truth.displacement);
-    if (reached > 2 * motion_mm)
-        throw SolverFailure("the truth moves by " + std::to_string(reached) + " mm where " + std::to_string(motion_mm) +
-                            " mm were wanted");
+tled::QuadraticTetrahedra elements_of(const TruthMesh& mesh, const RandomTissue& tissue) {
+    constexpr double locks_from = 0.475;
+    const auto pressure =
+        tissue.poisson_ratio > locks_from ? tled::QuadraticPressure::NodalAverage : tled::QuadraticPressure::Pointwise;
+    return {mesh.quadratic, tissue.materials, {tled::Quadrature::Points4, pressure}};
 }
 
 }  // namespace
@@ -63,21 +48,32 @@ TruthMesh truth_mesh(const OrganShape& shape, int elements, Observer& observer) 
     return mesh;
 }
 
-Truth deformed_organ(const OrganShape& shape, const RandomTissue& tissue, const RandomLoads& loads, double motion_mm,
-                     int elements, Observer& observer) {
-    constexpr double locks_from = 0.475;
-    Truth truth{truth_mesh(shape, elements, observer), {}};
-    const auto pressure =
-        tissue.poisson_ratio > locks_from ? tled::QuadraticPressure::NodalAverage : tled::QuadraticPressure::Pointwise;
-    const tled::QuadraticTetrahedra energy(truth.mesh.quadratic, tissue.materials,
-                                           {tled::Quadrature::Points4, pressure});
-    const double linear = largest_motion(linear_answer(energy, truth.mesh, shape, loads));
-    const RandomLoads wanted = scaled(loads, motion_mm / linear);
-    const auto conditions = conditions_on(truth.mesh.quadratic, truth.mesh.corners, shape, wanted);
+RandomOrgan random_organ(Random& random) {
+    OrganShape shape(random);
+    RandomTissue tissue = random_tissue(random);
+    RandomLoads loads = random_loads(shape, tissue.youngs_modulus_kpa, random);
+    return {std::move(shape), std::move(tissue), std::move(loads)};
+}
+
+RandomLoads sized_loads(const RandomOrgan& organ, const TruthMesh& mesh, double motion_mm) {
+    constexpr double small = 1e-3, any_mm = 1;  // the first step of Newton's method under small loads
+    const auto energy = elements_of(mesh, organ.tissue);
+    const auto conditions = conditions_on(mesh.quadratic, mesh.corners, organ.shape, scaled(organ.loads, small));
+    const auto linear = tled::newton_equilibrium(energy, conditions, {.tolerance_mm = any_mm}).displacement;
+    return scaled(organ.loads, motion_mm * small / linear.colwise().norm().maxCoeff());
+}
+
+Truth equilibrium(const RandomOrgan& organ, TruthMesh mesh, Observer& observer) {
+    const auto energy = elements_of(mesh, organ.tissue);
+    const auto conditions = conditions_on(mesh.quadratic, mesh.corners, organ.shape, organ.loads);
+    Truth truth;
     truth.displacement = tled::newton_equilibrium(energy, conditions, {.tolerance_mm = 1e-5}, observer).displacement;
+    truth.mesh = std::move(mesh);
     const Eigen::VectorXd jacobians = energy.jacobians(truth.displacement);
     truth.min_jacobian = jacobians.minCoeff();
-    require_sound(truth, jacobians, motion_mm);
+    if (truth.min_jacobian < least_jacobian || jacobians.maxCoeff() > largest_jacobian)
+        throw SolverFailure("the truth has det F from " + std::to_string(truth.min_jacobian) + " to " +
+                            std::to_string(jacobians.maxCoeff()) + ", which tissue does not survive");
     return truth;
 }
 

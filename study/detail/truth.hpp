@@ -12,12 +12,24 @@
 
 namespace tissuewarp::study::detail {
 
-/// Curved tetrahedra of the organ at rest. `elements`: how many, about.
+/// Curved tetrahedra of the organ at rest.
 struct TruthMesh {
     meshing::TetMesh corners;
     tled::QuadraticMesh quadratic;
 };
-TruthMesh truth_mesh(const OrganShape& shape, int elements, Observer& observer);
+/// Of about so many elements.
+TruthMesh truth_mesh(const OrganShape& shape, int elements, Observer& observer = silent_observer());
+
+/// Everything that a truth follows from but its mesh.
+struct RandomOrgan {
+    OrganShape shape;
+    RandomTissue tissue;
+    RandomLoads loads;
+};
+RandomOrgan random_organ(Random& random);
+
+/// The organ's loads scaled so that linear elasticity would move no node by more than `motion_mm`.
+RandomLoads sized_loads(const RandomOrgan& organ, const TruthMesh& mesh, double motion_mm);
 
 struct Truth {
     TruthMesh mesh;
@@ -25,10 +37,8 @@ struct Truth {
     double min_jacobian = 1;
 };
 
-/// Equilibrium under loads that are scaled until linear elasticity would move no node by more than `motion_mm`. Throws
-/// SolverFailure where Newton's method fails or the tissue is crushed or torn apart: det F out of 0.3 … 3, or a motion
-/// beyond twice the one wanted.
-Truth deformed_organ(const OrganShape& shape, const RandomTissue& tissue, const RandomLoads& loads, double motion_mm,
-                     int elements, Observer& observer);
+/// Equilibrium under the organ's loads. Throws SolverFailure where Newton's method fails or tissue is crushed or torn
+/// apart (det F out of 0.3 … 3), InvalidInput where a curved element is turned inside out at rest.
+Truth equilibrium(const RandomOrgan& organ, TruthMesh mesh, Observer& observer = silent_observer());
 
 }  // namespace tissuewarp::study::detail

@@ -1,0 +1,16 @@
+#pragma once
+/// Loads that act on the tissue and that no registration knows: what they would do to the displacement.
+
+#include "registration/pipeline.hpp"
+
+#include <Eigen/Core>
+
+#include <cstdint>
+
+namespace tissuewarp::registration::detail {
+
+/// Random forces on the nodes, 3N × count, mN, in equilibrium: a uniform body force and tractions on the outer surface
+/// that vary smoothly over half the organ's radius, of about 1 kPa. Only their shape tells; their size is arbitrary.
+Eigen::MatrixXd unknown_loads(const PreparedModel& prepared, int count, std::uint64_t seed);
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,86 @@
+#include "registration/detail/unknown_loads.hpp"
+
+#include "registration/detail/rigid_part.hpp"
+#include "registration/detail/white_noise.hpp"
+
+#include <Eigen/Cholesky>
+
+#include <cmath>
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+using Columns = Eigen::MatrixXd;  // 3N × k, nodes' vectors one after the other
+
+constexpr int waves = 20;            // of each component of a smooth traction
+constexpr double smooth_over = 0.5;  // of the organ's radius
+
+/// mm³ of each node's share of its elements.
+Eigen::VectorXd nodal_volumes(const meshing::TetMesh& mesh) {
+    const Eigen::VectorXd volumes = meshing::tet_volumes(mesh);
+    Eigen::VectorXd result = Eigen::VectorXd::Zero(mesh.nodes.cols());
+    for (Eigen::Index tet = 0; tet < volumes.size(); ++tet)
+        for (const int node : mesh.tets.col(tet)) result[node] += volumes[tet] / 4;
+    return result;
+}
+
+/// mm² of the outer surface.
+Eigen::VectorXd nodal_areas(const PreparedModel& prepared) {
+    Eigen::VectorXd result = Eigen::VectorXd::Zero(prepared.model.mesh.nodes.cols());
+    for (const InterfaceNode& node : prepared.interfaces.nodes())
+        if (node.outer == 0) result[node.node] += node.area;
+    return result;
+}
+
+double radius_of(const Eigen::Matrix3Xd& nodes) {
+    return std::sqrt((nodes.colwise() - nodes.rowwise().mean()).colwise().squaredNorm().mean());
+}
+
+/// Every node's vectors times its weight.
+Columns weighted(const Columns& vectors, const Eigen::VectorXd& weights) {
+    Columns result = vectors;
+    for (Eigen::Index n = 0; n < weights.size(); ++n) result.middleRows<3>(3 * n) *= weights[n];
+    return result;
+}
+
+/// A smooth Gaussian field of vectors by random waves (Rahimi and Recht 2007), each component of variance 1.
+class SmoothField {
+public:
+    SmoothField(double length_mm, std::mt19937_64& generator)
+        : wave_(white_noise(3, 3 * waves, generator) / length_mm) {
+        for (double& phase : phase_) phase = 2 * EIGEN_PI * uniform(generator);
+    }
+    Eigen::Vector3d operator()(const Eigen::Vector3d& point) const {
+        Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+        for (int w = 0; w < 3 * waves; ++w) sum[w / waves] += std::cos(wave_.col(w).dot(point) + phase_[w]);
+        return std::sqrt(2.0 / waves) * sum;
+    }
+
+private:
+    Eigen::Matrix<double, 3, 3 * waves> wave_;
+    Eigen::Matrix<double, 3 * waves, 1> phase_;
+};
+
+}  // namespace
+
+Columns unknown_loads(const PreparedModel& prepared, int count, std::uint64_t seed) {
+    const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
+    const Eigen::VectorXd volumes = nodal_volumes(prepared.model.mesh), areas = nodal_areas(prepared);
+    const double radius = radius_of(nodes);
+    std::mt19937_64 generator(seed);
+    Columns loads(nodes.size(), count);
+    for (Eigen::Index k = 0; k < count; ++k) {
+        const Eigen::Vector3d body = white_noise(3, 1, generator) / radius;
+        const SmoothField traction(smooth_over * radius, generator);
+        for (Eigen::Index n = 0; n < nodes.cols(); ++n) {
+            loads.block<3, 1>(3 * n, k) = volumes[n] * body;
+            if (areas[n] > 0) loads.block<3, 1>(3 * n, k) += areas[n] * traction(nodes.col(n));
+        }
+    }
+    // What holds the organ as a whole acts all over its surface.
+    const Columns motions = rigid_motions(nodes), held = weighted(motions, areas);
+    return loads - held * (motions.transpose() * held).ldlt().solve(motions.transpose() * loads);
+}
+
+}  // namespace tissuewarp::registration::detail

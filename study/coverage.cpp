@@ -1,0 +1,150 @@
+#include "study/coverage.hpp"
+
+#include "core/errors.hpp"
+#include "meshing/point_location.hpp"
+
+#include <chrono>
+#include <string>
+
+namespace tissuewarp::study {
+
+namespace {
+
+namespace fs = std::filesystem;
+using registration::PreparedModel;
+
+registration::Intraoperative seen_of(const Phantom& phantom, Evidence evidence) {
+    registration::Intraoperative seen;
+    if (evidence == Evidence::Labels) seen.labels = phantom.fixed_labels;
+    if (evidence == Evidence::Surface || evidence == Evidence::SurfaceAndPoints) seen.surface = phantom.surface;
+    if (evidence == Evidence::Points || evidence == Evidence::SurfaceAndPoints) seen.points = phantom.points;
+    return seen;
+}
+
+/// As `tissuewarp register` would, which knows nothing of the tissue.
+PreparedModel prepared_for(const Phantom& phantom, bool labels, Observer& observer) {
+    registration::PrepareOptions options;
+    options.meshing.edge_length = labels ? registration::suggested_edge_length(phantom.moving_labels)
+                                         : registration::suggested_edge_length_without_labels(phantom.moving_labels);
+    return registration::prepare(phantom.moving_labels, options, observer);
+}
+
+std::vector<CoverageRow> rows_of(const Phantom& phantom, Evidence evidence, const PreparedModel& prepared,
+                                 const CoverageOptions& options, Observer& observer) {
+    const auto result = registration::update(prepared, seen_of(phantom, evidence), options.update, observer);
+    const auto estimates =
+        registration::uncertainty(prepared, result, options.uncertainty, observer).at(phantom.targets.moving);
+    const Eigen::Matrix3Xd is = result.deformation.placement.inverse() * phantom.targets.fixed;
+    const meshing::PointLocator locator(prepared.model.mesh);
+    const Eigen::MatrixXd& nodal = result.deformation.displacement;
+    std::vector<CoverageRow> rows;
+    for (std::size_t k = 0; k < estimates.size(); ++k) {
+        const auto column = static_cast<Eigen::Index>(k);
+        const Eigen::Vector3d X = phantom.targets.moving.col(column);
+        const auto place = locator.find(X);
+        if (!estimates[k] || !place) continue;  // in the organ, out of its mesh
+        const Eigen::Vector3d u = meshing::interpolate(prepared.model.mesh, nodal, *place);
+        rows.push_back({phantom.seed, evidence, static_cast<int>(k), X + u - is.col(column),
+                        static_cast<int>(result.doubts.size()), u.norm(), *estimates[k]});
+    }
+    return rows;
+}
+
+void require_valid(const CoverageOptions& options) {
+    if (options.first_seed > options.last_seed)
+        throw InvalidInput("coverage: the first seed, " + std::to_string(options.first_seed) +
+                           ", comes after the last, " + std::to_string(options.last_seed));
+    if (options.evidence.empty()) throw InvalidInput("coverage: no kind of evidence is wanted; name at least one");
+}
+
+/// Says which phantom runs and how long the rest will take; asks for a stop in between.
+class Progress {
+public:
+    Progress(const CoverageOptions& options, Observer& observer)
+        : first_(options.first_seed), count_(options.last_seed - options.first_seed + 1), observer_(observer) {}
+
+    void before(std::uint64_t seed) {
+        std::string stage = "phantom " + std::to_string(seed);
+        if (computed_ > 0) {
+            const std::chrono::duration<double> passed = Clock::now() - start_;
+            const double left = passed.count() / double(computed_) * double(first_ + count_ - seed);
+            stage += ", " + std::to_string(int(left / 60) + 1) + " min left";
+        }
+        observer_.checkpoint(stage, double(seed - first_) / double(count_));
+    }
+    void computed() { ++computed_; }
+    void read() {
+        if (computed_ == 0) start_ = Clock::now();
+    }
+
+private:
+    using Clock = std::chrono::steady_clock;
+    std::uint64_t first_, count_, computed_ = 0;
+    Clock::time_point start_ = Clock::now();
+    Observer& observer_;
+};
+
+/// Passes on requests to stop, and what is worth telling; the stages within a phantom are not progress of the study.
+class Within : public Observer {
+public:
+    explicit Within(Observer& outer) : outer_(outer) {}
+    bool cancel_requested() override { return outer_.cancel_requested(); }
+
+private:
+    Observer& outer_;
+};
+
+}  // namespace
+
+const char* name_of(Evidence evidence) {
+    constexpr std::array names{"labels", "surface", "surface-and-points", "points"};
+    return names[static_cast<std::size_t>(evidence)];
+}
+
+std::vector<CoverageRow> measured_coverage(const Phantom& phantom, const CoverageOptions& options, Observer& observer) {
+    std::vector<CoverageRow> rows;
+    std::optional<PreparedModel> for_labels, for_points;
+    for (const Evidence evidence : options.evidence) {
+        const bool labels = evidence == Evidence::Labels;
+        std::optional<PreparedModel>& prepared = labels ? for_labels : for_points;
+        try {
+            if (!prepared) prepared = prepared_for(phantom, labels, observer);
+            const auto here = rows_of(phantom, evidence, *prepared, options, observer);
+            rows.insert(rows.end(), here.begin(), here.end());
+        } catch (const SolverFailure& failure) {
+            observer.note("phantom " + std::to_string(phantom.seed) + ", " + name_of(evidence) + ": " + failure.what());
+        } catch (const InvalidInput& refused) {
+            observer.note("phantom " + std::to_string(phantom.seed) + ", " + name_of(evidence) + ": " + refused.what());
+        }
+    }
+    return rows;
+}
+
+std::vector<CoverageRow> measured_coverage(const fs::path& folder, const CoverageOptions& options, Observer& observer) {
+    require_valid(options);
+    fs::create_directories(folder);
+    Progress progress(options, observer);
+    Within within(observer);
+    std::vector<CoverageRow> rows;
+    for (std::uint64_t seed = options.first_seed; seed <= options.last_seed; ++seed) {
+        progress.before(seed);
+        const fs::path kept = folder / ("phantom_" + std::to_string(seed) + ".csv");
+        if (fs::exists(kept)) {
+            progress.read();
+        } else {
+            try {
+                write_coverage(kept, measured_coverage(random_phantom(seed, options.phantom, within), options, within));
+            } catch (const SolverFailure& failure) {
+                observer.note(failure.what());
+                continue;
+            }
+            progress.computed();
+        }
+        const auto here = read_coverage(kept);
+        rows.insert(rows.end(), here.begin(), here.end());
+    }
+    observer.progress("coverage", 1);
+    return rows;
+}
+
+}  // namespace tissuewarp::study

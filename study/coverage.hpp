@@ -1,0 +1,59 @@
+#pragma once
+/// Does the interval of a registration's error estimate hold? Random phantoms are registered, and what the estimate
+/// says of their targets is set against what happened.
+
+#include "core/observer.hpp"
+#include "registration/uncertainty.hpp"
+#include "study/phantom.hpp"
+
+#include <Eigen/Core>
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace tissuewarp::study {
+
+/// What a registration is given of a phantom.
+enum class Evidence { Labels, Surface, SurfaceAndPoints, Points };
+constexpr std::array all_evidence{Evidence::Labels, Evidence::Surface, Evidence::SurfaceAndPoints, Evidence::Points};
+/// "labels", "surface", "surface-and-points", "points".
+const char* name_of(Evidence evidence);
+
+struct CoverageOptions {
+    std::uint64_t first_seed = 1001, last_seed = 1120;
+    std::vector<Evidence> evidence{all_evidence.begin(), all_evidence.end()};
+    PhantomOptions phantom;
+    registration::UpdateOptions update;
+    registration::UncertaintyOptions uncertainty;
+};
+
+/// One target of one registration.
+struct CoverageRow {
+    std::uint64_t seed = 0;
+    Evidence evidence = Evidence::Labels;
+    int target = 0;
+    Eigen::Vector3d error = Eigen::Vector3d::Zero();  ///< where it was put less where it is, moving frame, mm
+    int doubts = 0;                                   ///< of the registration as a whole, which the program names
+    double moved_mm = 0;                              ///< elastic displacement that the registration gave it
+    registration::ErrorEstimate estimate;
+};
+
+/// Registers the phantoms of the seeds to each kind of evidence. Each seed's rows are kept in
+/// `folder`/phantom_<seed>.csv, which appear complete or not at all; seeds whose file is there are read, not computed.
+/// Phantoms and registrations that fail are noted to the observer and have no rows. Throws InvalidInput for options
+/// that make no sense or a file that is not such a table, IoError, Cancelled.
+std::vector<CoverageRow> measured_coverage(const std::filesystem::path& folder, const CoverageOptions& options = {},
+                                           Observer& observer = silent_observer());
+
+/// Rows of one phantom.
+std::vector<CoverageRow> measured_coverage(const Phantom& phantom, const CoverageOptions& options,
+                                           Observer& observer = silent_observer());
+
+/// CSV with a header; lengths mm, errors and covariances in the moving frame.
+void write_coverage(const std::filesystem::path& path, const std::vector<CoverageRow>& rows);
+std::vector<CoverageRow> read_coverage(const std::filesystem::path& path);
+
+}  // namespace tissuewarp::study

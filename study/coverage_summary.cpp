@@ -1,0 +1,107 @@
+#include "study/coverage_summary.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+
+namespace tissuewarp::study {
+
+namespace {
+
+constexpr std::size_t bins = 10;
+constexpr std::size_t level_95 = 2;
+
+using Rows = std::vector<const CoverageRow*>;
+
+bool holds(const CoverageRow& row, double probability) {
+    return row.error.norm() <= registration::interval_mm(row.estimate, probability);
+}
+
+double share_held(const Rows& rows, double probability) {
+    const auto held =
+        std::count_if(rows.begin(), rows.end(), [&](const CoverageRow* row) { return holds(*row, probability); });
+    return double(held) / double(rows.size());
+}
+
+double true_mm(const Rows& rows) {
+    double sum = 0;
+    for (const CoverageRow* row : rows) sum += row->error.squaredNorm();
+    return std::sqrt(sum / double(rows.size()));
+}
+
+double estimated_mm(const Rows& rows) {
+    double sum = 0;
+    for (const CoverageRow* row : rows) sum += row->estimate.deviation_mm * row->estimate.deviation_mm;
+    return std::sqrt(sum / double(rows.size()));
+}
+
+std::vector<ReliabilityBin> binned(Rows rows) {
+    std::sort(rows.begin(), rows.end(), [](const CoverageRow* a, const CoverageRow* b) {
+        return a->estimate.deviation_mm < b->estimate.deviation_mm;
+    });
+    std::vector<ReliabilityBin> result;
+    for (std::size_t bin = 0; bin < bins; ++bin) {
+        const auto at = [&](std::size_t b) { return rows.begin() + std::ptrdiff_t(b * rows.size() / bins); };
+        const Rows part(at(bin), at(bin + 1));
+        if (!part.empty()) result.push_back({int(part.size()), estimated_mm(part), true_mm(part)});
+    }
+    return result;
+}
+
+Coverage summary_of(Evidence evidence, const Rows& rows) {
+    Coverage result;
+    result.evidence = evidence;
+    result.targets = int(rows.size());
+    std::map<std::uint64_t, Rows> by_phantom;
+    for (const CoverageRow* row : rows) by_phantom[row->seed].push_back(row);
+    result.phantoms = int(by_phantom.size());
+    for (std::size_t level = 0; level < nominal_shares.size(); ++level)
+        result.held[level] = share_held(rows, nominal_shares[level]);
+    double variance = 0;
+    for (const auto& [seed, here] : by_phantom) {
+        result.phantom_shares.push_back(share_held(here, nominal_shares[level_95]));
+        const double weight = double(here.size()) / double(rows.size());
+        variance += std::pow(weight * (result.phantom_shares.back() - result.held[level_95]), 2);
+    }
+    result.held_95_error = std::sqrt(variance);
+    std::sort(result.phantom_shares.begin(), result.phantom_shares.end());
+    result.estimated_mm = estimated_mm(rows);
+    result.true_mm = true_mm(rows);
+    result.bins = binned(rows);
+    return result;
+}
+
+}  // namespace
+
+std::vector<Coverage> coverage_of(const std::vector<CoverageRow>& rows) {
+    std::vector<Coverage> result;
+    for (const Evidence evidence : all_evidence) {
+        Rows all, shown;
+        for (const CoverageRow& row : rows) {
+            if (row.evidence != evidence) continue;
+            all.push_back(&row);
+            if (row.estimate.shown) shown.push_back(&row);
+        }
+        if (all.empty()) continue;
+        result.push_back(summary_of(evidence, shown.empty() ? all : shown));
+        result.back().shown_share = double(shown.size()) / double(all.size());
+    }
+    return result;
+}
+
+std::string table_of(const std::vector<Coverage>& coverage) {
+    std::string table =
+        "evidence            phantoms  targets  shown, %   within 50 %   80 %   95 %        99 %   true rms  "
+        "estimated, mm\n";
+    for (const Coverage& c : coverage) {
+        char line[200];
+        std::snprintf(line, sizeof line, "%-20s %7d %8d %9.0f %12.1f %6.1f %6.1f ±%4.1f %6.1f %9.2f %9.2f\n",
+                      name_of(c.evidence), c.phantoms, c.targets, 100 * c.shown_share, 100 * c.held[0], 100 * c.held[1],
+                      100 * c.held[2], 100 * c.held_95_error, 100 * c.held[3], c.true_mm, c.estimated_mm);
+        table += line;
+    }
+    return table;
+}
+
+}  // namespace tissuewarp::study

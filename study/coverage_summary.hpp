@@ -1,0 +1,43 @@
+#pragma once
+/// What rows of coverage say: how often intervals hold, and whether a deviation of 1 mm means errors of 1 mm.
+
+#include "study/coverage.hpp"
+
+#include <array>
+#include <string>
+#include <vector>
+
+namespace tissuewarp::study {
+
+constexpr std::array<double, 4> nominal_shares{0.5, 0.8, 0.95, 0.99};
+
+/// Targets whose estimated deviation lies in a range.
+struct ReliabilityBin {
+    int targets = 0;
+    double estimated_mm = 0, true_mm = 0;  ///< roots of mean squares
+};
+
+/// Of one kind of evidence: of the targets that the data show, or of all where they show none.
+struct Coverage {
+    Evidence evidence = Evidence::Labels;
+    int phantoms = 0, targets = 0;
+    double shown_share = 1;                            ///< of all targets
+    std::array<double, nominal_shares.size()> held{};  ///< share of targets within the interval of each probability
+    /// Standard error of the share at 95 %, from how it varies among phantoms: targets of one phantom are not
+    /// independent.
+    double held_95_error = 0;
+    double estimated_mm = 0, true_mm = 0;  ///< roots of mean squares
+    std::vector<double> phantom_shares;    ///< at 95 %, of each phantom, ascending
+    std::vector<ReliabilityBin> bins;      ///< a tenth of the targets each, by falling trust
+};
+
+/// By kind of evidence; kinds without rows are left out.
+std::vector<Coverage> coverage_of(const std::vector<CoverageRow>& rows);
+
+/// A table for a terminal.
+std::string table_of(const std::vector<Coverage>& coverage);
+
+/// Estimated against true deviations, and shares of intervals that hold, as SVG.
+std::string coverage_figure(const std::vector<Coverage>& coverage);
+
+}  // namespace tissuewarp::study

@@ -1,0 +1,127 @@
+/// Coverage: what rows say, kept tables, and one phantom from end to end.
+#include "study/coverage.hpp"
+
+#include "core/errors.hpp"
+#include "study/coverage_summary.hpp"
+#include "study/detail/random.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <utility>
+
+namespace tissuewarp::study {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Errors drawn from the very distribution that the estimate states, times a factor: a covariance whose scale is known
+/// from six numbers, so that errors over it are of Student's kind.
+std::vector<CoverageRow> drawn_rows(double factor) {
+    detail::Random random(1);
+    std::vector<CoverageRow> rows;
+    constexpr double freedom = 6;
+    for (std::uint64_t seed = 1; seed <= 4000; ++seed) {
+        double chi_square = 0;
+        for (int k = 0; k < freedom; ++k) chi_square += std::pow(random.normal(), 2);
+        const double scale = std::sqrt((freedom - 2) / chi_square);
+        CoverageRow row;
+        row.seed = seed;
+        row.estimate.covariance = Eigen::Vector3d(1, 0.5, 0.2).asDiagonal();
+        row.estimate.deviation_mm = std::sqrt(row.estimate.covariance.trace());
+        row.error = factor * scale * row.estimate.covariance.diagonal().cwiseSqrt().cwiseProduct(random.normal3());
+        rows.push_back(row);
+    }
+    return rows;
+}
+
+TEST(Coverage, IntervalsHoldErrorsOfTheStatedDistribution) {
+    const auto coverage = coverage_of(drawn_rows(1));
+    ASSERT_EQ(coverage.size(), 1u);
+    EXPECT_EQ(coverage[0].targets, 4000);
+    EXPECT_NEAR(coverage[0].held[0], 0.50, 0.03);
+    EXPECT_NEAR(coverage[0].held[1], 0.80, 0.025);
+    EXPECT_NEAR(coverage[0].held[2], 0.95, 0.015);
+    EXPECT_NEAR(coverage[0].held[3], 0.99, 0.01);
+    EXPECT_NEAR(coverage[0].true_mm / coverage[0].estimated_mm, 1, 0.1);
+}
+
+TEST(Coverage, ErrorsHalfAsLargeAgainAreSeen) {
+    const auto coverage = coverage_of(drawn_rows(1.5));
+    EXPECT_LT(coverage[0].held[2], 0.90);
+    EXPECT_GT(coverage[0].true_mm / coverage[0].estimated_mm, 1.3);
+}
+
+TEST(Coverage, TargetsThatTheDataDoNotShowAreNotCounted) {
+    auto rows = drawn_rows(1);
+    for (std::size_t k = 0; k < rows.size(); k += 4) {
+        rows[k].estimate.shown = false;
+        rows[k].error *= 100;
+    }
+    const auto coverage = coverage_of(rows);
+    EXPECT_EQ(coverage[0].targets, 3000);
+    EXPECT_DOUBLE_EQ(coverage[0].shown_share, 0.75);
+    EXPECT_NEAR(coverage[0].held[2], 0.95, 0.015);
+}
+
+TEST(Coverage, TablesAreKeptAndBrokenOnesRefused) {
+    const fs::path folder = fs::path(TISSUEWARP_BINARY_DIR) / "coverage_test";
+    fs::remove_all(folder);
+    fs::create_directories(folder);
+    auto rows = drawn_rows(1);
+    rows.resize(3);
+    rows[1].evidence = Evidence::SurfaceAndPoints;
+    rows[2].estimate.shown = false;
+    write_coverage(folder / "phantom_1.csv", rows);
+    const auto again = read_coverage(folder / "phantom_1.csv");
+    ASSERT_EQ(again.size(), 3u);
+    EXPECT_EQ(again[1].evidence, Evidence::SurfaceAndPoints);
+    EXPECT_FALSE(again[2].estimate.shown);
+    EXPECT_NEAR((again[0].error - rows[0].error).norm(), 0, 1e-4);
+    EXPECT_LT((again[0].estimate.covariance - rows[0].estimate.covariance).norm(), 1e-5);
+
+    std::ofstream(folder / "phantom_2.csv") << "seed,nonsense\n1,2\n";
+    EXPECT_THROW(static_cast<void>(read_coverage(folder / "phantom_2.csv")), InvalidInput);
+    std::ofstream(folder / "phantom_1.csv", std::ios::app) << "7,labels,1,0,1.0\n";
+    EXPECT_THROW(static_cast<void>(read_coverage(folder / "phantom_1.csv")), InvalidInput);
+    CoverageOptions backwards;
+    std::swap(backwards.first_seed, backwards.last_seed);
+    EXPECT_THROW(static_cast<void>(measured_coverage(folder, backwards)), InvalidInput);
+}
+
+TEST(Coverage, FigureNamesWhatItShows) {
+    const std::string svg = coverage_figure(coverage_of(drawn_rows(1)));
+    EXPECT_NE(svg.find("<svg"), std::string::npos);
+    EXPECT_NE(svg.find("labels (4000 phantoms)"), std::string::npos);
+    EXPECT_EQ(svg.find("nan"), std::string::npos);
+}
+
+// One phantom from end to end, twice: the second time read, not computed.
+TEST(Coverage, APhantomIsMeasuredOnceAndKept) {
+    const fs::path folder = fs::path(TISSUEWARP_BINARY_DIR) / "coverage_kept";
+    fs::remove_all(folder);
+    CoverageOptions options;
+    options.first_seed = options.last_seed = 5;
+    options.evidence = {Evidence::SurfaceAndPoints, Evidence::Points, Evidence::Surface};
+    options.phantom.targets = 60;
+    options.update.device = registration::Device::Cpu;
+    const auto rows = measured_coverage(folder, options);
+    ASSERT_GT(rows.size(), 160u);
+    for (const CoverageRow& row : rows) {
+        EXPECT_TRUE(row.error.allFinite());
+        EXPECT_GT(row.estimate.deviation_mm, 0.05);
+        EXPECT_LT(row.estimate.deviation_mm, 20);
+        EXPECT_NEAR(row.estimate.interval_mm, registration::interval_mm(row.estimate, 0.95),
+                    1e-3 * row.estimate.interval_mm);
+        EXPECT_TRUE(row.evidence != Evidence::Surface || !row.estimate.shown);
+    }
+    const auto kept = fs::last_write_time(folder / "phantom_5.csv");
+    EXPECT_EQ(measured_coverage(folder, options).size(), rows.size());
+    EXPECT_EQ(fs::last_write_time(folder / "phantom_5.csv"), kept);
+}
+
+}  // namespace
+}  // namespace tissuewarp::study
