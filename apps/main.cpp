@@ -27,6 +27,7 @@ struct RunVerb {
     void operator()(const apps::BenchOptions& options) const { apps::run_bench(options); }
     void operator()(const apps::SimulateOptions& options) const { apps::run_simulate(options); }
     void operator()(const apps::ExplainOptions& options) const { apps::run_explain(options); }
+    void operator()(const apps::CalibrateOptions& options) const { apps::run_calibrate(options); }
     void operator()(const apps::StudyOptions& options) const { apps::run_study(options); }
 };
 

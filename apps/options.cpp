@@ -9,6 +9,7 @@
 #include <CLI/CLI.hpp>
 
 #include <charconv>
+#include <cmath>
 #include <deque>
 
 namespace tissuewarp::apps {
@@ -128,6 +129,21 @@ std::map<int, double> label_lengths(const std::vector<std::string>& entries) {
     return lengths;
 }
 
+/// "0.5mm", "0.5 mm" or "0.5", in the first of the units; nothing where there is no text.
+std::optional<double> quantity(const std::string& option, const std::string& text,
+                               const std::vector<std::pair<std::string, double>>& units) {
+    if (text.empty()) return std::nullopt;
+    double value = 0;
+    const char* end = text.data() + text.size();
+    const auto [stop, error] = std::from_chars(text.data(), end, value);
+    std::string unit(stop, end);
+    unit.erase(0, unit.find_first_not_of(' '));
+    if (unit.empty()) unit = units.front().first;
+    for (const auto& [name, factor] : units)
+        if (error == std::errc() && name == unit && value > 0 && std::isfinite(value)) return value * factor;
+    throw InvalidInput(option + " '" + text + "' is no quantity above 0; write for instance 2" + units.front().first);
+}
+
 std::vector<int> label_list(const std::string& option, const std::vector<std::string>& entries) {
     std::vector<int> labels;
     for (const std::string& entry : entries) {
@@ -154,8 +170,10 @@ struct Parser {
     BenchOptions bench;
     SimulateOptions simulate;
     ExplainOptions explain;
+    CalibrateOptions calibrate;
     StudyOptions study;
     std::filesystem::path config;
+    std::string accuracy, time_budget;
     std::vector<std::string> register_lengths, mesh_lengths, info_files, anchors, rigid_neighbours;
     std::deque<Verb> verbs;
 
@@ -170,6 +188,8 @@ struct Parser {
         declare_bench(verbs.emplace_back(app, "bench", "Time the solver's engines on this machine"));
         declare_simulate(verbs.emplace_back(app, "simulate", "Simulate what a scene file names"));
         declare_explain(verbs.emplace_back(app, "explain", "Print what a scene will run and what a step costs"));
+        declare_calibrate(
+            verbs.emplace_back(app, "calibrate", "Measure on phantoms what --accuracy and --time-budget choose by"));
         declare_study(verbs.emplace_back(app, "study", "Measure what accuracy costs in time on this machine"));
     }
 
@@ -208,6 +228,10 @@ struct Parser {
         verb.landmarks(o.landmarks);
         verb.path("--points", o.points, "Moving points to carry along: CSV x,y,z (mm, LPS)");
         verb.path("--surface", o.surface, "Moving surface to carry along: .ply, .stl, .obj, .vtk (mm, LPS)");
+        verb.text("--accuracy", accuracy,
+                  "Choose the mesh for this error of targets (mm, root mean square), for instance 0.5mm");
+        verb.text("--time-budget", time_budget,
+                  "Choose mesh and rounds for this time, preparation and writing apart, for instance 2s");
         verb.number("--edge-length", o.edge_length, "MM", 0.0, 100.0,
                     "Target edge of the tetrahedra (mm); 0: about 50 000 of them with fixed labels, 15 000 without");
         verb.list("--label-edge-length", register_lengths, "LABEL=MM", "Target edge in one label (mm); repeatable");
@@ -236,6 +260,7 @@ struct Parser {
             ->delimiter(',');
         verb.flag("--match-image", o.match_image, "Match blocks of the images besides the other data");
         verb.flag("--no-align", o.no_align, "Skip the rigid alignment: the images share one frame");
+        verb.flag("--no-error-estimate", o.no_error_estimate, "Leave out how far off targets may lie, for speed");
         verb.flag("--resample-labels", o.resample_labels, "Accept labels on another grid than their image");
         verb.text("--device", o.device.name, "auto, cpu, gpu or gpu:<index>")
             ->check(CLI::Validator(check_device, "", "device"));
@@ -383,6 +408,15 @@ struct Parser {
         verb.common(o.common);
     }
 
+    void declare_calibrate(Verb& verb) {
+        CalibrateOptions& o = calibrate;
+        verb.path("-o,--output", o.output, "File to write; default: where register looks for it");
+        verb.text("--device", o.device.name, "auto, cpu, gpu or gpu:<index>")
+            ->check(CLI::Validator(check_device, "", "device"));
+        verb.flag("--quick", o.quick, "Two phantoms, two meshes: whether everything runs");
+        verb.common(o.common);
+    }
+
     void declare_study(Verb& verb) {
         StudyOptions& o = study;
         verb.app().footer("Example:\n  tissuewarp study accuracy-time --quick --output out/study");
@@ -405,6 +439,8 @@ struct Parser {
         const std::string verb = app.get_subcommands().front()->get_name();
         if (verb == "register") {
             registration.label_edge_length = label_lengths(register_lengths);
+            registration.accuracy = quantity("--accuracy", accuracy, {{"mm", 1.0}});
+            registration.time_budget = quantity("--time-budget", time_budget, {{"s", 1.0}, {"ms", 1e-3}});
             registration.anchors = label_list("--anchor", anchors);
             registration.rigid_neighbours = label_list("--rigid-neighbour", rigid_neighbours);
             if (registration.fixed_labels.empty() && registration.fixed_surface.empty() &&
@@ -428,6 +464,7 @@ struct Parser {
         if (verb == "bench") return bench;
         if (verb == "simulate") return simulate;
         if (verb == "explain") return explain;
+        if (verb == "calibrate") return calibrate;
         if (verb == "study") return study;
         info.files.assign(info_files.begin(), info_files.end());
         return info;
@@ -458,7 +495,7 @@ struct Parser {
     }
 
     static std::vector<std::string> verb_names() {
-        return {"register", "mesh", "warp", "evaluate", "info", "bench", "simulate", "explain", "study"};
+        return {"register", "mesh", "warp", "evaluate", "info", "bench", "simulate", "explain", "calibrate", "study"};
     }
 };
 
@@ -495,8 +532,10 @@ Command parse_command_line(std::vector<std::string> arguments) {
     } catch (const CLI::ParseError& error) {
         const bool no_verb = parser.app.get_subcommands().empty();
         throw InvalidInput(
-            no_verb ? "give a verb: register, mesh, warp, evaluate, info, bench, simulate, explain or study; see --help"
-                    : std::string(error.what()) + "; see --help");
+            no_verb
+                ? "give a verb: register, mesh, warp, evaluate, info, bench, simulate, explain, calibrate or study; "
+                  "see --help"
+                : std::string(error.what()) + "; see --help");
     }
     return parser.result();
 }

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -48,9 +49,10 @@ struct RegisterOptions {
     PointPairFiles point_pairs;
     CurveFiles curves;
     LandmarkFiles landmarks;
-    std::filesystem::path points, surface;    ///< of the moving frame, carried along
-    double edge_length = 0.0;                 ///< mm; 0: from the volume of the organ and what is given
-    std::map<int, double> label_edge_length;  ///< mm
+    std::filesystem::path points, surface;        ///< of the moving frame, carried along
+    std::optional<double> accuracy, time_budget;  ///< mm; s: they choose the mesh
+    double edge_length = 0.0;                     ///< mm; 0: from the volume of the organ and what is given
+    std::map<int, double> label_edge_length;      ///< mm
     std::filesystem::path materials;
     double default_youngs_modulus = 3.0;  ///< kPa
     double default_poissons_ratio = 0.45;
@@ -64,6 +66,7 @@ struct RegisterOptions {
     bool match_image = false;                    ///< implied where the fixed image is all there is
     bool no_align = false;
     bool resample_labels = false;
+    bool no_error_estimate = false;
     bool dry_run = false;
     DeviceChoice device;
     std::filesystem::path save_parameters;
@@ -133,6 +136,13 @@ struct ExplainOptions {
     std::filesystem::path scene;
 };
 
+struct CalibrateOptions {
+    CommonOptions common;
+    std::filesystem::path output;  ///< empty: where register looks
+    bool quick = false;
+    DeviceChoice device;
+};
+
 struct StudyOptions {
     CommonOptions common;
     std::string name;                    ///< of the study
@@ -145,7 +155,7 @@ struct StudyOptions {
 };
 
 using Command = std::variant<RegisterOptions, MeshOptions, WarpOptions, EvaluateOptions, InfoOptions, BenchOptions,
-                             SimulateOptions, ExplainOptions, StudyOptions>;
+                             SimulateOptions, ExplainOptions, CalibrateOptions, StudyOptions>;
 
 /// The text that --help or --version asked for; not an error.
 struct HelpRequest {

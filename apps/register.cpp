@@ -1,10 +1,12 @@
 // tissuewarp register: read → prepare → update → fields → warp → score and write.
 
+#include "apps/dial.hpp"
 #include "apps/output_folder.hpp"
 #include "apps/progress.hpp"
 #include "apps/register_outputs.hpp"
 #include "apps/report_json.hpp"
 #include "apps/silenced_stderr.hpp"
+#include "apps/update_device.hpp"
 #include "apps/verbs.hpp"
 #include "apps/versions.hpp"
 #include "imaging/filters.hpp"
@@ -15,8 +17,6 @@
 
 #include <fmt/format.h>
 #include <tbb/task_group.h>
-
-#include <charconv>
 
 namespace tissuewarp::apps {
 
@@ -30,9 +30,11 @@ double edge_length(const RegisterOptions& options, const RegistrationInputs& inp
     return inputs.fixed_labels.empty() ? suggested_edge_length_without_labels(organ) : suggested_edge_length(organ);
 }
 
-PrepareOptions prepare_options(const RegisterOptions& options, const RegistrationInputs& inputs) {
+PrepareOptions prepare_options(const RegistrationRun& run) {
+    const RegisterOptions& options = run.options;
+    const RegistrationInputs& inputs = run.inputs;
     PrepareOptions result;
-    result.meshing.edge_length = edge_length(options, inputs);
+    result.meshing.edge_length = run.dial ? run.dial->edge_length_mm : edge_length(options, inputs);
     result.meshing.label_edge_length = options.label_edge_length;
     for (const auto& [label, tissue] : inputs.materials) result.materials[label] = material_of(tissue);
     result.default_material = tled::neo_hookean_lnj(options.default_youngs_modulus, options.default_poissons_ratio);
@@ -44,15 +46,13 @@ PrepareOptions prepare_options(const RegisterOptions& options, const Registratio
     return result;
 }
 
-UpdateOptions update_options(const RegisterOptions& options) {
-    UpdateOptions result;
+UpdateOptions update_options(const RegistrationRun& run) {
+    const RegisterOptions& options = run.options;
+    UpdateOptions result = on_device(options.device);
     result.align = !options.no_align;
     result.rematches = options.rounds;
     result.equilibrium.tolerance_mm = options.tolerance;
-    const std::string& device = options.device.name;
-    if (device == "cpu") result.device = Device::Cpu;
-    if (device.starts_with("gpu")) result.device = Device::Gpu;
-    if (device.starts_with("gpu:")) std::from_chars(device.data() + 4, device.data() + device.size(), result.gpu_index);
+    if (run.dial) result.time_budget_s = run.dial->update_budget_s;
     return result;
 }
 
@@ -102,7 +102,7 @@ void append(std::vector<StageTime>& times, const std::vector<StageTime>& more) {
 
 void register_model(RegistrationRun& run, const FitOptions& to_fit, ProgressLine& progress) {
     FittedUpdate fitted =
-        update_and_fit(*run.prepared, seen(run.inputs, run.options), update_options(run.options), to_fit, progress);
+        update_and_fit(*run.prepared, seen(run.inputs, run.options), update_options(run), to_fit, progress);
     run.result = std::move(fitted.result);
     run.fit = std::move(fitted.fit);
     append(run.times, run.result.times);
@@ -135,6 +135,15 @@ void warp_everything(RegistrationRun& run) {
     }
 }
 
+/// How far off the result may be, and what that says against it.
+void estimate_errors(RegistrationRun& run, ProgressLine& progress) {
+    progress.begin("error estimate", 0.57, 0.65);
+    Products& products = run.products;
+    products.uncertainty = uncertainty(*run.prepared, run.result, {}, progress);
+    products.uncertainty_volumes =
+        uncertainty_on_grid(*products.uncertainty, run.result.deformation, products.fixed_to_moving.geometry);
+}
+
 Scores score(const RegistrationRun& run) {
     Scores scores;
     const auto without_neighbours = [&](const imaging::Volume& labels) {
@@ -160,7 +169,7 @@ void run_register(const RegisterOptions& options) {
     StageClock clock;
     ProgressLine progress(options.common.quiet);
     const FitOptions to_fit = fit_options(options);
-    RegistrationRun run{options, utc_now(), {}, {}, {}, {}, {}, {}, {}, {}};
+    RegistrationRun run(options, utc_now());
 
     if (options.dry_run) require_could_write(options.output);
     if (!options.save_parameters.empty()) require_could_write_file(options.save_parameters);
@@ -176,13 +185,17 @@ void run_register(const RegisterOptions& options) {
         return print_plan(run.inputs, options);
     }
 
+    if (options.accuracy || options.time_budget) {
+        run.dial = dial_choice(run.inputs, options);
+        progress.note(run.dial->reason);
+    }
     progress.begin("preparing the model", 0.02, 0.20);
-    run.prepared = std::make_unique<PreparedModel>(
-        prepare(run.inputs.moving_labels, prepare_options(options, run.inputs), progress));
+    run.prepared = std::make_unique<PreparedModel>(prepare(run.inputs.moving_labels, prepare_options(run), progress));
     if (options.match_image) prepare_image(*run.prepared, run.inputs.moving, {}, progress);
     append(run.times, run.prepared->times);
 
     progress.begin("registering", 0.20, 0.47);
+    const double ready = clock.total();
     register_model(run, to_fit, progress);
     clock.lap("");
 
@@ -190,8 +203,14 @@ void run_register(const RegisterOptions& options) {
     run.times.push_back(clock.lap("fields"));
     warp_everything(run);
     run.times.push_back(clock.lap("warp"));
+    run.intraoperative_seconds = clock.total() - ready;
+    if (!options.no_error_estimate) {
+        estimate_errors(run, progress);
+        run.times.push_back(clock.lap("error estimate"));
+    }
+    if (run.dial) doubt_dial(run);
 
-    progress.begin("writing and scoring", 0.57, 0.88);
+    progress.begin("writing and scoring", 0.65, 0.88);
     auto silenced = std::make_unique<SilencedStandardError>();
     tbb::task_group writing;  // compression takes one core per file; the scores run beside it
     start_writing(run, *output, writing, progress);

@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <limits>
 #include <memory>
 
 namespace tissuewarp::apps {
@@ -38,6 +39,26 @@ void write_mesh(const Deformation& deformation, const std::filesystem::path& pat
     meshing::write_vtu(deformation.mesh, path, {elastic, total}, {jacobian});
 }
 
+/// What is estimated of places of the moving frame; NaN outside the tissue, where nothing is said.
+void append_estimates(std::vector<Column>& columns, const RegistrationRun& run, const Eigen::Matrix3Xd& places) {
+    if (!run.products.uncertainty) return;
+    const auto estimates = run.products.uncertainty->at(places);
+    const auto column = [&](const char* name, auto value) {
+        Eigen::VectorXd values(places.cols());
+        for (Eigen::Index p = 0; p < values.size(); ++p) {
+            const auto& estimate = estimates[static_cast<std::size_t>(p)];
+            values[p] = estimate ? double(value(*estimate)) : std::numeric_limits<double>::quiet_NaN();
+        }
+        columns.push_back({name, values});
+    };
+    column("algebraic_mm", [](const auto& e) { return e.algebraic_mm; });
+    column("discretisation_mm", [](const auto& e) { return e.discretisation_mm; });
+    column("data_mm", [](const auto& e) { return e.data_mm; });
+    column("deviation_mm", [](const auto& e) { return e.deviation_mm; });
+    column("interval_95_mm", [](const auto& e) { return e.interval_mm; });
+    column("trusted", [](const auto& e) { return e.shown; });
+}
+
 void write_landmarks(const RegistrationRun& run, const std::filesystem::path& path) {
     const registration::Landmarks& landmarks = *run.inputs.landmarks;
     std::vector<Column> columns;
@@ -46,12 +67,14 @@ void write_landmarks(const RegistrationRun& run, const std::filesystem::path& pa
     append_points(columns, "intra_", landmarks.fixed);
     columns.push_back({"before_mm", (landmarks.moving - landmarks.fixed).colwise().norm()});
     columns.push_back({"after_mm", (run.products.landmarks - landmarks.fixed).colwise().norm()});
+    append_estimates(columns, run, landmarks.moving);
     write_columns(columns, path);
 }
 
-void write_points(const Eigen::Matrix3Xd& points, const std::filesystem::path& path) {
+void write_points(const RegistrationRun& run, const std::filesystem::path& path) {
     std::vector<Column> columns;
-    append_points(columns, "", points);
+    append_points(columns, "", run.products.points);
+    append_estimates(columns, run, *run.inputs.points);
     write_columns(columns, path);
 }
 
@@ -76,6 +99,17 @@ std::string summary_row(const std::string& name, const registration::Summary& s)
                        s.percentile_95, s.maximum);
 }
 
+std::string estimate_text(const registration::UncertaintySummary& s) {
+    std::string text = fmt::format(
+        "estimated error (1 σ): {:.2f} mm over the tissue, of the mesh {:.2f}, the solver {:.3f}, the data {:.2f}; "
+        "95 % within {:.2f} mm, where least is known within {:.2f} mm\n",
+        s.deviation_mm, s.discretisation_mm, s.algebraic_mm, s.data_mm, s.interval_mm, s.worst_interval_mm);
+    if (s.unseen_share > 0)
+        text += fmt::format("not to be trusted: {:.0f} % of the tissue, of which the data say next to nothing\n",
+                            100 * s.unseen_share);
+    return text;
+}
+
 std::string fit_table(const registration::ParameterFit& fit) {
     if (fit.parameters.empty()) return "";
     std::string text = "fitted parameters         given  fitted     +/-\n";
@@ -96,6 +130,8 @@ std::vector<std::string> output_names(const RegisterOptions& options) {
     for (const char* name : {"warped_labels.nii.gz", "displacement_moving_to_fixed.nii.gz",
                              "displacement_fixed_to_moving.nii.gz", "mesh.vtu", "record.h5"})
         names.emplace_back(name);
+    if (!options.no_error_estimate)
+        for (const char* name : {"uncertainty.nii.gz", "uncertainty_trust.nii.gz"}) names.emplace_back(name);
     if (options.landmarks.given()) names.push_back("warped_landmarks.csv");
     if (!options.points.empty()) names.push_back("warped_points.csv");
     if (!options.surface.empty()) names.push_back(surface_name(options));
@@ -120,13 +156,17 @@ void start_writing(const RegistrationRun& run, const OutputFolder& output, tbb::
     const Products& products = run.products;
     start("displacement_moving_to_fixed.nii.gz", [&](auto& path) { write_volume(products.moving_to_fixed, path); });
     start("displacement_fixed_to_moving.nii.gz", [&](auto& path) { write_volume(products.fixed_to_moving, path); });
+    if (products.uncertainty) {
+        start("uncertainty.nii.gz", [&](auto& path) { write_volume(products.uncertainty_volumes.deviation, path); });
+        start("uncertainty_trust.nii.gz", [&](auto& path) { write_volume(products.uncertainty_volumes.trust, path); });
+    }
     if (!products.warped.empty()) start("warped.nii.gz", [&](auto& path) { write_volume(products.warped, path); });
     start("warped_labels.nii.gz", [&](auto& path) { write_volume(compact(products.warped_labels), path); });
     start("mesh.vtu", [&](auto& path) { write_mesh(run.result.deformation, path); });
     start("record.h5",
           [&](auto& path) { registration::write_record(*run.prepared, run.result, record_info(run), path); });
     if (run.inputs.landmarks) start("warped_landmarks.csv", [&](auto& path) { write_landmarks(run, path); });
-    if (run.inputs.points) start("warped_points.csv", [&](auto& path) { write_points(products.points, path); });
+    if (run.inputs.points) start("warped_points.csv", [&](auto& path) { write_points(run, path); });
     if (products.surface)
         start(surface_name(run.options), [&](auto& path) { meshing::write_surface(*products.surface, path); });
 }
@@ -168,6 +208,9 @@ std::string summary_text(const RegistrationRun& run, double total_seconds) {
                             fit->deepest_mm);
     if (const auto& fit = run.result.anchors)
         text += fmt::format("anchors: {} nodes, moved by at most {:.2f} mm\n", fit->nodes, fit->largest_mm);
+    text += fmt::format("from data at hand to warped image: {:.2f} s\n", run.intraoperative_seconds);
+    if (run.dial) text += "chosen: " + run.dial->reason + "\n";
+    if (const auto& error = run.products.uncertainty) text += estimate_text(registration::summarise(*error));
     if (const auto& expected = run.result.expected)
         text += fmt::format("expected error of tissue: {:.1f} mm, at most {:.1f} mm\n", expected->mean_mm,
                             expected->worst_mm);

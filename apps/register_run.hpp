@@ -3,7 +3,9 @@
 
 #include "apps/inputs.hpp"
 #include "meshing/quality.hpp"
+#include "registration/dial.hpp"
 #include "registration/parameter_fit.hpp"
+#include "registration/uncertainty.hpp"
 
 #include <chrono>
 #include <memory>
@@ -16,6 +18,8 @@ struct Products {
     imaging::Volume moving_to_fixed, fixed_to_moving;  ///< displacement fields, mm, LPS
     imaging::Volume warped, warped_labels;             ///< on the output grid; warped is empty without --moving
     Eigen::Matrix3Xd landmarks, points;                ///< where moving landmarks and points went, mm, LPS
+    std::optional<registration::Uncertainty> uncertainty;
+    registration::UncertaintyVolumes uncertainty_volumes;  ///< on the output grid
     std::optional<meshing::SurfaceMesh> surface;
 };
 
@@ -27,12 +31,17 @@ struct Scores {
 };
 
 struct RegistrationRun {
+    /// `at` is the time of the start, UTC.
+    RegistrationRun(const RegisterOptions& given, std::string at) : options(given), started(std::move(at)) {}
+
     const RegisterOptions& options;
     std::string started;  ///< UTC
     RegistrationInputs inputs;
     std::unique_ptr<registration::PreparedModel> prepared;
     registration::UpdateResult result;
-    registration::ParameterFit fit;  ///< without parameters where none was asked for
+    std::optional<registration::DialChoice> dial;  ///< where an accuracy or a time was asked for
+    double intraoperative_seconds = 0;             ///< from data and model at hand to the warped image
+    registration::ParameterFit fit;                ///< without parameters where none was asked for
     Products products;
     Scores scores;
     std::vector<registration::StageTime> times;

@@ -168,6 +168,30 @@ void add_fits(json& report, const registration::UpdateResult& result) {
                                     {"worst_place_mm", vector(expected->worst_place)}};
 }
 
+json to_json(const registration::UncertaintySummary& s) {
+    return {{"algebraic_mm", number(s.algebraic_mm)},
+            {"discretisation_mm", number(s.discretisation_mm)},
+            {"data_mm", number(s.data_mm)},
+            {"deviation_mm", number(s.deviation_mm)},
+            {"interval_95_mm", number(s.interval_mm)},
+            {"worst_interval_95_mm", number(s.worst_interval_mm)},
+            {"worst_place_mm", vector(s.worst_place)},
+            {"unseen_share", number(s.unseen_share)}};
+}
+
+/// What was asked for, chosen and expected.
+json dial(const RegistrationRun& run) {
+    const registration::DialChoice& choice = *run.dial;
+    json object{{"edge_length_mm", choice.edge_length_mm},
+                {"expected_seconds", choice.seconds},
+                {"expected_error_mm", choice.error_mm},
+                {"expected_error_95_mm", choice.error_95_mm},
+                {"reason", choice.reason}};
+    if (run.options.accuracy) object["accuracy_mm"] = *run.options.accuracy;
+    if (run.options.time_budget) object["time_budget_s"] = *run.options.time_budget;
+    return object;
+}
+
 json fitted(const registration::ParameterFit& fit) {
     json list = json::array();
     for (const registration::FittedParameter& each : fit.parameters)
@@ -294,6 +318,10 @@ json report_json(const RegistrationRun& run, double total_seconds) {
     if (!scores.after.empty())
         report["overlap"] = {{"before", to_json(scores.before)}, {"after", to_json(scores.after)}};
     add_fits(report, run.result);
+    if (run.products.uncertainty)
+        report["error_estimate"] = to_json(registration::summarise(*run.products.uncertainty));
+    report["intraoperative_seconds"] = run.intraoperative_seconds;
+    if (run.dial) report["dial"] = dial(run);
     if (!run.fit.parameters.empty()) report["fit"] = fitted(run.fit);
     if (scores.target_error) report["target_registration_error"] = to_json(*scores.target_error);
     return report;

@@ -11,7 +11,7 @@ namespace tissuewarp::apps {
 
 void run_study(const StudyOptions& options) {
     static const std::map<std::string, void (*)(const StudyOptions&)> studies{
-        {"accuracy-time", run_accuracy_time_study}};
+        {"accuracy-time", run_accuracy_time_study}, {"dial", run_dial_study}};
     const auto study = studies.find(options.name);
     if (study == studies.end()) {
         std::string names;

@@ -9,4 +9,7 @@ namespace tissuewarp::apps {
 /// interrupt left results behind.
 void run_accuracy_time_study(const StudyOptions& options);
 
+/// Whether --time-budget and --accuracy keep what they are asked for, on 50 random phantoms.
+void run_dial_study(const StudyOptions& options);
+
 }  // namespace tissuewarp::apps

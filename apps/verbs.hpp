@@ -12,6 +12,7 @@ void run_evaluate(const EvaluateOptions& options);
 void run_info(const InfoOptions& options);
 void run_bench(const BenchOptions& options);
 void run_simulate(const SimulateOptions& options);
+void run_calibrate(const CalibrateOptions& options);
 void run_explain(const ExplainOptions& options);
 void run_study(const StudyOptions& options);
 

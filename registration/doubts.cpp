@@ -108,6 +108,10 @@ std::vector<std::string> doubts(const PreparedModel& prepared, const Intraoperat
     if (last.held_back > last.matched / 50)
         reasons.push_back(std::to_string(last.held_back) + " of " + std::to_string(last.matched) +
                           " matches are still far from where they belong; allow more rounds");
+    if (result.cut_short)
+        reasons.push_back("the time budget ended the registration after " + std::to_string(result.rounds.size()) +
+                          " rounds, the last of which still moved tissue by " + to_text(last.largest_change_mm) +
+                          " mm; allow more time, or a coarser mesh");
     if (result.min_jacobian < 0.1)
         reasons.push_back("tissue is compressed to " + to_text(result.min_jacobian) + " of its volume in one element");
     if (result.image) doubt_image(*result.image, reasons);

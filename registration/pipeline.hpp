@@ -26,8 +26,11 @@ struct StageTime {
     double seconds = 0;
 };
 
-/// Edge length (mm) that cuts an organ of the map's volume into about 50 000 tetrahedra: a cube root of the volume
-/// over 18. Boundaries of a label map pull at every node of the surface, which should lie on it.
+/// Edge (mm) of a cube of the labelled voxels' volume.
+double organ_size(const imaging::Volume& labels);
+
+/// Edge length (mm) that cuts an organ of the map's volume into about 50 000 tetrahedra: organ_size over 18. Boundaries
+/// of a label map pull at every node of the surface, which should lie on it.
 double suggested_edge_length(const imaging::Volume& labels);
 
 /// The same into about 15 000, over 12: where an image or points pull, without labels. Finer tetrahedra cost three to
@@ -175,6 +178,9 @@ struct UpdateOptions {
     double max_angle_deg = 50.0;   ///< between mesh normal and image boundary normal
     double residual_scale_mm = 1.0;  ///< Geman–McClure scale of the last round for what the model cannot follow
     double trimmed_share = 0.02;     ///< of the matches, dropped in the last round: those the model did not follow
+    /// Seconds that an update may take. When they run short the last round comes early, and where they do not suffice
+    /// for that either, the rounds end: the result then says so. 0: as long as it takes.
+    double time_budget_s = 0;
     tled::EquilibriumOptions equilibrium;
     Device device = Device::Auto;
     int gpu_index = -1;  ///< EGL device, −1: the first with hardware
@@ -270,6 +276,7 @@ struct UpdateResult {
     std::optional<AnchorFit> anchors;       ///< and anchors
     std::optional<ExpectedError> expected;  ///< where neither labels nor an image show the organ as a whole
     std::vector<StageTime> times;
+    bool cut_short = false;           ///< by the time budget: the last round was not reached
     std::vector<std::string> doubts;  ///< reasons not to trust the result, empty when there are none
 };
 

@@ -33,20 +33,19 @@ void measure_offsets(Interfaces& interfaces, const meshing::TetMesh& mesh, const
             moving.crossing(mesh.nodes.col(node.node), node.normal, node.inner, node.outer, range_mm, max_angle_deg);
 }
 
-/// Edge of a cube of the labels' volume, mm.
-double size_of_organ(const imaging::Volume& labels) {
+}  // namespace
+
+double organ_size(const imaging::Volume& labels) {
     return std::cbrt(cv::countNonZero(imaging::mask_of_all(labels).voxels.reshape(1, 1)) *
                      labels.geometry.voxel_volume());
 }
 
-}  // namespace
-
 double suggested_edge_length(const imaging::Volume& labels) {
-    return size_of_organ(labels) / 18;
+    return organ_size(labels) / 18;
 }
 
 double suggested_edge_length_without_labels(const imaging::Volume& labels) {
-    return size_of_organ(labels) / 12;
+    return organ_size(labels) / 12;
 }
 
 PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions& given, Observer& observer) {

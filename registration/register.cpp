@@ -8,6 +8,7 @@
 #include "registration/detail/evidence_set.hpp"
 #include "registration/detail/expected_error.hpp"
 #include "registration/detail/loads.hpp"
+#include "registration/detail/pace.hpp"
 #include "registration/detail/rigid_part.hpp"
 #include "registration/detail/stopwatch.hpp"
 #include "registration/detail/surroundings.hpp"
@@ -34,10 +35,11 @@ void append(std::vector<tled::Spring>& springs, const std::vector<tled::Spring>&
 class Rematching {
 public:
     Rematching(const PreparedModel& prepared, tled::Engine& engine, detail::EvidenceSet& evidence,
-               const UpdateOptions& options, UpdateResult& result, Observer& observer)
+               const UpdateOptions& options, detail::Pace& pace, UpdateResult& result, Observer& observer)
         : prepared_(prepared),
           evidence_(evidence),
           options_(options),
+          pace_(pace),
           result_(result),
           observer_(observer),
           engine_(engine),
@@ -50,13 +52,22 @@ public:
 
     /// Leaves the elastic displacement in the moving frame, 3 × N mm.
     Eigen::Matrix3Xd run() {
+        const int last = options_.rematches - 1;
         int round = 0;
+        pace_.begin_rounds();
         for (int done = 0; done < 2 * options_.rematches && round < options_.rematches; ++done) {
             search_image(round);
             const Round record = attempt(round);
             result_.rounds.push_back(record);
             if (placement_is_free()) detail::give_rigid_part_to_placement(prepared_, state_);
             observer_.checkpoint("registration", double(round + 1) / options_.rematches);
+            pace_.lap();
+            if (round < last && !pace_.room_for(2)) {
+                result_.cut_short = !pace_.room_for(1);
+                if (result_.cut_short) break;
+                round = last;
+                continue;
+            }
             if (50 * record.held_back > record.matched) continue;  // more than 2 %: the same range once more
             const bool settled =
                 record.largest_change_mm < (searches_left() ? settled_for_search_mm() : options_.settled_mm);
@@ -74,6 +85,7 @@ private:
     const PreparedModel& prepared_;
     detail::EvidenceSet& evidence_;
     const UpdateOptions& options_;
+    detail::Pace& pace_;
     UpdateResult& result_;
     Observer& observer_;
     tled::Engine& engine_;
@@ -242,6 +254,7 @@ UpdateResult Updater::update(const Intraoperative& given, Observer& observer) {
     const auto& [prepared, options, solver, dense] = *impl_;
     const Intraoperative seen = detail::without_neighbours(given, prepared.options.rigid_neighbours);
     detail::require_usable(prepared, seen);
+    detail::Pace pace(options.time_budget_s);
     detail::Stopwatch stopwatch;
     UpdateResult result;
     detail::EvidenceSet evidence(prepared, seen, options, dense.get());
@@ -250,7 +263,8 @@ UpdateResult Updater::update(const Intraoperative& given, Observer& observer) {
     if (seen.labels) evidence.labels.emplace(prepared, *seen.labels, options);
     result.times.push_back(stopwatch.lap("boundary maps"));
 
-    const Eigen::Matrix3Xd displacement = Rematching(prepared, *solver, evidence, options, result, observer).run();
+    const Eigen::Matrix3Xd displacement =
+        Rematching(prepared, *solver, evidence, options, pace, result, observer).run();
     result.deformation = {prepared.model.mesh, displacement, result.alignment.placement};
     result.doubts = detail::doubts(prepared, seen, result);
     return result;

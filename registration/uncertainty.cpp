@@ -119,6 +119,33 @@ std::vector<std::optional<ErrorEstimate>> Uncertainty::at(const Eigen::Matrix3Xd
     return result;
 }
 
+UncertaintySummary summarise(const Uncertainty& uncertainty) {
+    const meshing::TetMesh& mesh = uncertainty.mesh();
+    const Eigen::VectorXd volumes = meshing::tet_volumes(mesh);
+    Eigen::VectorXd share = Eigen::VectorXd::Zero(mesh.nodes.cols());
+    for (Eigen::Index tet = 0; tet < volumes.size(); ++tet)
+        for (const int node : mesh.tets.col(tet)) share[node] += volumes[tet] / 4;
+    share /= share.sum();
+    const std::vector<ErrorEstimate> nodal = uncertainty.at_nodes();
+    UncertaintySummary sum;
+    for (Eigen::Index n = 0; n < share.size(); ++n) {
+        const ErrorEstimate& here = nodal[static_cast<std::size_t>(n)];
+        const auto square = [](double x) { return x * x; };
+        sum.algebraic_mm += share[n] * square(here.algebraic_mm);
+        sum.discretisation_mm += share[n] * square(here.discretisation_mm);
+        sum.data_mm += share[n] * square(here.data_mm);
+        sum.deviation_mm += share[n] * square(here.deviation_mm);
+        sum.interval_mm += share[n] * here.interval_mm;
+        if (!here.shown) sum.unseen_share += share[n];
+        if (here.interval_mm <= sum.worst_interval_mm) continue;
+        sum.worst_interval_mm = here.interval_mm;
+        sum.worst_place = mesh.nodes.col(n);
+    }
+    for (double* squared : {&sum.algebraic_mm, &sum.discretisation_mm, &sum.data_mm, &sum.deviation_mm})
+        *squared = std::sqrt(*squared);
+    return sum;
+}
+
 Uncertainty uncertainty(const PreparedModel& prepared, const UpdateResult& result, const UncertaintyOptions& options,
                         Observer& observer) {
     require_related(prepared, result);

@@ -3,6 +3,7 @@
 /// cannot follow, and what data and tissue leave open.
 
 #include "core/observer.hpp"
+#include "imaging/volume.hpp"
 #include "meshing/point_location.hpp"
 #include "registration/pipeline.hpp"
 
@@ -41,6 +42,8 @@ public:
     [[nodiscard]] std::vector<std::optional<ErrorEstimate>> at(const Eigen::Matrix3Xd& points) const;
     /// Of every node.
     [[nodiscard]] std::vector<ErrorEstimate> at_nodes() const;
+    /// In the moving frame.
+    [[nodiscard]] const meshing::TetMesh& mesh() const { return mesh_; }
 
 private:
     meshing::TetMesh mesh_;
@@ -49,6 +52,33 @@ private:
     Eigen::Matrix<double, 6, Eigen::Dynamic> covariance_;
     Eigen::VectorXd unexplained_;
 };
+
+/// The estimate over the tissue, by volume.
+struct UncertaintySummary {
+    double algebraic_mm = 0, discretisation_mm = 0, data_mm = 0, deviation_mm = 0;  ///< root mean square
+    double interval_mm = 0;                                                         ///< mean
+    double worst_interval_mm = 0;
+    Eigen::Vector3d worst_place = Eigen::Vector3d::Zero();  ///< moving frame, LPS mm
+    double unseen_share = 0;                                ///< of the tissue: not shown
+};
+UncertaintySummary summarise(const Uncertainty& uncertainty);
+
+/// What a voxel of the trust map says.
+enum class Trust : unsigned char {
+    Outside = 0,    ///< no tissue of the model; the field is continued there and nothing is said of it
+    Shown = 1,      ///< the data show this tissue
+    DoNotTrust = 2  ///< they say next to nothing of it
+};
+
+/// The estimate on a grid of the fixed frame.
+struct UncertaintyVolumes {
+    imaging::Volume deviation;  ///< deviation_mm, float32, NaN outside the tissue
+    imaging::Volume trust;      ///< Trust, one byte
+};
+
+/// Throws InvalidInput when the estimate and the deformation have different meshes.
+UncertaintyVolumes uncertainty_on_grid(const Uncertainty& uncertainty, const Deformation& deformation,
+                                       const imaging::Geometry& fixed_grid);
 
 /// Throws InvalidInput when the result does not belong to the model, SolverFailure where the stiffness cannot be
 /// factorised, Cancelled.

@@ -2,6 +2,7 @@
 
 #include "core/atomic_file.hpp"
 #include "core/errors.hpp"
+#include "core/user_cache.hpp"
 #include "shaders/device.hpp"
 #include "tled/detail/step_shapes.hpp"
 
@@ -9,7 +10,6 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <cstdlib>
 #include <fstream>
 #include <limits>
 #include <optional>
@@ -119,16 +119,7 @@ Element element_of(const RestState& rest) {
 }
 
 fs::path step_shape_cache_path() {
-    constexpr const char* file = "gpu_step_shapes.tsv";
-    const auto variable = [](const char* name) {
-        const char* value = std::getenv(name);
-        return fs::path(value == nullptr ? "" : value);
-    };
-    if (const fs::path folder = variable("TISSUEWARP_CACHE"); !folder.empty()) return folder / file;
-    // The XDG Base Directory Specification has relative paths ignored.
-    if (const fs::path caches = variable("XDG_CACHE_HOME"); caches.is_absolute()) return caches / "tissuewarp" / file;
-    if (const fs::path home = variable("HOME"); !home.empty()) return home / ".cache" / "tissuewarp" / file;
-    return {};
+    return user_cache_file("gpu_step_shapes.tsv");
 }
 
 StepShapeCache read_step_shape_cache(const fs::path& path) {

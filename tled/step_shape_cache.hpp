@@ -35,8 +35,7 @@ struct StepShapeCache {
     int skipped = 0;  ///< lines of the file that could not be used
 };
 
-/// gpu_step_shapes.tsv in the folder that the environment variable TISSUEWARP_CACHE names, else in
-/// $XDG_CACHE_HOME/tissuewarp, else in ~/.cache/tissuewarp. Empty where there is none of the three.
+/// gpu_step_shapes.tsv as user_cache_file (core/user_cache.hpp) places it; empty where there is no place.
 std::filesystem::path step_shape_cache_path();
 
 /// Never fails: nothing where there is no file; lines that are damaged or that hold what no measurement gives are

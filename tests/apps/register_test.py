@@ -10,8 +10,8 @@ import numpy
 from phantom import CENTRE_LPS, FIXED_AFFINE, MOVING_AFFINE, SHIFT_LPS, SIZE, Phantom, run
 
 OUTPUTS = ["displacement_fixed_to_moving.nii.gz", "displacement_moving_to_fixed.nii.gz", "mesh.vtu", "preview.png",
-           "record.h5", "report.html", "report.json", "warped.nii.gz", "warped_labels.nii.gz", "warped_landmarks.csv",
-           "warped_points.csv"]
+           "record.h5", "report.html", "report.json", "uncertainty.nii.gz", "uncertainty_trust.nii.gz", "warped.nii.gz",
+           "warped_labels.nii.gz", "warped_landmarks.csv", "warped_points.csv"]
 
 
 def dice(a, b):
@@ -92,6 +92,23 @@ class Register(unittest.TestCase):
         self.assertEqual(error["moved"]["after"]["count"], 1)
         table = numpy.genfromtxt(self.phantom.output / "warped_landmarks.csv", delimiter=",", names=True)
         self.assertAlmostEqual(float(table["after_mm"]), measured, delta=1e-5)
+
+    def test_error_estimate(self):
+        estimate = self.report["error_estimate"]
+        self.assertGreater(estimate["deviation_mm"], 0)
+        self.assertGreaterEqual(estimate["deviation_mm"], max(estimate["data_mm"], estimate["discretisation_mm"]))
+        self.assertGreater(estimate["interval_95_mm"], estimate["deviation_mm"])
+        table = numpy.genfromtxt(self.phantom.output / "warped_landmarks.csv", delimiter=",", names=True)
+        self.assertGreater(float(table["interval_95_mm"]), float(table["deviation_mm"]))
+        deviation = nibabel.load(self.phantom.output / "uncertainty.nii.gz")
+        trust = numpy.asarray(nibabel.load(self.phantom.output / "uncertainty_trust.nii.gz").dataobj)
+        labels = numpy.asarray(nibabel.load(self.phantom.output / "warped_labels.nii.gz").dataobj)
+        values = deviation.get_fdata()
+        numpy.testing.assert_array_equal(numpy.isnan(values), trust == 0)
+        self.assertGreater((trust[labels > 0] > 0).mean(), 0.9)  # but for voxels cut by the surface
+        self.assertLess((trust[labels == 0] > 0).mean(), 0.02)
+        self.assertAlmostEqual(numpy.sqrt(numpy.nanmean(values ** 2)), estimate["deviation_mm"],
+                               delta=0.2 * estimate["deviation_mm"])
 
     def test_report_holds_every_chapter(self):
         for key in ("schema", "schema_version", "program", "version", "versions", "started", "inputs", "parameters",

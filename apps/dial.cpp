@@ -1,0 +1,62 @@
+#include "apps/dial.hpp"
+
+#include "core/errors.hpp"
+#include "imaging/labels.hpp"
+#include "registration/fronts_io.hpp"
+
+#include <fmt/format.h>
+
+namespace tissuewarp::apps {
+
+namespace {
+
+using namespace registration;
+
+void require_compatible(const RegisterOptions& options) {
+    if (options.edge_length > 0)
+        throw InvalidInput("--edge-length beside --accuracy or --time-budget, which choose it; leave one of them out");
+    if (options.time_budget && !options.fit.empty())
+        throw InvalidInput("--fit registers many times; leave out --time-budget");
+    if (options.accuracy && options.no_error_estimate)
+        throw InvalidInput("--accuracy is checked against the error estimate; leave out --no-error-estimate");
+}
+
+double megavoxels(const imaging::Geometry& grid) {
+    return double(grid.voxel_count()) / 1e6;
+}
+
+}  // namespace
+
+DialChoice dial_choice(const RegistrationInputs& inputs, const RegisterOptions& options) {
+    require_compatible(options);
+    if (options.match_image)
+        throw InvalidInput(
+            "no figures for matching the image itself; give --edge-length in place of --accuracy and --time-budget");
+    const imaging::Geometry& output = inputs.fixed_grid() ? *inputs.fixed_grid() : inputs.moving_grid();
+    DialCase what;
+    what.kind = inputs.fixed_labels.empty() ? DataKind::Partial : DataKind::Labels;
+    what.organ_mm = organ_size(imaging::without_labels(inputs.moving_labels, options.rigid_neighbours));
+    what.moving_megavoxels = megavoxels(inputs.moving_grid());
+    what.output_megavoxels = megavoxels(output);
+    if (!inputs.fixed_labels.empty()) what.fixed_label_megavoxels = megavoxels(inputs.fixed_labels.geometry);
+    return choose(known_fronts(), {options.accuracy, options.time_budget}, what);
+}
+
+void doubt_dial(RegistrationRun& run) {
+    constexpr double late = 1.1;
+    std::vector<std::string>& doubts = run.result.doubts;
+    if (const auto& budget = run.options.time_budget; budget && run.intraoperative_seconds > late * *budget)
+        doubts.push_back(
+            fmt::format("the time budget of {:.3g} s was exceeded: {:.3g} s", *budget, run.intraoperative_seconds));
+    if (!run.options.accuracy) return;
+    const UncertaintySummary estimate = summarise(*run.products.uncertainty);
+    if (estimate.deviation_mm <= *run.options.accuracy) return;
+    doubts.push_back(fmt::format(
+        "{:.3g} mm were asked for and {:.3g} mm are estimated, of which the data leave {:.3g} mm and the mesh {:.3g} "
+        "mm; {}",
+        *run.options.accuracy, estimate.deviation_mm, estimate.data_mm, estimate.discretisation_mm,
+        estimate.data_mm > estimate.discretisation_mm ? "more or better data would help, a finer mesh would not"
+                                                      : "a finer mesh would help"));
+}
+
+}  // namespace tissuewarp::apps

@@ -1,0 +1,198 @@
+#include "study/calibration.hpp"
+
+#include "core/errors.hpp"
+#include "registration/evaluation.hpp"
+#include "registration/field.hpp"
+#include "registration/warp.hpp"
+#include "study/phantom.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <string>
+
+namespace tissuewarp::study {
+
+using namespace registration;
+
+namespace {
+
+class Stopwatch {
+public:
+    double lap() {
+        const auto now = std::chrono::steady_clock::now();
+        const double seconds = std::chrono::duration<double>(now - last_).count();
+        last_ = now;
+        return seconds;
+    }
+
+private:
+    std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+double megavoxels(const imaging::Geometry& grid) {
+    return double(grid.voxel_count()) / 1e6;
+}
+
+/// `share` of the sorted values lie below, with linear interpolation; 0.5 is the median.
+double quantile(std::vector<double> values, double share) {
+    std::sort(values.begin(), values.end());
+    const double place = share * double(values.size() - 1);
+    const auto below = static_cast<std::size_t>(place);
+    const std::size_t above = std::min(below + 1, values.size() - 1);
+    return values[below] + (place - double(below)) * (values[above] - values[below]);
+}
+
+/// Amounts of work and the seconds that they took.
+struct Cost {
+    std::vector<double> amounts, seconds;
+    void add(double amount, double taken) {
+        amounts.push_back(amount);
+        seconds.push_back(taken);
+    }
+    /// Least squares with neither part below 0.
+    [[nodiscard]] LinearCost line() const {
+        const auto n = double(amounts.size());
+        double x = 0, y = 0, xx = 0, xy = 0;
+        for (std::size_t i = 0; i < amounts.size(); ++i) {
+            x += amounts[i] / n;
+            y += seconds[i] / n;
+            xx += amounts[i] * amounts[i] / n;
+            xy += amounts[i] * seconds[i] / n;
+        }
+        const double variance = xx - x * x;
+        const double slope = variance > 1e-9 * xx ? std::max(0.0, (xy - x * y) / variance) : 0.0;
+        if (y - slope * x >= 0) return {y - slope * x, slope};
+        return {0.0, xx > 0 ? xy / xx : 0.0};
+    }
+};
+
+/// What all registrations of one mesh density and one kind of data gave.
+struct Sample {
+    std::vector<double> tetrahedra, preparation, rounds, judging, errors;
+};
+
+double seconds_of(const std::vector<StageTime>& times, const std::string& stage) {
+    double sum = 0;
+    for (const StageTime& time : times)
+        if (time.stage == stage) sum += time.seconds;
+    return sum;
+}
+
+double root_mean_square_error(const Deformation& deformation, const Landmarks& targets) {
+    const Eigen::Matrix3Xd off = PointTransform(deformation)(targets.moving) - targets.fixed;
+    return std::sqrt(off.colwise().squaredNorm().mean());
+}
+
+class Measurement {
+public:
+    Measurement(const FrontsPlan& plan, Observer& observer) : plan_(plan), observer_(observer) {
+        if (plan.seeds.empty() || plan.edges_per_organ.empty() || plan.voxel_mm.empty())
+            throw InvalidInput("nothing to measure: give phantoms, meshes and sizes of voxels");
+        work_ = plan.seeds.size() * (plan.edges_per_organ.size() + 1) + plan.voxel_mm.size() - 1;
+    }
+
+    Fronts run() {
+        for (const std::uint64_t seed : plan_.seeds) {
+            const Phantom phantom = made(seed, plan_.voxel_mm.front());
+            for (const double density : plan_.edges_per_organ) register_with(phantom, density);
+        }
+        for (std::size_t size = 1; size < plan_.voxel_mm.size(); ++size) {
+            const Phantom phantom = made(plan_.seeds.front(), plan_.voxel_mm[size]);
+            register_with(phantom, plan_.edges_per_organ.front());
+        }
+        return fronts();
+    }
+
+private:
+    const FrontsPlan& plan_;
+    Observer& observer_;
+    std::size_t work_ = 0, done_ = 0;
+    std::map<std::pair<DataKind, double>, Sample> samples_;
+    Cost alignment_[2], fields_, warp_;
+    std::string engine_;
+
+    void checkpoint() { observer_.checkpoint("measuring", std::min(1.0, double(done_++) / double(work_))); }
+
+    Phantom made(std::uint64_t seed, double voxel_mm) {
+        checkpoint();
+        PhantomOptions options;
+        options.voxel_mm = voxel_mm;
+        return random_phantom(seed, options);
+    }
+
+    void register_with(const Phantom& phantom, double density) {
+        checkpoint();
+        Stopwatch stopwatch;
+        PrepareOptions options;
+        options.meshing.edge_length = organ_size(phantom.moving_labels) / density;
+        const PreparedModel prepared = prepare(phantom.moving_labels, options);
+        const double preparation = stopwatch.lap();
+        Updater updater(prepared, plan_.update);
+        for (const DataKind kind : {DataKind::Labels, DataKind::Partial}) {
+            Intraoperative seen;
+            if (kind == DataKind::Labels)
+                seen.labels = phantom.fixed_labels;
+            else {
+                seen.surface = phantom.surface;
+                seen.points = phantom.points;
+            }
+            const UpdateResult result = updater.update(seen);
+            engine_ = result.engine;
+            Sample& sample = samples_[{kind, density}];
+            sample.tetrahedra.push_back(prepared.model.mesh.tet_count());
+            sample.preparation.push_back(preparation);
+            sample.rounds.push_back(seconds_of(result.times, "correspondence") +
+                                    seconds_of(result.times, "equilibrium"));
+            sample.judging.push_back(seconds_of(result.times, "expected error"));
+            sample.errors.push_back(root_mean_square_error(result.deformation, phantom.targets));
+            alignment_[int(kind)].add(
+                kind == DataKind::Labels ? megavoxels(phantom.fixed_labels.geometry) : 0.0,
+                seconds_of(result.times, "rigid alignment") + seconds_of(result.times, "boundary maps"));
+            time_images(phantom, result.deformation);
+        }
+    }
+
+    void time_images(const Phantom& phantom, const Deformation& deformation) {
+        const imaging::Geometry &moving = phantom.moving_labels.geometry, &fixed = phantom.fixed_labels.geometry;
+        Stopwatch stopwatch;
+        const imaging::Volume forward = displacement_moving_to_fixed(deformation, moving);
+        const imaging::Volume backward = displacement_fixed_to_moving(deformation, fixed);
+        fields_.add(megavoxels(moving) + megavoxels(fixed), stopwatch.lap());
+        warp_image(phantom.moving_labels.as(CV_32F), backward);
+        warp_labels(phantom.moving_labels, backward);
+        warp_.add(megavoxels(fixed), stopwatch.lap());
+    }
+
+    [[nodiscard]] Fronts fronts() const {
+        Fronts fronts;
+        fronts.machine = engine_;
+        fronts.measured_here = true;
+        for (const DataKind kind : {DataKind::Labels, DataKind::Partial})
+            fronts.alignment[int(kind)] = alignment_[int(kind)].line();
+        fronts.fields = fields_.line();
+        fronts.warp = warp_.line();
+        for (const auto& [key, sample] : samples_) {
+            FrontPoint point;
+            std::tie(point.kind, point.edges_per_organ) = key;
+            point.tetrahedra = quantile(sample.tetrahedra, 0.5);
+            point.preparation_s = quantile(sample.preparation, 0.5);
+            point.rounds_s = quantile(sample.rounds, 0.5);
+            point.rounds_95_s = quantile(sample.rounds, 0.95);
+            point.judging_s = quantile(sample.judging, 0.5);
+            point.error_mm = quantile(sample.errors, 0.5);
+            point.error_95_mm = quantile(sample.errors, 0.95);
+            fronts.points.push_back(point);
+        }
+        return fronts;
+    }
+};
+
+}  // namespace
+
+Fronts measure_fronts(const FrontsPlan& plan, Observer& observer) {
+    return Measurement(plan, observer).run();
+}
+
+}  // namespace tissuewarp::study

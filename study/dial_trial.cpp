@@ -1,0 +1,106 @@
+#include "study/dial_trial.hpp"
+
+#include "core/errors.hpp"
+#include "registration/evaluation.hpp"
+#include "registration/field.hpp"
+#include "registration/uncertainty.hpp"
+#include "registration/warp.hpp"
+#include "study/phantom.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <string>
+
+namespace tissuewarp::study {
+
+using namespace registration;
+
+namespace {
+
+double megavoxels(const imaging::Geometry& grid) {
+    return double(grid.voxel_count()) / 1e6;
+}
+
+DialCase case_of(const Phantom& phantom, DataKind kind) {
+    const double fixed = megavoxels(phantom.fixed_labels.geometry);
+    return {kind, organ_size(phantom.moving_labels), megavoxels(phantom.moving_labels.geometry), fixed,
+            kind == DataKind::Labels ? fixed : 0.0};
+}
+
+Intraoperative data_of(const Phantom& phantom, DataKind kind) {
+    Intraoperative seen;
+    if (kind == DataKind::Labels) {
+        seen.labels = phantom.fixed_labels;
+    } else {
+        seen.surface = phantom.surface;
+        seen.points = phantom.points;
+    }
+    return seen;
+}
+
+double root_mean_square_error(const Deformation& deformation, const Landmarks& targets) {
+    const Eigen::Matrix3Xd off = PointTransform(deformation)(targets.moving) - targets.fixed;
+    return std::sqrt(off.colwise().squaredNorm().mean());
+}
+
+DialTrial tried(const Phantom& phantom, DataKind kind, const DialRequest& request, const Fronts& fronts,
+                UpdateOptions update) {
+    const DialChoice choice = choose(fronts, request, case_of(phantom, kind));
+    PrepareOptions options;
+    options.meshing.edge_length = choice.edge_length_mm;
+    const PreparedModel prepared = prepare(phantom.moving_labels, options);
+    const imaging::Volume image = phantom.moving_labels.as(CV_32F);
+    update.time_budget_s = choice.update_budget_s;
+    Updater updater(prepared, update);
+
+    const auto begin = std::chrono::steady_clock::now();
+    const UpdateResult result = updater.update(data_of(phantom, kind));
+    displacement_moving_to_fixed(result.deformation, phantom.moving_labels.geometry);
+    const imaging::Volume backward = displacement_fixed_to_moving(result.deformation, phantom.fixed_labels.geometry);
+    warp_image(image, backward);
+    warp_labels(phantom.moving_labels, backward);
+    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
+
+    DialTrial trial{phantom.seed, kind, request, choice.edge_length_mm, choice.seconds, taken.count()};
+    trial.error_mm = root_mean_square_error(result.deformation, phantom.targets);
+    trial.estimated_mm = summarise(uncertainty(prepared, result)).deviation_mm;
+    trial.possible = choice.time_met && choice.accuracy_met;
+    const bool doubted = (request.accuracy_mm && trial.estimated_mm > *request.accuracy_mm) || !trial.kept_time();
+    trial.announced = !trial.possible || result.cut_short || doubted;
+    return trial;
+}
+
+std::vector<DialRequest> requests_of(const DialTrialOptions& options) {
+    std::vector<DialRequest> requests;
+    for (const double seconds : options.budgets_s) requests.push_back({{}, seconds});
+    for (const double mm : options.accuracies_mm) requests.push_back({mm, {}});
+    if (requests.empty() || options.last_seed < options.first_seed)
+        throw InvalidInput("nothing to try: give phantoms, and budgets or accuracies");
+    return requests;
+}
+
+}  // namespace
+
+std::vector<DialTrial> try_dial(const Fronts& fronts, const DialTrialOptions& options, Observer& observer) {
+    const std::vector<DialRequest> requests = requests_of(options);
+    const double phantoms = double(options.last_seed - options.first_seed) + 1;
+    std::vector<DialTrial> trials;
+    for (std::uint64_t seed = options.first_seed; seed <= options.last_seed; ++seed) {
+        const double done = double(seed - options.first_seed);
+        observer.checkpoint("trials", done / phantoms);
+        try {
+            const Phantom phantom = random_phantom(seed);
+            for (const DataKind kind : {DataKind::Labels, DataKind::Partial})
+                for (std::size_t r = 0; r < requests.size(); ++r) {
+                    observer.checkpoint("trials", (done + double(r + 1) / double(requests.size() + 1)) / phantoms);
+                    trials.push_back(tried(phantom, kind, requests[r], fronts, options.update));
+                }
+        } catch (const SolverFailure& failure) {
+            observer.note("phantom " + std::to_string(seed) + " is left out: " + failure.what());
+        }
+    }
+    observer.progress("trials", 1.0);
+    return trials;
+}
+
+}  // namespace tissuewarp::study

@@ -1,0 +1,154 @@
+/// The posterior, and what is made of it.
+#include "registration/uncertainty.hpp"
+#include "core/errors.hpp"
+#include "registration/detail/ground.hpp"
+#include "registration/detail/posterior.hpp"
+#include "registration/field.hpp"
+#include "tests/registration/shapes.hpp"
+#include "tests/support/label_shapes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+namespace tissuewarp::registration {
+namespace {
+
+using Eigen::Matrix3Xd;
+using Eigen::Vector3d;
+
+PreparedModel organ() {
+    PrepareOptions options;
+    options.meshing.edge_length = 10;
+    return prepare(shapes::organ_labels({}), options);
+}
+
+UpdateOptions on_cpu() {
+    UpdateOptions options;
+    options.device = Device::Cpu;
+    return options;
+}
+
+/// Three places left of the middle, held by pairs where they were.
+PointPairs pairs_on_the_left(double deviation_mm) {
+    PointPairs pairs{Matrix3Xd(3, 4), Matrix3Xd(3, 4), deviation_mm};
+    pairs.moving << -35, -25, -30, -28, 0, 10, -10, 3, 4, 0, -6, 12;
+    pairs.fixed = pairs.moving;
+    return pairs;
+}
+
+// The simple twin: covariances by unit forces at single nodes. 800 samples show a variance to 5 % (1 σ); with the wrong
+// triangle of the factor, or without the free placement's share, they differ by a factor.
+TEST(Posterior, SamplesHaveItsCovariance) {
+    const PreparedModel prepared = organ();
+    detail::WeighedSprings springs;
+    springs.energy = 40;
+    springs.ground = detail::ground_springs(prepared, springs.energy, [](const InterfaceNode&) { return 8.0; });
+    for (const int node : {3, 17, 40, 80})
+        springs.data.push_back({node, 30 * Eigen::Matrix3d::Identity(), Vector3d(0, 0, 0)});
+    for (const bool free_placement : {false, true}) {
+        springs.free_placement = free_placement;
+        const detail::Posterior posterior(prepared, springs);
+        const std::vector<int> nodes{3, 10, 200, prepared.rest.node_count - 1};
+        const auto exact = posterior.covariances(nodes);
+        const Eigen::MatrixXd samples = posterior.samples(800, 7);
+        for (std::size_t n = 0; n < nodes.size(); ++n) {
+            const Matrix3Xd drawn = samples.middleRows<3>(3 * nodes[n]);
+            const Eigen::Matrix3d found = drawn * drawn.transpose() / double(samples.cols());
+            EXPECT_LT((found - exact[n]).norm(), 0.25 * exact[n].norm()) << free_placement << ' ' << n;
+        }
+        EXPECT_EQ(samples.leftCols(2), posterior.samples(800, 7).leftCols(2));
+        EXPECT_NE(samples.leftCols(2), posterior.samples(800, 8).leftCols(2));
+    }
+}
+
+// The far end of the organ is known worse than tissue between pairs, and is not to be trusted; pairs known ten times as
+// well leave less open beside them.
+TEST(Uncertainty, GrowsAwayFromTheData) {
+    const PreparedModel prepared = organ();
+    Matrix3Xd places(3, 3);
+    places << -30, 0, 40, 0, 0, 0, 0, 0, 0;
+    std::vector<double> beside;
+    for (const double deviation : {1.0, 0.1}) {
+        const UpdateResult result = update(prepared, {.points = pairs_on_the_left(deviation)}, on_cpu());
+        const auto estimates = uncertainty(prepared, result).at(places);
+        ASSERT_TRUE(estimates[0] && estimates[1] && estimates[2]);
+        EXPECT_LT(estimates[0]->data_mm, 0.5 * estimates[1]->data_mm);
+        EXPECT_LT(estimates[1]->data_mm, 0.8 * estimates[2]->data_mm);
+        EXPECT_TRUE(estimates[0]->shown);
+        for (const auto& each : estimates) {
+            EXPECT_GT(each->interval_mm, 1.4 * each->deviation_mm);
+            EXPECT_LT(each->interval_mm, 2.0 * each->deviation_mm);
+            EXPECT_GE(each->deviation_mm, each->data_mm);
+        }
+        beside.push_back(estimates[0]->data_mm);
+    }
+    EXPECT_LT(beside[1], 0.9 * beside[0]);
+}
+
+TEST(Uncertainty, SaysNothingOfPlacesOutsideTheTissue) {
+    const PreparedModel prepared = organ();
+    const auto estimate = uncertainty(prepared, update(prepared, {.points = pairs_on_the_left(1)}, on_cpu()));
+    Matrix3Xd far(3, 1);
+    far << 200, 0, 0;
+    EXPECT_FALSE(estimate.at(far).front());
+}
+
+// The interval's quantile: three equal deviations are Maxwell's law, 2.796 σ; one alone is Gauss's, 1.960 σ.
+TEST(Uncertainty, IntervalsAreThoseOfGaussianErrors) {
+    const PreparedModel prepared = organ();
+    const Eigen::Index count = prepared.model.mesh.nodes.cols();
+    const Matrix3Xd none = Matrix3Xd::Zero(3, count);
+    const auto interval = [&](const Vector3d& variances) {
+        Eigen::Matrix<double, 6, Eigen::Dynamic> covariance = Eigen::Matrix<double, 6, Eigen::Dynamic>::Zero(6, count);
+        covariance.topRows<3>().colwise() = variances;
+        return Uncertainty(prepared.model.mesh, none, none, covariance, Eigen::VectorXd::Zero(count))
+            .at_nodes()
+            .front()
+            .interval_mm;
+    };
+    EXPECT_NEAR(interval({1, 1, 1}), 2.796, 0.03);
+    EXPECT_NEAR(interval({4, 0, 0}), 2 * 1.960, 0.06);
+    EXPECT_NEAR(interval({1, 1, 0}), 2.448, 0.03);
+    EXPECT_EQ(interval({0, 0, 0}), 0);
+}
+
+// On the grid: numbers in the tissue alone, the same as at the places of the moving frame that the voxels show.
+TEST(Uncertainty, LiesOnTheGridWhereTheTissueWent) {
+    const PreparedModel prepared = organ();
+    PointPairs pairs = pairs_on_the_left(1);
+    pairs.fixed = test::motion(20, {0, 0, 1}, {15, 5, -3}) * pairs.fixed;
+    const UpdateResult result = update(prepared, {.points = pairs}, on_cpu());
+    const Uncertainty estimate = uncertainty(prepared, result);
+    imaging::Geometry grid = prepared.labels.geometry;
+    grid.origin += Vector3d(10, 5, 0);
+    const UncertaintyVolumes volumes = uncertainty_on_grid(estimate, result.deformation, grid);
+    const imaging::Volume back = displacement_fixed_to_moving(result.deformation, grid);
+    int inside = 0;
+    for (std::int64_t v = 0; v < grid.voxel_count(); v += 997) {
+        const float deviation = volumes.deviation.data<float>()[v];
+        const auto trust = Trust(volumes.trust.data<unsigned char>()[v]);
+        EXPECT_EQ(std::isnan(deviation), trust == Trust::Outside);
+        if (trust == Trust::Outside) continue;
+        ++inside;
+        const int i = int(v % grid.size[0]), j = int(v / grid.size[0] % grid.size[1]),
+                  k = int(v / grid.size[0] / grid.size[1]);
+        const cv::Vec3f& shift = back.data<cv::Vec3f>()[v];
+        const Vector3d place = grid.point(Vector3d(i, j, k)) + Vector3d(shift[0], shift[1], shift[2]);
+        const auto there = estimate.at(place);
+        ASSERT_TRUE(there.front());
+        EXPECT_NEAR(deviation / there.front()->deviation_mm, 1, 0.1);
+    }
+    EXPECT_GT(inside, 50);
+}
+
+TEST(Uncertainty, RefusesAResultOfAnotherModel) {
+    const PreparedModel prepared = organ();
+    UpdateResult result = update(prepared, {.points = pairs_on_the_left(1)}, on_cpu());
+    result.deformation.displacement.conservativeResize(3, 5);
+    EXPECT_THROW(uncertainty(prepared, result), InvalidInput);
+}
+
+}  // namespace
+}  // namespace tissuewarp::registration
