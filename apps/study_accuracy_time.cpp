@@ -1,5 +1,6 @@
 // tissuewarp study accuracy-time: what accuracy costs in time on this machine.
 
+#include "apps/bench_engines.hpp"
 #include "apps/progress.hpp"
 #include "apps/study.hpp"
 #include "apps/versions.hpp"
@@ -8,12 +9,10 @@
 #include "imaging/image_io.hpp"
 #include "study/accuracy_time.hpp"
 #include "study/page.hpp"
-#include "tled/engine_choice.hpp"
 
 #include <fmt/format.h>
 
 #include <charconv>
-#include <thread>
 
 namespace tissuewarp::apps {
 
@@ -43,8 +42,7 @@ int gpu_index_of(const DeviceChoice& device) {
     return device.name.starts_with("gpu:") ? std::stoi(device.name.substr(4)) : -1;
 }
 
-study::BodyOptions body_options(const StudyOptions& options) {
-    constexpr int full = 8000, quick = 1000;  // quadratic tetrahedra
+study::BodyOptions body_options(const StudyOptions& options, int full, int quick) {
     study::BodyOptions body;
     body.reference_tetrahedra = options.quick ? quick : full;
     body.cache = options.output / "references";
@@ -54,13 +52,15 @@ study::BodyOptions body_options(const StudyOptions& options) {
 
 /// Checked before anything is measured; made when its turn comes.
 study::NamedProblem problem_named(const std::string& name, const StudyOptions& options) {
-    const study::BodyOptions body = body_options(options);
     const int gpu = gpu_index_of(options.device);
     const char* here = "run where the repository's data lies";
-    if (name == "cube") return {name, [body](Observer&) { return study::body_problem(study::stretched_cube(), body); }};
+    if (name == "cube")
+        return {name, [body = body_options(options, 3000, 1000)](Observer&) {
+                    return study::body_problem(study::stretched_cube(), body);
+                }};
     if (name == "brain") {
         require_folder(repository_brain, name, here);
-        return {name, [body](Observer&) {
+        return {name, [body = body_options(options, 12000, 4000)](Observer&) {
                     const auto labels = imaging::read_labels(fs::path(repository_brain) / "preop_labels.nii.gz");
                     return study::body_problem(study::indented_organ(labels), body);
                 }};
@@ -104,20 +104,21 @@ std::vector<study::NamedProblem> problems_of(const StudyOptions& options) {
     return problems;
 }
 
-/// The base's processor first.
-std::vector<tled::Processor> processors_of(const std::string& device) {
-    if (device == "cpu" || (device == "auto" && !tled::has_gpu())) return {tled::Processor::Cpu};
-    if (device == "auto") return {tled::Processor::Cpu, tled::Processor::Gpu};
+/// The base's processor first. A software rasteriser counts only where it was asked for.
+std::vector<tled::Processor> processors_of(const std::string& name, const std::optional<BenchDevice>& device) {
+    if (!device || (name == "auto" && !device->gpu.hardware)) return {tled::Processor::Cpu};
+    if (name == "auto") return {tled::Processor::Cpu, tled::Processor::Gpu};
     return {tled::Processor::Gpu, tled::Processor::Cpu};
 }
 
-study::Provenance provenance_of(const StudyOptions& options) {
+study::Provenance provenance_of(const StudyOptions& options, const std::optional<BenchDevice>& device) {
     const auto cube = study::stretched_cube();
     tled::Model model;
     model.mesh = cube.mesh(6, silent_observer());
     model.materials[1] = study::material_of({});
     study::Provenance provenance{{"processor", tled::make_cpu_engine(tled::rest_state(model))->description()},
                                  {"plan", options.quick ? "quick" : "full"}};
+    if (device) provenance["GPU"] = device->gpu.name;
     for (const auto& [name, version] : versions()) provenance["version of " + name] = version;
     return provenance;
 }
@@ -134,13 +135,14 @@ void run_accuracy_time_study(const StudyOptions& options) {
     if (options.output.empty()) throw InvalidInput("give --output, the folder for measurements and page");
     ProgressLine progress(options.common.quiet);
     const std::vector<study::NamedProblem> problems = problems_of(options);
+    const std::optional<BenchDevice> device = bench_device(options.device.name);
     study::AccuracyTimeOptions study_options;
     study_options.plan.extent = options.quick ? study::Extent::Quick : study::Extent::Full;
     study_options.plan.most_elements = options.most_elements;
-    study_options.plan.processors = processors_of(options.device.name);
+    study_options.plan.processors = processors_of(options.device.name, device);
     study_options.runs = options.repeats > 0 ? options.repeats : options.quick ? 2 : 5;
     require_writable_folder(options.output / "references");
-    const study::Provenance provenance = provenance_of(options);
+    const study::Provenance provenance = provenance_of(options, device);
     study::Store store(options.output, provenance);
     const std::size_t before = store.points().size();
     std::vector<study::ProblemSummary> summaries;

@@ -190,7 +190,8 @@ Body indented_organ(const imaging::Volume& label_map) {
     const Dent dent(tissue);
     Body body;
     body.name = "brain";
-    body.story = "a brain, its base held and its frontal surface pressed in by 10 mm";
+    body.hold = Hold::Soft;
+    body.story = "a brain, its base held and its frontal surface pressed in by springs";
     body.mesh = [tissue](int tetrahedra, Observer& observer) {
         meshing::MeshingOptions options;
         options.edge_length = edge_length_for(tissue, tetrahedra);

@@ -34,7 +34,8 @@ struct Symmetry {
 struct Body {
     std::string name, story;
     std::function<meshing::TetMesh(int tetrahedra, Observer&)> mesh;  ///< nearly so many
-    bool cells = false;                                  ///< its tetrahedra are those of box_mesh, six to a hexahedron
+    Hold hold = Hold::Hard;  ///< of the base: hard where the held part ends where meshes can follow it
+    bool cells = false;      ///< its tetrahedra are those of box_mesh, six to a hexahedron
     std::function<Pull(const Eigen::Vector3d& X)> pull;  ///< at a rest position of the surface, mm
     Eigen::Matrix3Xd samples;                            ///< rest positions inside, mm, where errors are measured
     std::optional<Symmetry> symmetry;

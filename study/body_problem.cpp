@@ -121,7 +121,11 @@ public:
 
     [[nodiscard]] std::string name() const override { return body_.name; }
     [[nodiscard]] std::string story() const override { return body_.story; }
-    [[nodiscard]] Setting base() const override { return {}; }
+    [[nodiscard]] Setting base() const override {
+        Setting setting;
+        setting.physics.hold = body_.hold;
+        return setting;
+    }
     [[nodiscard]] bool is_registration() const override { return false; }
 
     [[nodiscard]] std::string refusal(const Setting& setting) const override {
@@ -271,14 +275,10 @@ private:
 
     /// Kept in memory and in the cache.
     const Reference& reference(const Physics& physics, Observer& observer) {
-        constexpr double fewer = 0.4;  // for the physics of a few settings alone
-        const int tetrahedra = physics == base().physics
-                                   ? options_.reference_tetrahedra
-                                   : static_cast<int>(std::lround(fewer * options_.reference_tetrahedra));
         char number[32];
         std::snprintf(number, sizeof number, "%g", physics.poissons_ratio);
         std::string key = name() + "-" + name_of(physics.law) + "-" + number + "-" + name_of(physics.hold) + "-" +
-                          std::to_string(tetrahedra);
+                          std::to_string(options_.reference_tetrahedra);
         std::replace(key.begin(), key.end(), ' ', '_');
         const auto known = references_.find(key);
         if (known != references_.end()) return known->second;
@@ -291,7 +291,9 @@ private:
                                    "; delete it or give another --output");
             return references_[key] = std::move(stored);
         }
-        Reference made = reference_of(body_, physics, tetrahedra, observer);
+        Reference made = physics == base().physics
+                             ? reference_of(body_, physics, options_.reference_tetrahedra, observer)
+                             : changed_reference(body_, physics, reference(base().physics, observer), observer);
         if (!options_.cache.empty()) write_reference(made, file);
         return references_[key] = std::move(made);
     }

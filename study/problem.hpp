@@ -33,7 +33,7 @@ public:
 };
 
 struct BodyOptions {
-    int reference_tetrahedra = 3000;  ///< quadratic, of the problem's own physics; others get 0.4 times as many
+    int reference_tetrahedra = 3000;  ///< quadratic
     std::filesystem::path cache;      ///< folder where references are kept; empty: nowhere
     int most_checked = 60000;         ///< elements up to which the algebraic error is found by Newton's method
     int gpu_index = -1;               ///< EGL device, −1: the first with hardware
