@@ -7,6 +7,7 @@
 #include "registration/detail/rigid_part.hpp"
 #include "registration/detail/unknown_loads.hpp"
 #include "registration/detail/white_noise.hpp"
+#include "tled/lifted_residual.hpp"
 #include "tled/reference.hpp"
 
 #include <Eigen/Cholesky>
@@ -14,6 +15,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 
 namespace tissuewarp::registration {
@@ -50,13 +52,13 @@ Eigen::Matrix3Xd displacement_under_pulls(const UpdateResult& result) {
     return back * (rest + result.deformation.displacement) - rest;
 }
 
-/// Forces out of balance at the nodes, mN.
-Eigen::Matrix3Xd residual(const PreparedModel& prepared, const LastPulls& pulls, const Eigen::Matrix3Xd& displacement) {
-    Eigen::Matrix3Xd force = pulls.loads - tled::internal_force(prepared.rest, displacement);
+/// What the last round's equilibrium was under.
+tled::NodalConditions conditions_of(const PreparedModel& prepared, const LastPulls& pulls) {
+    tled::Conditions conditions;
     for (const auto* springs : {&pulls.data, &pulls.holds, &pulls.ground, &pulls.supports})
-        for (const tled::Spring& spring : *springs)
-            force.col(spring.node) += spring.stiffness * (spring.target - displacement.col(spring.node));
-    return force;
+        append(conditions.springs, *springs);
+    conditions.external_force = pulls.loads;
+    return tled::nodal_conditions(conditions, prepared.rest.node_count);
 }
 
 /// xx, yy, zz, xy, xz, yz of every node's displacement over the samples (3N × k of mean 0).
@@ -125,13 +127,14 @@ double normal_quantile(double probability) {
     return x;
 }
 
-ErrorEstimate estimate_of(const Eigen::Vector3d& algebraic, const Eigen::Vector3d& discretisation,
+ErrorEstimate estimate_of(const Eigen::Vector3d& algebraic, const std::optional<Eigen::Vector3d>& discretisation,
                           const Eigen::Matrix3d& covariance, double unexplained) {
     ErrorEstimate result;
     result.algebraic_mm = algebraic.norm();
-    result.discretisation_mm = discretisation.norm();
+    result.discretisation_mm = discretisation ? discretisation->norm() : std::numeric_limits<double>::quiet_NaN();
     result.data_mm = std::sqrt(covariance.trace());
-    result.covariance = covariance + algebraic * algebraic.transpose() + discretisation * discretisation.transpose();
+    result.covariance = covariance + algebraic * algebraic.transpose();
+    if (discretisation) result.covariance += *discretisation * discretisation->transpose();
     result.deviation_mm = std::sqrt(result.covariance.trace());
     result.interval_mm = interval_mm(result, 0.95);
     result.shown = unexplained < shown_below;
@@ -140,8 +143,8 @@ ErrorEstimate estimate_of(const Eigen::Vector3d& algebraic, const Eigen::Vector3
 
 }  // namespace
 
-Uncertainty::Uncertainty(meshing::TetMesh mesh, Eigen::Matrix3Xd algebraic, Eigen::Matrix3Xd discretisation,
-                         Covariances covariance, Eigen::VectorXd unexplained)
+Uncertainty::Uncertainty(meshing::TetMesh mesh, Eigen::Matrix3Xd algebraic,
+                         std::optional<tled::DiscretisationError> discretisation, Covariances covariance, Eigen::VectorXd unexplained)
     : mesh_(std::move(mesh)),
       locator_(mesh_),
       algebraic_(std::move(algebraic)),
@@ -151,9 +154,11 @@ Uncertainty::Uncertainty(meshing::TetMesh mesh, Eigen::Matrix3Xd algebraic, Eige
 
 std::vector<ErrorEstimate> Uncertainty::at_nodes() const {
     std::vector<ErrorEstimate> result;
-    for (Eigen::Index n = 0; n < unexplained_.size(); ++n)
-        result.push_back(
-            estimate_of(algebraic_.col(n), discretisation_.col(n), matrix_of(covariance_.col(n)), unexplained_[n]));
+    for (Eigen::Index n = 0; n < unexplained_.size(); ++n) {
+        std::optional<Eigen::Vector3d> of_mesh;
+        if (discretisation_) of_mesh = discretisation_->corner.col(n);
+        result.push_back(estimate_of(algebraic_.col(n), of_mesh, matrix_of(covariance_.col(n)), unexplained_[n]));
+    }
     return result;
 }
 
@@ -164,8 +169,10 @@ std::vector<std::optional<ErrorEstimate>> Uncertainty::at(const Eigen::Matrix3Xd
         result.emplace_back();
         if (!place) continue;
         const auto here = [&](const Eigen::MatrixXd& nodal) { return meshing::interpolate(mesh_, nodal, *place); };
-        result.back() = estimate_of(here(algebraic_), here(discretisation_), matrix_of(here(covariance_)),
-                                    here(unexplained_.transpose())[0]);
+        std::optional<Eigen::Vector3d> of_mesh;
+        if (discretisation_) of_mesh = discretisation_->at(mesh_, place->tet, place->barycentric);
+        result.back() =
+            estimate_of(here(algebraic_), of_mesh, matrix_of(here(covariance_)), here(unexplained_.transpose())[0]);
     }
     return result;
 }
@@ -224,10 +231,14 @@ Uncertainty uncertainty(const PreparedModel& prepared, const UpdateResult& resul
     Eigen::VectorXd unexplained = unexplained_share(prepared.model.mesh.nodes, hidden, free);
     if (place_is_uncertain(result)) unexplained.setConstant(2 * shown_below);
     const Eigen::Matrix3Xd displacement = displacement_under_pulls(result);
-    const Eigen::Matrix3Xd algebraic = posterior.stiffness().solve(residual(prepared, pulls, displacement));
-    const Eigen::Matrix3Xd discretisation = Eigen::Matrix3Xd::Zero(3, displacement.cols());
+    const tled::NodalConditions conditions = conditions_of(prepared, pulls);
+    const tled::RestStiffness stiffness(prepared.rest, conditions, prepared.stiffness);
+    const Eigen::Matrix3Xd algebraic = tled::lifted_residual(prepared.rest, stiffness, conditions, displacement);
+    const tled::DiscretisationEstimate mesh =
+        tled::discretisation_error(prepared.model, stiffness, conditions, displacement);
+    if (!mesh.error) observer.note("no estimate of the error of the mesh: " + mesh.reason);
     observer.checkpoint("error estimate", 1.0);
-    return {prepared.model.mesh, algebraic, discretisation, covariance, unexplained};
+    return {prepared.model.mesh, algebraic, mesh.error, covariance, unexplained};
 }
 
 // ‖e‖² over its mean is a multiple of χ² (Satterthwaite, Biometrics 2 (1946) 110) whose scale is itself known from few

@@ -6,6 +6,7 @@
 #include "imaging/volume.hpp"
 #include "meshing/point_location.hpp"
 #include "registration/pipeline.hpp"
+#include "tled/discretisation_error.hpp"
 
 #include <Eigen/Core>
 
@@ -23,7 +24,7 @@ struct UncertaintyOptions {
 /// Errors of one place, mm. Each deviation is the root of the expected square of the error vector's length.
 struct ErrorEstimate {
     double algebraic_mm = 0;       ///< of the solver: the lifted residual
-    double discretisation_mm = 0;  ///< of linear tetrahedra of this size
+    double discretisation_mm = 0;  ///< of linear tetrahedra of this size; NaN where there is no estimate of it
     double data_mm = 0;            ///< of matches, and of tissue between them: 1 σ
     double deviation_mm = 0;       ///< all together, 1 σ
     /// All together, mm², moving frame before the placement turns it.
@@ -38,9 +39,11 @@ double interval_mm(const ErrorEstimate& estimate, double probability);
 /// The estimate at every node of the mesh, and anywhere between.
 class Uncertainty {
 public:
-    /// At the nodes: errors (3 × N mm) of solver and mesh, covariances (6 × N mm²: xx, yy, zz, xy, xz, yz), and what
-    /// part of the variance of motions under unknown loads the data left (N).
-    Uncertainty(meshing::TetMesh mesh, Eigen::Matrix3Xd algebraic, Eigen::Matrix3Xd discretisation,
+    /// The error of the mesh, where there is an estimate of it; and at the nodes the error of the solver (3 × N mm),
+    /// covariances (6 × N mm²: xx, yy, zz, xy, xz, yz), and what part of the variance of motions under unknown loads the
+    /// data left (N).
+    Uncertainty(meshing::TetMesh mesh, Eigen::Matrix3Xd algebraic,
+                std::optional<tled::DiscretisationError> discretisation,
                 Eigen::Matrix<double, 6, Eigen::Dynamic> covariance, Eigen::VectorXd unexplained);
 
     /// Of places of the moving frame, 3 × P mm; nothing for places farther than half an element outside the mesh.
@@ -53,7 +56,8 @@ public:
 private:
     meshing::TetMesh mesh_;
     meshing::PointLocator locator_;
-    Eigen::Matrix3Xd algebraic_, discretisation_;
+    Eigen::Matrix3Xd algebraic_;
+    std::optional<tled::DiscretisationError> discretisation_;
     Eigen::Matrix<double, 6, Eigen::Dynamic> covariance_;
     Eigen::VectorXd unexplained_;
 };
