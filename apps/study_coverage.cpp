@@ -14,6 +14,20 @@
 
 namespace tissuewarp::apps {
 
+namespace {
+
+std::vector<study::CoverageRow> measured(const StudyOptions& options, const study::CoverageOptions& plan,
+                                         ProgressLine& progress) {
+    try {
+        return study::measured_coverage(options.output, plan, progress);
+    } catch (const Cancelled&) {
+        throw Interrupted("interrupted; the phantoms so far are in '" + options.output.string() +
+                          "', and the same command goes on from there");
+    }
+}
+
+}  // namespace
+
 void run_coverage_study(const StudyOptions& options) {
     if (options.output.empty()) throw InvalidInput("give --output, the folder that keeps each phantom's measurements");
     study::CoverageOptions plan;
@@ -22,7 +36,7 @@ void run_coverage_study(const StudyOptions& options) {
     if (options.quick) plan.last_seed = std::min(plan.last_seed, plan.first_seed + 1);
     ProgressLine progress(options.common.quiet);
     progress.begin("registering phantoms", 0.0, 1.0);
-    const auto coverage = study::coverage_of(study::measured_coverage(options.output, plan, progress));
+    const auto coverage = study::coverage_of(measured(options, plan, progress));
     progress.clear();
     if (coverage.empty()) throw SolverFailure("no phantom could be registered; give other seeds");
     write_text(study::coverage_figure(coverage), options.output / "coverage.svg");
