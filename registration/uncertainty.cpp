@@ -144,7 +144,8 @@ ErrorEstimate estimate_of(const Eigen::Vector3d& algebraic, const std::optional<
 }  // namespace
 
 Uncertainty::Uncertainty(meshing::TetMesh mesh, Eigen::Matrix3Xd algebraic,
-                         std::optional<tled::DiscretisationError> discretisation, Covariances covariance, Eigen::VectorXd unexplained)
+                         std::optional<tled::DiscretisationError> discretisation, Covariances covariance,
+                         Eigen::VectorXd unexplained)
     : mesh_(std::move(mesh)),
       locator_(mesh_),
       algebraic_(std::move(algebraic)),

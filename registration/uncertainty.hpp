@@ -40,8 +40,8 @@ double interval_mm(const ErrorEstimate& estimate, double probability);
 class Uncertainty {
 public:
     /// The error of the mesh, where there is an estimate of it; and at the nodes the error of the solver (3 × N mm),
-    /// covariances (6 × N mm²: xx, yy, zz, xy, xz, yz), and what part of the variance of motions under unknown loads the
-    /// data left (N).
+    /// covariances (6 × N mm²: xx, yy, zz, xy, xz, yz), and what part of the variance of motions under unknown loads
+    /// the data left (N).
     Uncertainty(meshing::TetMesh mesh, Eigen::Matrix3Xd algebraic,
                 std::optional<tled::DiscretisationError> discretisation,
                 Eigen::Matrix<double, 6, Eigen::Dynamic> covariance, Eigen::VectorXd unexplained);

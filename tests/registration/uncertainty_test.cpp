@@ -136,7 +136,7 @@ TEST(Uncertainty, IntervalsAreThoseOfErrorsOfUncertainSize) {
     const auto interval = [&](const Vector3d& variances) {
         Eigen::Matrix<double, 6, Eigen::Dynamic> covariance = Eigen::Matrix<double, 6, Eigen::Dynamic>::Zero(6, count);
         covariance.topRows<3>().colwise() = variances;
-        return Uncertainty(prepared.model.mesh, none, none, covariance, Eigen::VectorXd::Zero(count))
+        return Uncertainty(prepared.model.mesh, none, std::nullopt, covariance, Eigen::VectorXd::Zero(count))
             .at_nodes()
             .front()
             .interval_mm;
