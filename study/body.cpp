@@ -124,13 +124,19 @@ tled::Conditions pulled_conditions(const Body& body, Hold hold, const Matrix3Xd&
     return conditions;
 }
 
-/// The outer faces all of whose corners are pulled at.
+/// The outer faces pulled at in all corners and in the middle, which a face between two plates is not.
 std::vector<std::array<int, 3>> pulled_faces(const Body& body, const meshing::TetMesh& mesh) {
+    const auto pulled = [&](const std::array<int, 3>& face) {
+        Vector3d middle = Vector3d::Zero();
+        for (const int node : face) {
+            if (!(body.pull(mesh.nodes.col(node)).weight > 0)) return false;
+            middle += mesh.nodes.col(node) / 3;
+        }
+        return body.pull(middle).weight > 0;
+    };
     std::vector<std::array<int, 3>> faces;
     for (const meshing::InterfaceFace& face : meshing::interface_faces(mesh))
-        if (face.outer == 0 && std::all_of(face.nodes.begin(), face.nodes.end(),
-                                           [&](int node) { return body.pull(mesh.nodes.col(node)).weight > 0; }))
-            faces.push_back(face.nodes);
+        if (face.outer == 0 && pulled(face.nodes)) faces.push_back(face.nodes);
     return faces;
 }
 

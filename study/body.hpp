@@ -51,8 +51,8 @@ Body stretched_cube();
 /// lower than 100 mm all lengths shrink alike.
 Body indented_organ(const imaging::Volume& label_map);
 
-/// What acts on linear tetrahedra, or on hexahedra that share their nodes: imposed displacements wherever all corners
-/// of a boundary face are pulled at, or springs there of 3 kPa/mm times the weight.
+/// What acts on linear tetrahedra, or on hexahedra that share their nodes: imposed displacements on boundary faces
+/// pulled at in their corners and their middle, or springs there of 3 kPa/mm times the weight.
 tled::Conditions conditions_of(const Body& body, Hold hold, const meshing::TetMesh& mesh);
 /// The same on quadratic tetrahedra with straight edges, of the symmetric part where there is one; `linear` is the mesh
 /// of their corners. Springs act by the rule of the edges' middles, exact to second degree.

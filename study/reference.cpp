@@ -54,10 +54,11 @@ tled::NodalConditions scaled(tled::NodalConditions conditions, double factor) {
     return conditions;
 }
 
-/// By central differences of a small part of the load.
+/// By central differences of a small part of the load: of third order in it, and large enough for the line search,
+/// which compares energies that rounding blurs.
 Matrix3Xd linear_answer(const tled::DiscreteEnergy& energy, const tled::NodalConditions& conditions,
                         Observer& observer) {
-    constexpr double part = 1e-3, tolerance_mm = 1e-9;
+    constexpr double part = 0.02, tolerance_mm = 1e-6;
     return (newton(energy, scaled(conditions, part), tolerance_mm, observer) -
             newton(energy, scaled(conditions, -part), tolerance_mm, observer)) /
            (2 * part);

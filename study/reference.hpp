@@ -20,7 +20,7 @@ struct Reference {
 };
 
 /// Newton's method in float64 with averages of the pressure (tled::QuadraticPressure::NodalAverage), which do not lock.
-/// The linear law by central differences of 1/1000 of the load. Throws SolverFailure, Cancelled.
+/// The linear law by central differences of 1/50 of the load. Throws SolverFailure, Cancelled.
 Reference reference_of(const Body& body, const Physics& physics, int tetrahedra, Observer& observer);
 
 /// The same for other physics from what it changes on the coarser mesh alone: errors of the mesh cancel in that
