@@ -21,7 +21,7 @@ Fronts fronts_from_json(const std::string& text, const std::string& source);
 /// and InvalidInput for a file that cannot be used.
 Fronts known_fronts();
 
-/// Measured on two cores of a server without GPU.
+/// Rough: two phantoms and two meshes, on two busy cores.
 Fronts shipped_fronts();
 
 /// Makes the folder and replaces the file at once. Throws IoError.

@@ -1,5 +1,5 @@
 #pragma once
-/// fronts.json of `tissuewarp calibrate` on two cores of a server without GPU.
+/// fronts.json of `tissuewarp calibrate --quick` on two busy cores: two phantoms, two meshes.
 
 namespace tissuewarp::registration::detail {
 
