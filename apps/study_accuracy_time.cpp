@@ -145,19 +145,18 @@ void run_accuracy_time_study(const StudyOptions& options) {
     const study::Provenance provenance = provenance_of(options, device);
     study::Store store(options.output, provenance);
     const std::size_t before = store.points().size();
-    std::vector<study::ProblemSummary> summaries;
     try {
-        summaries = study::measure_accuracy_time(
+        study::measure_accuracy_time(
             problems, study_options, store,
             [&](const std::string& words, double from, double to) { progress.begin(words, from, to); }, progress);
     } catch (const Cancelled&) {
         throw Interrupted(fmt::format("interrupted; {} points are in '{}', and the same command goes on from there",
                                       store.points().size(), options.output.string()));
     }
-    study::write_page(summaries, store.points(), provenance, options.output);
+    study::write_page(store.problems(), store.points(), provenance, options.output);
     progress.clear();
     if (options.common.quiet) return;
-    for (const study::ProblemSummary& problem : summaries) print_problem(problem, store);
+    for (const study::ProblemSummary& problem : store.problems()) print_problem(problem, store);
     for (const std::string& note : progress.notes()) fmt::print("note: {}\n", note);
     fmt::print("\n{} points, {} of them measured now; {}\n", store.points().size(), store.points().size() - before,
                (options.output / "accuracy-time.html").string());

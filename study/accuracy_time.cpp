@@ -44,17 +44,15 @@ Left left_of(const Problem& problem, const PlanOptions& options, const Store& st
 
 }  // namespace
 
-std::vector<ProblemSummary> measure_accuracy_time(const std::vector<NamedProblem>& problems,
-                                                  const AccuracyTimeOptions& options, Store& store,
-                                                  const PointListener& listener, Observer& observer) {
-    std::vector<ProblemSummary> summaries;
+void measure_accuracy_time(const std::vector<NamedProblem>& problems, const AccuracyTimeOptions& options, Store& store,
+                           const PointListener& listener, Observer& observer) {
     WithoutNotes quiet(observer);
     for (std::size_t p = 0; p < problems.size(); ++p) {
         const double from = double(p) / double(problems.size()), share = 1.0 / double(problems.size());
         constexpr double making = 0.02;  // of the problem's share
         listener(problems[p].name, from, from + making * share);
         const std::unique_ptr<Problem> problem = problems[p].make(quiet);
-        summaries.push_back(
+        store.describe(
             {problem->name(), problem->story(), base_of(*problem, options.plan), problem->is_registration()});
         const Left left = left_of(*problem, options.plan, store);
         const double all = std::accumulate(left.work.begin(), left.work.end(), 0.0);
@@ -68,7 +66,6 @@ std::vector<ProblemSummary> measure_accuracy_time(const std::vector<NamedProblem
             store.add(std::move(point));
         }
     }
-    return summaries;
 }
 
 }  // namespace tissuewarp::study

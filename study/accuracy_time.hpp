@@ -22,20 +22,12 @@ struct AccuracyTimeOptions {
     int runs = 5;
 };
 
-/// What a page says about a problem.
-struct ProblemSummary {
-    std::string name, story;
-    Setting base;
-    bool registration = false;
-};
-
 /// Called before each point: its words, and how much of all work is done before and after it, 0 … 1.
 using PointListener = std::function<void(const std::string& words, double from, double to)>;
 
 /// Measures what the store does not hold yet. Notes failures to the observer. Throws InvalidInput, GpuUnavailable,
 /// IoError, Cancelled; what was measured until then stays in the store.
-std::vector<ProblemSummary> measure_accuracy_time(const std::vector<NamedProblem>& problems,
-                                                  const AccuracyTimeOptions& options, Store& store,
-                                                  const PointListener& listener, Observer& observer);
+void measure_accuracy_time(const std::vector<NamedProblem>& problems, const AccuracyTimeOptions& options, Store& store,
+                           const PointListener& listener, Observer& observer);
 
 }  // namespace tissuewarp::study

@@ -76,30 +76,37 @@ std::string csv_line(const Point& p) {
 
 }  // namespace
 
-Store::Store(std::filesystem::path folder, Provenance provenance)
-    : folder_(std::move(folder)), provenance_(std::move(provenance)) {
+Store::Store(std::filesystem::path folder, Provenance provenance) : folder_(std::move(folder)) {
     const std::filesystem::path file = folder_ / "results.h5";
-    if (!std::filesystem::exists(file)) return;
-    Provenance stored;
-    points_ = read_points(file, &stored);
-    for (const auto& [name, value] : provenance_)
-        if (stored[name] != value)
-            throw InvalidInput("'" + file.string() + "' was measured with " + name + " '" + stored[name] +
+    if (std::filesystem::exists(file)) measured_ = read_measurements(file);
+    for (const auto& [name, value] : provenance)
+        if (!measured_.points.empty() && measured_.provenance[name] != value)
+            throw InvalidInput("'" + file.string() + "' was measured with " + name + " '" + measured_.provenance[name] +
                                "', this is '" + value + "': times of the two do not compare; give another --output");
+    measured_.provenance = std::move(provenance);
+}
+
+void Store::describe(ProblemSummary problem) {
+    const auto known = std::find_if(measured_.problems.begin(), measured_.problems.end(),
+                                    [&](const ProblemSummary& each) { return each.name == problem.name; });
+    if (known == measured_.problems.end())
+        measured_.problems.push_back(std::move(problem));
+    else
+        *known = std::move(problem);
 }
 
 bool Store::holds(const std::string& problem, const Setting& setting) const {
-    return std::any_of(points_.begin(), points_.end(),
+    return std::any_of(points().begin(), points().end(),
                        [&](const Point& point) { return point.problem == problem && point.setting == setting; });
 }
 
 void Store::add(Point point) {
-    points_.push_back(std::move(point));
+    measured_.points.push_back(std::move(point));
     write();
 }
 
 void Store::write() const {
-    write_points(points_, provenance_, folder_ / "results.h5");
+    write_measurements(measured_, folder_ / "results.h5");
     AtomicFile table(folder_ / "results.csv");
     std::ofstream stream(table.path(), std::ios::binary);
     stream << csv();
@@ -115,7 +122,7 @@ std::string Store::csv() const {
         "numerical_rms_mm,numerical_largest_mm,reference_uncertainty_mm,model_rms_mm,model_largest_mm,tre_mean_mm,"
         "tre_median_mm,tre_95_mm,tre_largest_mm,tre_before_mm,engine,method,preparation_stages_s,operation_stages_s,"
         "failure\n";
-    for (const Point& point : points_) text += csv_line(point);
+    for (const Point& point : points()) text += csv_line(point);
     return text;
 }
 

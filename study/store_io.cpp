@@ -13,7 +13,7 @@ namespace tissuewarp::study {
 namespace {
 
 constexpr const char* format = "tissuewarp study";
-constexpr int version = 1;
+constexpr int version = 2;
 constexpr double absent = -1;  // no length or time is negative
 
 double stored(const std::optional<double>& value) {
@@ -181,11 +181,61 @@ void read_places(const Hdf5Input& file, std::vector<Point>& points, const std::s
     }
 }
 
-}  // namespace
+/// Each problem with the row of its base among the points, −1 where that was not measured.
+void write_problems(Hdf5Output& file, const Measurements& measured) {
+    std::vector<std::string> names, stories, kinds;
+    Eigen::VectorXd base = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(measured.problems.size()), absent);
+    for (const ProblemSummary& problem : measured.problems) {
+        for (std::size_t i = 0; i < measured.points.size(); ++i)
+            if (measured.points[i].problem == problem.name && measured.points[i].setting == problem.base)
+                base[static_cast<Eigen::Index>(names.size())] = double(i);
+        names.push_back(problem.name);
+        stories.push_back(problem.story);
+        kinds.emplace_back(problem.registration ? "registration" : "body");
+    }
+    file.texts("problems/name", names);
+    file.texts("problems/story", stories);
+    file.texts("problems/kind", kinds);
+    file.vector<double>("problems/point_of_base", base, "1");
+}
 
-void write_points(const std::vector<Point>& points, const Provenance& provenance, const std::filesystem::path& path) {
-    AtomicFile target(path);
-    Hdf5Output file(target.path(), format, version);
+/// Without problems whose base was not measured: the study describes them anew when it goes on with them.
+void read_problems(const Hdf5Input& file, Measurements& measured, const std::string& path) {
+    const std::vector<std::string> names = file.texts("problems/name"), stories = file.texts("problems/story"),
+                                   kinds = file.texts("problems/kind");
+    if (stories.size() != names.size() || kinds.size() != names.size())
+        throw InvalidInput("'" + path + "': " + std::to_string(names.size()) + " problems have " +
+                           std::to_string(stories.size()) + " stories and " + std::to_string(kinds.size()) + " kinds");
+    const Eigen::VectorXd base = file.vector<double>("problems/point_of_base", static_cast<Eigen::Index>(names.size()));
+    for (std::size_t i = 0; i < names.size(); ++i) {
+        const double row = base[static_cast<Eigen::Index>(i)];
+        if (row == absent) continue;
+        if (!(row >= 0 && row < double(measured.points.size())))
+            throw InvalidInput("'" + path + "': the base of '" + names[i] + "' is point " + std::to_string(row) +
+                               " of " + std::to_string(measured.points.size()));
+        measured.problems.push_back(
+            {names[i], stories[i], measured.points[static_cast<std::size_t>(row)].setting, kinds[i] == "registration"});
+    }
+}
+
+void write_provenance(Hdf5Output& file, const Provenance& provenance) {
+    std::vector<std::string> names, values;
+    for (const auto& [name, value] : provenance) {
+        names.push_back(name);
+        values.push_back(value);
+    }
+    file.texts("provenance/name", names);
+    file.texts("provenance/value", values);
+}
+
+Provenance read_provenance(const Hdf5Input& file) {
+    const std::vector<std::string> names = file.texts("provenance/name"), values = file.texts("provenance/value");
+    Provenance provenance;
+    for (std::size_t row = 0; row < std::min(names.size(), values.size()); ++row) provenance[names[row]] = values[row];
+    return provenance;
+}
+
+void write_columns(Hdf5Output& file, const std::vector<Point>& points) {
     for (const TextColumn& column : text_columns()) {
         std::vector<std::string> values;
         for (const Point& point : points) values.push_back(column.get(point));
@@ -196,41 +246,47 @@ void write_points(const std::vector<Point>& points, const Provenance& provenance
         for (std::size_t i = 0; i < points.size(); ++i) values[static_cast<Eigen::Index>(i)] = column.get(points[i]);
         file.vector<double>(column.name, values, column.units);
     }
-    write_times(file, points);
-    write_places(file, points);
-    std::vector<std::string> names, values;
-    for (const auto& [name, value] : provenance) {
-        names.push_back(name);
-        values.push_back(value);
-    }
-    file.texts("provenance/name", names);
-    file.texts("provenance/value", values);
-    file.close();
-    target.commit();
 }
 
-std::vector<Point> read_points(const std::filesystem::path& path, Provenance* provenance) {
-    const Hdf5Input file(path, format, version);
+std::vector<Point> read_columns(const Hdf5Input& file, const std::string& path) {
     std::vector<Point> points(file.texts("problem").size());
-    const auto count = static_cast<Eigen::Index>(points.size());
     for (const TextColumn& column : text_columns()) {
         const std::vector<std::string> values = file.texts(column.name);
         if (values.size() != points.size())
-            throw InvalidInput("'" + path.string() + "': '" + column.name + "' has " + std::to_string(values.size()) +
+            throw InvalidInput("'" + path + "': '" + column.name + "' has " + std::to_string(values.size()) +
                                " entries for " + std::to_string(points.size()) + " points");
         for (std::size_t i = 0; i < points.size(); ++i) column.set(points[i], values[i]);
     }
     for (const NumberColumn& column : number_columns()) {
-        const Eigen::VectorXd values = file.vector<double>(column.name, count);
+        const Eigen::VectorXd values = file.vector<double>(column.name, static_cast<Eigen::Index>(points.size()));
         for (std::size_t i = 0; i < points.size(); ++i) column.set(points[i], values[static_cast<Eigen::Index>(i)]);
     }
-    read_times(file, points, path.string());
-    read_places(file, points, path.string());
-    if (provenance == nullptr) return points;
-    const std::vector<std::string> names = file.texts("provenance/name"), values = file.texts("provenance/value");
-    for (std::size_t row = 0; row < std::min(names.size(), values.size()); ++row)
-        (*provenance)[names[row]] = values[row];
     return points;
+}
+
+}  // namespace
+
+void write_measurements(const Measurements& measured, const std::filesystem::path& path) {
+    AtomicFile target(path);
+    Hdf5Output file(target.path(), format, version);
+    write_columns(file, measured.points);
+    write_times(file, measured.points);
+    write_places(file, measured.points);
+    write_problems(file, measured);
+    write_provenance(file, measured.provenance);
+    file.close();
+    target.commit();
+}
+
+Measurements read_measurements(const std::filesystem::path& path) {
+    const Hdf5Input file(path, format, version);
+    Measurements measured;
+    measured.points = read_columns(file, path.string());
+    read_times(file, measured.points, path.string());
+    read_places(file, measured.points, path.string());
+    read_problems(file, measured, path.string());
+    measured.provenance = read_provenance(file);
+    return measured;
 }
 
 }  // namespace tissuewarp::study

@@ -62,11 +62,11 @@ protected:
 
 TEST_F(StoreTest, EverythingComesBack) {
     const std::vector<Point> points{full_point(), failed_point()};
-    write_points(points, machine, folder / "results.h5");
-    Provenance provenance;
-    const std::vector<Point> read = read_points(folder / "results.h5", &provenance);
+    write_measurements({{}, points, machine}, folder / "results.h5");
+    const Measurements measured = read_measurements(folder / "results.h5");
+    const std::vector<Point>& read = measured.points;
     ASSERT_EQ(read.size(), 2u);
-    EXPECT_EQ(provenance, machine);
+    EXPECT_EQ(measured.provenance, machine);
     const Point &a = points[0], &b = read[0];
     EXPECT_EQ(a.problem, b.problem);
     EXPECT_EQ(a.setting, b.setting);
@@ -102,6 +102,24 @@ TEST_F(StoreTest, KnowsWhatItHolds) {
     EXPECT_FALSE(again.holds("cube", full_point().setting));
     EXPECT_FALSE(again.holds("phantom:8", full_point().setting));
     EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 2);  // no temporary files
+}
+
+// The page shows problems of earlier runs beside those of the last one.
+TEST_F(StoreTest, RemembersProblemsWhoseBaseWasMeasured) {
+    const ProblemSummary phantom{"phantom:7", "a blob", full_point().setting, true};
+    {
+        Store store(folder, machine);
+        store.describe({"phantom:7", "an older story", {}, false});
+        store.describe(phantom);
+        store.describe({"brain", "not measured yet", {}, false});
+        store.add(full_point());
+    }
+    const Store again(folder, machine);
+    ASSERT_EQ(again.problems().size(), 1u);
+    EXPECT_EQ(again.problems()[0].name, phantom.name);
+    EXPECT_EQ(again.problems()[0].story, phantom.story);
+    EXPECT_EQ(again.problems()[0].base, phantom.base);
+    EXPECT_TRUE(again.problems()[0].registration);
 }
 
 TEST_F(StoreTest, TableHasAFieldForEveryName) {
