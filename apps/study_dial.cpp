@@ -1,10 +1,8 @@
 // tissuewarp study dial: whether --time-budget and --accuracy keep what they are asked for.
 
-#include "apps/point_files.hpp"
 #include "apps/progress.hpp"
 #include "apps/study.hpp"
 #include "apps/update_device.hpp"
-#include "core/atomic_file.hpp"
 #include "core/errors.hpp"
 #include "registration/fronts_io.hpp"
 #include "study/dial_trial.hpp"
@@ -20,27 +18,6 @@ namespace tissuewarp::apps {
 namespace {
 
 using study::DialTrial;
-
-void write_table(const std::vector<DialTrial>& trials, const std::filesystem::path& path) {
-    std::vector<Column> columns;
-    const auto column = [&](const char* name, auto value) {
-        Eigen::VectorXd values(static_cast<Eigen::Index>(trials.size()));
-        for (std::size_t t = 0; t < trials.size(); ++t) values[Eigen::Index(t)] = double(value(trials[t]));
-        columns.push_back({name, values});
-    };
-    column("seed", [](const DialTrial& t) { return t.seed; });
-    column("partial_data", [](const DialTrial& t) { return t.kind == registration::DataKind::Partial; });
-    column("time_budget_s", [](const DialTrial& t) { return t.request.time_s.value_or(0); });
-    column("accuracy_mm", [](const DialTrial& t) { return t.request.accuracy_mm.value_or(0); });
-    column("edge_length_mm", [](const DialTrial& t) { return t.edge_length_mm; });
-    column("expected_s", [](const DialTrial& t) { return t.expected_s; });
-    column("seconds", [](const DialTrial& t) { return t.seconds; });
-    column("error_mm", [](const DialTrial& t) { return t.error_mm; });
-    column("estimated_mm", [](const DialTrial& t) { return t.estimated_mm; });
-    column("possible", [](const DialTrial& t) { return t.possible; });
-    column("announced", [](const DialTrial& t) { return t.announced; });
-    write_columns(columns, path);
-}
 
 double percentile_95(std::vector<double> values) {
     std::sort(values.begin(), values.end());
@@ -72,6 +49,16 @@ void print_request(const std::vector<DialTrial>& trials) {
                100 * share(trials, [](const DialTrial& t) { return t.kept_accuracy() && t.announced; }));
 }
 
+std::vector<DialTrial> measured(const StudyOptions& options, const study::DialTrialOptions& plan,
+                                ProgressLine& progress) {
+    try {
+        return study::try_dial(options.output, registration::known_fronts(), plan, progress);
+    } catch (const Cancelled&) {
+        throw Interrupted("interrupted; the trials so far are in '" + options.output.string() +
+                          "', and the same command goes on from there");
+    }
+}
+
 }  // namespace
 
 void run_dial_study(const StudyOptions& options) {
@@ -79,13 +66,12 @@ void run_dial_study(const StudyOptions& options) {
     plan.update = on_device(options.device);
     std::tie(plan.first_seed, plan.last_seed) = phantom_seeds(options.problems, {plan.first_seed, plan.last_seed});
     if (options.quick) plan.last_seed = std::min(plan.last_seed, plan.first_seed + 1);
-    if (!options.output.empty()) require_writable_folder(options.output);
+    if (options.output.empty()) throw InvalidInput("give --output, the folder that keeps each phantom's trials");
     ProgressLine progress(options.common.quiet);
     progress.begin("registering phantoms", 0.0, 1.0);
-    const auto trials = study::try_dial(registration::known_fronts(), plan, progress);
+    const std::vector<DialTrial> trials = measured(options, plan, progress);
     progress.clear();
     if (trials.empty()) throw SolverFailure("no phantom could be made; give other seeds");
-    if (!options.output.empty()) write_table(trials, options.output / "dial.csv");
     std::vector<std::vector<DialTrial>> groups;
     for (const DialTrial& trial : trials) {
         const auto group = std::find_if(groups.begin(), groups.end(), [&](const auto& g) {

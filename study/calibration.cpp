@@ -1,14 +1,13 @@
 #include "study/calibration.hpp"
 
 #include "core/errors.hpp"
-#include "registration/evaluation.hpp"
 #include "registration/field.hpp"
 #include "registration/warp.hpp"
-#include "study/phantom.hpp"
+#include "study/detail/registered_phantom.hpp"
+#include "study/point.hpp"
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <map>
 #include <string>
 
@@ -30,19 +29,6 @@ public:
 private:
     std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
-
-double megavoxels(const imaging::Geometry& grid) {
-    return double(grid.voxel_count()) / 1e6;
-}
-
-/// `share` of the sorted values lie below, with linear interpolation; 0.5 is the median.
-double quantile(std::vector<double> values, double share) {
-    std::sort(values.begin(), values.end());
-    const double place = share * double(values.size() - 1);
-    const auto below = static_cast<std::size_t>(place);
-    const std::size_t above = std::min(below + 1, values.size() - 1);
-    return values[below] + (place - double(below)) * (values[above] - values[below]);
-}
 
 /// Amounts of work and the seconds that they took.
 struct Cost {
@@ -78,11 +64,6 @@ double seconds_of(const std::vector<StageTime>& times, const std::string& stage)
     for (const StageTime& time : times)
         if (time.stage == stage) sum += time.seconds;
     return sum;
-}
-
-double root_mean_square_error(const Deformation& deformation, const Landmarks& targets) {
-    const Eigen::Matrix3Xd off = PointTransform(deformation)(targets.moving) - targets.fixed;
-    return std::sqrt(off.colwise().squaredNorm().mean());
 }
 
 class Measurement {
@@ -131,14 +112,7 @@ private:
         const double preparation = stopwatch.lap();
         Updater updater(prepared, plan_.update);
         for (const DataKind kind : {DataKind::Labels, DataKind::Partial}) {
-            Intraoperative seen;
-            if (kind == DataKind::Labels)
-                seen.labels = phantom.fixed_labels;
-            else {
-                seen.surface = phantom.surface;
-                seen.points = phantom.points;
-            }
-            const UpdateResult result = updater.update(seen);
+            const UpdateResult result = updater.update(detail::seen_of(phantom, kind));
             engine_ = result.engine;
             Sample& sample = samples_[{kind, density}];
             sample.tetrahedra.push_back(prepared.model.mesh.tet_count());
@@ -146,9 +120,9 @@ private:
             sample.rounds.push_back(seconds_of(result.times, "correspondence") +
                                     seconds_of(result.times, "equilibrium"));
             sample.judging.push_back(seconds_of(result.times, "expected error"));
-            sample.errors.push_back(root_mean_square_error(result.deformation, phantom.targets));
+            sample.errors.push_back(detail::root_mean_square_error(result.deformation, phantom.targets));
             alignment_[int(kind)].add(
-                kind == DataKind::Labels ? megavoxels(phantom.fixed_labels.geometry) : 0.0,
+                kind == DataKind::Labels ? detail::megavoxels(phantom.fixed_labels.geometry) : 0.0,
                 seconds_of(result.times, "rigid alignment") + seconds_of(result.times, "boundary maps"));
             time_images(phantom, result.deformation);
         }
@@ -159,10 +133,10 @@ private:
         Stopwatch stopwatch;
         const imaging::Volume forward = displacement_moving_to_fixed(deformation, moving);
         const imaging::Volume backward = displacement_fixed_to_moving(deformation, fixed);
-        fields_.add(megavoxels(moving) + megavoxels(fixed), stopwatch.lap());
+        fields_.add(detail::megavoxels(moving) + detail::megavoxels(fixed), stopwatch.lap());
         warp_image(phantom.moving_labels.as(CV_32F), backward);
         warp_labels(phantom.moving_labels, backward);
-        warp_.add(megavoxels(fixed), stopwatch.lap());
+        warp_.add(detail::megavoxels(fixed), stopwatch.lap());
     }
 
     [[nodiscard]] Fronts fronts() const {
@@ -176,13 +150,13 @@ private:
         for (const auto& [key, sample] : samples_) {
             FrontPoint point;
             std::tie(point.kind, point.edges_per_organ) = key;
-            point.tetrahedra = quantile(sample.tetrahedra, 0.5);
-            point.preparation_s = quantile(sample.preparation, 0.5);
-            point.rounds_s = quantile(sample.rounds, 0.5);
-            point.rounds_95_s = quantile(sample.rounds, 0.95);
-            point.judging_s = quantile(sample.judging, 0.5);
-            point.error_mm = quantile(sample.errors, 0.5);
-            point.error_95_mm = quantile(sample.errors, 0.95);
+            point.tetrahedra = percentile(sample.tetrahedra, 0.5);
+            point.preparation_s = percentile(sample.preparation, 0.5);
+            point.rounds_s = percentile(sample.rounds, 0.5);
+            point.rounds_95_s = percentile(sample.rounds, 0.95);
+            point.judging_s = percentile(sample.judging, 0.5);
+            point.error_mm = percentile(sample.errors, 0.5);
+            point.error_95_mm = percentile(sample.errors, 0.95);
             fronts.points.push_back(point);
         }
         return fronts;

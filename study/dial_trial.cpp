@@ -1,14 +1,12 @@
 #include "study/dial_trial.hpp"
 
 #include "core/errors.hpp"
-#include "registration/evaluation.hpp"
 #include "registration/field.hpp"
 #include "registration/uncertainty.hpp"
 #include "registration/warp.hpp"
-#include "study/phantom.hpp"
+#include "study/detail/registered_phantom.hpp"
 
 #include <chrono>
-#include <cmath>
 #include <string>
 
 namespace tissuewarp::study {
@@ -17,30 +15,10 @@ using namespace registration;
 
 namespace {
 
-double megavoxels(const imaging::Geometry& grid) {
-    return double(grid.voxel_count()) / 1e6;
-}
-
 DialCase case_of(const Phantom& phantom, DataKind kind) {
-    const double fixed = megavoxels(phantom.fixed_labels.geometry);
-    return {kind, organ_size(phantom.moving_labels), megavoxels(phantom.moving_labels.geometry), fixed,
+    const double fixed = detail::megavoxels(phantom.fixed_labels.geometry);
+    return {kind, organ_size(phantom.moving_labels), detail::megavoxels(phantom.moving_labels.geometry), fixed,
             kind == DataKind::Labels ? fixed : 0.0};
-}
-
-Intraoperative data_of(const Phantom& phantom, DataKind kind) {
-    Intraoperative seen;
-    if (kind == DataKind::Labels) {
-        seen.labels = phantom.fixed_labels;
-    } else {
-        seen.surface = phantom.surface;
-        seen.points = phantom.points;
-    }
-    return seen;
-}
-
-double root_mean_square_error(const Deformation& deformation, const Landmarks& targets) {
-    const Eigen::Matrix3Xd off = PointTransform(deformation)(targets.moving) - targets.fixed;
-    return std::sqrt(off.colwise().squaredNorm().mean());
 }
 
 DialTrial tried(const Phantom& phantom, DataKind kind, const DialRequest& request, const Fronts& fronts,
@@ -54,7 +32,7 @@ DialTrial tried(const Phantom& phantom, DataKind kind, const DialRequest& reques
     Updater updater(prepared, update);
 
     const auto begin = std::chrono::steady_clock::now();
-    const UpdateResult result = updater.update(data_of(phantom, kind));
+    const UpdateResult result = updater.update(detail::seen_of(phantom, kind));
     displacement_moving_to_fixed(result.deformation, phantom.moving_labels.geometry);
     const imaging::Volume backward = displacement_fixed_to_moving(result.deformation, phantom.fixed_labels.geometry);
     warp_image(image, backward);
@@ -62,7 +40,7 @@ DialTrial tried(const Phantom& phantom, DataKind kind, const DialRequest& reques
     const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
 
     DialTrial trial{phantom.seed, kind, request, choice.edge_length_mm, choice.seconds, taken.count()};
-    trial.error_mm = root_mean_square_error(result.deformation, phantom.targets);
+    trial.error_mm = detail::root_mean_square_error(result.deformation, phantom.targets);
     trial.estimated_mm = summarise(uncertainty(prepared, result)).deviation_mm;
     trial.possible = choice.time_met && choice.accuracy_met;
     const bool doubted = (request.accuracy_mm && trial.estimated_mm > *request.accuracy_mm) || !trial.kept_time();
@@ -79,22 +57,30 @@ std::vector<DialRequest> requests_of(const DialTrialOptions& options) {
     return requests;
 }
 
+std::vector<DialTrial> tried(const Phantom& phantom, const std::vector<DialRequest>& requests, const Fronts& fronts,
+                             const UpdateOptions& update) {
+    std::vector<DialTrial> trials;
+    for (const DataKind kind : {DataKind::Labels, DataKind::Partial})
+        for (const DialRequest& request : requests) trials.push_back(tried(phantom, kind, request, fronts, update));
+    return trials;
+}
+
 }  // namespace
 
-std::vector<DialTrial> try_dial(const Fronts& fronts, const DialTrialOptions& options, Observer& observer) {
+std::vector<DialTrial> try_dial(const std::filesystem::path& folder, const Fronts& fronts,
+                                const DialTrialOptions& options, Observer& observer) {
     const std::vector<DialRequest> requests = requests_of(options);
-    const double phantoms = double(options.last_seed - options.first_seed) + 1;
+    std::filesystem::create_directories(folder);
     std::vector<DialTrial> trials;
     for (std::uint64_t seed = options.first_seed; seed <= options.last_seed; ++seed) {
-        const double done = double(seed - options.first_seed);
-        observer.checkpoint("trials", done / phantoms);
+        observer.checkpoint("phantom " + std::to_string(seed),
+                            double(seed - options.first_seed) / double(options.last_seed - options.first_seed + 1));
+        const std::filesystem::path kept = folder / ("dial_" + std::to_string(seed) + ".csv");
         try {
-            const Phantom phantom = random_phantom(seed);
-            for (const DataKind kind : {DataKind::Labels, DataKind::Partial})
-                for (std::size_t r = 0; r < requests.size(); ++r) {
-                    observer.checkpoint("trials", (done + double(r + 1) / double(requests.size() + 1)) / phantoms);
-                    trials.push_back(tried(phantom, kind, requests[r], fronts, options.update));
-                }
+            if (!std::filesystem::exists(kept))
+                write_dial_trials(kept, tried(random_phantom(seed), requests, fronts, options.update));
+            const std::vector<DialTrial> here = read_dial_trials(kept);
+            trials.insert(trials.end(), here.begin(), here.end());
         } catch (const SolverFailure& failure) {
             observer.note("phantom " + std::to_string(seed) + " is left out: " + failure.what());
         }

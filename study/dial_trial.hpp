@@ -7,6 +7,7 @@
 #include "registration/pipeline.hpp"
 
 #include <cstdint>
+#include <filesystem>
 #include <vector>
 
 namespace tissuewarp::study {
@@ -33,9 +34,15 @@ struct DialTrial {
     [[nodiscard]] bool kept_accuracy() const { return !request.accuracy_mm || error_mm <= *request.accuracy_mm; }
 };
 
-/// With labels, and with a part of the surface and pairs of points. Phantoms that fail are noted and left out. Throws
-/// InvalidInput for requests that cannot be, Cancelled.
-std::vector<DialTrial> try_dial(const registration::Fronts& fronts, const DialTrialOptions& options,
-                                Observer& observer = silent_observer());
+/// With labels, and with a part of the surface and pairs of points. Each phantom's trials are kept in
+/// `folder`/dial_<seed>.csv, which appear complete or not at all; phantoms whose file is there are read, not tried.
+/// Phantoms that fail are noted and left out. Throws InvalidInput for requests that cannot be or a file that is not
+/// such a table, IoError, Cancelled.
+std::vector<DialTrial> try_dial(const std::filesystem::path& folder, const registration::Fronts& fronts,
+                                const DialTrialOptions& options, Observer& observer = silent_observer());
+
+/// CSV with a header: lengths mm, times s, an empty field where nothing was asked. Throw IoError, InvalidInput.
+void write_dial_trials(const std::filesystem::path& path, const std::vector<DialTrial>& trials);
+std::vector<DialTrial> read_dial_trials(const std::filesystem::path& path);
 
 }  // namespace tissuewarp::study
