@@ -1,6 +1,7 @@
 // tissuewarp calibrate: what meshes cost and give on this machine, for --accuracy and --time-budget.
 
 #include "apps/progress.hpp"
+#include "apps/study.hpp"
 #include "apps/update_device.hpp"
 #include "apps/verbs.hpp"
 #include "core/atomic_file.hpp"
@@ -10,11 +11,25 @@
 
 #include <fmt/format.h>
 
+#include <numeric>
+
 namespace tissuewarp::apps {
 
 namespace {
 
 using registration::Fronts;
+
+constexpr std::uint64_t most_phantoms = 1000;  // half a day
+
+std::vector<std::uint64_t> seeds_of(const CalibrateOptions& options, const std::vector<std::uint64_t>& otherwise) {
+    const auto [first, last] = phantom_seeds(options.problems, {otherwise.front(), otherwise.back()});
+    if (last - first >= most_phantoms)
+        throw InvalidInput(fmt::format("--problems names {} phantoms; {} are the most, and 8 are enough for most uses",
+                                       last - first + 1, most_phantoms));
+    std::vector<std::uint64_t> seeds(last - first + 1);
+    std::iota(seeds.begin(), seeds.end(), first);
+    return seeds;
+}
 
 std::filesystem::path destination(const CalibrateOptions& options) {
     if (!options.output.empty()) return options.output;
@@ -45,8 +60,9 @@ void run_calibrate(const CalibrateOptions& options) {
     ProgressLine progress(options.common.quiet);
     study::FrontsPlan plan;
     plan.update = on_device(options.device);
+    plan.seeds = seeds_of(options, plan.seeds);
     if (options.quick) {
-        plan.seeds.resize(2);
+        plan.seeds.resize(std::min<std::size_t>(2, plan.seeds.size()));
         plan.edges_per_organ = {8, 12};
     }
     progress.begin("registering phantoms", 0.0, 1.0);

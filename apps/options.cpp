@@ -411,6 +411,7 @@ struct Parser {
     void declare_calibrate(Verb& verb) {
         CalibrateOptions& o = calibrate;
         verb.path("-o,--output", o.output, "File to write; default: where register looks for it");
+        verb.list("--problems", o.problems, "NAME", "phantom:FIRST-LAST; default: phantom:5001-5008");
         verb.text("--device", o.device.name, "auto, cpu, gpu or gpu:<index>")
             ->check(CLI::Validator(check_device, "", "device"));
         verb.flag("--quick", o.quick, "Two phantoms, two meshes: whether everything runs");
@@ -420,11 +421,11 @@ struct Parser {
     void declare_study(Verb& verb) {
         StudyOptions& o = study;
         verb.app().footer("Example:\n  tissuewarp study accuracy-time --quick --output out/study");
-        verb.text("name", o.name, "accuracy-time")->required();
+        verb.text("name", o.name, "accuracy-time, coverage or dial")->required();
         verb.path("-o,--output", o.output, "Folder for measurements and page; a study interrupted there goes on")
             ->type_name("FOLDER");
         verb.list("--problems", o.problems, "NAME",
-                  "Of cube, brain, brainshift, liver, phantom:SEED; default: all but liver")
+                  "Of cube, brain, brainshift, liver, phantom:SEED; coverage and dial: phantom:FIRST-LAST")
             ->delimiter(',');
         verb.path("--data", o.data, "Folder that holds phantom-liver, for the liver")->type_name("FOLDER");
         verb.number("--most-elements", o.most_elements, "COUNT", 1000, 2000000, "Leave larger meshes out");

@@ -138,7 +138,8 @@ struct ExplainOptions {
 
 struct CalibrateOptions {
     CommonOptions common;
-    std::filesystem::path output;  ///< empty: where register looks
+    std::filesystem::path output;       ///< empty: where register looks
+    std::vector<std::string> problems;  ///< "phantom:FIRST-LAST"; empty: eight
     bool quick = false;
     DeviceChoice device;
 };
