@@ -36,6 +36,7 @@ struct FrontPoint {
     double rounds_s = 0;         ///< matching and equilibrium: median
     double rounds_95_s = 0;      ///< and 95th percentile
     double judging_s = 0;        ///< after the last round: median
+    double fields_s = 0;         ///< both fields on the grids of phantoms, where the mesh decides: median
     double error_mm = 0;         ///< root mean square over the targets of a phantom: median over phantoms
     double error_95_mm = 0;      ///< and 95th percentile
 };
@@ -45,7 +46,7 @@ struct Fronts {
     std::string machine;         ///< processor, threads and device, for people
     bool measured_here = false;  ///< false: the figures that come with the program
     LinearCost alignment[2];     ///< by DataKind: over millions of voxels of the fixed labels; constant otherwise
-    LinearCost fields;           ///< both fields, over millions of voxels of the two grids
+    LinearCost fields;           ///< both fields, over millions of voxels of the two grids; beside FrontPoint::fields_s
     LinearCost warp;             ///< image and labels, over millions of voxels of the output grid
     std::vector<FrontPoint> points;
 };

@@ -21,7 +21,7 @@ Fronts fronts_from_json(const std::string& text, const std::string& source);
 /// and InvalidInput for a file that cannot be used.
 Fronts known_fronts();
 
-/// Rough: two phantoms and two meshes, on two busy cores.
+/// Of seven phantoms and seven meshes, on two cores of a Xeon.
 Fronts shipped_fronts();
 
 /// Makes the folder and replaces the file at once. Throws IoError.

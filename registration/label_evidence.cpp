@@ -26,7 +26,10 @@ Contribution LabelEvidence::contribution(const RoundPlan& plan, const State& sta
     if (plan.last) trim(matches, options_.trimmed_share, options_.residual_scale_mm);
     Contribution result{matched_springs(interfaces, matches, normals, state.displacement, prepared_.options),
                         holding_springs(interfaces, state.displacement, prepared_.options),
-                        static_cast<int>(matches.size()), 0, 0, mean_residual(matches)};
+                        static_cast<int>(matches.size()),
+                        0,
+                        0,
+                        mean_residual(matches)};
     for (const Match& match : matches) {
         result.matched += match.found;
         result.held_back += match.held_back;

@@ -1,5 +1,7 @@
 #pragma once
-/// fronts.json of `tissuewarp calibrate --quick` on two busy cores: two phantoms, two meshes.
+/// fronts.json of `tissuewarp calibrate` with seven phantoms (5001–5005, 5007, 5008), each on two cores of their own of
+/// one Xeon with AVX-512; medians and percentiles over the phantoms. What a voxel of a field takes is from one of them
+/// (5002) on a busier machine.
 
 namespace tissuewarp::registration::detail {
 

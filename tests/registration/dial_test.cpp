@@ -113,7 +113,7 @@ TEST(Fronts, ComeWithTheProgram) {
     for (const DataKind kind : {DataKind::Labels, DataKind::Partial})
         EXPECT_GE(std::count_if(fronts.points.begin(), fronts.points.end(),
                                 [&](const FrontPoint& p) { return p.kind == kind; }),
-                  2);
+                  3);
 }
 
 // Without time a single round is made and a doubt says so; with plenty the result is that without a budget.
