@@ -106,6 +106,7 @@ struct Row {
 constexpr Row rows[] = {{"L-BFGS, metric K0", tled::EquilibriumMethod::Lbfgs, false},
                         {"L-BFGS, metric renewed", tled::EquilibriumMethod::Lbfgs, true},
                         {"dynamic relaxation", tled::EquilibriumMethod::DynamicRelaxation, false},
+                        {"self-checked relaxation", tled::EquilibriumMethod::SelfCheckedRelaxation, false},
                         {"nonlinear CG", tled::EquilibriumMethod::NonlinearCg, false},
                         {"automatic", tled::EquilibriumMethod::Automatic, false}};
 

@@ -96,6 +96,7 @@ private:
     /// Data other than labels pull with other springs than those that the model was prepared with: a factor made with
     /// them takes a tenth of the iterations.
     std::optional<tled::RestStiffness> metric_;
+    bool relaxation_failed_ = false;
     double matching_seconds_ = 0, solving_seconds_ = 0;
 
     /// Points show the organ wherever it lies, and nothing says where that is.
@@ -147,6 +148,7 @@ private:
                 return match_and_solve(round);
             } catch (const SolverFailure& failure) {
                 if (halving == most_halvings) throw;
+                relaxation_failed_ |= equilibrium_.method == tled::EquilibriumMethod::SelfCheckedRelaxation;
                 equilibrium_.method = options_.equilibrium.method;
                 step_mm_ /= 2;
                 observer_.note("a round is repeated with steps of at most " + detail::to_text(step_mm_) +
@@ -175,11 +177,14 @@ private:
         return {round, round == options_.rematches - 1, range, scale, step_mm_};
     }
 
-    /// With a factor of the data's own springs L-BFGS takes a handful of solves: fewer than it costs to find the lowest
-    /// frequency, which dynamic relaxation is tuned by.
+    /// Labels hold the tissue with about the springs it was prepared with: its lowest frequency is known, and
+    /// relaxation needs no solves with a factor of other springs. With a factor of the data's own springs L-BFGS takes
+    /// a handful of solves: fewer than it costs to find the lowest frequency.
     void choose_method() {
-        const bool free = equilibrium_.method == tled::EquilibriumMethod::Automatic;
-        if (free && metric_ && engine_.processor() == tled::Processor::Cpu)
+        if (equilibrium_.method != tled::EquilibriumMethod::Automatic) return;
+        if (!needs_metric() && !relaxation_failed_)
+            equilibrium_.method = tled::EquilibriumMethod::SelfCheckedRelaxation;
+        else if (metric_ && engine_.processor() == tled::Processor::Cpu)
             equilibrium_.method = tled::EquilibriumMethod::Lbfgs;
     }
 

@@ -104,7 +104,8 @@ struct Prepared {
 /// What chooses between methods, and what tunes dynamic relaxation.
 bool needs_frequency(const Setting& setting) {
     return setting.physics.law != Law::Linear &&
-           (setting.solver == Solver::Automatic || setting.solver == Solver::DynamicRelaxation);
+           (setting.solver == Solver::Automatic || setting.solver == Solver::DynamicRelaxation ||
+            setting.solver == Solver::SelfCheckedRelaxation);
 }
 
 /// An answer with what it took.

@@ -41,7 +41,8 @@ std::string name_of(Law law) {
 }
 
 std::string name_of(Solver solver) {
-    constexpr const char* names[] = {"automatic", "L-BFGS", "dynamic relaxation", "conjugate gradients", "Newton"};
+    constexpr const char* names[] = {"automatic",           "L-BFGS", "dynamic relaxation", "self-checked relaxation",
+                                     "conjugate gradients", "Newton"};
     return names[static_cast<int>(solver)];
 }
 
@@ -107,6 +108,8 @@ tled::EquilibriumMethod method_of(Solver solver) {
             return tled::EquilibriumMethod::Lbfgs;
         case Solver::DynamicRelaxation:
             return tled::EquilibriumMethod::DynamicRelaxation;
+        case Solver::SelfCheckedRelaxation:
+            return tled::EquilibriumMethod::SelfCheckedRelaxation;
         case Solver::NonlinearCg:
             return tled::EquilibriumMethod::NonlinearCg;
         case Solver::Newton:

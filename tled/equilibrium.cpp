@@ -29,7 +29,7 @@ void require_usable(const NodalConditions& conditions, const EquilibriumOptions&
 /// (figures: docs/performance.md, "Equilibrium to a given error").
 Choice choose(const Engine& engine, const RestStiffness& stiffness, const NodalConditions& conditions) {
     if (engine.processor() == Processor::Gpu)
-        return {EquilibriumMethod::DynamicRelaxation, "its steps run on the GPU without transfers"};
+        return {EquilibriumMethod::SelfCheckedRelaxation, "on the GPU a solve with the factor outweighs all steps"};
     constexpr double highest = 8, decades = 4;  // of diag(K₀)⁻¹K₀; neper from a linear start to a tolerance
     constexpr double evaluations_per_entry = 7.5e-3;  // of a solve, by entries of the factor per node
     constexpr double iterations = 50;                 // 12 to 20 for ν = 0.49, 50 to 75 for 0.499
@@ -49,6 +49,8 @@ EquilibriumResult solve(EquilibriumMethod method, detail::EquilibriumSearch& sea
             return detail::nonlinear_cg(search, start);
         case EquilibriumMethod::DynamicRelaxation:
             return detail::dynamic_relaxation(search, start);
+        case EquilibriumMethod::SelfCheckedRelaxation:
+            return detail::self_checked_relaxation(search, start);
         case EquilibriumMethod::Lbfgs:
         case EquilibriumMethod::Automatic:
             break;
@@ -64,6 +66,8 @@ const char* name_of(EquilibriumMethod method) {
             return "L-BFGS";
         case EquilibriumMethod::DynamicRelaxation:
             return "dynamic relaxation";
+        case EquilibriumMethod::SelfCheckedRelaxation:
+            return "self-checked relaxation";
         case EquilibriumMethod::NonlinearCg:
             return "nonlinear conjugate gradients";
         case EquilibriumMethod::Automatic:

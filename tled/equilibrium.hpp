@@ -11,9 +11,10 @@ namespace tissuewarp::tled {
 
 enum class EquilibriumMethod {
     Automatic,
-    Lbfgs,              ///< limited-memory BFGS with the factor of K₀ as metric (Liu and Nocedal 1989)
-    DynamicRelaxation,  ///< heavy ball with mass diag K₀ (Underwood 1983; Joldes, Wittek, Miller 2011)
-    NonlinearCg,        ///< conjugate gradients (Polak and Ribière 1969), preconditioned with diag K₀
+    Lbfgs,                  ///< limited-memory BFGS with the factor of K₀ as metric (Liu and Nocedal 1989)
+    DynamicRelaxation,      ///< heavy ball with mass diag K₀ (Underwood 1983; Joldes, Wittek, Miller 2011)
+    SelfCheckedRelaxation,  ///< the same, started and checked without the factor of K₀
+    NonlinearCg,            ///< conjugate gradients (Polak and Ribière 1969), preconditioned with diag K₀
 };
 
 struct EquilibriumOptions {
@@ -37,7 +38,9 @@ struct EquilibriumResult {
 
 /// Brings the engine to equilibrium under the conditions. Starts from the linear-elastic solution, or from `start`
 /// (3 × N mm) plus the linear-elastic answer to its residual. Accepts by the lifted residual; soon after a linear
-/// start, or with the history of L-BFGS, by a larger estimate (docs/decisions/equilibrium.md).
+/// start, or with the history of L-BFGS, by a larger estimate (docs/decisions/equilibrium.md). Self-checked relaxation
+/// starts from rest or `start` itself, unless that tears tissue, and accepts by how its movement contracts; it trusts
+/// that the springs of `stiffness` hold the tissue about as those of `conditions` do.
 ///
 /// Throws InvalidInput for options or conditions that cannot be used, and SolverFailure, which names the cause, the
 /// tetrahedron and the last good state: no admissible start, no progress, the precision of the engine reached, too many

@@ -60,5 +60,6 @@ constexpr double linear_start_safety = 1.5;
 EquilibriumResult lbfgs(EquilibriumSearch& search, const Eigen::Matrix3Xd* start);
 EquilibriumResult nonlinear_cg(EquilibriumSearch& search, const Eigen::Matrix3Xd* start);
 EquilibriumResult dynamic_relaxation(EquilibriumSearch& search, const Eigen::Matrix3Xd* start);
+EquilibriumResult self_checked_relaxation(EquilibriumSearch& search, const Eigen::Matrix3Xd* start);
 
 }  // namespace tissuewarp::tled::detail

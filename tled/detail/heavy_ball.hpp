@@ -1,0 +1,25 @@
+#pragma once
+/// The explicit step with mass diag K₀ as the heavy-ball iteration on M⁻¹K, whose optimal coefficients follow from the
+/// extreme eigenvalues (Polyak 1964).
+
+#include "tled/detail/equilibrium_search.hpp"
+
+namespace tissuewarp::tled::detail {
+
+/// Of M⁻¹K.
+struct Spectrum {
+    double lowest = 0, highest = 0;
+};
+
+/// c = 4/(√λ_max + √λ_min)², ρ = ((√λ_max − √λ_min)/(√λ_max + √λ_min))². Every error falls by √ρ a step.
+StepCoefficients heavy_ball(const Spectrum& spectrum);
+
+/// Neper by which errors fall in a step.
+double decay(const Spectrum& spectrum);
+
+/// At the last good state, whose residual is given: λ_max by Lanczos' iteration (Golub and Van Loan, section 10.1) on
+/// M^(−½) K M^(−½), with products by differences of the real force kernel; λ_min from that of K₀. Leaves the engine at
+/// that state, at rest. Fails where no λ_max above 0 is found.
+Spectrum spectrum_at(EquilibriumSearch& search, const Eigen::Matrix3Xd& mass, const Eigen::Matrix3Xd& residual);
+
+}  // namespace tissuewarp::tled::detail

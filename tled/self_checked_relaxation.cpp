@@ -1,0 +1,119 @@
+// Dynamic relaxation that no triangular solve starts or checks: from the state it is given, and stopped by how its own
+// movement contracts. Its work grows as the nodes times the square root of the condition, and on a GPU nothing but
+// states leaves the device.
+
+#include "tled/detail/heavy_ball.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+namespace tissuewarp::tled::detail {
+
+using Eigen::Matrix3Xd;
+
+namespace {
+
+/// Loads that act at once make waves of up to twice the displacement that they leave. Steps without momentum make
+/// none, and momentum that grows slowly makes small ones.
+struct Opening {
+    int steps;
+    double momentum;
+};
+constexpr std::array openings{Opening{4, 0.0}, Opening{6, 0.5}, Opening{10, 0.75}, Opening{20, 0.87}};
+
+constexpr double neper_a_window = 1;     // foreseen decay between two looks
+constexpr double slowest = 0.95;         // contraction of a window that is still believed
+constexpr double estimate_safety = 1.5;  // of the error: modes and directions do not add up to a bound
+constexpr int most_restarts = 6;
+constexpr int most_idle_windows = 12;  // without the movement falling by a tenth
+
+class SelfCheckedRelaxation {
+public:
+    explicit SelfCheckedRelaxation(EquilibriumSearch& search)
+        : search_(search), mass_(search.stiffness.diagonal(search.conditions)) {
+        search_.engine.set_mass(mass_);
+    }
+
+    EquilibriumResult run(const Matrix3Xd* start) {
+        search_.keep(first_state(start), unknown_error());
+        spectrum_ = spectrum_at(search_, mass_, search_.residual());
+        while (!(open() && settle())) restart();
+        return search_.finish();
+    }
+
+private:
+    EquilibriumSearch& search_;
+    Matrix3Xd mass_;
+    Spectrum spectrum_;
+    int restarts_ = 0;
+
+    [[nodiscard]] double unknown_error() const { return 1e3 * search_.options.tolerance_mm; }
+
+    /// As it is given, or the linear answer where imposed displacements would tear tissue at rest.
+    Matrix3Xd first_state(const Matrix3Xd* start) {
+        const NodalConditions& conditions = search_.conditions;
+        const Matrix3Xd rest = Matrix3Xd::Zero(3, conditions.constrained.cols());
+        Matrix3Xd u = conditions.constrained.select(conditions.imposed, start != nullptr ? *start : rest);
+        if (!search_.admissible(u)) u = search_.begin(start);
+        return u;
+    }
+
+    /// Where steps lead; nothing where tissue was inverted.
+    std::optional<Matrix3Xd> stepped(int steps, const StepCoefficients& coefficients) {
+        search_.require_evaluations(steps);
+        search_.engine.run(steps, coefficients);
+        const bool inverted = !(search_.engine.smallest_jacobian().value > 0);
+        std::optional<Matrix3Xd> u = search_.engine.displacement();
+        if (!u->allFinite() || (inverted && !search_.engine.admits_inversion())) u.reset();
+        return u;
+    }
+
+    bool open() {
+        const StepCoefficients last = heavy_ball(spectrum_);
+        for (const Opening& opening : openings)
+            if (opening.momentum < last.momentum && !stepped(opening.steps, {opening.momentum, 1 / spectrum_.highest}))
+                return false;
+        return true;
+    }
+
+    /// Windows of steps until what is left after the last is foreseen to be less than the tolerance; false where tissue
+    /// was inverted. Movements d of windows that contract by q leave q/(1 − q) d.
+    bool settle() {
+        Matrix3Xd before = search_.engine.displacement();
+        double last = 0, least = 0;
+        for (int window = 0, idle = 0;; ++window) {
+            const int steps = static_cast<int>(std::ceil(neper_a_window / decay(spectrum_)));
+            std::optional<Matrix3Xd> after = stepped(steps, heavy_ball(spectrum_));
+            if (!after) return false;
+            const double moved = largest_norm(*after - before), foreseen = std::exp(-neper_a_window);
+            const double seen = window == 0 ? slowest : moved / std::max(last, 1e-300);
+            const double contraction = std::clamp(seen, foreseen, slowest);
+            const double error =
+                estimate_safety * contraction / (1 - contraction) * std::max(moved, contraction * last);
+            search_.keep(*after, window == 0 ? unknown_error() : error);
+            if (window > 0 && error <= search_.options.tolerance_mm) return true;
+            if (window > 1 && std::log(seen) > -0.4 * neper_a_window) spectrum_.lowest *= 0.6;
+            if (window == 0 || moved < 0.9 * least) idle = 0, least = moved;
+            if (++idle > most_idle_windows) search_.fail_stalled();
+            before = std::move(*after);
+            last = moved;
+        }
+    }
+
+    void restart() {
+        if (++restarts_ > most_restarts || !search_.admissible(search_.last_good())) search_.fail_stalled();
+        spectrum_ = spectrum_at(search_, mass_, search_.residual());
+        spectrum_.highest *= 1 << restarts_;
+        search_.observer.note("relaxation restarted from the last good state with a smaller step");
+    }
+};
+
+}  // namespace
+
+EquilibriumResult self_checked_relaxation(EquilibriumSearch& search, const Matrix3Xd* start) {
+    return SelfCheckedRelaxation(search).run(start);
+}
+
+}  // namespace tissuewarp::tled::detail
