@@ -78,8 +78,9 @@ struct DialChoice {
 
 /// With an accuracy alone, the fastest mesh whose 95th percentile of errors keeps it, otherwise the most accurate one;
 /// with a time, the most accurate mesh (or the fastest that keeps the accuracy) whose 95th percentile of times keeps
-/// it, otherwise the fastest. Throws InvalidInput when nothing is asked, or for values that are not above 0, and where
-/// nothing was measured for the kind of data.
+/// it, otherwise the fastest. Of meshes within 5 % of the most accurate one, the finest counts as that. Throws
+/// InvalidInput when nothing is asked, or for values that are not above 0, and where nothing was measured for the kind
+/// of data.
 DialChoice choose(const Fronts& fronts, const DialRequest& request, const DialCase& what);
 
 }  // namespace tissuewarp::registration

@@ -1,14 +1,39 @@
 """--accuracy and --time-budget choose a mesh, say what they expect, and check it."""
 
 import json
+import os
 import unittest
+from unittest import mock
 
 from phantom import PhantomTest, run
 
 INPUT = 2
 
 
+def measured(edges_per_organ, tetrahedra, rounds_s, error_mm):
+    return {"data": "labels", "edges_per_organ": edges_per_organ, "tetrahedra": tetrahedra, "preparation_s": rounds_s,
+            "rounds_s": rounds_s, "rounds_95_s": 2 * rounds_s, "judging_s": 0, "fields_s": 0.05,
+            "error_mm": error_mm, "error_95_mm": 2 * error_mm}
+
+
+FRONTS = {"schema": "tissuewarp.fronts", "schema_version": 2, "machine": "a test",
+          **{name: {"constant_s": 0.05, "slope_s": 0.1}
+             for name in ("alignment_labels", "alignment_partial", "fields", "warp")},
+          "points": [measured(6, 2000, 0.1, 2.0), measured(10, 10000, 0.5, 0.5)]}
+
+
 class Dial(PhantomTest):
+    """By figures of its own: those of a machine or of the program are measured, and may choose otherwise."""
+
+    def setUp(self):
+        super().setUp()
+        cache = self.phantom.folder / "cache"
+        cache.mkdir()
+        (cache / "fronts.json").write_text(json.dumps(FRONTS))
+        patch = mock.patch.dict(os.environ, TISSUEWARP_CACHE=str(cache))
+        patch.start()
+        self.addCleanup(patch.stop)
+
     def registered(self, *options):
         result = self.phantom.register(*options)
         self.assertEqual(result.returncode, 0, result.stderr)

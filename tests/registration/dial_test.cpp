@@ -71,6 +71,15 @@ TEST(Dial, TakesTheFastestAccurateMeshWithinTheTime) {
     EXPECT_FALSE(both.accuracy_met);
 }
 
+// Errors that measurements hardly tell apart do not choose the coarsest mesh.
+TEST(Dial, TakesTheFinestOfEquallyAccurateMeshes) {
+    Fronts fronts = three_meshes();
+    for (FrontPoint& point : fronts.points) point.error_95_mm = 2 + 0.002 * point.edges_per_organ;
+    EXPECT_DOUBLE_EQ(choose(fronts, {.accuracy_mm = {}, .time_s = 2}, head()).edge_length_mm, 10);
+    EXPECT_DOUBLE_EQ(choose(fronts, {.accuracy_mm = {}, .time_s = 20}, head()).edge_length_mm, 5);
+    EXPECT_DOUBLE_EQ(choose(fronts, {.accuracy_mm = 3, .time_s = 20}, head()).edge_length_mm, 20);
+}
+
 TEST(Dial, RefusesWhatItCannotChooseBy) {
     EXPECT_THROW(choose(three_meshes(), {}, head()), InvalidInput);
     EXPECT_THROW(choose(three_meshes(), {.accuracy_mm = -1, .time_s = {}}, head()), InvalidInput);
