@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace tissuewarp::tled::detail {
 
@@ -14,6 +15,19 @@ namespace {
 constexpr int lanczos_steps = 10;       // within 1 % of λ_max; power iteration takes 20 for 3 %
 constexpr double step_safety = 1.05;    // on λ_max: Lanczos approaches from below, stiffness grows under load
 constexpr double damping_factor = 1.4;  // on the lowest eigenvalue of K₀: the slowest mode carries little of the error
+
+/// Smallest λ of shifts of the whole, which springs alone hold: no smaller than λ_min of M⁻¹K. Infinite where
+/// displacements are imposed.
+double lowest_of_shifts(const NodalConditions& conditions, const Matrix3Xd& mass) {
+    if (conditions.constrained.any()) return std::numeric_limits<double>::infinity();
+    const Eigen::Matrix<double, 6, 1> k = conditions.spring_stiffness.rowwise().sum();  // xx yy zz xy yz zx
+    const Eigen::Matrix3d springs =
+        (Eigen::Matrix3d() << k[0], k[3], k[5], k[3], k[1], k[4], k[5], k[4], k[2]).finished();
+    const Eigen::Vector3d root = mass.rowwise().sum().cwiseSqrt().cwiseInverse();
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> shifts(root.asDiagonal() * springs * root.asDiagonal(),
+                                                                Eigen::EigenvaluesOnly);
+    return shifts.eigenvalues().minCoeff();
+}
 
 }  // namespace
 
@@ -54,7 +68,9 @@ Spectrum spectrum_at(EquilibriumSearch& search, const Matrix3Xd& mass, const Mat
     const double highest = step_safety * eigen.eigenvalues().maxCoeff();
     if (!(highest > 0)) search.fail_stalled();
     search.engine.set_state(u, still);
-    return {std::min(damping_factor * search.stiffness.lowest_eigenvalue(), highest / 4), highest};
+    const double lowest =
+        damping_factor * std::min(search.stiffness.lowest_eigenvalue(), lowest_of_shifts(search.conditions, mass));
+    return {std::min(lowest, highest / 4), highest};
 }
 
 }  // namespace tissuewarp::tled::detail

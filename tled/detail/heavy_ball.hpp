@@ -18,8 +18,9 @@ StepCoefficients heavy_ball(const Spectrum& spectrum);
 double decay(const Spectrum& spectrum);
 
 /// At the last good state, whose residual is given: λ_max by Lanczos' iteration (Golub and Van Loan, section 10.1) on
-/// M^(−½) K M^(−½), with products by differences of the real force kernel; λ_min from that of K₀. Leaves the engine at
-/// that state, at rest. Fails where no λ_max above 0 is found.
+/// M^(−½) K M^(−½), with products by differences of the real force kernel; λ_min from that of K₀ with the springs it
+/// was factorised with, and of shifts of the whole under the present ones. Leaves the engine at that state, at rest.
+/// Fails where no λ_max above 0 is found.
 Spectrum spectrum_at(EquilibriumSearch& search, const Eigen::Matrix3Xd& mass, const Eigen::Matrix3Xd& residual);
 
 }  // namespace tissuewarp::tled::detail
