@@ -142,6 +142,11 @@ void estimate_errors(RegistrationRun& run, ProgressLine& progress) {
     products.uncertainty = uncertainty(*run.prepared, run.result, {}, progress);
     products.uncertainty_volumes =
         uncertainty_on_grid(*products.uncertainty, run.result.deformation, products.fixed_to_moving.geometry);
+    const double left = summarise(*products.uncertainty).algebraic_mm;
+    if (left > run.options.tolerance)
+        run.result.doubts.push_back(fmt::format("the solver stopped {:.2g} mm (root mean square) from equilibrium, "
+                                                "{:g} mm were to be the most",
+                                                left, run.options.tolerance));
 }
 
 Scores score(const RegistrationRun& run) {

@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <limits>
 #include <memory>
 
@@ -100,10 +101,12 @@ std::string summary_row(const std::string& name, const registration::Summary& s)
 }
 
 std::string estimate_text(const registration::UncertaintySummary& s) {
+    const std::string of_mesh =
+        std::isfinite(s.discretisation_mm) ? fmt::format("{:.2f}", s.discretisation_mm) : "not estimated";
     std::string text = fmt::format(
-        "estimated error (1 σ): {:.2f} mm over the tissue, of the mesh {:.2f}, the solver {:.3f}, the data {:.2f}; "
+        "estimated error (1 σ): {:.2f} mm over the tissue, of the mesh {}, the solver {:.3f}, the data {:.2f}; "
         "95 % within {:.2f} mm, where least is known within {:.2f} mm\n",
-        s.deviation_mm, s.discretisation_mm, s.algebraic_mm, s.data_mm, s.interval_mm, s.worst_interval_mm);
+        s.deviation_mm, of_mesh, s.algebraic_mm, s.data_mm, s.interval_mm, s.worst_interval_mm);
     if (s.unseen_share > 0)
         text += fmt::format("not to be trusted: {:.0f} % of the tissue, of which the data say next to nothing\n",
                             100 * s.unseen_share);

@@ -12,8 +12,7 @@ using Eigen::Matrix3Xd;
 
 namespace {
 
-constexpr double slack = 0.85;  // part of the steps to the tolerance, by the decay of the slowest mode
-constexpr int most_restarts = 6;
+constexpr double slack = 0.85;      // part of the steps to the tolerance, by the decay of the slowest mode
 constexpr int most_idle_lifts = 6;  // without the error falling by a tenth
 
 class Relaxation {
@@ -64,7 +63,7 @@ private:
             const Matrix3Xd u = search_.engine.displacement();
             const bool inverted = !(search_.engine.smallest_jacobian().value > 0);
             if (!u.allFinite() || (inverted && !search_.engine.admits_inversion())) {
-                restart();
+                spectrum_ = restarted(search_, mass_, ++restarts_);
                 return false;
             }
             search_.keep(u, error);
@@ -84,14 +83,6 @@ private:
     void adapt_damping(double before, double now, int steps) {
         if (steps < 50 || std::log(before / std::max(now, 1e-300)) > 0.4 * decay(spectrum_) * steps) return;
         spectrum_.lowest *= 0.6;
-    }
-
-    void restart() {
-        if (++restarts_ > most_restarts) search_.fail_stalled();
-        if (!search_.admissible(search_.last_good())) search_.fail_stalled();
-        spectrum_ = spectrum_at(search_, mass_, search_.residual());
-        spectrum_.highest *= 1 << restarts_;
-        search_.observer.note("relaxation restarted from the last good state with a smaller step");
     }
 };
 

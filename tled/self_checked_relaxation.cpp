@@ -26,8 +26,7 @@ constexpr std::array openings{Opening{4, 0.0}, Opening{6, 0.5}, Opening{10, 0.75
 constexpr double neper_a_window = 1;     // foreseen decay between two looks
 constexpr double slowest = 0.95;         // contraction of a window that is still believed
 constexpr double estimate_safety = 1.5;  // of the error: modes and directions do not add up to a bound
-constexpr int most_restarts = 6;
-constexpr int most_idle_windows = 12;  // without the movement falling by a tenth
+constexpr int most_idle_windows = 12;    // without the movement falling by a tenth
 
 class SelfCheckedRelaxation {
 public:
@@ -39,7 +38,7 @@ public:
     EquilibriumResult run(const Matrix3Xd* start) {
         search_.keep(first_state(start), unknown_error());
         spectrum_ = spectrum_at(search_, mass_, search_.residual());
-        while (!(open() && settle())) restart();
+        while (!(open() && settle())) spectrum_ = restarted(search_, mass_, ++restarts_);
         return search_.finish();
     }
 
@@ -100,13 +99,6 @@ private:
             before = std::move(*after);
             last = moved;
         }
-    }
-
-    void restart() {
-        if (++restarts_ > most_restarts || !search_.admissible(search_.last_good())) search_.fail_stalled();
-        spectrum_ = spectrum_at(search_, mass_, search_.residual());
-        spectrum_.highest *= 1 << restarts_;
-        search_.observer.note("relaxation restarted from the last good state with a smaller step");
     }
 };
 

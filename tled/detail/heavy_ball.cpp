@@ -12,8 +12,10 @@ using Eigen::Matrix3Xd;
 
 namespace {
 
-constexpr int lanczos_steps = 10;       // within 1 % of λ_max; power iteration takes 20 for 3 %
-constexpr double step_safety = 1.05;    // on λ_max: Lanczos approaches from below, stiffness grows under load
+constexpr int lanczos_steps = 10;     // within 1 % of λ_max; power iteration takes 20 for 3 %
+constexpr double step_safety = 1.05;  // on λ_max: Lanczos approaches from below, stiffness grows under load
+constexpr double least_ratio = 1e-6;  // of λ_min to λ_max: a way that nothing holds is not waited for
+constexpr int most_restarts = 6;
 constexpr double damping_factor = 1.4;  // on the lowest eigenvalue of K₀: the slowest mode carries little of the error
 
 /// Smallest λ of shifts of the whole, which springs alone hold: no smaller than λ_min of M⁻¹K. Infinite where
@@ -70,7 +72,15 @@ Spectrum spectrum_at(EquilibriumSearch& search, const Matrix3Xd& mass, const Mat
     search.engine.set_state(u, still);
     const double lowest =
         damping_factor * std::min(search.stiffness.lowest_eigenvalue(), lowest_of_shifts(search.conditions, mass));
-    return {std::min(lowest, highest / 4), highest};
+    return {std::clamp(lowest, least_ratio * highest, highest / 4), highest};
+}
+
+Spectrum restarted(EquilibriumSearch& search, const Matrix3Xd& mass, int restarts) {
+    if (restarts > most_restarts || !search.admissible(search.last_good())) search.fail_stalled();
+    Spectrum spectrum = spectrum_at(search, mass, search.residual());
+    spectrum.highest *= 1 << restarts;
+    search.observer.note("relaxation restarted from the last good state with a smaller step");
+    return spectrum;
 }
 
 }  // namespace tissuewarp::tled::detail

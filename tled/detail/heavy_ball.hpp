@@ -23,4 +23,8 @@ double decay(const Spectrum& spectrum);
 /// Fails where no λ_max above 0 is found.
 Spectrum spectrum_at(EquilibriumSearch& search, const Eigen::Matrix3Xd& mass, const Eigen::Matrix3Xd& residual);
 
+/// The same for the `restarts`th time, after steps that inverted tissue: back at the last good state, with λ_max taken
+/// 2^restarts times as large. Fails where that state is none, or after six.
+Spectrum restarted(EquilibriumSearch& search, const Eigen::Matrix3Xd& mass, int restarts);
+
 }  // namespace tissuewarp::tled::detail
