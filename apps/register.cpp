@@ -142,11 +142,8 @@ void estimate_errors(RegistrationRun& run, ProgressLine& progress) {
     products.uncertainty = uncertainty(*run.prepared, run.result, {}, progress);
     products.uncertainty_volumes =
         uncertainty_on_grid(*products.uncertainty, run.result.deformation, products.fixed_to_moving.geometry);
-    const double left = summarise(*products.uncertainty).algebraic_mm;
-    if (left > run.options.tolerance)
-        run.result.doubts.push_back(fmt::format("the solver stopped {:.2g} mm (root mean square) from equilibrium, "
-                                                "{:g} mm were to be the most",
-                                                left, run.options.tolerance));
+    const std::string doubt = doubt_of_solver(summarise(*products.uncertainty), run.options.tolerance);
+    if (!doubt.empty()) run.result.doubts.push_back(doubt);
 }
 
 Scores score(const RegistrationRun& run) {

@@ -15,6 +15,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <string>
 
@@ -203,6 +204,15 @@ UncertaintySummary summarise(const Uncertainty& uncertainty) {
     for (double* squared : {&sum.algebraic_mm, &sum.discretisation_mm, &sum.data_mm, &sum.deviation_mm})
         *squared = std::sqrt(*squared);
     return sum;
+}
+
+std::string doubt_of_solver(const UncertaintySummary& summary, double tolerance_mm) {
+    if (summary.algebraic_mm <= tolerance_mm) return {};
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  "the solver stopped %.2g mm (root mean square) from equilibrium, where %.2g mm were asked for",
+                  summary.algebraic_mm, tolerance_mm);
+    return text;
 }
 
 Uncertainty uncertainty(const PreparedModel& prepared, const UpdateResult& result, const UncertaintyOptions& options,

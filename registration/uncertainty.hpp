@@ -12,6 +12,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace tissuewarp::registration {
@@ -71,6 +72,9 @@ struct UncertaintySummary {
     double unseen_share = 0;                                ///< of the tissue: not shown
 };
 UncertaintySummary summarise(const Uncertainty& uncertainty);
+
+/// In words, where the solver stopped farther from equilibrium than the tolerance it was given, mm; otherwise empty.
+std::string doubt_of_solver(const UncertaintySummary& summary, double tolerance_mm);
 
 /// What a voxel of the trust map says.
 enum class Trust : unsigned char {

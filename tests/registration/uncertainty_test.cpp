@@ -183,5 +183,16 @@ TEST(Uncertainty, RefusesAResultOfAnotherModel) {
     EXPECT_THROW(uncertainty(prepared, result), InvalidInput);
 }
 
+// More than the tolerance is said, in both figures; up to it nothing is.
+TEST(Uncertainty, DoubtsASolverThatStoppedFarFromEquilibrium) {
+    UncertaintySummary summary;
+    summary.algebraic_mm = 0.05;
+    EXPECT_EQ(doubt_of_solver(summary, 0.05), "");
+    summary.algebraic_mm = 0.3;
+    const std::string doubt = doubt_of_solver(summary, 0.05);
+    EXPECT_NE(doubt.find("0.3 mm"), std::string::npos) << doubt;
+    EXPECT_NE(doubt.find("0.05 mm"), std::string::npos) << doubt;
+}
+
 }  // namespace
 }  // namespace tissuewarp::registration
