@@ -49,14 +49,8 @@ void doubt_dial(RegistrationRun& run) {
         doubts.push_back(
             fmt::format("the time budget of {:.3g} s was exceeded: {:.3g} s", *budget, run.intraoperative_seconds));
     if (!run.options.accuracy) return;
-    const UncertaintySummary estimate = summarise(*run.products.uncertainty);
-    if (estimate.deviation_mm <= *run.options.accuracy) return;
-    doubts.push_back(fmt::format(
-        "{:.3g} mm were asked for and {:.3g} mm are estimated, of which the data leave {:.3g} mm and the mesh {:.3g} "
-        "mm; {}",
-        *run.options.accuracy, estimate.deviation_mm, estimate.data_mm, estimate.discretisation_mm,
-        estimate.data_mm > estimate.discretisation_mm ? "more or better data would help, a finer mesh would not"
-                                                      : "a finer mesh would help"));
+    std::string doubt = doubt_of_accuracy(summarise(*run.products.uncertainty), *run.options.accuracy);
+    if (!doubt.empty()) doubts.push_back(std::move(doubt));
 }
 
 }  // namespace tissuewarp::apps

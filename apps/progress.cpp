@@ -29,7 +29,7 @@ std::pair<double, double> share_of(std::string_view stage) {
     if (stage == "rigid alignment") return {0.0, 0.15};
     if (stage == "registration") return {0.15, 1.0};
     if (stage == "equilibrium") return {0.0, 0.0};
-    if (stage == "factor of the rest stiffness") return {0.75, 1.0};
+    if (stage == "rest stiffness") return {0.75, 1.0};
     return {0.0, 1.0};
 }
 

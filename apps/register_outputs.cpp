@@ -180,7 +180,8 @@ void write_reports(const RegistrationRun& run, const nlohmann::json& report, con
     write_json(report, output.path("report.json"));
     report::write_report(
         {given(run.inputs.moving), given(run.inputs.fixed), given(products.warped), &run.inputs.moving_labels,
-         given(run.inputs.fixed_labels), &products.warped_labels, &products.moving_to_fixed, report},
+         given(run.inputs.fixed_labels), &products.warped_labels, &products.moving_to_fixed,
+         given(products.uncertainty_volumes.deviation), given(products.uncertainty_volumes.trust), report},
         output.staging());
 }
 

@@ -1,6 +1,7 @@
-// Seconds to factorise and to solve with the stiffness at rest: boxes of Kuhn tetrahedra, E = 3 kPa, ν = 0.49, springs
-// on the whole boundary, as a registration has them. See docs/decisions/rest_stiffness.md.
-//     rest_stiffness_bench [cells an edge ...; default 16 20 24 27]
+// Seconds to make, to factorise and to solve with the stiffness at rest, and for what does without a factor: boxes of
+// Kuhn tetrahedra, E = 3 kPa, ν = 0.49, springs on the whole boundary, as a registration has them. See
+// docs/decisions/rest_stiffness.md.
+//     rest_stiffness_bench [--without-factor] [cells an edge ...; default 16 20 24 27]
 
 #include "meshing/primitives.hpp"
 #include "tled/model.hpp"
@@ -9,6 +10,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <memory>
 #include <vector>
 
@@ -35,7 +37,13 @@ tled::Conditions boundary_springs(const meshing::TetMesh& mesh, double stiffness
     return conditions;
 }
 
-void measure(int cells, tled::Element element) {
+/// The problem, and the same with every third spring ten times weaker, as after a rematch that takes outliers back.
+struct Box {
+    tled::RestState rest;
+    tled::NodalConditions conditions, other;
+};
+
+Box box_of(int cells, tled::Element element) {
     tled::Model model;
     model.mesh = meshing::box_mesh(Eigen::Vector3d::Constant(edge_mm), {cells, cells, cells}, 0.15, 1);
     model.materials[1] = tled::neo_hookean_lnj(3.0, 0.49);
@@ -43,24 +51,41 @@ void measure(int cells, tled::Element element) {
     const tled::RestState rest = tled::rest_state(model);
     tled::Conditions conditions = boundary_springs(model.mesh, 1000.0 / (cells * cells));
     const auto factorised = tled::nodal_conditions(conditions, rest.node_count);
-    // Every third spring ten times weaker, as after a rematch that takes outliers back.
     for (std::size_t s = 0; s < conditions.springs.size(); s += 3) conditions.springs[s].stiffness *= 0.1;
-    const auto other = tled::nodal_conditions(conditions, rest.node_count);
+    return {rest, factorised, tled::nodal_conditions(conditions, rest.node_count)};
+}
 
-    std::unique_ptr<tled::RestStiffness> stiffness;
-    const double construct = seconds([&] { stiffness = std::make_unique<tled::RestStiffness>(rest, factorised); });
+void measure_factor(const tled::RestStiffness& stiffness, const Box& box) {
+    const double analyse = seconds([&] { stiffness.analyse(); });
+    const double factorise = seconds([&] { stiffness.factorise(); });
     constexpr int repeats = 5;
-    const Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Random(3, rest.node_count);
+    const Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Random(3, box.rest.node_count);
     const double solve = seconds([&] {
-                             for (int k = 0; k < repeats; ++k) static_cast<void>(stiffness->solve(force));
+                             for (int k = 0; k < repeats; ++k) static_cast<void>(stiffness.solve(force));
                          }) /
                          repeats;
-    const double loose = seconds([&] { static_cast<void>(stiffness->solve(force, other, 1e-2)); });
-    const double tight = seconds([&] { static_cast<void>(stiffness->solve(force, other, 1e-8)); });
-    const double lowest = seconds([&] { static_cast<void>(stiffness->lowest_eigenvalue()); });
-    std::printf("| %d | %s | %.1f | %.2f | %.3f | %.2f | %.2f | %.2f |\n", rest.element_count(),
-                element == tled::Element::T4 ? "T4" : "averaged pressure",
-                1e-6 * static_cast<double>(stiffness->factor_nonzeros()), construct, solve, loose, tight, lowest);
+    const double loose = seconds([&] { static_cast<void>(stiffness.solve(force, box.other, 1e-2)); });
+    const double tight = seconds([&] { static_cast<void>(stiffness.solve(force, box.other, 1e-8)); });
+    double value = 0;
+    const double lowest = seconds([&] { value = stiffness.lowest_eigenvalue(); });
+    std::printf(" %.1f | %.2f | %.2f | %.3f | %.2f | %.2f | %.2f: %.3g |",
+                1e-6 * static_cast<double>(stiffness.factor_nonzeros()), analyse, factorise, solve, loose, tight,
+                lowest, value);
+}
+
+void measure(int cells, tled::Element element, bool with_factor) {
+    const Box box = box_of(cells, element);
+    std::unique_ptr<tled::RestStiffness> stiffness;
+    const double construct =
+        seconds([&] { stiffness = std::make_unique<tled::RestStiffness>(box.rest, box.conditions); });
+    double value = 0;
+    const double lowest = seconds([&] { value = stiffness->approximate_lowest_eigenvalue(); });
+    const double linear =
+        seconds([&] { static_cast<void>(stiffness->approximate_linear_solution(box.conditions, 0.05)); });
+    std::printf("| %d | %s | %.2f | %.2f: %.3g | %.2f |", box.rest.element_count(),
+                element == tled::Element::T4 ? "T4" : "averaged pressure", construct, lowest, value, linear);
+    if (with_factor) measure_factor(*stiffness, box);
+    std::printf("\n");
     std::fflush(stdout);
 }
 
@@ -68,16 +93,19 @@ void measure(int cells, tled::Element element) {
 
 int main(int argc, char** argv) {
     std::vector<int> cells{16, 20, 24, 27};
-    if (argc > 1) {
-        cells.clear();
-        for (int k = 1; k < argc; ++k) cells.push_back(std::atoi(argv[k]));
-    }
-    std::printf(
-        "| tetrahedra | element | factor, 10⁶ entries | construct, s | solve, s | other springs to 1e-2, s | "
-        "to 1e-8, s | lowest eigenvalue, s |\n|---|---|---|---|---|---|---|---|\n");
+    const bool with_factor = argc < 2 || std::strcmp(argv[1], "--without-factor") != 0;
+    const int first = with_factor ? 1 : 2;
+    if (argc > first) cells.assign(argc - first, 0);
+    for (int k = first; k < argc; ++k) cells[static_cast<std::size_t>(k - first)] = std::atoi(argv[k]);
+    std::printf("| tetrahedra | element | construct, s | lowest eigenvalue about, s: λ | linear answer to 0.05, s |");
+    if (with_factor)
+        std::printf(
+            " factor, 10⁶ entries | analyse, s | factorise, s | solve, s | other springs to 1e-2, s | to 1e-8, s | "
+            "lowest eigenvalue, s: λ |");
+    std::printf(with_factor ? "\n|---|---|---|---|---|---|---|---|---|---|---|---|\n" : "\n|---|---|---|---|---|\n");
     for (int n : cells) {
-        measure(n, tled::Element::T4);
-        measure(n, tled::Element::AveragedPressureT4);
+        measure(n, tled::Element::T4, with_factor);
+        measure(n, tled::Element::AveragedPressureT4, with_factor);
     }
     return 0;
 }

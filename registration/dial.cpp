@@ -74,15 +74,18 @@ std::vector<DialChoice> choices(const Fronts& fronts, const DialRequest& request
     return all;
 }
 
-/// The finest of those within 5 % of the least error, which measurements hardly tell apart: it follows thin structures,
-/// which phantoms do not have.
-const DialChoice& most_accurate(const std::vector<DialChoice>& all) {
+/// Of those within 5 % of the least error, which measurements hardly tell apart, the finest, which follows thin
+/// structures as phantoms do not have them; where no time was given, of those that take at most twice as long as the
+/// fastest. `all` is sorted by time and not empty.
+const DialChoice& most_accurate(const std::vector<DialChoice>& all, bool time_given) {
     double least = all.front().error_95_mm;
     for (const DialChoice& choice : all) least = std::min(least, choice.error_95_mm);
-    const DialChoice* finest = nullptr;
+    const DialChoice *fastest = nullptr, *finest = nullptr;
     for (const DialChoice& choice : all) {
         if (choice.error_95_mm > 1.05 * least) continue;
-        if (finest == nullptr || choice.edge_length_mm < finest->edge_length_mm) finest = &choice;
+        if (fastest == nullptr) fastest = finest = &choice;
+        if (!time_given && choice.seconds > 2 * fastest->seconds) continue;
+        if (choice.edge_length_mm < finest->edge_length_mm) finest = &choice;
     }
     return *finest;
 }
@@ -107,7 +110,7 @@ DialChoice choose(const Fronts& fronts, const DialRequest& request, const DialCa
     const std::vector<DialChoice> all = choices(fronts, request, what);
     std::vector<DialChoice> in_time;
     std::copy_if(all.begin(), all.end(), std::back_inserter(in_time), [](const DialChoice& c) { return c.time_met; });
-    DialChoice chosen = in_time.empty() ? all.front() : most_accurate(in_time);
+    DialChoice chosen = in_time.empty() ? all.front() : most_accurate(in_time, request.time_s.has_value());
     if (request.accuracy_mm)
         for (const DialChoice& candidate : in_time)
             if (candidate.accuracy_met) {

@@ -32,7 +32,7 @@ struct FrontPoint {
     DataKind kind = DataKind::Labels;
     double edges_per_organ = 0;  ///< a cube root of the organ's volume over the edge of the mesh
     double tetrahedra = 0;       ///< median
-    double preparation_s = 0;    ///< meshing, rest state, factor: median
+    double preparation_s = 0;    ///< meshing, rest state, rest stiffness: median
     double rounds_s = 0;         ///< matching and equilibrium: median
     double rounds_95_s = 0;      ///< and 95th percentile
     double judging_s = 0;        ///< after the last round: median
@@ -78,7 +78,8 @@ struct DialChoice {
 
 /// With an accuracy alone, the fastest mesh whose 95th percentile of errors keeps it, otherwise the most accurate one;
 /// with a time, the most accurate mesh (or the fastest that keeps the accuracy) whose 95th percentile of times keeps
-/// it, otherwise the fastest. Of meshes within 5 % of the most accurate one, the finest counts as that. Throws
+/// it, otherwise the fastest. Of meshes within 5 % of the most accurate one, the finest counts as that, if it takes at
+/// most twice as long as the fastest of them or a time is given. Throws
 /// InvalidInput when nothing is asked, or for values that are not above 0, and where nothing was measured for the kind
 /// of data.
 DialChoice choose(const Fronts& fronts, const DialRequest& request, const DialCase& what);

@@ -91,7 +91,7 @@ struct PreparedModel {
     std::optional<RigidNeighbours> neighbours;
 };
 
-/// Label map → mesh → rest state → factor. Throws InvalidInput, Cancelled.
+/// Label map → mesh → rest state → rest stiffness, its pattern analysed. Throws InvalidInput, Cancelled.
 PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions& options = {},
                       Observer& observer = silent_observer());
 
@@ -99,7 +99,7 @@ PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions
 PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_labels, const PrepareOptions& options = {},
                       Observer& observer = silent_observer());
 
-/// The same model of other tissue: rest state and factor are made anew. Throws InvalidInput for materials that do not
+/// The same model of other tissue: rest state and stiffness are made anew. Throws InvalidInput for materials that do not
 /// fit the model.
 PreparedModel with_materials(PreparedModel prepared, const tled::MaterialTable& materials);
 

@@ -49,7 +49,17 @@ Columns bounded_inverse(const Columns& matrix, double least) {
 }  // namespace
 
 Posterior::Posterior(const PreparedModel& prepared, const WeighedSprings& springs)
-    : stiffness_(stiffness_with(prepared, springs)),
+    : Posterior(prepared, springs, stiffness_with(prepared, springs)) {}
+
+std::pair<Posterior, Posterior> Posterior::both(const PreparedModel& prepared, const WeighedSprings& first,
+                                                const WeighedSprings& second) {
+    tled::RestStiffness one = stiffness_with(prepared, first), other = stiffness_with(prepared, second);
+    tled::factorise_together(one, other);
+    return {Posterior(prepared, first, std::move(one)), Posterior(prepared, second, std::move(other))};
+}
+
+Posterior::Posterior(const PreparedModel& prepared, const WeighedSprings& springs, tled::RestStiffness stiffness)
+    : stiffness_(std::move(stiffness)),
       rows_(3 * Eigen::Index(prepared.rest.node_count)),
       energy_(springs.energy),
       freed_(rows_, 0) {

@@ -1,4 +1,4 @@
-// Before the operation: label map → mesh → rest state → factor of the rest stiffness.
+// Before the operation: label map → mesh → rest state → rest stiffness.
 
 #include "registration/detail/stopwatch.hpp"
 #include "registration/detail/surface_springs.hpp"
@@ -31,6 +31,12 @@ void measure_offsets(Interfaces& interfaces, const meshing::TetMesh& mesh, const
     for (InterfaceNode& node : interfaces.nodes())
         node.offset =
             moving.crossing(mesh.nodes.col(node.node), node.normal, node.inner, node.outer, range_mm, max_angle_deg);
+}
+
+/// Numbers of a factor depend on what pulls at the tissue, and relaxation needs none.
+void make_ready(const tled::RestStiffness& stiffness) {
+    stiffness.analyse();
+    (void)stiffness.approximate_lowest_eigenvalue();
 }
 
 }  // namespace
@@ -74,10 +80,11 @@ PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_label
     Interfaces interfaces(model.mesh);
     measure_offsets(interfaces, model.mesh, LabelBoundaryField(organ, {labels.begin(), labels.end()}));
     times.push_back(stopwatch.lap("rest state"));
-    observer.checkpoint("factor of the rest stiffness", 0.0);
+    observer.checkpoint("rest stiffness", 0.0);
     const auto springs = tled::nodal_conditions(detail::full_weight_springs(interfaces, options), rest.node_count);
     tled::RestStiffness stiffness(rest, springs);
-    times.push_back(stopwatch.lap("factor"));
+    make_ready(stiffness);
+    times.push_back(stopwatch.lap("rest stiffness"));
     return {std::move(model),     std::move(organ), options,      std::move(interfaces), std::move(rest),
             std::move(stiffness), std::move(times), std::nullopt, std::move(neighbours)};
 }
@@ -87,6 +94,7 @@ PreparedModel with_materials(PreparedModel prepared, const tled::MaterialTable& 
     prepared.rest = tled::rest_state(prepared.model);
     const auto springs = detail::full_weight_springs(prepared.interfaces, prepared.options);
     prepared.stiffness = tled::RestStiffness(prepared.rest, tled::nodal_conditions(springs, prepared.rest.node_count));
+    make_ready(prepared.stiffness);
     return prepared;
 }
 

@@ -4,193 +4,193 @@ namespace tissuewarp::registration::detail {
 
 const char* const shipped_fronts_text = R"json({
  "alignment_labels": {
-  "constant_s": 0.07171,
-  "slope_s": 0.2405
+  "constant_s": 0.07339,
+  "slope_s": 0.4294
  },
  "alignment_partial": {
-  "constant_s": 0.03907,
+  "constant_s": 0.04583,
   "slope_s": 0.0
  },
  "fields": {
   "constant_s": 0.0,
-  "slope_s": 0.07255
+  "slope_s": 0.03783
  },
  "machine": "CPU float32, AVX3, 2 threads",
  "points": [
   {
    "data": "labels",
    "edges_per_organ": 6.0,
-   "error_95_mm": 2.356,
-   "error_mm": 1.215,
+   "error_95_mm": 2.394,
+   "error_mm": 1.232,
+   "fields_s": 0.1589,
    "judging_s": 0.0,
-   "preparation_s": 0.08698,
-   "rounds_95_s": 0.02703,
-   "rounds_s": 0.01478,
-   "tetrahedra": 2140.0,
-   "fields_s": 0.1567
+   "preparation_s": 0.1326,
+   "rounds_95_s": 0.01705,
+   "rounds_s": 0.01023,
+   "tetrahedra": 2141.0
   },
   {
    "data": "labels",
    "edges_per_organ": 8.0,
-   "error_95_mm": 2.451,
-   "error_mm": 1.228,
+   "error_95_mm": 2.385,
+   "error_mm": 1.288,
+   "fields_s": 0.1711,
    "judging_s": 0.0,
-   "preparation_s": 0.1325,
-   "rounds_95_s": 0.1015,
-   "rounds_s": 0.04537,
-   "tetrahedra": 4938.0,
-   "fields_s": 0.1567
+   "preparation_s": 0.1565,
+   "rounds_95_s": 0.03166,
+   "rounds_s": 0.02241,
+   "tetrahedra": 4947.0
   },
   {
    "data": "labels",
    "edges_per_organ": 10.0,
-   "error_95_mm": 2.453,
-   "error_mm": 1.213,
+   "error_95_mm": 2.386,
+   "error_mm": 1.286,
+   "fields_s": 0.192,
    "judging_s": 0.0,
-   "preparation_s": 0.2977,
-   "rounds_95_s": 0.2587,
-   "rounds_s": 0.1437,
-   "tetrahedra": 9702.0,
-   "fields_s": 0.1567
+   "preparation_s": 0.2498,
+   "rounds_95_s": 0.06543,
+   "rounds_s": 0.0421,
+   "tetrahedra": 9712.0
   },
   {
    "data": "labels",
    "edges_per_organ": 12.0,
-   "error_95_mm": 2.463,
-   "error_mm": 1.233,
+   "error_95_mm": 2.392,
+   "error_mm": 1.295,
+   "fields_s": 0.2007,
    "judging_s": 0.0,
-   "preparation_s": 0.4425,
-   "rounds_95_s": 0.4478,
-   "rounds_s": 0.2354,
-   "tetrahedra": 16610.0,
-   "fields_s": 0.1567
+   "preparation_s": 0.4017,
+   "rounds_95_s": 0.1083,
+   "rounds_s": 0.0731,
+   "tetrahedra": 16640.0
   },
   {
    "data": "labels",
    "edges_per_organ": 15.0,
-   "error_95_mm": 2.472,
-   "error_mm": 1.236,
+   "error_95_mm": 2.399,
+   "error_mm": 1.303,
+   "fields_s": 0.2005,
    "judging_s": 0.0,
-   "preparation_s": 1.109,
-   "rounds_95_s": 1.608,
-   "rounds_s": 0.7748,
-   "tetrahedra": 32240.0,
-   "fields_s": 0.1567
+   "preparation_s": 0.8082,
+   "rounds_95_s": 0.2715,
+   "rounds_s": 0.1592,
+   "tetrahedra": 32270.0
   },
   {
    "data": "labels",
    "edges_per_organ": 18.0,
-   "error_95_mm": 2.475,
-   "error_mm": 1.246,
+   "error_95_mm": 2.402,
+   "error_mm": 1.302,
+   "fields_s": 0.2479,
    "judging_s": 0.0,
-   "preparation_s": 2.446,
-   "rounds_95_s": 4.626,
-   "rounds_s": 2.512,
-   "tetrahedra": 56060.0,
-   "fields_s": 0.1567
+   "preparation_s": 1.364,
+   "rounds_95_s": 0.5494,
+   "rounds_s": 0.3271,
+   "tetrahedra": 56060.0
   },
   {
    "data": "labels",
    "edges_per_organ": 22.0,
-   "error_95_mm": 2.479,
-   "error_mm": 1.246,
+   "error_95_mm": 2.404,
+   "error_mm": 1.305,
+   "fields_s": 0.3179,
    "judging_s": 0.0,
-   "preparation_s": 7.196,
-   "rounds_95_s": 9.924,
-   "rounds_s": 5.744,
-   "tetrahedra": 101900.0,
-   "fields_s": 0.1567
+   "preparation_s": 2.412,
+   "rounds_95_s": 1.031,
+   "rounds_s": 0.7334,
+   "tetrahedra": 102000.0
   },
   {
    "data": "partial",
    "edges_per_organ": 6.0,
-   "error_95_mm": 2.752,
-   "error_mm": 1.542,
-   "judging_s": 0.01219,
-   "preparation_s": 0.08698,
-   "rounds_95_s": 0.03349,
-   "rounds_s": 0.0202,
-   "tetrahedra": 2140.0,
-   "fields_s": 0.1567
+   "error_95_mm": 2.762,
+   "error_mm": 1.506,
+   "fields_s": 0.1455,
+   "judging_s": 0.01769,
+   "preparation_s": 0.1326,
+   "rounds_95_s": 0.04298,
+   "rounds_s": 0.02781,
+   "tetrahedra": 2141.0
   },
   {
    "data": "partial",
    "edges_per_organ": 8.0,
-   "error_95_mm": 2.485,
-   "error_mm": 1.466,
-   "judging_s": 0.0415,
-   "preparation_s": 0.1325,
-   "rounds_95_s": 0.1035,
-   "rounds_s": 0.05389,
-   "tetrahedra": 4938.0,
-   "fields_s": 0.1567
+   "error_95_mm": 2.466,
+   "error_mm": 1.435,
+   "fields_s": 0.1815,
+   "judging_s": 0.05534,
+   "preparation_s": 0.1565,
+   "rounds_95_s": 0.11,
+   "rounds_s": 0.07819,
+   "tetrahedra": 4947.0
   },
   {
    "data": "partial",
    "edges_per_organ": 10.0,
-   "error_95_mm": 2.352,
-   "error_mm": 1.433,
-   "judging_s": 0.1095,
-   "preparation_s": 0.2977,
-   "rounds_95_s": 0.1888,
-   "rounds_s": 0.1315,
-   "tetrahedra": 9702.0,
-   "fields_s": 0.1567
+   "error_95_mm": 2.335,
+   "error_mm": 1.387,
+   "fields_s": 0.1901,
+   "judging_s": 0.1369,
+   "preparation_s": 0.2498,
+   "rounds_95_s": 0.2456,
+   "rounds_s": 0.1791,
+   "tetrahedra": 9712.0
   },
   {
    "data": "partial",
    "edges_per_organ": 12.0,
-   "error_95_mm": 2.295,
+   "error_95_mm": 2.283,
    "error_mm": 1.322,
-   "judging_s": 0.2453,
-   "preparation_s": 0.4425,
-   "rounds_95_s": 0.4356,
-   "rounds_s": 0.3526,
-   "tetrahedra": 16610.0,
-   "fields_s": 0.1567
+   "fields_s": 0.1724,
+   "judging_s": 0.334,
+   "preparation_s": 0.4017,
+   "rounds_95_s": 0.5435,
+   "rounds_s": 0.4412,
+   "tetrahedra": 16640.0
   },
   {
    "data": "partial",
    "edges_per_organ": 15.0,
-   "error_95_mm": 2.178,
-   "error_mm": 1.391,
-   "judging_s": 0.7422,
-   "preparation_s": 1.109,
-   "rounds_95_s": 1.664,
-   "rounds_s": 1.062,
-   "tetrahedra": 32240.0,
-   "fields_s": 0.1567
+   "error_95_mm": 2.172,
+   "error_mm": 1.351,
+   "fields_s": 0.2031,
+   "judging_s": 1.152,
+   "preparation_s": 0.8082,
+   "rounds_95_s": 2.384,
+   "rounds_s": 1.492,
+   "tetrahedra": 32270.0
   },
   {
    "data": "partial",
    "edges_per_organ": 18.0,
-   "error_95_mm": 2.209,
-   "error_mm": 1.355,
-   "judging_s": 1.922,
-   "preparation_s": 2.446,
-   "rounds_95_s": 5.567,
-   "rounds_s": 3.27,
-   "tetrahedra": 56060.0,
-   "fields_s": 0.1567
+   "error_95_mm": 2.198,
+   "error_mm": 1.337,
+   "fields_s": 0.2548,
+   "judging_s": 2.56,
+   "preparation_s": 1.364,
+   "rounds_95_s": 6.847,
+   "rounds_s": 4.093,
+   "tetrahedra": 56060.0
   },
   {
    "data": "partial",
    "edges_per_organ": 22.0,
-   "error_95_mm": 2.19,
-   "error_mm": 1.38,
-   "judging_s": 5.825,
-   "preparation_s": 7.196,
-   "rounds_95_s": 15.99,
-   "rounds_s": 10.6,
-   "tetrahedra": 101900.0,
-   "fields_s": 0.1567
+   "error_95_mm": 2.177,
+   "error_mm": 1.349,
+   "fields_s": 0.3351,
+   "judging_s": 8.948,
+   "preparation_s": 2.412,
+   "rounds_95_s": 18.43,
+   "rounds_s": 12.44,
+   "tetrahedra": 102000.0
   }
  ],
  "schema": "tissuewarp.fronts",
  "schema_version": 2,
  "warp": {
-  "constant_s": 0.0001493,
-  "slope_s": 0.01668
+  "constant_s": 5.706e-05,
+  "slope_s": 0.02508
  }
 }
 )json";

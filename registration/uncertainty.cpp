@@ -215,6 +215,18 @@ std::string doubt_of_solver(const UncertaintySummary& summary, double tolerance_
     return text;
 }
 
+std::string doubt_of_accuracy(const UncertaintySummary& summary, double accuracy_mm) {
+    if (summary.interval_mm <= accuracy_mm) return {};
+    char text[256];
+    std::snprintf(text, sizeof text,
+                  "%.3g mm were asked for, and errors are within %.3g mm with a probability of 95 %% (1 σ: %.3g mm, of "
+                  "which the data leave %.3g mm and the mesh %.3g mm); %s",
+                  accuracy_mm, summary.interval_mm, summary.deviation_mm, summary.data_mm, summary.discretisation_mm,
+                  summary.data_mm > summary.discretisation_mm ? "more or better data would help, a finer mesh would not"
+                                                              : "a finer mesh would help");
+    return text;
+}
+
 Uncertainty uncertainty(const PreparedModel& prepared, const UpdateResult& result, const UncertaintyOptions& options,
                         Observer& observer) {
     require_related(prepared, result);
@@ -229,12 +241,11 @@ Uncertainty uncertainty(const PreparedModel& prepared, const UpdateResult& resul
     append(seen.data, pulls.data);
 
     observer.checkpoint("error estimate", 0.0);
-    const detail::Posterior posterior(prepared, seen);
-    const Eigen::MatrixXd loads = detail::unknown_loads(prepared, options.samples, options.seed);
-    const Eigen::MatrixXd hidden = posterior.inverse(loads);
+    const auto [posterior, prior] = detail::Posterior::both(prepared, seen, unseen);
     observer.checkpoint("error estimate", 0.4);
-    const Eigen::MatrixXd free = detail::Posterior(prepared, unseen).inverse(loads);
-    observer.checkpoint("error estimate", 0.7);
+    const Eigen::MatrixXd loads = detail::unknown_loads(prepared, options.samples, options.seed);
+    const Eigen::MatrixXd hidden = posterior.inverse(loads), free = prior.inverse(loads);
+    observer.checkpoint("error estimate", 0.6);
     const Eigen::MatrixXd noise =
         posterior.inverse(noise_forces(seen, loads.rows(), options.samples, options.seed + 1));
     const Covariances covariance =
@@ -243,10 +254,11 @@ Uncertainty uncertainty(const PreparedModel& prepared, const UpdateResult& resul
     if (place_is_uncertain(result)) unexplained.setConstant(2 * shown_below);
     const Eigen::Matrix3Xd displacement = displacement_under_pulls(result);
     const tled::NodalConditions conditions = conditions_of(prepared, pulls);
-    const tled::RestStiffness stiffness(prepared.rest, conditions, prepared.stiffness);
-    const Eigen::Matrix3Xd algebraic = tled::lifted_residual(prepared.rest, stiffness, conditions, displacement);
+    const Eigen::Matrix3Xd algebraic =
+        tled::lifted_residual(prepared.rest, posterior.stiffness(), conditions, displacement);
+    observer.checkpoint("error estimate", 0.7);
     const tled::DiscretisationEstimate mesh =
-        tled::discretisation_error(prepared.model, stiffness, conditions, displacement);
+        tled::discretisation_error(prepared.model, posterior.stiffness(), conditions, displacement);
     if (!mesh.error) observer.note("no estimate of the error of the mesh: " + mesh.reason);
     observer.checkpoint("error estimate", 1.0);
     return {prepared.model.mesh, algebraic, mesh.error, covariance, unexplained};

@@ -76,6 +76,11 @@ UncertaintySummary summarise(const Uncertainty& uncertainty);
 /// In words, where the solver stopped farther from equilibrium than the tolerance it was given, mm; otherwise empty.
 std::string doubt_of_solver(const UncertaintySummary& summary, double tolerance_mm);
 
+/// In words, where errors are not within `accuracy_mm` with a probability of 95 % on average over the tissue, what is
+/// at fault and what would help; otherwise empty. Of random phantoms, the error over the tissue (root mean square) of
+/// 97 to 100 in a hundred is within that radius (docs/accuracy-time.md, "Is an accuracy kept?").
+std::string doubt_of_accuracy(const UncertaintySummary& summary, double accuracy_mm);
+
 /// What a voxel of the trust map says.
 enum class Trust : unsigned char {
     Outside = 0,    ///< no tissue of the model; the field is continued there and nothing is said of it

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdarg>
 #include <cstdio>
+#include <initializer_list>
 #include <limits>
 
 namespace tissuewarp::report {
@@ -21,21 +22,28 @@ namespace {
 
 /// 6 000, 0.01, 1e7 becomes 10 000 000.
 std::string number_text(double value) {
-    std::string digits = value < 1 ? printed("%g", value) : printed("%.0f", value);
+    std::string digits = value < 100 ? printed("%g", value) : printed("%.0f", value);
     if (value >= 10000)
         for (int at = static_cast<int>(digits.size()) - 3; at > 0; at -= 3)
             digits.insert(static_cast<std::size_t>(at), "\u202f");
     return digits;
 }
 
-/// Where ticks stand on an axis from `low` to `high`: decades, and 2 and 5 between where there are few of them.
-std::vector<double> ticks(double low, double high) {
-    const bool few = high / low < 200;
+/// These digits times powers of ten within `low` and `high`.
+std::vector<double> round_numbers(double low, double high, std::initializer_list<double> digits) {
     std::vector<double> result;
     for (double decade = std::pow(10.0, std::floor(std::log10(low))); decade <= high; decade *= 10)
-        for (const double digit : {1.0, 2.0, 5.0})
-            if (const double tick = digit * decade; (few || digit == 1.0) && tick >= low && tick <= high)
-                result.push_back(tick);
+        for (const double digit : digits)
+            if (const double number = digit * decade; number >= low && number <= high) result.push_back(number);
+    return result;
+}
+
+/// Where ticks stand on an axis from `low` to `high`: decades, and more between them where they are few.
+std::vector<double> ticks(double low, double high) {
+    constexpr std::size_t enough = 3;
+    if (high / low >= 200) return round_numbers(low, high, {1.0});
+    std::vector<double> result = round_numbers(low, high, {1.0, 2.0, 5.0});
+    if (result.size() < enough) result = round_numbers(low, high, {1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0});
     return result;
 }
 

@@ -18,6 +18,8 @@ struct ReportInput {
     const imaging::Volume* fixed_labels = nullptr;   ///< needed, or the warped ones
     const imaging::Volume* warped_labels = nullptr;
     const imaging::Volume* moving_to_fixed = nullptr;  ///< displacement field of three channels, LPS mm, moving grid
+    const imaging::Volume* uncertainty = nullptr;  ///< estimated error, 1 σ, mm, fixed frame, NaN outside the tissue
+    const imaging::Volume* trust = nullptr;        ///< beside it: 0 no tissue, 1 shown, 2 not to be trusted; one byte
     nlohmann::json report;  ///< report.json, docs/manual/register.md; missing keys leave sections out
 };
 

@@ -82,18 +82,18 @@ struct Prepared {
     tled::RestState rest;
     tled::NodalConditions conditions;
     std::unique_ptr<tled::RestStiffness> stiffness;
-    double rest_seconds = 0, factor_seconds = 0;
-    std::optional<double> frequency_seconds;
-    std::optional<Matrix3Xd> exact;  ///< on this mesh, where it was asked for
+    double rest_seconds = 0, stiffness_seconds = 0;
+    std::map<std::string, double> kept_seconds;  ///< of what the stiffness keeps, when it was made
+    std::optional<Matrix3Xd> exact;              ///< on this mesh, where it was asked for
 
-    /// The stiffness keeps its lowest frequency: of the first time it is asked for.
-    double seconds_of_frequency() {
-        if (!frequency_seconds) {
-            const Clock clock;
-            (void)stiffness->lowest_eigenvalue();
-            frequency_seconds = clock.seconds();
-        }
-        return *frequency_seconds;
+    /// Makes what the stiffness keeps, the first time.
+    template <class Make>
+    double seconds_of(const std::string& what, const Make& make) {
+        const auto known = kept_seconds.find(what);
+        if (known != kept_seconds.end()) return known->second;
+        const Clock clock;
+        make(*stiffness);
+        return kept_seconds[what] = clock.seconds();
     }
 
     [[nodiscard]] bool serves(const Setting& setting) const {
@@ -101,11 +101,17 @@ struct Prepared {
     }
 };
 
-/// What chooses between methods, and what tunes dynamic relaxation.
+/// Without a factor; automatic on a GPU (tled::equilibrium).
+bool is_self_checked(const Setting& setting) {
+    if (setting.physics.law == Law::Linear) return false;
+    return setting.solver == Solver::SelfCheckedRelaxation ||
+           (setting.solver == Solver::Automatic && setting.processor == tled::Processor::Gpu);
+}
+
+/// Chooses between methods, and tunes dynamic relaxation.
 bool needs_frequency(const Setting& setting) {
-    return setting.physics.law != Law::Linear &&
-           (setting.solver == Solver::Automatic || setting.solver == Solver::DynamicRelaxation ||
-            setting.solver == Solver::SelfCheckedRelaxation);
+    return setting.physics.law != Law::Linear && !is_self_checked(setting) &&
+           (setting.solver == Solver::Automatic || setting.solver == Solver::DynamicRelaxation);
 }
 
 /// An answer with what it took.
@@ -182,9 +188,9 @@ private:
         prepared_.rest_seconds = rest_clock.seconds();
         prepared_.conditions =
             tled::nodal_conditions(conditions_of(body_, setting.physics.hold, meshed_.mesh), prepared_.rest.node_count);
-        const Clock factor_clock;
+        const Clock stiffness_clock;
         prepared_.stiffness = std::make_unique<tled::RestStiffness>(prepared_.rest, prepared_.conditions);
-        prepared_.factor_seconds = factor_clock.seconds();
+        prepared_.stiffness_seconds = stiffness_clock.seconds();
         prepared_.wanted = setting.elements;
         prepared_.element = setting.element;
         prepared_.physics = setting.physics;
@@ -196,10 +202,7 @@ private:
         point.nodes = rest.node_count;
         point.stages = {{"mesh", Phase::Preparation, {meshed_.seconds}},
                         {"rest state", Phase::Preparation, {prepared_.rest_seconds}}};
-        if (setting.solver != Solver::Newton)
-            point.stages.push_back({"factor", Phase::Preparation, {prepared_.factor_seconds}});
-        if (needs_frequency(setting))
-            point.stages.push_back({"lowest frequency", Phase::Preparation, {prepared_.seconds_of_frequency()}});
+        add_stiffness(setting, point);
         const auto run = runner(setting, point, observer);
         Solved solved;
         Stage equilibrium{"equilibrium", Phase::Operation, {}};
@@ -217,6 +220,24 @@ private:
         point.estimated_mm = solved.estimated_mm;
         point.min_jacobian = tled::jacobians(rest, solved.displacement).minCoeff();
         judge(setting, solved.displacement, point, observer);
+    }
+
+    /// What the method takes of the stiffness.
+    void add_stiffness(const Setting& setting, Point& point) {
+        if (setting.solver == Solver::Newton) return;
+        const auto add = [&](const char* stage, double seconds) {
+            point.stages.push_back({stage, Phase::Preparation, {seconds}});
+        };
+        add("stiffness", prepared_.stiffness_seconds);
+        if (is_self_checked(setting)) {
+            const auto make = [](const tled::RestStiffness& k) { (void)k.approximate_lowest_eigenvalue(); };
+            add("lowest frequency without factor", prepared_.seconds_of("frequency about", make));
+            return;
+        }
+        add("factor", prepared_.seconds_of("factor", [](const tled::RestStiffness& k) { k.factorise(); }));
+        if (!needs_frequency(setting)) return;
+        const auto make = [](const tled::RestStiffness& k) { (void)k.lowest_eigenvalue(); };
+        add("lowest frequency", prepared_.seconds_of("frequency", make));
     }
 
     /// What one run does, its engine made.

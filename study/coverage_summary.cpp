@@ -36,6 +36,12 @@ double estimated_mm(const Rows& rows) {
     return std::sqrt(sum / double(rows.size()));
 }
 
+double mean_interval_mm(const Rows& rows) {
+    double sum = 0;
+    for (const CoverageRow* row : rows) sum += registration::interval_mm(row->estimate, nominal_shares[level_95]);
+    return sum / double(rows.size());
+}
+
 std::vector<ReliabilityBin> binned(Rows rows) {
     std::sort(rows.begin(), rows.end(), [](const CoverageRow* a, const CoverageRow* b) {
         return a->estimate.deviation_mm < b->estimate.deviation_mm;
@@ -59,11 +65,14 @@ Coverage summary_of(Evidence evidence, const Rows& rows) {
     for (std::size_t level = 0; level < nominal_shares.size(); ++level)
         result.held[level] = share_held(rows, nominal_shares[level]);
     double variance = 0;
+    int within = 0;
     for (const auto& [seed, here] : by_phantom) {
+        within += true_mm(here) <= mean_interval_mm(here);
         result.phantom_shares.push_back(share_held(here, nominal_shares[level_95]));
         const double weight = double(here.size()) / double(rows.size());
         variance += std::pow(weight * (result.phantom_shares.back() - result.held[level_95]), 2);
     }
+    result.phantoms_within = double(within) / double(by_phantom.size());
     result.held_95_error = std::sqrt(variance);
     std::sort(result.phantom_shares.begin(), result.phantom_shares.end());
     result.estimated_mm = estimated_mm(rows);
@@ -93,12 +102,13 @@ std::vector<Coverage> coverage_of(const std::vector<CoverageRow>& rows) {
 std::string table_of(const std::vector<Coverage>& coverage) {
     std::string table =
         "evidence            phantoms  targets  shown, %   within 50 %   80 %   95 %        99 %   true rms  "
-        "estimated, mm\n";
+        "estimated, mm   phantoms within, %\n";
     for (const Coverage& c : coverage) {
         char line[200];
-        std::snprintf(line, sizeof line, "%-20s %7d %8d %9.0f %12.1f %6.1f %6.1f ±%4.1f %6.1f %9.2f %9.2f\n",
+        std::snprintf(line, sizeof line, "%-20s %7d %8d %9.0f %12.1f %6.1f %6.1f ±%4.1f %6.1f %9.2f %9.2f %15.0f\n",
                       name_of(c.evidence), c.phantoms, c.targets, 100 * c.shown_share, 100 * c.held[0], 100 * c.held[1],
-                      100 * c.held[2], 100 * c.held_95_error, 100 * c.held[3], c.true_mm, c.estimated_mm);
+                      100 * c.held[2], 100 * c.held_95_error, 100 * c.held[3], c.true_mm, c.estimated_mm,
+                      100 * c.phantoms_within);
         table += line;
     }
     return table;

@@ -27,6 +27,9 @@ struct Coverage {
     /// independent.
     double held_95_error = 0;
     double estimated_mm = 0, true_mm = 0;  ///< roots of mean squares
+    /// Share of phantoms whose error, root mean square over these targets, is within the mean of their intervals of
+    /// 95 %, by which an accuracy is promised.
+    double phantoms_within = 0;
     std::vector<double> phantom_shares;    ///< at 95 %, of each phantom, ascending
     std::vector<ReliabilityBin> bins;      ///< a tenth of the targets each, by falling trust
 };

@@ -41,9 +41,11 @@ DialTrial tried(const Phantom& phantom, DataKind kind, const DialRequest& reques
 
     DialTrial trial{phantom.seed, kind, request, choice.edge_length_mm, choice.seconds, taken.count()};
     trial.error_mm = detail::root_mean_square_error(result.deformation, phantom.targets);
-    trial.estimated_mm = summarise(uncertainty(prepared, result)).deviation_mm;
+    const UncertaintySummary estimate = summarise(uncertainty(prepared, result));
+    trial.estimated_mm = estimate.deviation_mm;
     trial.possible = choice.time_met && choice.accuracy_met;
-    const bool doubted = (request.accuracy_mm && trial.estimated_mm > *request.accuracy_mm) || !trial.kept_time();
+    const bool doubted =
+        (request.accuracy_mm && !doubt_of_accuracy(estimate, *request.accuracy_mm).empty()) || !trial.kept_time();
     trial.announced = !trial.possible || result.cut_short || doubted;
     return trial;
 }

@@ -15,7 +15,7 @@ namespace tissuewarp::study {
 struct DialTrialOptions {
     std::uint64_t first_seed = 7001, last_seed = 7050;  ///< of random_phantom
     std::vector<double> budgets_s{1.0, 2.0};
-    std::vector<double> accuracies_mm{1.0, 2.0};
+    std::vector<double> accuracies_mm{1.0, 2.0, 4.0};
     registration::UpdateOptions update;
 };
 

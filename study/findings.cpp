@@ -32,11 +32,19 @@ std::string value_of(const std::string& factor, const Setting& setting) {
     return name_of(setting.processor) + ", " + std::to_string(setting.elements);
 }
 
-std::string verdict_of(double error_ratio, double time_ratio) {
+/// Errors to the same reference are not, where they differ by less than is known of it.
+bool told_apart(const Point& point, const Point& base) {
+    if (!(point.setting.physics == base.setting.physics)) return true;
+    return std::abs(point.error_mm() - base.error_mm()) > base.reference_mm.value_or(0);
+}
+
+std::string verdict_of(double error_ratio, double time_ratio, bool told_apart) {
     const int accuracy = error_ratio < 1 - same_error ? 1 : error_ratio > 1 + same_error ? -1 : 0;
     const int speed = time_ratio < 1 - same_time ? 1 : time_ratio > 1 + same_time ? -1 : 0;
     const char* accurate[] = {"less accurate", "as accurate", "more accurate"};
     const char* fast[] = {"slower", "as fast", "faster"};
+    if (accuracy != 0 && !told_apart)
+        return std::string("the reference does not tell which is more accurate, ") + fast[speed + 1];
     std::string words = std::string(accurate[accuracy + 1]) + ", " + fast[speed + 1];
     if (accuracy + speed < 0 && accuracy <= 0 && speed <= 0) words += ": does not pay";
     if (accuracy + speed > 0 && accuracy >= 0 && speed >= 0) words += ": pays";
@@ -51,8 +59,8 @@ std::vector<Comparison> comparisons_of(const Setting& base_setting, const Point&
             if (factor_of(point->setting, base_setting) != factor) continue;
             const double error = point->error_mm() / base.error_mm();
             const double time = point->median_seconds() / base.median_seconds();
-            comparisons.push_back(
-                {point, factor, value_of(factor, point->setting), error, time, verdict_of(error, time)});
+            comparisons.push_back({point, factor, value_of(factor, point->setting), error, time,
+                                   verdict_of(error, time, told_apart(*point, base))});
         }
     return comparisons;
 }

@@ -28,7 +28,8 @@ public:
         const Matrix3Xd residual = search_.residual();
         double error = linear_start_safety * largest_norm(search_.lifted(residual));
         search_.keep(u, error);
-        if (error > search_.options.tolerance_mm) spectrum_ = spectrum_at(search_, mass_, residual);
+        if (error > search_.options.tolerance_mm)
+            spectrum_ = spectrum_at(search_, mass_, residual, search_.stiffness.lowest_eigenvalue());
         double least = error;
         for (int idle = 0; error > search_.options.tolerance_mm;) {
             const int steps = steps_to_reach(error);
@@ -63,7 +64,7 @@ private:
             const Matrix3Xd u = search_.engine.displacement();
             const bool inverted = !(search_.engine.smallest_jacobian().value > 0);
             if (!u.allFinite() || (inverted && !search_.engine.admits_inversion())) {
-                spectrum_ = restarted(search_, mass_, ++restarts_);
+                spectrum_ = restarted(search_, mass_, ++restarts_, search_.stiffness.lowest_eigenvalue());
                 return false;
             }
             search_.keep(u, error);

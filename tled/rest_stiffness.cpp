@@ -2,7 +2,10 @@
 
 #include <Eigen/Eigenvalues>
 
+#include <tbb/parallel_invoke.h>
+
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <mutex>
 #include <string>
@@ -11,6 +14,8 @@
 #include "tled/detail/cholmod_factor.hpp"
 #include "tled/detail/effect_stiffness.hpp"
 #include "tled/detail/held_tissue.hpp"
+#include "tled/detail/lowest_mode.hpp"
+#include "tled/detail/single_blas_thread.hpp"
 #include "tled/detail/springs.hpp"
 #include "tled/detail/stiffness.hpp"
 
@@ -28,13 +33,21 @@ bool same_springs(const NodalConditions& a, const NodalConditions& b) {
            a.spring_stiffness == b.spring_stiffness;
 }
 
+/// What stiffnesses of one pattern share, made by the first that needs it.
+struct Analysis {
+    std::once_flag made;
+    std::unique_ptr<const detail::CholmodFactor> factor;  // without numbers
+};
+
 }  // namespace
 
 struct RestStiffness::Impl {
     NodalConditions conditions;  // those factorised
     std::shared_ptr<const detail::Stiffness>
         elastic;  // K₀ with membranes and sliding pairs, without springs, all degrees of freedom
-    std::unique_ptr<detail::CholmodFactor> factor;
+    std::shared_ptr<const std::vector<Matrix3d>> elastic_diagonal;  // of every node
+    std::shared_ptr<Analysis> analysis = std::make_shared<Analysis>();
+    Matrix3Xd position;      // at rest, mm
     std::vector<int> index;  // degree of freedom 3·node + component → free number or −1
     int free_count = 0;
 
@@ -69,16 +82,27 @@ struct RestStiffness::Impl {
         detail::add_spring_resistance(present, x, y);
         return y;
     }
+    void take(detail::Stiffness stiffness) {
+        elastic_diagonal = std::make_shared<const std::vector<Matrix3d>>(stiffness.diagonal_blocks());
+        elastic = std::make_shared<const detail::Stiffness>(std::move(stiffness));
+    }
     void number_free(const NodalConditions& present);
-    void factorise(const detail::CholmodFactor* analysed);
+    void factorise() const;
+    [[nodiscard]] const detail::CholmodFactor& factor() const;
+    [[nodiscard]] Eigen::SparseMatrix<double> lower_triangle() const;
+    void analyse(const std::function<Eigen::SparseMatrix<double>()>& lower) const;
     void require_compatible(const NodalConditions& present) const;
-    [[nodiscard]] VectorXd conjugate_gradients(const VectorXd& force, const NodalConditions& present,
-                                               double relative_tolerance) const;
+    [[nodiscard]] Matrix3Xd linear_force(const NodalConditions& present) const;
+    template <class Preconditioner>
+    [[nodiscard]] Matrix3Xd conjugate_gradients(const Matrix3Xd& force, const NodalConditions& present,
+                                                const Preconditioner& precondition, double relative_tolerance) const;
 
     [[nodiscard]] double lowest_by_lanczos(const Matrix3Xd& diagonal) const;
 
-    std::once_flag lowest_known;
-    double lowest = 0.0;
+    mutable std::once_flag factorised;
+    mutable std::unique_ptr<detail::CholmodFactor> made;  // by factor()
+    std::once_flag lowest_known, approximation_known;
+    double lowest = 0.0, lowest_approximation = 0.0;
 };
 
 void RestStiffness::Impl::require_compatible(const NodalConditions& present) const {
@@ -92,15 +116,19 @@ void RestStiffness::Impl::require_compatible(const NodalConditions& present) con
 
 // Preconditioned conjugate gradients (Saad, Iterative Methods for Sparse Linear Systems, algorithm 9.1). The error is
 // measured in the norm of the preconditioner, √(r·z), relative to its start.
-VectorXd RestStiffness::Impl::conjugate_gradients(const VectorXd& force, const NodalConditions& present,
-                                                  double relative_tolerance) const {
+// Force, answer and what the preconditioner makes of them are zero on the constrained degrees of freedom.
+template <class Preconditioner>
+Matrix3Xd RestStiffness::Impl::conjugate_gradients(const Matrix3Xd& force, const NodalConditions& present,
+                                                   const Preconditioner& precondition,
+                                                   double relative_tolerance) const {
     constexpr int max_iterations = 2000;
-    VectorXd x = VectorXd::Zero(free_count), r = force, z = factor->solve(r), p = z;
-    double rz = r.dot(z);
+    const auto dot = [](const Matrix3Xd& a, const Matrix3Xd& b) { return a.cwiseProduct(b).sum(); };
+    Matrix3Xd x = Matrix3Xd::Zero(3, force.cols()), r = force, z = precondition(r), p = z;
+    double rz = dot(r, z);
     const double limit = relative_tolerance * relative_tolerance * rz;
     for (int iteration = 0; rz > limit; ++iteration) {
-        const VectorXd Kp = reduced(multiply(expanded(p), present));
-        const double curvature = p.dot(Kp);
+        const Matrix3Xd Kp = present.constrained.select(0.0, multiply(p, present));
+        const double curvature = dot(p, Kp);
         if (iteration == max_iterations || !(curvature > 0.0)) {
             throw SolverFailure("conjugate gradients stopped at a relative residual of " +
                                 std::to_string(relative_tolerance * std::sqrt(rz / limit)) + " after " +
@@ -110,8 +138,8 @@ VectorXd RestStiffness::Impl::conjugate_gradients(const VectorXd& force, const N
         const double step = rz / curvature;
         x += step * p;
         r -= step * Kp;
-        z = factor->solve(r);
-        const double next = r.dot(z);
+        z = precondition(r);
+        const double next = dot(r, z);
         p = z + next / rz * p;
         rz = next;
     }
@@ -133,7 +161,7 @@ double RestStiffness::Impl::lowest_by_lanczos(const Matrix3Xd& diagonal) const {
     double largest = 0.0;
     for (int step = 0; step < most_steps; ++step) {
         basis.push_back(q);
-        VectorXd next = factor->solve(D.cwiseProduct(q));
+        VectorXd next = factor().solve(D.cwiseProduct(q));
         projected(step, step) = next.dot(D.cwiseProduct(q));
         for (int pass = 0; pass < 2; ++pass)
             for (const VectorXd& other : basis) next -= next.dot(D.cwiseProduct(other)) * other;
@@ -157,26 +185,38 @@ void RestStiffness::Impl::number_free(const NodalConditions& present) {
         if (!present.constrained.data()[d]) index[static_cast<std::size_t>(d)] = free_count++;
 }
 
-// Factor of `elastic` + springs on the free degrees of freedom; with the analysis of `analysed`, where there is one.
-void RestStiffness::Impl::factorise(const detail::CholmodFactor* analysed) {
-    if (free_count == 0) return;
+/// Of `elastic` + springs on the free degrees of freedom.
+Eigen::SparseMatrix<double> RestStiffness::Impl::lower_triangle() const {
     detail::BlockRows K = detail::assembled(*elastic, detail::Triangle::Lower);
     for (std::size_t s = 0; s < conditions.spring_node.size(); ++s)
         K.diagonal(conditions.spring_node[s]) += detail::spring_matrix(conditions, static_cast<int>(s));
-    const Eigen::SparseMatrix<double> lower = detail::scalar_matrix(K, index, detail::Triangle::Lower);
-    K = {};
-    if (analysed != nullptr) {
-        factor = std::make_unique<detail::CholmodFactor>(analysed->analysis());
-    } else {
+    return detail::scalar_matrix(K, index, detail::Triangle::Lower);
+}
+
+void RestStiffness::Impl::analyse(const std::function<Eigen::SparseMatrix<double>()>& lower) const {
+    std::call_once(analysis->made, [&] {
         std::vector<int> node_of;
         for (std::size_t d = 0; d < index.size(); ++d)
             if (index[d] >= 0) node_of.push_back(static_cast<int>(d) / 3);
-        factor = std::make_unique<detail::CholmodFactor>(lower, node_of);
-    }
-    if (factor->factorize(lower)) return;
-    throw InvalidInput(
-        "the stiffness at rest is not positive definite: a node without tetrahedra, or tissue that the springs and "
-        "prescribed displacements hold too weakly; hold it at more nodes or with stiffer springs");
+        analysis->factor = std::make_unique<const detail::CholmodFactor>(lower(), node_of);
+    });
+}
+
+void RestStiffness::Impl::factorise() const {
+    const Eigen::SparseMatrix<double> lower = lower_triangle();
+    analyse([&] { return lower; });
+    auto numbers = std::make_unique<detail::CholmodFactor>(analysis->factor->analysis());
+    if (!numbers->factorize(lower))
+        throw InvalidInput(
+            "the stiffness at rest is not positive definite: a node without tetrahedra, or tissue that the springs and "
+            "prescribed displacements hold too weakly; hold it at more nodes or with stiffer springs");
+    made = std::move(numbers);
+}
+
+/// Precondition: something is free.
+const detail::CholmodFactor& RestStiffness::Impl::factor() const {
+    std::call_once(factorised, [this] { factorise(); });
+    return *made;
 }
 
 RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& conditions)
@@ -184,9 +224,9 @@ RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& condi
     detail::require_held(rest, conditions);
     detail::Stiffness elastic = detail::stiffness(rest, Matrix3Xd::Zero(3, rest.node_count));
     detail::add_effects(conditions.effects.surface, rest.position, elastic);
-    impl_->elastic = std::make_shared<detail::Stiffness>(std::move(elastic));
+    impl_->take(std::move(elastic));
+    impl_->position = rest.position;
     impl_->number_free(conditions);
-    impl_->factorise(nullptr);
 }
 
 RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& conditions, const Matrix3Xd& displacement)
@@ -196,9 +236,9 @@ RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& condi
     metric.elements = detail::stiffness(rest, Matrix3Xd::Zero(3, rest.node_count)).elements;
     metric.products.stiffness = metric.products.stiffness.cwiseMax(0.0);
     detail::add_effects(conditions.effects.surface, rest.position, metric);
-    impl_->elastic = std::make_shared<detail::Stiffness>(std::move(metric));
+    impl_->take(std::move(metric));
+    impl_->position = rest.position;
     impl_->number_free(conditions);
-    impl_->factorise(nullptr);
 }
 
 RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& conditions, const RestStiffness& other)
@@ -206,44 +246,73 @@ RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& condi
     detail::require_held(rest, conditions);
     other.impl_->require_compatible(conditions);
     impl_->elastic = other.impl_->elastic;
+    impl_->elastic_diagonal = other.impl_->elastic_diagonal;
+    impl_->analysis = other.impl_->analysis;
+    impl_->position = rest.position;
     impl_->number_free(conditions);
-    impl_->factorise(other.impl_->factor.get());
 }
 
 RestStiffness::~RestStiffness() = default;
 RestStiffness::RestStiffness(RestStiffness&&) noexcept = default;
 RestStiffness& RestStiffness::operator=(RestStiffness&&) noexcept = default;
 
+void RestStiffness::analyse() const {
+    if (impl_->free_count > 0) impl_->analyse([this] { return impl_->lower_triangle(); });
+}
+
+void RestStiffness::factorise() const {
+    if (impl_->free_count > 0) static_cast<void>(impl_->factor());
+}
+
+void factorise_together(const RestStiffness& first, const RestStiffness& second) {
+    first.analyse();
+    const detail::SingleBlasThread single;
+    tbb::parallel_invoke([&] { first.factorise(); }, [&] { second.factorise(); });
+}
+
 Matrix3Xd RestStiffness::solve(const Matrix3Xd& force) const {
     if (impl_->free_count == 0) return Matrix3Xd::Zero(3, force.cols());
-    return impl_->expanded(impl_->factor->solve(impl_->reduced(force)));
+    return impl_->expanded(impl_->factor().solve(impl_->reduced(force)));
 }
 
 Matrix3Xd RestStiffness::solve(const Matrix3Xd& force, const NodalConditions& conditions,
                                double relative_tolerance) const {
     impl_->require_compatible(conditions);
     if (same_springs(conditions, impl_->conditions) || impl_->free_count == 0) return solve(force);
-    return impl_->expanded(impl_->conjugate_gradients(impl_->reduced(force), conditions, relative_tolerance));
+    const auto precondition = [this](const Matrix3Xd& r) { return solve(r); };
+    return impl_->conjugate_gradients(conditions.constrained.select(0.0, force), conditions, precondition,
+                                      relative_tolerance);
 }
 
 MatrixXd RestStiffness::solve_columns(const MatrixXd& forces) const {
-    return impl_->on_free(forces, [&](const MatrixXd& free) { return impl_->factor->solve_columns(free); });
+    return impl_->on_free(forces, [&](const MatrixXd& free) { return impl_->factor().solve_columns(free); });
 }
 
 MatrixXd RestStiffness::colour_columns(const MatrixXd& white) const {
-    return impl_->on_free(white, [&](const MatrixXd& free) { return impl_->factor->colour_columns(free); });
+    return impl_->on_free(white, [&](const MatrixXd& free) { return impl_->factor().colour_columns(free); });
+}
+
+// K_ff u_f = f_f + springs' targets − K_fc u_c: the imposed values enter with the residual of u = (0, u_c).
+Matrix3Xd RestStiffness::Impl::linear_force(const NodalConditions& present) const {
+    return detail::applied_force(present) - multiply(present.imposed, present);
 }
 
 Matrix3Xd RestStiffness::linear_solution(const NodalConditions& conditions) const {
-    // K_ff u_f = f_f + springs' targets − K_fc u_c: the imposed values enter with the residual of u = (0, u_c).
     constexpr double tolerance = 1e-10;
-    const Matrix3Xd force = detail::applied_force(conditions) - impl_->multiply(conditions.imposed, conditions);
-    return conditions.imposed + solve(force, conditions, tolerance);
+    return conditions.imposed + solve(impl_->linear_force(conditions), conditions, tolerance);
+}
+
+Matrix3Xd RestStiffness::approximate_linear_solution(const NodalConditions& conditions,
+                                                     double relative_tolerance) const {
+    const Matrix3Xd inverse_diagonal = diagonal(conditions).cwiseInverse();
+    const auto precondition = [&](const Matrix3Xd& r) { return inverse_diagonal.cwiseProduct(r); };
+    const Matrix3Xd force = conditions.constrained.select(0.0, impl_->linear_force(conditions));
+    return conditions.imposed + impl_->conjugate_gradients(force, conditions, precondition, relative_tolerance);
 }
 
 Matrix3Xd RestStiffness::diagonal(const NodalConditions& conditions) const {
     impl_->require_compatible(conditions);
-    std::vector<Matrix3d> blocks = impl_->elastic->diagonal_blocks();
+    std::vector<Matrix3d> blocks = *impl_->elastic_diagonal;
     for (std::size_t s = 0; s < conditions.spring_node.size(); ++s) {
         blocks[conditions.spring_node[s]] += detail::spring_matrix(conditions, static_cast<int>(s));
     }
@@ -259,8 +328,20 @@ double RestStiffness::lowest_eigenvalue() const {
     return impl_->lowest;
 }
 
+double RestStiffness::approximate_lowest_eigenvalue() const {
+    if (impl_->free_count == 0) return std::numeric_limits<double>::infinity();
+    const auto multiply = [this](const Matrix3Xd& x) {
+        return Matrix3Xd(impl_->conditions.constrained.select(0.0, impl_->multiply(x, impl_->conditions)));
+    };
+    std::call_once(impl_->approximation_known, [&] {
+        impl_->lowest_approximation =
+            detail::lowest_mode(multiply, diagonal(impl_->conditions), impl_->position, impl_->conditions.constrained);
+    });
+    return impl_->lowest_approximation;
+}
+
 long long RestStiffness::factor_nonzeros() const {
-    return impl_->factor ? impl_->factor->nonzeros() : 0;
+    return impl_->free_count > 0 ? impl_->factor().nonzeros() : 0;
 }
 
 }  // namespace tissuewarp::tled

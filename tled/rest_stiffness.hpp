@@ -1,6 +1,6 @@
 #pragma once
-/// The stiffness at rest K₀, factorised before the operation (CHOLMOD): gives the linear-elastic start, the diagonal
-/// mass, the lowest frequency, and turns a residual into an error in millimetres.
+/// The stiffness at rest K₀ and its factor (CHOLMOD): gives the linear-elastic start, the diagonal mass, the lowest
+/// frequency, and turns a residual into an error in millimetres.
 
 #include "tled/conditions.hpp"
 #include "tled/rest_state.hpp"
@@ -14,6 +14,8 @@ namespace tissuewarp::tled {
 /// K₀ + springs, membranes and sliding pairs of the rest configuration with constrained degrees of freedom removed.
 /// Moving targets do not change it; pressures, fluid and contact are not in it. Free rigid modes are excluded by the
 /// springs or prescribed displacements; without them construction throws InvalidInput ("nothing holds the tissue").
+/// What needs the factor makes it at first, once, and throws InvalidInput where the stiffness is not positive definite
+/// or SolverFailure without memory for it; multiplications, diagonal and approximations do without.
 class RestStiffness {
 public:
     RestStiffness(const RestState& rest, const NodalConditions& conditions);
@@ -27,6 +29,12 @@ public:
     ~RestStiffness();
     RestStiffness(RestStiffness&&) noexcept;
     RestStiffness& operator=(RestStiffness&&) noexcept;
+
+    /// Orders the unknowns and analyses the pattern of the factor now, rather than with the factor or in a copy for
+    /// other springs.
+    void analyse() const;
+    /// Makes the factor now, rather than when it is needed first.
+    void factorise() const;
 
     /// x with K x = f on the free degrees of freedom, zero on the constrained ones (3 × N; f in mN, x in mm). When
     /// `conditions` carry other springs than those factorised (same constraints), conjugate gradients with the factor
@@ -45,11 +53,18 @@ public:
     /// Linear-elastic displacement under the conditions, imposed values included (3 × N, mm).
     [[nodiscard]] Eigen::Matrix3Xd linear_solution(const NodalConditions& conditions) const;
 
+    /// The same up to a residual of `relative_tolerance` times that of rest, by conjugate gradients preconditioned with
+    /// the diagonal: no factor is needed.
+    [[nodiscard]] Eigen::Matrix3Xd approximate_linear_solution(const NodalConditions& conditions,
+                                                               double relative_tolerance) const;
+
     /// Diagonal of K₀ + springs of `conditions`, 3 × N, mN/mm; ones where constrained.
     [[nodiscard]] Eigen::Matrix3Xd diagonal(const NodalConditions& conditions) const;
 
     /// Smallest λ of K x = λ diag(K) x on the free degrees of freedom, by Lanczos steps with the factor.
     [[nodiscard]] double lowest_eigenvalue() const;
+    /// From above within some per cent, by products with K alone: no factor is needed.
+    [[nodiscard]] double approximate_lowest_eigenvalue() const;
 
     /// Non-zeros of the factor, for reports.
     [[nodiscard]] long long factor_nonzeros() const;
@@ -58,5 +73,8 @@ private:
     struct Impl;
     std::unique_ptr<Impl> impl_;
 };
+
+/// Makes both factors at the same time, each on one core.
+void factorise_together(const RestStiffness& first, const RestStiffness& second);
 
 }  // namespace tissuewarp::tled

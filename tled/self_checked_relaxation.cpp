@@ -1,6 +1,6 @@
 // Dynamic relaxation that no triangular solve starts or checks: from the state it is given, and stopped by how its own
-// movement contracts. Its work grows as the nodes times the square root of the condition, and on a GPU nothing but
-// states leaves the device.
+// movement contracts: the stiffness at rest is multiplied with, and never factorised. Its work grows as the nodes times
+// the square root of the condition, and on a GPU nothing but states leaves the device.
 
 #include "tled/detail/heavy_ball.hpp"
 
@@ -31,32 +31,45 @@ constexpr int most_idle_windows = 12;    // without the movement falling by a te
 class SelfCheckedRelaxation {
 public:
     explicit SelfCheckedRelaxation(EquilibriumSearch& search)
-        : search_(search), mass_(search.stiffness.diagonal(search.conditions)) {
+        : search_(search),
+          mass_(search.stiffness.diagonal(search.conditions)),
+          lowest_at_rest_(search.stiffness.approximate_lowest_eigenvalue()) {
         search_.engine.set_mass(mass_);
     }
 
     EquilibriumResult run(const Matrix3Xd* start) {
         search_.keep(first_state(start), unknown_error());
-        spectrum_ = spectrum_at(search_, mass_, search_.residual());
-        while (!(open() && settle())) spectrum_ = restarted(search_, mass_, ++restarts_);
+        spectrum_ = spectrum_at(search_, mass_, search_.residual(), lowest_at_rest_);
+        while (!(open() && settle())) spectrum_ = restarted(search_, mass_, ++restarts_, lowest_at_rest_);
         return search_.finish();
     }
 
 private:
     EquilibriumSearch& search_;
     Matrix3Xd mass_;
+    double lowest_at_rest_;
     Spectrum spectrum_;
     int restarts_ = 0;
 
     [[nodiscard]] double unknown_error() const { return 1e3 * search_.options.tolerance_mm; }
 
-    /// As it is given, or the linear answer where imposed displacements would tear tissue at rest.
+    /// The start, or rest; where displacements are imposed on tissue at rest, which they would tear, about the linear
+    /// answer.
     Matrix3Xd first_state(const Matrix3Xd* start) {
         const NodalConditions& conditions = search_.conditions;
         const Matrix3Xd rest = Matrix3Xd::Zero(3, conditions.constrained.cols());
-        Matrix3Xd u = conditions.constrained.select(conditions.imposed, start != nullptr ? *start : rest);
-        if (!search_.admissible(u)) u = search_.begin(start);
-        return u;
+        const Matrix3Xd imposed = conditions.constrained.select(conditions.imposed, rest);
+        if (start == nullptr && !imposed.isZero(0)) return about_linear_answer();
+        const Matrix3Xd u = conditions.constrained.select(imposed, start != nullptr ? *start : rest);
+        return search_.admissible(u) ? u : search_.begin(start);
+    }
+
+    Matrix3Xd about_linear_answer() {
+        for (const double tolerance : {0.02, 0.002}) {
+            Matrix3Xd u = search_.stiffness.approximate_linear_solution(search_.conditions, tolerance);
+            if (search_.admissible(u) && search_.engine.smallest_jacobian().value > least_starting_jacobian) return u;
+        }
+        return search_.begin(nullptr);
     }
 
     /// Where steps lead; nothing where tissue was inverted.

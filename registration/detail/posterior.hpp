@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 namespace tissuewarp::registration::detail {
@@ -26,6 +27,9 @@ class Posterior {
 public:
     /// Throws InvalidInput where the springs do not hold the tissue.
     Posterior(const PreparedModel& prepared, const WeighedSprings& springs);
+    /// Of both, made at the same time.
+    static std::pair<Posterior, Posterior> both(const PreparedModel& prepared, const WeighedSprings& first,
+                                                const WeighedSprings& second);
 
     /// Covariances of the displacements of nodes, mm².
     [[nodiscard]] std::vector<Eigen::Matrix3d> covariances(const std::vector<int>& nodes) const;
@@ -42,6 +46,8 @@ public:
     [[nodiscard]] const tled::RestStiffness& stiffness() const { return stiffness_; }
 
 private:
+    Posterior(const PreparedModel& prepared, const WeighedSprings& springs, tled::RestStiffness stiffness);
+
     tled::RestStiffness stiffness_;
     Eigen::Index rows_;  // 3 N
     double energy_;

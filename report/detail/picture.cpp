@@ -30,17 +30,20 @@ constexpr double difference_range = 0.5;  // of the grey window
 struct Scene {
     const ReportInput& input;
     double mm_per_pixel = 1;
-    std::array<Plane, 3> fixed_planes, moving_planes;
-    Window fixed_window, moving_window;
-    std::optional<Focus> focus;
-    std::optional<Volume> magnitude;
-    double displacement_limit = 1;  ///< mm, end of the colour bar
+    std::array<Plane, 3> fixed_planes{}, moving_planes{};
+    Window fixed_window{}, moving_window{};
+    std::optional<Focus> focus{};
+    std::optional<Volume> magnitude{};
+    double displacement_limit = 1, error_limit = 1;  ///< mm, ends of the colour bars
+    bool distrusts = false;                          ///< some tissue is not to be trusted
 };
 
 struct Column {
     std::string title, subtitle;
     std::function<cv::Mat(int row)> draw;
     bool of_moving_frame = false;
+    double bar_mm = 0;  ///< end of the colour bar beside it; 0: none
+    [[nodiscard]] int width() const { return cell + gap + (bar_mm > 0 ? bar_margin : 0); }
 };
 
 double voxel_mm(const Volume& volume) {
@@ -107,6 +110,24 @@ cv::Mat displacement(const Scene& scene, int row) {
     return picture;
 }
 
+/// Tissue that is not to be trusted is hatched.
+cv::Mat estimated_error(const Scene& scene, int row) {
+    constexpr int stripe = 3, stripes_apart = 9;  // pixels
+    const Plane& plane = scene.fixed_planes[static_cast<std::size_t>(row)];
+    const Volume& labels = organ_labels(scene.input);
+    cv::Mat picture = base(scene.input.fixed, scene.fixed_window, labels, plane);
+    const cv::Mat trust = label_slice(*scene.input.trust, plane), tissue = trust != 0;
+    cv::Mat values = slice(*scene.input.uncertainty, plane, Interpolation::Nearest) / scene.error_limit, mixed;
+    values.setTo(0, ~tissue);  // NaN
+    cv::addWeighted(magnitude_to_colour(cv::min(values, 1.0)), 0.75, picture, 0.25, 0, mixed);
+    mixed.copyTo(picture, tissue);
+    for (int y = 0; y < picture.rows; ++y)
+        for (int x = 0; x < picture.cols; ++x)
+            if (trust.at<int>(y, x) == 2 && (x + y) % stripes_apart < stripe) picture.at<cv::Vec3b>(y, x) *= 0.2;
+    outline(picture, labels, plane, scene, fixed_colour, 1);
+    return picture;
+}
+
 void letters(cv::Mat& panel, const Plane& plane) {
     text(panel, plane.left, {6, panel.rows / 2}, 0.6, ink);
     text(panel, plane.right, {panel.cols - 6, panel.rows / 2}, 0.6, ink, Anchor::Right);
@@ -144,11 +165,14 @@ std::vector<Column> columns_of(const Scene& scene) {
     if (in.fixed != nullptr && in.warped != nullptr)
         columns.push_back({"Difference after", "intraoperative - warped",
                            [&scene, &in](int row) { return difference(scene, row, *in.warped, in.warped_labels); }});
+    if (in.uncertainty != nullptr)
+        columns.push_back({"Estimated error", "one standard deviation, mm",
+                           [&scene](int row) { return estimated_error(scene, row); }, false, scene.error_limit});
     if (scene.magnitude)
         columns.push_back(
             {"Displacement",
              in.report.contains("alignment") ? "mm, beyond the rigid alignment" : "mm, rigid motion included",
-             [&scene](int row) { return displacement(scene, row); }, true});
+             [&scene](int row) { return displacement(scene, row); }, true, scene.displacement_limit});
     return columns;
 }
 
@@ -187,17 +211,20 @@ void legend(cv::Mat& page, const std::vector<Column>& columns, const Scene& scen
     text(page, "Radiological: the patient's right (R) is on the left. A front, P back,", {left_margin, y + 54}, 0.5,
          faint);
     text(page, "S head, I feet. Places in LPS mm.", {left_margin, y + 72}, 0.5, faint);
-    for (std::size_t k = 0; k < columns.size(); ++k) {
-        const int x = left_margin + static_cast<int>(k) * (cell + gap);
-        if (columns[k].title.starts_with("Difference")) {
+    int x = left_margin;
+    for (const Column& column : columns) {
+        if (column.title.starts_with("Difference")) {
             difference_bar(page, {x + 60, y - 6, cell - 120, 12});
             text(page, "of the grey window; pale outside labels", {x + cell / 2, y + 44}, 0.5, faint, Anchor::Centre);
         }
-        if (columns[k].of_moving_frame) {
+        if (column.title == "Estimated error" && scene.distrusts)
+            text(page, "hatched: do not trust", {x + cell / 2, y}, 0.55, ink, Anchor::Centre);
+        if (column.of_moving_frame) {
             char line[96];
             std::snprintf(line, sizeof line, "largest in the organ: %.1f mm, at the cross", scene.focus->displacement);
             text(page, line, {x + cell / 2, y}, 0.55, ink, Anchor::Centre);
         }
+        x += column.width();
     }
 }
 
@@ -216,12 +243,25 @@ void require_input(const ReportInput& input) {
     require_channels(input.fixed_labels, 1, "the fixed label map");
     require_channels(input.warped_labels, 1, "the warped label map");
     require_channels(input.moving_to_fixed, 3, "the displacement field");
+    require_channels(input.uncertainty, 1, "the estimated error");
+    require_channels(input.trust, 1, "the map of trust");
+    if ((input.uncertainty == nullptr) != (input.trust == nullptr))
+        throw InvalidInput("report: the estimated error and the map of trust go together");
+}
+
+void show_errors(Scene& scene) {
+    const cv::Mat trust = scene.input.trust->voxels.reshape(1, 1),
+                  errors = scene.input.uncertainty->voxels.reshape(1, 1);
+    double largest = 0;
+    cv::minMaxLoc(errors, nullptr, &largest, nullptr, nullptr, trust != 0);
+    scene.error_limit = std::max(largest, 0.1);
+    scene.distrusts = cv::countNonZero(trust == 2) > 0;
 }
 
 Scene scene_of(const ReportInput& input) {
     const std::optional<Box> fixed = label_box(organ_labels(input)), moving = label_box(*input.moving_labels);
     if (!fixed || !moving) throw InvalidInput("report: a label map holds no label");
-    Scene scene{input, 1, {}, {}, {}, {}, {}, {}};
+    Scene scene{input};
     if (input.moving_to_fixed != nullptr) {
         scene.magnitude = elastic_magnitude(*input.moving_to_fixed, alignment_of(input.report));
         const Focus focus = largest_displacement(*input.moving_to_fixed, *scene.magnitude, *input.moving_labels);
@@ -243,6 +283,7 @@ Scene scene_of(const ReportInput& input) {
     else if (input.warped != nullptr)
         scene.moving_window = window_of(*input.warped, *fixed);
     if (scene.focus) scene.displacement_limit = std::max(scene.focus->displacement, 0.1);
+    if (input.uncertainty != nullptr) show_errors(scene);
     return scene;
 }
 
@@ -276,13 +317,13 @@ Preview draw_preview(const ReportInput& input) {
         top[row] = height;
         height += scene.fixed_planes[row].grid.size[1] + gap;
     }
-    const int count = static_cast<int>(columns.size());
     constexpr int least_width = 660;  // of the legend
-    const int width = left_margin + count * (cell + gap) + (scene.magnitude ? bar_margin : left_margin - gap);
+    int width = left_margin + (columns.back().bar_mm > 0 ? 0 : left_margin - gap);
+    for (const Column& column : columns) width += column.width();
     cv::Mat page(height + bottom_margin, std::max(width, least_width), CV_8UC3, background);
-    for (int k = 0; k < count; ++k) {
-        const Column& column = columns[static_cast<std::size_t>(k)];
-        const int x = left_margin + k * (cell + gap);
+    int x = left_margin;
+    for (const Column& column : columns) {
+        const bool first = &column == &columns.front();
         text(page, column.title, {x + cell / 2, 34}, 0.85, ink, Anchor::Centre);
         text(page, column.subtitle, {x + cell / 2, 62}, 0.55, faint, Anchor::Centre);
         for (int row = 0; row < 3; ++row) {
@@ -290,15 +331,16 @@ Preview draw_preview(const ReportInput& input) {
             const auto index = static_cast<std::size_t>(row);
             const Plane& plane = (column.of_moving_frame ? scene.moving_planes : scene.fixed_planes)[index];
             letters(panel, plane);
-            if (k == 0 || column.of_moving_frame) place_name(panel, plane);
-            if (k == 0) scale_bar(panel, scene.mm_per_pixel);
+            if (first || column.of_moving_frame) place_name(panel, plane);
+            if (first) scale_bar(panel, scene.mm_per_pixel);
             const cv::Size size(std::min(panel.cols, cell), panel.rows);
             panel(cv::Rect({0, 0}, size)).copyTo(page(cv::Rect({x + (cell - size.width) / 2, top[index]}, size)));
         }
+        if (column.bar_mm > 0)
+            vertical_bar(page, {x + cell + gap + 8, top[0] + 30, 16, std::max(top[1] - top[0] - 60, 40)},
+                         column.bar_mm);
+        x += column.width();
     }
-    if (scene.magnitude)
-        vertical_bar(page, {width - bar_margin + 8, top[0] + 30, 16, std::max(top[1] - top[0] - 60, 40)},
-                     scene.displacement_limit);
     legend(page, columns, scene);
     return {page, scene.focus};
 }

@@ -10,8 +10,8 @@ struct Preview {
     std::optional<Focus> focus;  ///< where tissue moved most, when there is a field
 };
 
-/// Rows: axial, coronal, sagittal. Columns, as far as the data is there: before, after, the two differences, and the
-/// displacement over the moving image.
+/// Rows: axial, coronal, sagittal. Columns, as far as the data is there: before, after, the two differences, the
+/// estimated error over the fixed image, and the displacement over the moving image.
 Preview draw_preview(const ReportInput& input);
 
 /// Moving to fixed, from the report's "alignment" entry; the identity without one.

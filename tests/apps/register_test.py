@@ -122,7 +122,7 @@ class Register(unittest.TestCase):
         for key in ("dice", "hausdorff_95_mm", "mean_surface_distance_mm"):
             self.assertIn(key, self.report["overlap"]["after"]["all"])
         stages = [entry["stage"] for entry in self.report["stages"]]
-        for stage in ("read", "meshing", "factor", "rigid alignment", "correspondence", "equilibrium", "fields", "warp",
+        for stage in ("read", "meshing", "rest stiffness", "rigid alignment", "correspondence", "equilibrium", "fields", "warp",
                       "score", "write"):
             self.assertIn(stage, stages)
         self.assertGreater(self.report["peak_memory_mb"], 10)

@@ -80,6 +80,17 @@ TEST(Dial, TakesTheFinestOfEquallyAccurateMeshes) {
     EXPECT_DOUBLE_EQ(choose(fronts, {.accuracy_mm = 3, .time_s = 20}, head()).edge_length_mm, 20);
 }
 
+// Without a time, an accuracy that no mesh has is no reason to wait for one that is no more accurate.
+TEST(Dial, WaitsForAFinerMeshNoLongerThanTwiceWhereItGainsNothing) {
+    Fronts fronts = three_meshes();
+    for (FrontPoint& point : fronts.points) point.error_95_mm = 2 + 0.002 * point.edges_per_organ;
+    EXPECT_DOUBLE_EQ(choose(fronts, {.accuracy_mm = 1, .time_s = {}}, head()).edge_length_mm, 20);
+    fronts.points[1].rounds_s = 0.5;  // 0.85 s with the rest, against 0.48 s
+    EXPECT_DOUBLE_EQ(choose(fronts, {.accuracy_mm = 1, .time_s = {}}, head()).edge_length_mm, 10);
+    fronts.points[2].error_95_mm = 1.8;
+    EXPECT_DOUBLE_EQ(choose(fronts, {.accuracy_mm = 1, .time_s = {}}, head()).edge_length_mm, 5);
+}
+
 TEST(Dial, RefusesWhatItCannotChooseBy) {
     EXPECT_THROW(choose(three_meshes(), {}, head()), InvalidInput);
     EXPECT_THROW(choose(three_meshes(), {.accuracy_mm = -1, .time_s = {}}, head()), InvalidInput);

@@ -194,5 +194,18 @@ TEST(Uncertainty, DoubtsASolverThatStoppedFarFromEquilibrium) {
     EXPECT_NE(doubt.find("0.05 mm"), std::string::npos) << doubt;
 }
 
+TEST(Uncertainty, AnAccuracyThatIsNotSureIsDoubted) {
+    UncertaintySummary summary;
+    summary.deviation_mm = summary.data_mm = 0.9;
+    summary.interval_mm = 1.5;
+    EXPECT_EQ(doubt_of_accuracy(summary, 1.5), "");
+    const std::string doubt = doubt_of_accuracy(summary, 1);  // more than the deviation is not enough
+    EXPECT_NE(doubt.find("1 mm were asked for"), std::string::npos) << doubt;
+    EXPECT_NE(doubt.find("within 1.5 mm"), std::string::npos) << doubt;
+    EXPECT_NE(doubt.find("better data would help"), std::string::npos) << doubt;
+    summary.discretisation_mm = 2;
+    EXPECT_NE(doubt_of_accuracy(summary, 1).find("; a finer mesh would help"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace tissuewarp::registration

@@ -13,6 +13,7 @@
 
 #include <cstdlib>
 #include <fstream>
+#include <limits>
 
 namespace tissuewarp::report {
 namespace {
@@ -55,7 +56,7 @@ struct Example {
     });
 
     [[nodiscard]] ReportInput input(const json& report = {}) const {
-        return {&moving, &moving, &moving, &labels, &labels, &labels, &field, report};
+        return {&moving, &moving, &moving, &labels, &labels, &labels, &field, nullptr, nullptr, report};
     }
 };
 
@@ -283,6 +284,29 @@ TEST_F(Pages, ShowInRedWhatIsBrighterDuringTheOperation) {
     input.fixed = &darker;
     const cv::Vec3b blue = AxialPanels{detail::draw_preview(input).picture}.at(2, 38, 62);
     EXPECT_GT(blue[0], blue[2] + 20);
+}
+
+// Two millimetres on the patient's left, none on the right; the back of the left is not to be trusted.
+TEST_F(Pages, ShowWhereTheErrorIsLargeAndWhereNothingIsKnown) {
+    const Volume error = filled<float>(example.grid, CV_32FC1, [](const Vector3d& p) {
+        return p.norm() >= 40 ? std::numeric_limits<float>::quiet_NaN() : p[0] > 0 ? 2.0F : 0.1F;
+    });
+    const Volume trust = filled<std::uint8_t>(example.grid, CV_8UC1, [](const Vector3d& p) {
+        return std::uint8_t(p.norm() >= 40 ? 0 : p[0] > 0 && p[1] > 0 ? 2 : 1);
+    });
+    ReportInput input = example.input();
+    input.uncertainty = &error;
+    EXPECT_THROW(detail::draw_preview(input), InvalidInput);
+    input.trust = &trust;
+    const AxialPanels panels{detail::draw_preview(input).picture};
+    EXPECT_GT(panels.at(4, 80, -30)[1], panels.at(4, -80, -30)[1] + 60);  // viridis
+    const auto darkest = [&](int down) {
+        int least = 255;
+        for (int right = 60; right < 80; ++right) least = std::min<int>(least, panels.at(4, right, down)[1]);
+        return least;
+    };
+    EXPECT_LT(darkest(40), 60);
+    EXPECT_GT(darkest(-40), 100);
 }
 
 TEST_F(Pages, AreDrawnByABrowser) {

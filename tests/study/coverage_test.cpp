@@ -47,6 +47,20 @@ TEST(Coverage, IntervalsHoldErrorsOfTheStatedDistribution) {
     EXPECT_NEAR(coverage[0].held[2], 0.95, 0.015);
     EXPECT_NEAR(coverage[0].held[3], 0.99, 0.01);
     EXPECT_NEAR(coverage[0].true_mm / coverage[0].estimated_mm, 1, 0.1);
+    EXPECT_DOUBLE_EQ(coverage[0].phantoms_within, coverage[0].held[2]);  // a target each
+}
+
+TEST(Coverage, APhantomIsWithinByTheErrorOverAllItsTargets) {
+    auto rows = drawn_rows(1);
+    rows.resize(2);
+    rows[1].seed = rows[0].seed;
+    const double radius = registration::interval_mm(rows[0].estimate, 0.95);
+    rows[0].error = Eigen::Vector3d(0.5 * radius, 0, 0);
+    rows[1].error = Eigen::Vector3d(0, 1.2 * radius, 0);  // together 0.92
+    EXPECT_DOUBLE_EQ(coverage_of(rows)[0].phantoms_within, 1);
+    EXPECT_DOUBLE_EQ(coverage_of(rows)[0].held[2], 0.5);
+    rows[1].error *= 1.2;
+    EXPECT_DOUBLE_EQ(coverage_of(rows)[0].phantoms_within, 0);
 }
 
 TEST(Coverage, ErrorsHalfAsLargeAgainAreSeen) {

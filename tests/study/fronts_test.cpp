@@ -117,6 +117,20 @@ Point made_up(const Setting& setting, double seconds, double error) {
     return point;
 }
 
+TEST(Findings, DoNotTellApartWhatTheReferenceDoesNot) {
+    Setting finer, linear;
+    finer.elements = 50000;
+    linear.physics.law = Law::Linear;
+    std::vector<Point> points{made_up({}, 1, 0.10), made_up(finer, 4, 0.05), made_up(linear, 0.01, 0.05)};
+    for (Point& point : points) point.reference_mm = 0.06;
+    const Findings findings = findings_of({"cube", "", {}, false}, points);
+    ASSERT_EQ(findings.comparisons.size(), 2u);
+    EXPECT_EQ(findings.comparisons[0].verdict, "the reference does not tell which is more accurate, slower");
+    EXPECT_EQ(findings.comparisons[1].verdict, "more accurate, faster: pays");  // laws are compared on one mesh
+    for (Point& point : points) point.reference_mm = 0.04;
+    EXPECT_EQ(findings_of({"cube", "", {}, false}, points).comparisons[0].verdict, "more accurate, slower");
+}
+
 TEST(Findings, SayWhatPays) {
     Setting finer, linear, slow, precise;
     finer.elements = 50000;

@@ -1,12 +1,13 @@
 #include "tled/detail/cholmod_factor.hpp"
 
 #include <cholmod.h>
-#include <dlfcn.h>
 
 #include <algorithm>
+#include <optional>
 #include <string>
 
 #include "core/errors.hpp"
+#include "tled/detail/single_blas_thread.hpp"
 
 namespace tissuewarp::tled::detail {
 
@@ -40,29 +41,6 @@ cholmod_dense view(const Eigen::MatrixXd& columns) {
     b.dtype = CHOLMOD_DOUBLE;
     return b;
 }
-
-// OpenBLAS's threads wait for each other by spinning: on small supernodes this costs more than it gives, and on busy
-// cores it multiplies the time. One thread while this lives, where `active` and where the BLAS is OpenBLAS.
-class SingleBlasThread {
-public:
-    explicit SingleBlasThread(bool active) {
-        static const auto get = reinterpret_cast<int (*)()>(dlsym(RTLD_DEFAULT, "openblas_get_num_threads"));
-        static const auto set = reinterpret_cast<void (*)(int)>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads"));
-        if (!active || !get || !set) return;
-        set_ = set;
-        before_ = get();
-        set(1);
-    }
-    ~SingleBlasThread() {
-        if (set_) set_(before_);
-    }
-    SingleBlasThread(const SingleBlasThread&) = delete;
-    SingleBlasThread& operator=(const SingleBlasThread&) = delete;
-
-private:
-    void (*set_)(int) = nullptr;
-    int before_ = 1;
-};
 
 // Lower triangle of the node graph of a matrix, as a pattern with unit values.
 Eigen::SparseMatrix<double> node_graph(const Eigen::SparseMatrix<double>& lower, const std::vector<int>& node_of,
@@ -118,7 +96,7 @@ struct CholmodFactor::Impl {
     // With the system that CHOLMOD calls `system`.
     [[nodiscard]] Eigen::MatrixXd solved(int system, const Eigen::MatrixXd& b) const {
         cholmod_dense right = view(b);
-        const SingleBlasThread single(true);  // a triangular solve is bound by memory
+        const SingleBlasThread single;  // a triangular solve is bound by memory
         cholmod_solve2(system, L, &right, nullptr, &x, nullptr, &y, &e, &common);
         require_success("solve with");
         return Eigen::Map<const Eigen::MatrixXd>(static_cast<const double*>(x->x), b.rows(), b.cols());
@@ -192,7 +170,8 @@ bool CholmodFactor::factorize(const Eigen::SparseMatrix<double>& lower) {
     impl_->common.status = CHOLMOD_OK;
     impl_->L = cholmod_copy_factor(impl_->symbolic, &impl_->common);
     impl_->require_success("copy the analysis of");
-    const SingleBlasThread single(impl_->small);
+    std::optional<SingleBlasThread> single;
+    if (impl_->small) single.emplace();
     cholmod_factorize(&matrix, impl_->L, &impl_->common);
     impl_->require_success("factorise");
     return impl_->common.status != CHOLMOD_NOT_POSDEF;

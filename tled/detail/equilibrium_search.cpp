@@ -11,7 +11,6 @@ using Eigen::Matrix3Xd;
 
 namespace {
 
-constexpr double least_starting_jacobian = 0.1;
 constexpr double solve_tolerance = 1e-2;  // of lifted residuals when the springs are not those factorised
 
 std::string text(double value) {

@@ -56,6 +56,8 @@ private:
 /// K₀ overestimates what it knows nothing about: soon after a linear start the true error was up to 1.5 times ‖K₀⁻¹
 /// r‖∞.
 constexpr double linear_start_safety = 1.5;
+/// det F below which a linear start is shortened.
+constexpr double least_starting_jacobian = 0.1;
 
 EquilibriumResult lbfgs(EquilibriumSearch& search, const Eigen::Matrix3Xd* start);
 EquilibriumResult nonlinear_cg(EquilibriumSearch& search, const Eigen::Matrix3Xd* start);

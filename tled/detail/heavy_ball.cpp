@@ -43,7 +43,8 @@ double decay(const Spectrum& spectrum) {
     return -0.5 * std::log(heavy_ball(spectrum).momentum);
 }
 
-Spectrum spectrum_at(EquilibriumSearch& search, const Matrix3Xd& mass, const Matrix3Xd& residual) {
+Spectrum spectrum_at(EquilibriumSearch& search, const Matrix3Xd& mass, const Matrix3Xd& residual,
+                     double lowest_at_rest) {
     const Matrix3Xd u = search.last_good(), still = Matrix3Xd::Zero(3, u.cols());
     // Large enough to stand clear of round-off in u, small enough to stay near the tangent.
     const double amplitude = std::max(std::cbrt(search.engine.precision()), 1e-3) * 0.3;
@@ -70,14 +71,13 @@ Spectrum spectrum_at(EquilibriumSearch& search, const Matrix3Xd& mass, const Mat
     const double highest = step_safety * eigen.eigenvalues().maxCoeff();
     if (!(highest > 0)) search.fail_stalled();
     search.engine.set_state(u, still);
-    const double lowest =
-        damping_factor * std::min(search.stiffness.lowest_eigenvalue(), lowest_of_shifts(search.conditions, mass));
+    const double lowest = damping_factor * std::min(lowest_at_rest, lowest_of_shifts(search.conditions, mass));
     return {std::clamp(lowest, least_ratio * highest, highest / 4), highest};
 }
 
-Spectrum restarted(EquilibriumSearch& search, const Matrix3Xd& mass, int restarts) {
+Spectrum restarted(EquilibriumSearch& search, const Matrix3Xd& mass, int restarts, double lowest_at_rest) {
     if (restarts > most_restarts || !search.admissible(search.last_good())) search.fail_stalled();
-    Spectrum spectrum = spectrum_at(search, mass, search.residual());
+    Spectrum spectrum = spectrum_at(search, mass, search.residual(), lowest_at_rest);
     spectrum.highest *= 1 << restarts;
     search.observer.note("relaxation restarted from the last good state with a smaller step");
     return spectrum;

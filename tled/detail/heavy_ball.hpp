@@ -18,13 +18,14 @@ StepCoefficients heavy_ball(const Spectrum& spectrum);
 double decay(const Spectrum& spectrum);
 
 /// At the last good state, whose residual is given: λ_max by Lanczos' iteration (Golub and Van Loan, section 10.1) on
-/// M^(−½) K M^(−½), with products by differences of the real force kernel; λ_min from that of K₀ with the springs it
-/// was factorised with, and of shifts of the whole under the present ones. Leaves the engine at that state, at rest.
-/// Fails where no λ_max above 0 is found.
-Spectrum spectrum_at(EquilibriumSearch& search, const Eigen::Matrix3Xd& mass, const Eigen::Matrix3Xd& residual);
+/// M^(−½) K M^(−½), with products by differences of the real force kernel; λ_min from `lowest_at_rest`, that of K₀ with
+/// the springs of the stiffness, and of shifts of the whole under the present ones. Leaves the engine at that state, at
+/// rest. Fails where no λ_max above 0 is found.
+Spectrum spectrum_at(EquilibriumSearch& search, const Eigen::Matrix3Xd& mass, const Eigen::Matrix3Xd& residual,
+                     double lowest_at_rest);
 
 /// The same for the `restarts`th time, after steps that inverted tissue: back at the last good state, with λ_max taken
 /// 2^restarts times as large. Fails where that state is none, or after six.
-Spectrum restarted(EquilibriumSearch& search, const Eigen::Matrix3Xd& mass, int restarts);
+Spectrum restarted(EquilibriumSearch& search, const Eigen::Matrix3Xd& mass, int restarts, double lowest_at_rest);
 
 }  // namespace tissuewarp::tled::detail
