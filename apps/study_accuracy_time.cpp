@@ -145,15 +145,17 @@ void run_accuracy_time_study(const StudyOptions& options) {
     const study::Provenance provenance = provenance_of(options, device);
     study::Store store(options.output, provenance);
     const std::size_t before = store.points().size();
+    const auto show = [&] { study::write_page(store.problems(), store.points(), provenance, options.output); };
     try {
         study::measure_accuracy_time(
             problems, study_options, store,
             [&](const std::string& words, double from, double to) { progress.begin(words, from, to); }, progress);
     } catch (const Cancelled&) {
+        if (!store.points().empty()) show();
         throw Interrupted(fmt::format("interrupted; {} points are in '{}', and the same command goes on from there",
                                       store.points().size(), options.output.string()));
     }
-    study::write_page(store.problems(), store.points(), provenance, options.output);
+    show();
     progress.clear();
     if (options.common.quiet) return;
     for (const study::ProblemSummary& problem : store.problems()) print_problem(problem, store);

@@ -78,7 +78,7 @@ std::string doubt_of_solver(const UncertaintySummary& summary, double tolerance_
 
 /// In words, where errors are not within `accuracy_mm` with a probability of 95 % on average over the tissue, what is
 /// at fault and what would help; otherwise empty. Of random phantoms, the error over the tissue (root mean square) of
-/// 97 to 100 in a hundred is within that radius (docs/accuracy-time.md, "Is an accuracy kept?").
+/// 96 to 99 in a hundred is within that radius (docs/accuracy-time.md, "Is an accuracy kept?").
 std::string doubt_of_accuracy(const UncertaintySummary& summary, double accuracy_mm);
 
 /// What a voxel of the trust map says.

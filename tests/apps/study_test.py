@@ -185,19 +185,27 @@ class StudyOptions(PhantomTest):
         self.assert_refused(run("study", "accuracy-time", "--quick", "--problems", "cube", "--device", "gpu:99",
                                 "--output", self.phantom.output), GPU)
 
-    # What was measured until then stays, and the message says how to go on.
-    def test_interrupt_keeps_what_was_measured(self):
+    def interrupted_once_there_is(self, path):
         process = subprocess.Popen(
             [PROGRAM, "study", "accuracy-time", "--problems", "cube", "--device", "cpu", "--repeats", "1", "--output",
              str(self.phantom.output)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
             env={**os.environ, "OPENBLAS_NUM_THREADS": "1"})
-        while not self.phantom.output.exists() and process.poll() is None:
+        while not path.exists() and process.poll() is None:
             time.sleep(0.05)
         process.send_signal(signal.SIGINT)
         _, message = process.communicate(timeout=100)
         self.assertEqual(process.returncode, INTERRUPTED, message)
         self.assertIn("the same command goes on", message)
-        self.assertEqual(list(self.phantom.output.glob("*.h5*")), [])  # nothing was finished
+
+    def test_interrupt_before_anything_was_measured_leaves_nothing(self):
+        self.interrupted_once_there_is(self.phantom.output)
+        self.assertEqual(list(self.phantom.output.glob("*.h5*")), [])
+        self.assertFalse((self.phantom.output / "accuracy-time.html").exists())
+
+    def test_interrupt_keeps_and_shows_what_was_measured(self):
+        self.interrupted_once_there_is(self.phantom.output / "results.csv")
+        self.assertGreater(len((self.phantom.output / "results.csv").read_text().splitlines()), 1)
+        self.assertIn("a cube of 100 mm", (self.phantom.output / "accuracy-time.html").read_text())
 
 
 if __name__ == "__main__":

@@ -70,15 +70,13 @@ Direction combined(const std::vector<Direction>& basis, const VectorXd& weights)
 /// Each component constant, or as a coordinate.
 std::vector<Direction> smooth_fields(const Product& multiply_K, const Matrix3Xd& position,
                                      const Eigen::Matrix<bool, 3, Eigen::Dynamic>& constrained) {
-    const Matrix3Xd centred = position.colwise() - position.rowwise().mean();
+    Eigen::Matrix4Xd affine(4, position.cols());
+    affine << Eigen::RowVectorXd::Ones(position.cols()), position.colwise() - position.rowwise().mean();
     std::vector<Direction> fields;
     for (int component = 0; component < 3; ++component)
-        for (int power = -1; power < 3; ++power) {
+        for (int k = 0; k < 4; ++k) {
             Matrix3Xd x = Matrix3Xd::Zero(3, position.cols());
-            if (power < 0)
-                x.row(component).setOnes();
-            else
-                x.row(component) = centred.row(power);
+            x.row(component) = affine.row(k);
             x = constrained.select(0.0, x);
             fields.push_back({x, multiply_K(x)});
         }
