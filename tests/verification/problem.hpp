@@ -53,8 +53,8 @@ struct Problem {
     /// `may_touch` it. Empty without contact.
     std::function<double(int stage)> plane_height;
     std::function<bool(const Eigen::Vector3d& X)> may_touch;
-    /// Of the study with linear and with quadratic elements: three of constant ratio, and the one halfway between the
-    /// two finest. Meshes of all levels have the same shape; their cells shrink alike in all directions.
+    /// Of the study with linear and with quadratic elements, from coarse to fine. Meshes of all levels have the same
+    /// shape; their cells shrink alike in all directions.
     std::array<int, 4> levels{}, quadratic_levels{};
     std::vector<Quantity> quantities;
 };
