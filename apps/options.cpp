@@ -216,7 +216,8 @@ struct Parser {
                     "Standard deviation of a pair along each axis (mm)");
         CLI::Option* moving_curves =
             verb.path("--moving-curves", o.curves.moving,
-                      "Preoperative centre lines of vessels: .vtk with LINES, or CSV x,y,z,line (mm, LPS)");
+                      "Preoperative centre lines of vessels: .vtk with LINES, curves of 3D Slicer, or CSV x,y,z,line "
+                      "(mm, LPS)");
         CLI::Option* fixed_curves = verb.path("--fixed-curves", o.curves.fixed,
                                               "Intraoperative points along the same vessels to register to, likewise; "
                                               "those of no line need no column 'line'");

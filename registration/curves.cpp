@@ -4,6 +4,7 @@
 #include "meshing/mesh_io.hpp"
 #include "registration/detail/extent.hpp"
 #include "registration/detail/line_reader.hpp"
+#include "registration/slicer_markups.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,6 +12,7 @@
 #include <cmath>
 #include <map>
 #include <sstream>
+#include <utility>
 
 namespace tissuewarp::registration {
 
@@ -71,7 +73,12 @@ Polylines read_lines(const std::filesystem::path& path) {
                    [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
     if (extension == ".csv") return read_table(path);
     if (extension == ".vtk") return meshing::read_polylines(path);
-    throw InvalidInput(path.string() + ": curves are read from .vtk (legacy polydata) and .csv (x,y,z,line)");
+    if (is_slicer_markups(path)) {
+        Markups markups = read_slicer_markups(path);
+        return {std::move(markups.points), std::move(markups.lines)};
+    }
+    throw InvalidInput(path.string() +
+                       ": curves are read from .vtk (legacy polydata), .csv (x,y,z,line) and markups of 3D Slicer");
 }
 
 void require_usable_lines(const std::vector<Eigen::Matrix3Xd>& lines) {
@@ -151,7 +158,8 @@ Curves read_curves(const std::filesystem::path& moving, const std::filesystem::p
     constexpr double least_reach_mm = 2.5;
     const Polylines before = read_lines(moving), during = read_lines(fixed);
     if (before.lines.empty())
-        throw InvalidInput(moving.string() + ": holds no line; give .vtk with LINES, or .csv with a column 'line'");
+        throw InvalidInput(moving.string() +
+                           ": holds no line; give .vtk with LINES, .csv with a column 'line', or curves of 3D Slicer");
     Curves curves;
     for (const std::vector<int>& line : before.lines) curves.moving.emplace_back(before.nodes(Eigen::all, line));
     curves.fixed = during.nodes;

@@ -53,7 +53,7 @@ Eigen::Matrix3Xd read_elastix_points(const std::filesystem::path& path) {
 
 Markups read_points_of_any_kind(const std::filesystem::path& path) {
     if (is_slicer_markups(path)) return read_slicer_markups(path);
-    return {read_elastix_points(path), {}};
+    return {read_elastix_points(path), {}, {}};
 }
 
 /// Whether both files name all points, each differently, and by the same names.

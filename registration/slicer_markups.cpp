@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <numeric>
 #include <string_view>
 
 namespace tissuewarp::registration {
@@ -133,18 +134,30 @@ Eigen::Vector3d position_of(const json& point, const std::string& where) {
     return result;
 }
 
+/// The points from `first` on, as a line where the list is one.
+void take_line(const json& list, int first, Markups& markups) {
+    const std::string type = list.value("type", std::string("Fiducial"));
+    const int count = static_cast<int>(markups.points.cols()) - first;
+    if ((type != "Line" && type != "Curve" && type != "ClosedCurve") || count < 2) return;
+    std::vector<int>& line = markups.lines.emplace_back(static_cast<std::size_t>(count));
+    std::iota(line.begin(), line.end(), first);
+    if (type == "ClosedCurve") line.push_back(first);
+}
+
 void take_list(const json& list, const std::string& where, Markups& markups) {
     if (!list.is_object()) throw InvalidInput(where + ": is no list of points");
     require_millimetres(list, where);
     const Eigen::Vector3d signs = signs_of(system_of(list, where), where);
     const auto points = list.find("controlPoints");
     if (points == list.end() || !points->is_array()) throw InvalidInput(where + ": has no controlPoints");
+    const int first = static_cast<int>(markups.points.cols());
     for (const json& point : *points) {
         const std::string place = where + ", point " + std::to_string(&point - &points->front() + 1);
         if (!point.is_object()) throw InvalidInput(place + ": is no point");
         if (point.value("positionStatus", std::string("defined")) != "defined") continue;
         add(markups, signs.cwiseProduct(position_of(point, place)), point.value("label", std::string()));
     }
+    take_line(list, first, markups);
 }
 
 Markups read_json(const std::filesystem::path& path) {

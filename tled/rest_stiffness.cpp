@@ -2,8 +2,6 @@
 
 #include <Eigen/Eigenvalues>
 
-#include <tbb/parallel_invoke.h>
-
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -15,6 +13,7 @@
 #include "tled/detail/effect_stiffness.hpp"
 #include "tled/detail/held_tissue.hpp"
 #include "tled/detail/lowest_mode.hpp"
+#include "tled/detail/parallel_pair.hpp"
 #include "tled/detail/single_blas_thread.hpp"
 #include "tled/detail/springs.hpp"
 #include "tled/detail/stiffness.hpp"
@@ -267,7 +266,7 @@ void RestStiffness::factorise() const {
 void factorise_together(const RestStiffness& first, const RestStiffness& second) {
     first.analyse();
     const detail::SingleBlasThread single;
-    tbb::parallel_invoke([&] { first.factorise(); }, [&] { second.factorise(); });
+    parallel_pair([&] { first.factorise(); }, [&] { second.factorise(); });
 }
 
 Matrix3Xd RestStiffness::solve(const Matrix3Xd& force) const {

@@ -211,8 +211,7 @@ json summary_view(const json& report) {
                              {"worst", number(at(estimate, "worst_interval_95_mm"), 2)},
                              {"unseen", percent(unseen)},
                              {"doubtful", is_finite(unseen) && unseen.get<double>() > 0}};
-    }
-    if (is_finite(at(report, "estimated_error_mm")))
+    } else if (is_finite(at(report, "estimated_error_mm")))
         tiles["equations"] = {{"error", number(at(report, "estimated_error_mm"), 3)}};
     return tiles;
 }

@@ -82,6 +82,30 @@ TEST_F(CurveFiles, PolydataOfBothVersions) {
     }
 }
 
+TEST_F(CurveFiles, CurvesOfSlicerInTheSystemThatTheySay) {
+    const auto list = [](const std::string& type, const std::vector<std::string>& positions) {
+        std::string text = R"({"coordinateSystem": "RAS", "coordinateUnits": "mm", "type": ")" + type +
+                           R"(", "controlPoints": [)";
+        for (const std::string& position : positions)
+            text += (&position == &positions.front() ? "" : ", ") + (R"({"position": [)" + position + "]}");
+        return text + "]}";
+    };
+    const std::string curve = list("Curve", {"0, 0, 7", "-4, 0, 7", "-8, 0, 7", "-12, 0, 7"}),
+                      ring = list("ClosedCurve", {"0, -20, 0", "0, -24, 0", "0, -24, 4"}),
+                      loose = list("Fiducial", {"-1, -2, 3", "-30, -2, 3"});
+    const fs::path file = written("lines.mrk.json", R"({"markups": [)" + loose + ", " + curve + ", " + ring + "]}");
+    const Curves curves = read_curves(file, file);
+    ASSERT_EQ(curves.moving.size(), 2u);
+    EXPECT_EQ(curves.moving[0].col(3), Vector3d(12, 0, 7));
+    ASSERT_EQ(curves.moving[1].cols(), 4);
+    EXPECT_EQ(curves.moving[1].col(3), Vector3d(0, 20, 0));
+    EXPECT_EQ(curves.fixed.cols(), 9);
+    EXPECT_EQ(curves.tangents.col(0).norm(), 0);  // on no line
+    EXPECT_NEAR(curves.tangents.col(3)[0], 1, 1e-9);
+    const fs::path points = written("points.mrk.json", R"({"markups": [)" + loose + "]}");
+    EXPECT_NE(complaint(points, file).find("points.mrk.json: holds no line"), std::string::npos);
+}
+
 TEST_F(CurveFiles, HostileFilesAreRefusedByName) {
     const fs::path good = good_table("good.csv");
     ASSERT_EQ(complaint(good, good), "");

@@ -192,6 +192,15 @@ TEST_F(Pages, ShowNoTileForWhatOnlyATableHolds) {
     EXPECT_THAT(page(), testing::HasSubstr("<td>voxels of the whole field</td><td>0.700</td>"));
 }
 
+// The error estimate holds what the solver left.
+TEST_F(Pages, ShowWhatTheSolverLeftWhereNothingElseIsEstimated) {
+    write_report(example.input({{"estimated_error_mm", 0.03}}), folder);
+    EXPECT_THAT(page(), testing::HasSubstr("Estimated error of the solver"));
+    write_report(example.input({{"estimated_error_mm", 0.03}, {"error_estimate", {{"deviation_mm", 0.9}}}}), folder);
+    EXPECT_THAT(page(), testing::HasSubstr("Estimated error of targets"));
+    EXPECT_THAT(page(), testing::Not(testing::HasSubstr("Estimated error of the solver")));
+}
+
 TEST_F(Pages, SurviveReportsOfOddTypes) {
     const json odd = {{"inputs", 3},
                       {"stages", {1, "x", nullptr}},
