@@ -142,8 +142,9 @@ void estimate_errors(RegistrationRun& run, ProgressLine& progress) {
     products.uncertainty = uncertainty(*run.prepared, run.result, {}, progress);
     products.uncertainty_volumes =
         uncertainty_on_grid(*products.uncertainty, run.result.deformation, products.fixed_to_moving.geometry);
-    const std::string doubt = doubt_of_solver(summarise(*products.uncertainty), run.options.tolerance);
-    if (!doubt.empty()) run.result.doubts.push_back(doubt);
+    std::vector<std::string>& doubts = run.result.doubts;
+    for (std::string& doubt : doubts_of(*products.uncertainty, run.options.tolerance))
+        doubts.push_back(std::move(doubt));
 }
 
 Scores score(const RegistrationRun& run) {

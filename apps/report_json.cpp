@@ -162,10 +162,12 @@ void add_fits(json& report, const registration::UpdateResult& result) {
         report["contact"] = {{"touching", fit->touching}, {"deepest_mm", number(fit->deepest_mm)}};
     if (const auto& fit = result.anchors)
         report["anchors"] = {{"nodes", fit->nodes}, {"largest_mm", number(fit->largest_mm)}};
-    if (const auto& expected = result.expected)
-        report["expected_error"] = {{"mean_mm", number(expected->mean_mm)},
-                                    {"worst_mm", number(expected->worst_mm)},
-                                    {"worst_place_mm", vector(expected->worst_place)}};
+}
+
+json to_json(const registration::ExpectedError& expected) {
+    return {{"mean_mm", number(expected.mean_mm)},
+            {"worst_mm", number(expected.worst_mm)},
+            {"worst_place_mm", vector(expected.worst_place)}};
 }
 
 json to_json(const registration::UncertaintySummary& s) {
@@ -318,8 +320,10 @@ json report_json(const RegistrationRun& run, double total_seconds) {
     if (!scores.after.empty())
         report["overlap"] = {{"before", to_json(scores.before)}, {"after", to_json(scores.after)}};
     add_fits(report, run.result);
-    if (run.products.uncertainty)
+    if (run.products.uncertainty) {
         report["error_estimate"] = to_json(registration::summarise(*run.products.uncertainty));
+        if (const auto& expected = run.products.uncertainty->expected()) report["expected_error"] = to_json(*expected);
+    }
     report["intraoperative_seconds"] = run.intraoperative_seconds;
     if (run.dial) report["dial"] = dial(run);
     if (!run.fit.parameters.empty()) report["fit"] = fitted(run.fit);

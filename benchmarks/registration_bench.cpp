@@ -210,9 +210,6 @@ void print_row(const std::string& name, const UpdateResult& result, const Landma
                 last.matched, last.interface_nodes, last.mean_residual_mm, result.min_jacobian, seconds);
     if (result.image && result.image->agreement)
         std::fprintf(stderr, "  agreement of the images %.3f", *result.image->agreement);
-    if (result.expected)
-        std::fprintf(stderr, "  expected error %.2f mm, worst %.2f mm", result.expected->mean_mm,
-                     result.expected->worst_mm);
     if (result.surface)
         std::fprintf(stderr, "  inliers %.3f, residual %.2f mm, coverage %.2f, rival %.1f mm %.3f",
                      result.surface->inlier_share, result.surface->residual_mm, result.surface->coverage,

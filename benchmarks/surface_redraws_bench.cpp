@@ -8,6 +8,7 @@
 #include "imaging/image_io.hpp"
 #include "meshing/mesher.hpp"
 #include "registration/evaluation.hpp"
+#include "registration/expected_error.hpp"
 #include "registration/field.hpp"
 #include "registration/pipeline.hpp"
 
@@ -174,8 +175,10 @@ void run(const Arguments& arguments) {
         const Alignment rigid = align_surfaces(model, draw.seen, options.alignment);
         rigid_errors.push_back(mean_error(rigid.placement * landmarks.moving, targets));
         const auto start = std::chrono::steady_clock::now();
-        const UpdateResult result = update(prepared, {.surface = draw.seen}, options);
+        UpdateResult result = update(prepared, {.surface = draw.seen}, options);
         const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        const ExpectedError expected = expected_error(prepared, result);
+        if (const std::string doubt = doubt_of_data(expected); !doubt.empty()) result.doubts.push_back(doubt);
         errors.push_back(mean_error(PointTransform(result.deformation)(landmarks.moving), targets));
         constexpr double failure_mm = 5;
         failed += errors.back() > failure_mm;
@@ -184,7 +187,7 @@ void run(const Arguments& arguments) {
         std::printf("| %d | %.2f | %.2f | %.0f°, %.0f mm | %.2f | %.2f | %.2f | %.2f | %.0f at %.2f | %.2f | %.1f |",
                     seed, draw.coverage, draw.outliers, draw.angle_deg, draw.shift_mm, rigid_errors.back(),
                     errors.back(), result.surface->inlier_share, result.surface->residual_mm, result.surface->rival_mm,
-                    result.surface->rival_support, result.expected->mean_mm, seconds);
+                    result.surface->rival_support, expected.mean_mm, seconds);
         for (const std::string& doubt : result.doubts) std::printf(" %s;", doubt.c_str());
         std::printf(" |\n");
         std::fflush(stdout);

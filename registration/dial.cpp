@@ -29,7 +29,7 @@ struct FixedCosts {
 FixedCosts fixed_costs(const Fronts& fronts, const DialCase& what, const FrontPoint& point) {
     const LinearCost& alignment = fronts.alignment[static_cast<int>(what.kind)];
     return {alignment.at(what.fixed_label_megavoxels),
-            point.judging_s + point.fields_s + fronts.fields.at(what.moving_megavoxels + what.output_megavoxels) +
+            point.fields_s + fronts.fields.at(what.moving_megavoxels + what.output_megavoxels) +
                 fronts.warp.at(what.output_megavoxels)};
 }
 

@@ -35,7 +35,6 @@ struct FrontPoint {
     double preparation_s = 0;    ///< meshing, rest state, rest stiffness: median
     double rounds_s = 0;         ///< matching and equilibrium: median
     double rounds_95_s = 0;      ///< and 95th percentile
-    double judging_s = 0;        ///< after the last round: median
     double fields_s = 0;         ///< both fields on the grids of phantoms, where the mesh decides: median
     double error_mm = 0;         ///< root mean square over the targets of a phantom: median over phantoms
     double error_95_mm = 0;      ///< and 95th percentile

@@ -31,16 +31,6 @@ void doubt_surface(const SurfaceFit& fit, double deviation_mm, std::vector<std::
                           " mm elsewhere; give a wider patch, or landmarks");
 }
 
-/// Tissue 5 mm off is a registration that failed. The expected error is a root mean square over patients like this one:
-/// a third above it is not rare.
-void doubt_expectation(const ExpectedError& expected, std::vector<std::string>& reasons) {
-    constexpr double most_mm = 5.0 / 1.33;
-    if (expected.mean_mm > most_mm)
-        reasons.push_back("the data show too little of the organ: tissue is expected to lie " +
-                          to_text(expected.mean_mm) + " mm off, and " + to_text(expected.worst_mm) +
-                          " mm where least is known; show more of it, or give landmarks");
-}
-
 void doubt_image(const ImageFit& fit, std::vector<std::string>& reasons) {
     constexpr double least_matched = 0.1, least_shown = 0.5, most_residual_mm = 1.0, least_agreement = 0.1;
     if (fit.matched < least_matched * fit.blocks)
@@ -119,7 +109,6 @@ std::vector<std::string> doubts(const PreparedModel& prepared, const Intraoperat
     if (result.points) doubt_points(*result.points, reasons);
     if (result.curves) doubt_curves(*result.curves, seen.curves->deviation_mm, reasons);
     doubt_surroundings(result, reasons);
-    if (result.expected) doubt_expectation(*result.expected, reasons);
     if (!seen.labels) return reasons;
     const double growth = labelled_volume(*seen.labels) / labelled_volume(prepared.labels);
     double poisson = 0;

@@ -1,9 +1,12 @@
 #include "registration/detail/expected_error.hpp"
 
+#include "core/errors.hpp"
+
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
-namespace tissuewarp::registration::detail {
+namespace tissuewarp::registration {
 
 namespace {
 
@@ -25,10 +28,9 @@ std::vector<int> spread_nodes(const Eigen::Matrix3Xd& nodes) {
 
 }  // namespace
 
-ExpectedError expected_error(const PreparedModel& prepared, const WeighedSprings& springs) {
-    const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
+ExpectedError detail::expected_error(const Eigen::Matrix3Xd& nodes, const Posterior& posterior) {
     const std::vector<int> chosen = spread_nodes(nodes);
-    const std::vector<Eigen::Matrix3d> covariances = Posterior(prepared, springs).covariances(chosen);
+    const std::vector<Eigen::Matrix3d> covariances = posterior.covariances(chosen);
     ExpectedError result;
     double sum = 0;
     for (std::size_t place = 0; place < chosen.size(); ++place) {
@@ -42,4 +44,30 @@ ExpectedError expected_error(const PreparedModel& prepared, const WeighedSprings
     return result;
 }
 
-}  // namespace tissuewarp::registration::detail
+detail::WeighedSprings detail::weighed(const LastPulls& pulls) {
+    WeighedSprings springs{pulls.data, pulls.ground, pulls.energy, pulls.free_placement};
+    springs.data.insert(springs.data.end(), pulls.supports.begin(), pulls.supports.end());
+    return springs;
+}
+
+ExpectedError expected_error(const PreparedModel& prepared, const UpdateResult& result) {
+    if (result.pulls.ground.empty())
+        throw InvalidInput("labels or an image show the organ as a whole; uncertainty() tells what they leave");
+    return detail::expected_error(prepared.model.mesh.nodes,
+                                  detail::Posterior(prepared, detail::weighed(result.pulls)));
+}
+
+/// Tissue 5 mm off is a registration that failed. The expected error is a root mean square over patients like this one:
+/// a third above it is not rare.
+std::string doubt_of_data(const ExpectedError& expected) {
+    constexpr double most_mm = 5.0 / 1.33;
+    if (expected.mean_mm <= most_mm) return {};
+    char text[256];
+    std::snprintf(text, sizeof text,
+                  "the data show too little of the organ: tissue is expected to lie %.2f mm off, and %.2f mm where "
+                  "least is known; show more of it, or give landmarks",
+                  expected.mean_mm, expected.worst_mm);
+    return text;
+}
+
+}  // namespace tissuewarp::registration

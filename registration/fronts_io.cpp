@@ -19,7 +19,7 @@ namespace {
 using nlohmann::json;
 
 constexpr const char* schema = "tissuewarp.fronts";
-constexpr int schema_version = 2;
+constexpr int schema_version = 3;
 
 struct Key {
     const char* name;
@@ -30,7 +30,6 @@ constexpr Key keys[] = {{"edges_per_organ", &FrontPoint::edges_per_organ},
                         {"preparation_s", &FrontPoint::preparation_s},
                         {"rounds_s", &FrontPoint::rounds_s},
                         {"rounds_95_s", &FrontPoint::rounds_95_s},
-                        {"judging_s", &FrontPoint::judging_s},
                         {"fields_s", &FrontPoint::fields_s},
                         {"error_mm", &FrontPoint::error_mm},
                         {"error_95_mm", &FrontPoint::error_95_mm}};

@@ -99,8 +99,8 @@ PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions
 PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_labels, const PrepareOptions& options = {},
                       Observer& observer = silent_observer());
 
-/// The same model of other tissue: rest state and stiffness are made anew. Throws InvalidInput for materials that do not
-/// fit the model.
+/// The same model of other tissue: rest state and stiffness are made anew. Throws InvalidInput for materials that do
+/// not fit the model.
 PreparedModel with_materials(PreparedModel prepared, const tled::MaterialTable& materials);
 
 /// Adds what registering to a bare intraoperative volume takes: blocks of the preoperative image about feature points
@@ -244,19 +244,12 @@ struct AnchorFit {
     double largest_mm = 0;  ///< displacement of one of them
 };
 
-/// How far off tissue is expected to lie, from the deviations of the data and the prior alone: root mean square over
-/// places all over the organ, and the place that is known least.
-struct ExpectedError {
-    double mean_mm = 0, worst_mm = 0;
-    Eigen::Vector3d worst_place = Eigen::Vector3d::Zero();  ///< moving frame, LPS mm
-};
-
 /// What pulled at the tissue in the last round.
 struct LastPulls {
     std::vector<tled::Spring> data;
-    std::vector<tled::Spring> holds;  ///< where labels pull: to where nodes were before the round, which is no datum
-    std::vector<tled::Spring> ground;
-    std::vector<tled::Spring> supports;                           ///< anchors, and contact with rigid neighbours
+    std::vector<tled::Spring> holds;     ///< where labels pull: to where nodes were before the round, which is no datum
+    std::vector<tled::Spring> ground;    ///< the prior where points alone show the organ; otherwise none
+    std::vector<tled::Spring> supports;  ///< anchors, and contact with rigid neighbours
     Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();  ///< moving → fixed, as it was in that round
     Eigen::Matrix3Xd loads;                                       ///< on the nodes, 3 × N, mN
     double energy = 1;            ///< mN mm that weighs as much as one standard deviation of a datum
@@ -270,13 +263,12 @@ struct UpdateResult {
     LastPulls pulls;
     std::string engine;  ///< description of the device that solved
     double min_jacobian = 1;
-    std::optional<ImageFit> image;          ///< where a bare volume was given
-    std::optional<SurfaceFit> surface;      ///< where points of a surface were given
-    std::optional<PointFit> points;         ///< where pairs of points were given
-    std::optional<CurveFit> curves;         ///< where points along vessels were given
-    std::optional<ContactFit> contact;      ///< where the model has rigid neighbours
-    std::optional<AnchorFit> anchors;       ///< and anchors
-    std::optional<ExpectedError> expected;  ///< where neither labels nor an image show the organ as a whole
+    std::optional<ImageFit> image;      ///< where a bare volume was given
+    std::optional<SurfaceFit> surface;  ///< where points of a surface were given
+    std::optional<PointFit> points;     ///< where pairs of points were given
+    std::optional<CurveFit> curves;     ///< where points along vessels were given
+    std::optional<ContactFit> contact;  ///< where the model has rigid neighbours
+    std::optional<AnchorFit> anchors;   ///< and anchors
     std::vector<StageTime> times;
     bool cut_short = false;           ///< by the time budget: the last round was not reached
     std::vector<std::string> doubts;  ///< reasons not to trust the result, empty when there are none

@@ -6,7 +6,6 @@
 #include "registration/detail/doubts.hpp"
 #include "registration/detail/engine_choice.hpp"
 #include "registration/detail/evidence_set.hpp"
-#include "registration/detail/expected_error.hpp"
 #include "registration/detail/loads.hpp"
 #include "registration/detail/pace.hpp"
 #include "registration/detail/rigid_part.hpp"
@@ -161,14 +160,6 @@ private:
     void judge() {
         evidence_.judge(state_, result_);
         if (!prepared_.options.anchors.empty()) result_.anchors = detail::anchor_fit(prepared_, state_);
-        if (!evidence_.only_points()) return;
-        detail::Stopwatch stopwatch;
-        const int last = options_.rematches - 1;
-        auto springs = evidence_.contribution(plan_of(last), state_).conditions.springs;
-        append(springs, evidence_.supports(plan_of(last), state_));
-        result_.expected =
-            detail::expected_error(prepared_, {springs, evidence_.ground, evidence_.energy, placement_is_free()});
-        result_.times.push_back(stopwatch.lap("expected error"));
     }
 
     [[nodiscard]] detail::RoundPlan plan_of(int round) const {

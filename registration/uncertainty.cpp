@@ -1,6 +1,7 @@
 #include "registration/uncertainty.hpp"
 
 #include "core/errors.hpp"
+#include "registration/detail/expected_error.hpp"
 #include "registration/detail/ground.hpp"
 #include "registration/detail/posterior.hpp"
 #include "registration/detail/pull.hpp"
@@ -146,13 +147,14 @@ ErrorEstimate estimate_of(const Eigen::Vector3d& algebraic, const std::optional<
 
 Uncertainty::Uncertainty(meshing::TetMesh mesh, Eigen::Matrix3Xd algebraic,
                          std::optional<tled::DiscretisationError> discretisation, Covariances covariance,
-                         Eigen::VectorXd unexplained)
+                         Eigen::VectorXd unexplained, std::optional<ExpectedError> expected)
     : mesh_(std::move(mesh)),
       locator_(mesh_),
       algebraic_(std::move(algebraic)),
       discretisation_(std::move(discretisation)),
       covariance_(std::move(covariance)),
-      unexplained_(std::move(unexplained)) {}
+      unexplained_(std::move(unexplained)),
+      expected_(expected) {}
 
 std::vector<ErrorEstimate> Uncertainty::at_nodes() const {
     std::vector<ErrorEstimate> result;
@@ -215,6 +217,13 @@ std::string doubt_of_solver(const UncertaintySummary& summary, double tolerance_
     return text;
 }
 
+std::vector<std::string> doubts_of(const Uncertainty& uncertainty, double tolerance_mm) {
+    std::vector<std::string> reasons{doubt_of_solver(summarise(uncertainty), tolerance_mm)};
+    if (uncertainty.expected()) reasons.push_back(doubt_of_data(*uncertainty.expected()));
+    std::erase(reasons, "");
+    return reasons;
+}
+
 std::string doubt_of_accuracy(const UncertaintySummary& summary, double accuracy_mm) {
     if (summary.interval_mm <= accuracy_mm) return {};
     char text[256];
@@ -232,7 +241,8 @@ Uncertainty uncertainty(const PreparedModel& prepared, const UpdateResult& resul
     require_related(prepared, result);
     const LastPulls& pulls = result.pulls;
     detail::WeighedSprings unseen{pulls.supports, pulls.ground, pulls.energy, pulls.free_placement};
-    if (unseen.ground.empty()) {  // labels show where the organ lies, however it turned
+    const bool points_alone = !unseen.ground.empty();
+    if (!points_alone) {  // labels show where the organ lies, however it turned
         unseen.ground = detail::ground_springs(prepared, pulls.energy,
                                                [](const InterfaceNode&) { return TissuePrior().free_motion_mm; });
         unseen.free_placement = true;
@@ -260,8 +270,10 @@ Uncertainty uncertainty(const PreparedModel& prepared, const UpdateResult& resul
     const tled::DiscretisationEstimate mesh =
         tled::discretisation_error(prepared.model, posterior.stiffness(), conditions, displacement);
     if (!mesh.error) observer.note("no estimate of the error of the mesh: " + mesh.reason);
+    std::optional<ExpectedError> expected;
+    if (points_alone) expected = detail::expected_error(prepared.model.mesh.nodes, posterior);
     observer.checkpoint("error estimate", 1.0);
-    return {prepared.model.mesh, algebraic, mesh.error, covariance, unexplained};
+    return {prepared.model.mesh, algebraic, mesh.error, covariance, unexplained, expected};
 }
 
 // ‖e‖² over its mean is a multiple of χ² (Satterthwaite, Biometrics 2 (1946) 110) whose scale is itself known from few

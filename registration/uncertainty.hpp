@@ -5,6 +5,7 @@
 #include "core/observer.hpp"
 #include "imaging/volume.hpp"
 #include "meshing/point_location.hpp"
+#include "registration/expected_error.hpp"
 #include "registration/pipeline.hpp"
 #include "tled/discretisation_error.hpp"
 
@@ -42,10 +43,11 @@ class Uncertainty {
 public:
     /// The error of the mesh, where there is an estimate of it; and at the nodes the error of the solver (3 × N mm),
     /// covariances (6 × N mm²: xx, yy, zz, xy, xz, yz), and what part of the variance of motions under unknown loads
-    /// the data left (N).
+    /// the data left (N). What was expected beforehand, where points alone show the organ.
     Uncertainty(meshing::TetMesh mesh, Eigen::Matrix3Xd algebraic,
                 std::optional<tled::DiscretisationError> discretisation,
-                Eigen::Matrix<double, 6, Eigen::Dynamic> covariance, Eigen::VectorXd unexplained);
+                Eigen::Matrix<double, 6, Eigen::Dynamic> covariance, Eigen::VectorXd unexplained,
+                std::optional<ExpectedError> expected = {});
 
     /// Of places of the moving frame, 3 × P mm; nothing for places farther than half an element outside the mesh.
     [[nodiscard]] std::vector<std::optional<ErrorEstimate>> at(const Eigen::Matrix3Xd& points) const;
@@ -53,6 +55,8 @@ public:
     [[nodiscard]] std::vector<ErrorEstimate> at_nodes() const;
     /// In the moving frame.
     [[nodiscard]] const meshing::TetMesh& mesh() const { return mesh_; }
+    /// What data and prior alone let expect, where neither labels nor an image show the organ as a whole.
+    [[nodiscard]] const std::optional<ExpectedError>& expected() const { return expected_; }
 
 private:
     meshing::TetMesh mesh_;
@@ -61,6 +65,7 @@ private:
     std::optional<tled::DiscretisationError> discretisation_;
     Eigen::Matrix<double, 6, Eigen::Dynamic> covariance_;
     Eigen::VectorXd unexplained_;
+    std::optional<ExpectedError> expected_;
 };
 
 /// The estimate over the tissue, by volume.
@@ -75,6 +80,9 @@ UncertaintySummary summarise(const Uncertainty& uncertainty);
 
 /// In words, where the solver stopped farther from equilibrium than the tolerance it was given, mm; otherwise empty.
 std::string doubt_of_solver(const UncertaintySummary& summary, double tolerance_mm);
+
+/// All that the estimate says against a result whose equilibria had this tolerance, mm; empty when there is nothing.
+std::vector<std::string> doubts_of(const Uncertainty& uncertainty, double tolerance_mm);
 
 /// In words, where errors are not within `accuracy_mm` with a probability of 95 % on average over the tissue, what is
 /// at fault and what would help; otherwise empty. Of random phantoms, the error over the tissue (root mean square) of

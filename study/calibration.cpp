@@ -56,7 +56,7 @@ struct Cost {
 
 /// What all registrations of one mesh density and one kind of data gave.
 struct Sample {
-    std::vector<double> tetrahedra, preparation, rounds, judging, fields, errors;
+    std::vector<double> tetrahedra, preparation, rounds, fields, errors;
 };
 
 /// The same box with voxels of half the size.
@@ -128,7 +128,6 @@ private:
             sample.preparation.push_back(preparation);
             sample.rounds.push_back(seconds_of(result.times, "correspondence") +
                                     seconds_of(result.times, "equilibrium"));
-            sample.judging.push_back(seconds_of(result.times, "expected error"));
             sample.errors.push_back(detail::root_mean_square_error(result.deformation, phantom.targets));
             alignment_[int(kind)].add(
                 kind == DataKind::Labels ? detail::megavoxels(phantom.fixed_labels.geometry) : 0.0,
@@ -180,7 +179,6 @@ private:
             point.preparation_s = percentile(sample.preparation, 0.5);
             point.rounds_s = percentile(sample.rounds, 0.5);
             point.rounds_95_s = percentile(sample.rounds, 0.95);
-            point.judging_s = percentile(sample.judging, 0.5);
             point.fields_s = percentile(sample.fields, 0.5);
             point.error_mm = percentile(sample.errors, 0.5);
             point.error_95_mm = percentile(sample.errors, 0.95);

@@ -32,8 +32,11 @@ PreparedModel prepared_for(const Phantom& phantom, bool labels, Observer& observ
 std::vector<CoverageRow> rows_of(const Phantom& phantom, Evidence evidence, const PreparedModel& prepared,
                                  const CoverageOptions& options, Observer& observer) {
     const auto result = registration::update(prepared, seen_of(phantom, evidence), options.update, observer);
-    const auto estimates =
-        registration::uncertainty(prepared, result, options.uncertainty, observer).at(phantom.targets.moving);
+    const registration::Uncertainty uncertainty =
+        registration::uncertainty(prepared, result, options.uncertainty, observer);
+    const auto estimates = uncertainty.at(phantom.targets.moving);
+    const std::size_t doubts =
+        result.doubts.size() + doubts_of(uncertainty, options.update.equilibrium.tolerance_mm).size();
     const Eigen::Matrix3Xd is = result.deformation.placement.inverse() * phantom.targets.fixed;
     const meshing::PointLocator locator(prepared.model.mesh);
     const Eigen::MatrixXd& nodal = result.deformation.displacement;
@@ -44,8 +47,8 @@ std::vector<CoverageRow> rows_of(const Phantom& phantom, Evidence evidence, cons
         const auto place = locator.find(X);
         if (!estimates[k] || !place) continue;  // in the organ, out of its mesh
         const Eigen::Vector3d u = meshing::interpolate(prepared.model.mesh, nodal, *place);
-        rows.push_back({phantom.seed, evidence, static_cast<int>(k), X + u - is.col(column),
-                        static_cast<int>(result.doubts.size()), u.norm(), *estimates[k]});
+        rows.push_back({phantom.seed, evidence, static_cast<int>(k), X + u - is.col(column), static_cast<int>(doubts),
+                        u.norm(), *estimates[k]});
     }
     return rows;
 }

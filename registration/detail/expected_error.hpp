@@ -1,11 +1,15 @@
 #pragma once
-/// How far off tissue is expected to lie.
+/// How far off tissue is expected to lie, by a posterior that is already there.
 
 #include "registration/detail/posterior.hpp"
+#include "registration/expected_error.hpp"
 
 namespace tissuewarp::registration::detail {
 
-/// Of the posterior, at 16 nodes, each the farthest from those before.
-ExpectedError expected_error(const PreparedModel& prepared, const WeighedSprings& springs);
+/// At 16 of the nodes (3 × N, mm), each the farthest from those before.
+ExpectedError expected_error(const Eigen::Matrix3Xd& nodes, const Posterior& posterior);
+
+/// Springs of the last round as data, anchors and touching neighbours among them, and as prior.
+WeighedSprings weighed(const LastPulls& pulls);
 
 }  // namespace tissuewarp::registration::detail

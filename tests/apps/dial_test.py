@@ -12,11 +12,11 @@ INPUT = 2
 
 def measured(edges_per_organ, tetrahedra, rounds_s, error_mm):
     return {"data": "labels", "edges_per_organ": edges_per_organ, "tetrahedra": tetrahedra, "preparation_s": rounds_s,
-            "rounds_s": rounds_s, "rounds_95_s": 2 * rounds_s, "judging_s": 0, "fields_s": 0.05,
+            "rounds_s": rounds_s, "rounds_95_s": 2 * rounds_s, "fields_s": 0.05,
             "error_mm": error_mm, "error_95_mm": 2 * error_mm}
 
 
-FRONTS = {"schema": "tissuewarp.fronts", "schema_version": 2, "machine": "a test",
+FRONTS = {"schema": "tissuewarp.fronts", "schema_version": 3, "machine": "a test",
           **{name: {"constant_s": 0.05, "slope_s": 0.1}
              for name in ("alignment_labels", "alignment_partial", "fields", "warp")},
           "points": [measured(6, 2000, 0.1, 2.0), measured(10, 10000, 0.5, 0.5)]}

@@ -84,8 +84,8 @@ TEST_F(CurveFiles, PolydataOfBothVersions) {
 
 TEST_F(CurveFiles, CurvesOfSlicerInTheSystemThatTheySay) {
     const auto list = [](const std::string& type, const std::vector<std::string>& positions) {
-        std::string text = R"({"coordinateSystem": "RAS", "coordinateUnits": "mm", "type": ")" + type +
-                           R"(", "controlPoints": [)";
+        std::string text =
+            R"({"coordinateSystem": "RAS", "coordinateUnits": "mm", "type": ")" + type + R"(", "controlPoints": [)";
         for (const std::string& position : positions)
             text += (&position == &positions.front() ? "" : ", ") + (R"({"position": [)" + position + "]}");
         return text + "]}";

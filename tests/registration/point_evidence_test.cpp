@@ -82,7 +82,7 @@ TEST(PointEvidence, TwoPairsShiftTheOrganAndDoNotTurnIt) {
     const PointPairs places = grid_pairs(15);
     const Matrix3Xd moved = PointTransform(result.deformation)(places.moving);
     EXPECT_LT(((moved - places.moving).colwise() - shift).colwise().norm().maxCoeff(), 0.1);
-    EXPECT_FALSE(result.doubts.empty());  // two points say little of the rest
+    EXPECT_NE(doubt_of_data(expected_error(prepared, result)), "");  // two points say little of the rest
 }
 
 TEST(PointEvidence, WrongPairsAmongFewAreSaid) {
@@ -154,7 +154,8 @@ TEST(ExpectedError, IsThatOfTheDenseCovariance) {
         const Eigen::MatrixXd covariance = springs.energy * (free_placement ? loose.inverse().eval() : inverse);
         Eigen::VectorXd variances = Eigen::VectorXd::Zero(count);
         for (int k = 0; k < 3 * count; ++k) variances[k / 3] += covariance(k, k);
-        const ExpectedError found = detail::expected_error(prepared, springs);
+        const ExpectedError found =
+            detail::expected_error(prepared.model.mesh.nodes, detail::Posterior(prepared, springs));
         EXPECT_NEAR(found.mean_mm / std::sqrt(variances.mean()), 1, 1e-6) << free_placement;
         Eigen::Index worst = 0;
         EXPECT_NEAR(found.worst_mm / std::sqrt(variances.maxCoeff(&worst)), 1, 1e-6) << free_placement;

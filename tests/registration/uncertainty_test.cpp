@@ -8,6 +8,7 @@
 #include "tests/registration/shapes.hpp"
 #include "tests/support/label_shapes.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -116,6 +117,31 @@ TEST(Uncertainty, UnknownLoadsAreInEquilibrium) {
     }
     EXPECT_EQ(loads, detail::unknown_loads(prepared, 3, 5));
     EXPECT_LT(std::abs(loads.col(0).normalized().dot(loads.col(1).normalized())), 0.9);
+}
+
+// The estimate's own factor gives what a factor of its own does; pairs at one end show too little, pairs all over
+// enough.
+TEST(Uncertainty, TellsWhetherPointsShowEnough) {
+    const PreparedModel prepared = organ();
+    const auto too_little = testing::Contains(testing::HasSubstr("too little of the organ"));
+    PointPairs all_over = pairs_on_the_left(1);
+    all_over.moving.conservativeResize(3, 10);
+    all_over.moving.rightCols(6) << 30, 28, 0, 0, 5, -5, 0, 6, 18, -18, 0, 0, 3, -6, 0, 0, 14, -14;
+    all_over.fixed = all_over.moving;
+    const UpdateResult few = update(prepared, {.points = pairs_on_the_left(1)}, on_cpu()),
+                       enough = update(prepared, {.points = all_over}, on_cpu());
+    const Uncertainty of_few = uncertainty(prepared, few), of_enough = uncertainty(prepared, enough);
+    ASSERT_TRUE(of_few.expected() && of_enough.expected());
+    EXPECT_NEAR(of_few.expected()->mean_mm / expected_error(prepared, few).mean_mm, 1, 1e-9);
+    EXPECT_THAT(doubts_of(of_few, 1), too_little);
+    EXPECT_THAT(doubts_of(of_enough, 1), testing::IsEmpty()) << of_enough.expected()->mean_mm;
+}
+
+TEST(Uncertainty, ExpectsNothingBeforehandWhereLabelsShowTheOrgan) {
+    const PreparedModel prepared = organ();
+    const UpdateResult result = update(prepared, {.labels = prepared.labels}, on_cpu());
+    EXPECT_FALSE(uncertainty(prepared, result).expected());
+    EXPECT_THROW(expected_error(prepared, result), InvalidInput);
 }
 
 // Labels pull along normals; what holds nodes where they are is kept apart, or it would count as knowledge.

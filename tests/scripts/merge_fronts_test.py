@@ -11,7 +11,7 @@ SCRIPT = pathlib.Path(__file__).resolve().parents[2] / "scripts" / "merge_fronts
 
 
 def fronts(rounds_s, machine="two cores", densities=(6.0, 8.0)):
-    return {"schema_version": 2, "machine": machine, "warp": {"constant_s": rounds_s / 10, "slope_s": 0.1},
+    return {"schema_version": 3, "machine": machine, "warp": {"constant_s": rounds_s / 10, "slope_s": 0.1},
             "points": [{"data": "labels", "edges_per_organ": n, "rounds_s": n * rounds_s, "rounds_95_s": n * rounds_s,
                         "error_mm": rounds_s, "error_95_mm": rounds_s} for n in densities]}
 
