@@ -92,8 +92,8 @@ private:
     Eigen::Matrix3Xd loads_;  // mN, 3 × N
     double step_mm_;
     detail::State state_;
-    /// Data other than labels pull with other springs than those that the model was prepared with: a factor made with
-    /// them takes a tenth of the iterations.
+    /// Data other than labels pull with other springs than those that the model was prepared with: what relaxes
+    /// slowest, and what a factor would be of, follow from them.
     std::optional<tled::RestStiffness> metric_;
     bool relaxation_failed_ = false;
     double matching_seconds_ = 0, solving_seconds_ = 0;
@@ -168,12 +168,11 @@ private:
         return {round, round == options_.rematches - 1, range, scale, step_mm_};
     }
 
-    /// Labels hold the tissue with about the springs it was prepared with: its lowest frequency is known, and
-    /// relaxation needs no solves with a factor of other springs. With a factor of the data's own springs L-BFGS takes
-    /// a handful of solves: fewer than it costs to find the lowest frequency.
+    /// Relaxation needs no factor; where it failed, L-BFGS with a factor of the data's own springs takes a handful of
+    /// solves.
     void choose_method() {
         if (equilibrium_.method != tled::EquilibriumMethod::Automatic) return;
-        if (!needs_metric() && !relaxation_failed_)
+        if (!relaxation_failed_)
             equilibrium_.method = tled::EquilibriumMethod::SelfCheckedRelaxation;
         else if (metric_ && engine_.processor() == tled::Processor::Cpu)
             equilibrium_.method = tled::EquilibriumMethod::Lbfgs;
