@@ -2,12 +2,11 @@
 /// Small volumes and a folder for files, shared by the tests of imaging.
 
 #include "imaging/volume.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
-#include <unistd.h>
-#include <filesystem>
 #include <random>
 #include <string>
 
@@ -62,29 +61,7 @@ inline bool same_voxels(const cv::Mat& a, const cv::Mat& b) {
     return a.type() == b.type() && a.size == b.size && std::memcmp(a.data, b.data, a.total() * a.elemSize()) == 0;
 }
 
-/// A folder of its own, removed with what is in it.
-class TemporaryFolder {
-public:
-    TemporaryFolder() {
-        static int count = 0;
-        path_ = std::filesystem::temp_directory_path() /
-                ("tissuewarp-imaging-" + std::to_string(::getpid()) + "-" + std::to_string(count++));
-        std::filesystem::create_directories(path_);
-    }
-    ~TemporaryFolder() {
-        std::error_code ignored;
-        std::filesystem::remove_all(path_, ignored);
-    }
-    TemporaryFolder(const TemporaryFolder&) = delete;
-    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-    std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
-    const std::filesystem::path& path() const { return path_; }
-    bool is_empty() const { return std::filesystem::is_empty(path_); }
-
-private:
-    std::filesystem::path path_;
-};
+using tissuewarp::test::TemporaryFolder;
 
 /// Runs `call` and returns the message of the exception of type E that it throws; fails the test otherwise.
 template <class E, class Call>

@@ -5,6 +5,7 @@
 #include "registration/detail/surroundings.hpp"
 #include "registration/prepared_io.hpp"
 #include "tests/registration/shapes.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -17,6 +18,7 @@ using Eigen::Matrix3Xd;
 using Eigen::Vector3d;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
+using tissuewarp::test::TemporaryFolder;
 
 constexpr int organ = 1, plate = 2, cap = 3;
 constexpr double radius = 24, plate_top = -26.25;  // mm; between two slices of voxels
@@ -187,10 +189,9 @@ TEST(Surroundings, AreNotMeshedAndComeBackFromAFile) {
     const PreparedModel model = prepare(ball_on_plate(), coarse({plate}, {cap}));
     EXPECT_TRUE((model.model.mesh.labels.array() != plate).all());
     EXPECT_GT(model.model.mesh.nodes.row(2).minCoeff(), -25.5);
-    const auto path = std::filesystem::path(::testing::TempDir()) / "surroundings.h5";
-    write_prepared(model, path);
-    const PreparedModel back = read_prepared(path);
-    std::filesystem::remove(path);
+    const TemporaryFolder folder;
+    write_prepared(model, folder / "surroundings.h5");
+    const PreparedModel back = read_prepared(folder / "surroundings.h5");
     EXPECT_EQ(back.options.anchors, model.options.anchors);
     EXPECT_EQ(back.options.rigid_neighbours, model.options.rigid_neighbours);
     EXPECT_EQ(cv::norm(back.neighbours->distance.voxels, model.neighbours->distance.voxels, cv::NORM_INF), 0.0);

@@ -4,6 +4,7 @@
 #include "core/errors.hpp"
 #include "registration/detail/curve_tree.hpp"
 #include "tests/registration/numbers.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
@@ -19,17 +20,13 @@ using detail::CurveTree;
 using detail::Segment;
 using Eigen::Matrix3Xd;
 using Eigen::Vector3d;
+using tissuewarp::test::TemporaryFolder;
 
 class CurveFiles : public ::testing::Test {
 protected:
-    const fs::path folder = fs::path(::testing::TempDir()) / "curves_test";
-    void SetUp() override { fs::create_directories(folder); }
-    void TearDown() override { fs::remove_all(folder); }
+    const TemporaryFolder folder;
 
-    fs::path written(const std::string& name, const std::string& text) const {
-        std::ofstream(folder / name) << text;
-        return folder / name;
-    }
+    fs::path written(const std::string& name, const std::string& text) const { return folder.written(name, text); }
     std::string complaint(const fs::path& moving, const fs::path& fixed) const {
         try {
             read_curves(moving, fixed);

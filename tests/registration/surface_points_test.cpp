@@ -4,6 +4,7 @@
 #include "core/errors.hpp"
 #include "meshing/mesh_io.hpp"
 #include "tests/registration/shapes.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 
@@ -14,17 +15,13 @@ namespace tissuewarp::registration {
 namespace {
 
 namespace fs = std::filesystem;
+using tissuewarp::test::TemporaryFolder;
 
 class SurfacePointFiles : public ::testing::Test {
 protected:
-    const fs::path folder = fs::path(::testing::TempDir()) / "surface_points_test";
-    void SetUp() override { fs::create_directories(folder); }
-    void TearDown() override { fs::remove_all(folder); }
+    const TemporaryFolder folder;
 
-    fs::path written(const std::string& name, const std::string& text) const {
-        std::ofstream(folder / name) << text;
-        return folder / name;
-    }
+    fs::path written(const std::string& name, const std::string& text) const { return folder.written(name, text); }
     /// Lines of twelve points 10 mm apart on a bent sheet, in units of `unit` mm.
     static std::string sheet(double unit, const std::string& rest_of_line = "") {
         std::string text;
