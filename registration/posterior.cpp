@@ -1,12 +1,10 @@
 #include "registration/detail/posterior.hpp"
 
 #include "registration/detail/rigid_part.hpp"
-#include "registration/detail/white_noise.hpp"
 
 #include <Eigen/Eigenvalues>
 
 #include <cmath>
-#include <random>
 
 namespace tissuewarp::registration::detail {
 
@@ -87,16 +85,6 @@ Eigen::MatrixXd Posterior::inverse(const Eigen::MatrixXd& forces) const {
     Columns result = stiffness_.solve_columns(forces);
     if (freed_.cols() > 0) result += freed_ * (middle_ * (freed_.transpose() * forces));
     return result;
-}
-
-Eigen::MatrixXd Posterior::samples(int count, std::uint64_t seed) const {
-    std::mt19937_64 generator(seed);
-    Columns drawn = stiffness_.colour_columns(white_noise(rows_, count, generator));
-    if (freed_.cols() > 0) {
-        const Eigen::SelfAdjointEigenSolver<Columns> root(middle_);
-        drawn += freed_ * (root.operatorSqrt() * white_noise(freed_.cols(), count, generator));
-    }
-    return std::sqrt(energy_) * drawn;
 }
 
 }  // namespace tissuewarp::registration::detail

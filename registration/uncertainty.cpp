@@ -1,18 +1,10 @@
 #include "registration/uncertainty.hpp"
 
 #include "core/errors.hpp"
-#include "registration/detail/expected_error.hpp"
-#include "registration/detail/ground.hpp"
-#include "registration/detail/posterior.hpp"
+#include "registration/detail/coarse_twin.hpp"
+#include "registration/detail/data_uncertainty.hpp"
 #include "registration/detail/pull.hpp"
-#include "registration/detail/rigid_part.hpp"
-#include "registration/detail/unknown_loads.hpp"
-#include "registration/detail/white_noise.hpp"
 #include "tled/lifted_residual.hpp"
-#include "tled/reference.hpp"
-
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
@@ -26,12 +18,9 @@ namespace {
 
 using Covariances = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 
-/// Where the data left more than this share of the bending that unknown loads make they say next to nothing.
-constexpr double shown_below = 0.9;
-/// Of random phantoms (docs/accuracy-time.md, "Does the interval hold?"). The noise of a datum is far less than its
-/// pull admits, since neighbours share what they say. The size of the loads is known as a variance is from `freedom`
-/// numbers.
-constexpr double noise_share = 0.05, least_energy = 0.2, freedom_of_size = 6;
+/// Of random phantoms (docs/accuracy-time.md, "Does the interval hold?"): the size of the unknown loads is known as a
+/// variance is from so many numbers.
+constexpr double freedom_of_size = 6;
 
 void append(std::vector<tled::Spring>& springs, const std::vector<tled::Spring>& others) {
     springs.insert(springs.end(), others.begin(), others.end());
@@ -63,56 +52,8 @@ tled::NodalConditions conditions_of(const PreparedModel& prepared, const LastPul
     return tled::nodal_conditions(conditions, prepared.rest.node_count);
 }
 
-/// xx, yy, zz, xy, xz, yz of every node's displacement over the samples (3N × k of mean 0).
-Covariances covariances_of(const Eigen::MatrixXd& samples) {
-    Covariances result(6, samples.rows() / 3);
-    for (Eigen::Index n = 0; n < result.cols(); ++n) {
-        const Eigen::Matrix<double, 3, Eigen::Dynamic> drawn = samples.middleRows<3>(3 * n);
-        const Eigen::Matrix3d c = drawn * drawn.transpose() / double(samples.cols());
-        result.col(n) << c(0, 0), c(1, 1), c(2, 2), c(0, 1), c(0, 2), c(1, 2);
-    }
-    return result;
-}
-
 Eigen::Matrix3d matrix_of(const Eigen::Matrix<double, 6, 1>& c) {
     return (Eigen::Matrix3d() << c[0], c[3], c[4], c[3], c[1], c[5], c[4], c[5], c[2]).finished();
-}
-
-/// Forces that the noise of the data exerts through its springs, 3N × count: of covariance energy · K.
-Eigen::MatrixXd noise_forces(const detail::WeighedSprings& springs, Eigen::Index rows, int count, std::uint64_t seed) {
-    std::mt19937_64 generator(seed);
-    Eigen::MatrixXd forces = Eigen::MatrixXd::Zero(rows, count);
-    for (const tled::Spring& spring : springs.data) {
-        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spring.stiffness);
-        const Eigen::Matrix3d root =
-            axes.eigenvectors() * (springs.energy * axes.eigenvalues().cwiseMax(0)).cwiseSqrt().asDiagonal();
-        forces.middleRows<3>(3 * spring.node) += root * detail::white_noise(3, count, generator);
-    }
-    return forces;
-}
-
-/// Square of how large the unknown loads are, over those drawn: as large as the tissue was seen to strain, by strain
-/// energy, where it would be seen to move as `visible` (3N × k, mm) under those drawn.
-double load_size(const PreparedModel& prepared, const UpdateResult& result, const Eigen::MatrixXd& visible) {
-    const Eigen::Matrix3Xd& found = result.deformation.displacement;
-    const auto stiffness = tled::tangent_stiffness(prepared.rest, Eigen::Matrix3Xd::Zero(3, found.cols()));
-    const double drawn = 0.5 * visible.cwiseProduct(stiffness * visible).sum() / double(visible.cols());
-    return (tled::elastic_energy(prepared.rest, found) + least_energy * result.pulls.energy) / drawn;
-}
-
-/// What part of the variance of bending under the loads drawn the data leave, at each node: of all motion left, or with
-/// motions of the organ as a whole left out, which labels may leave open of a round one; the lesser of both.
-Eigen::VectorXd unexplained_share(const Eigen::Matrix3Xd& nodes, const Eigen::MatrixXd& hidden,
-                                  const Eigen::MatrixXd& free) {
-    const Eigen::MatrixXd motions = detail::rigid_motions(nodes);
-    const Eigen::LDLT<Eigen::MatrixXd> squares(motions.transpose() * motions);
-    const auto variance = [](const Eigen::MatrixXd& moved) {
-        return Eigen::VectorXd(covariances_of(moved).topRows<3>().colwise().sum());
-    };
-    const auto bending = [&](const Eigen::MatrixXd& moved) {
-        return Eigen::MatrixXd(moved - motions * squares.solve(motions.transpose() * moved));
-    };
-    return variance(hidden).cwiseMin(variance(bending(hidden))).cwiseQuotient(variance(bending(free)));
 }
 
 /// Points of a part of the surface alone: where an organ of smooth shape lies may be told wrong, by more than any
@@ -129,6 +70,34 @@ double normal_quantile(double probability) {
     return x;
 }
 
+/// What the data leave open, and the stiffness with their springs.
+struct OpenParts {
+    detail::DataUncertainty data;
+    tled::RestStiffness stiffness;
+};
+
+OpenParts open_here(const PreparedModel& prepared, const UpdateResult& result, const UncertaintyOptions& options) {
+    detail::Posteriors posteriors = detail::posteriors_of(prepared, result.pulls);
+    detail::DataUncertainty data =
+        detail::data_uncertainty(prepared, posteriors, result.deformation.displacement, options.samples, options.seed);
+    return {std::move(data), std::move(posteriors.seen).stiffness()};
+}
+
+/// On the mesh of the size that the estimate was calibrated with: a factor of a large one would take minutes and say
+/// nothing else, since what data leave open varies smoothly.
+OpenParts open_by_twin(const PreparedModel& prepared, const UpdateResult& result, const UncertaintyOptions& options,
+                       Observer& observer) {
+    const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
+    const detail::CoarseTwin twin = detail::coarse_twin(prepared, result, observer);
+    const meshing::TetMesh& mesh = twin.prepared.model.mesh;
+    detail::DataUncertainty data =
+        detail::data_uncertainty(twin.prepared, detail::posteriors_of(twin.prepared, twin.pulls), twin.displacement,
+                                 options.samples, options.seed);
+    data.covariance = detail::carried(mesh, data.covariance, nodes);
+    data.unexplained = detail::carried(mesh, data.unexplained.transpose(), nodes).transpose();
+    return {std::move(data), {prepared.rest, conditions_of(prepared, result.pulls), prepared.stiffness}};
+}
+
 ErrorEstimate estimate_of(const Eigen::Vector3d& algebraic, const std::optional<Eigen::Vector3d>& discretisation,
                           const Eigen::Matrix3d& covariance, double unexplained) {
     ErrorEstimate result;
@@ -139,7 +108,7 @@ ErrorEstimate estimate_of(const Eigen::Vector3d& algebraic, const std::optional<
     if (discretisation) result.covariance += *discretisation * discretisation->transpose();
     result.deviation_mm = std::sqrt(result.covariance.trace());
     result.interval_mm = interval_mm(result, 0.95);
-    result.shown = unexplained < shown_below;
+    result.shown = unexplained < detail::shown_below;
     return result;
 }
 
@@ -239,41 +208,21 @@ std::string doubt_of_accuracy(const UncertaintySummary& summary, double accuracy
 Uncertainty uncertainty(const PreparedModel& prepared, const UpdateResult& result, const UncertaintyOptions& options,
                         Observer& observer) {
     require_related(prepared, result);
-    const LastPulls& pulls = result.pulls;
-    detail::WeighedSprings unseen{pulls.supports, pulls.ground, pulls.energy, pulls.free_placement};
-    const bool points_alone = !unseen.ground.empty();
-    if (!points_alone) {  // labels show where the organ lies, however it turned
-        unseen.ground = detail::ground_springs(prepared, pulls.energy,
-                                               [](const InterfaceNode&) { return TissuePrior().free_motion_mm; });
-        unseen.free_placement = true;
-    }
-    detail::WeighedSprings seen = unseen;
-    append(seen.data, pulls.data);
-
     observer.checkpoint("error estimate", 0.0);
-    const auto [posterior, prior] = detail::Posterior::both(prepared, seen, unseen);
-    observer.checkpoint("error estimate", 0.4);
-    const Eigen::MatrixXd loads = detail::unknown_loads(prepared, options.samples, options.seed);
-    const Eigen::MatrixXd hidden = posterior.inverse(loads), free = prior.inverse(loads);
+    const OpenParts open = prepared.stiffness.is_large() ? open_by_twin(prepared, result, options, observer)
+                                                         : open_here(prepared, result, options);
     observer.checkpoint("error estimate", 0.6);
-    const Eigen::MatrixXd noise =
-        posterior.inverse(noise_forces(seen, loads.rows(), options.samples, options.seed + 1));
-    const Covariances covariance =
-        load_size(prepared, result, free - hidden) * covariances_of(hidden) + noise_share * covariances_of(noise);
-    Eigen::VectorXd unexplained = unexplained_share(prepared.model.mesh.nodes, hidden, free);
-    if (place_is_uncertain(result)) unexplained.setConstant(2 * shown_below);
     const Eigen::Matrix3Xd displacement = displacement_under_pulls(result);
-    const tled::NodalConditions conditions = conditions_of(prepared, pulls);
-    const Eigen::Matrix3Xd algebraic =
-        tled::lifted_residual(prepared.rest, posterior.stiffness(), conditions, displacement);
+    const tled::NodalConditions conditions = conditions_of(prepared, result.pulls);
+    const Eigen::Matrix3Xd algebraic = tled::lifted_residual(prepared.rest, open.stiffness, conditions, displacement);
     observer.checkpoint("error estimate", 0.7);
     const tled::DiscretisationEstimate mesh =
-        tled::discretisation_error(prepared.model, posterior.stiffness(), conditions, displacement);
+        tled::discretisation_error(prepared.model, open.stiffness, conditions, displacement);
     if (!mesh.error) observer.note("no estimate of the error of the mesh: " + mesh.reason);
-    std::optional<ExpectedError> expected;
-    if (points_alone) expected = detail::expected_error(prepared.model.mesh.nodes, posterior);
+    Eigen::VectorXd unexplained = open.data.unexplained;
+    if (place_is_uncertain(result)) unexplained.setConstant(2 * detail::shown_below);
     observer.checkpoint("error estimate", 1.0);
-    return {prepared.model.mesh, algebraic, mesh.error, covariance, unexplained, expected};
+    return {prepared.model.mesh, algebraic, mesh.error, open.data.covariance, unexplained, open.data.expected};
 }
 
 // ‖e‖² over its mean is a multiple of χ² (Satterthwaite, Biometrics 2 (1946) 110) whose scale is itself known from few

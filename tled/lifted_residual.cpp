@@ -16,7 +16,7 @@ Matrix3Xd lifted_residual(const RestState& rest, const RestStiffness& stiffness,
     const NodalEffects& effects = conditions.effects;
     if (!effects.surface.empty()) residual += surface_force(effects.surface, rest.position, displacement);
     if (effects.fluid) residual += fluid_force(*effects.fluid, displacement);
-    return stiffness.solve(residual, conditions, tolerance);
+    return stiffness.solve_iteratively(residual, conditions, tolerance);
 }
 
 }  // namespace tissuewarp::tled

@@ -17,6 +17,7 @@
 #include "tled/detail/single_blas_thread.hpp"
 #include "tled/detail/springs.hpp"
 #include "tled/detail/stiffness.hpp"
+#include "tled/detail/two_level.hpp"
 
 namespace tissuewarp::tled {
 
@@ -88,6 +89,8 @@ struct RestStiffness::Impl {
     void number_free(const NodalConditions& present);
     void factorise() const;
     [[nodiscard]] const detail::CholmodFactor& factor() const;
+    [[nodiscard]] detail::BlockRows free_rows() const;
+    [[nodiscard]] const detail::TwoLevel& two_levels() const;
     [[nodiscard]] Eigen::SparseMatrix<double> lower_triangle() const;
     void analyse(const std::function<Eigen::SparseMatrix<double>()>& lower) const;
     void require_compatible(const NodalConditions& present) const;
@@ -98,6 +101,8 @@ struct RestStiffness::Impl {
 
     [[nodiscard]] double lowest_by_lanczos(const Matrix3Xd& diagonal) const;
 
+    mutable std::once_flag divided;
+    mutable std::unique_ptr<const detail::TwoLevel> levels;  // by two_levels()
     mutable std::once_flag factorised;
     mutable std::unique_ptr<detail::CholmodFactor> made;  // by factor()
     std::once_flag lowest_known, approximation_known;
@@ -218,6 +223,30 @@ const detail::CholmodFactor& RestStiffness::Impl::factor() const {
     return *made;
 }
 
+/// All rows of `elastic` + springs, zero where constrained.
+detail::BlockRows RestStiffness::Impl::free_rows() const {
+    detail::BlockRows K = detail::assembled(*elastic, detail::Triangle::Full);
+    for (std::size_t s = 0; s < conditions.spring_node.size(); ++s)
+        K.diagonal(conditions.spring_node[s]) += detail::spring_matrix(conditions, static_cast<int>(s));
+    for (int i = 0; i < K.rows(); ++i)
+        for (int k = K.offset[i]; k < K.offset[i + 1]; ++k)
+            for (int c = 0; c < 3; ++c) {
+                if (conditions.constrained(c, i)) K.block[k].row(c).setZero();
+                if (conditions.constrained(c, K.column[k])) K.block[k].col(c).setZero();
+            }
+    return K;
+}
+
+const detail::TwoLevel& RestStiffness::Impl::two_levels() const {
+    std::call_once(divided, [this] {
+        const auto product = [this](const Matrix3Xd& x) {
+            return Matrix3Xd(conditions.constrained.select(0.0, multiply(x, conditions)));
+        };
+        levels = std::make_unique<const detail::TwoLevel>(free_rows(), product, position, conditions.constrained);
+    });
+    return *levels;
+}
+
 RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& conditions)
     : impl_(std::make_unique<Impl>()) {
     detail::require_held(rest, conditions);
@@ -287,8 +316,21 @@ MatrixXd RestStiffness::solve_columns(const MatrixXd& forces) const {
     return impl_->on_free(forces, [&](const MatrixXd& free) { return impl_->factor().solve_columns(free); });
 }
 
-MatrixXd RestStiffness::colour_columns(const MatrixXd& white) const {
-    return impl_->on_free(white, [&](const MatrixXd& free) { return impl_->factor().colour_columns(free); });
+bool RestStiffness::is_large() const {
+    return impl_->position.cols() > most_factorised_nodes;
+}
+
+Matrix3Xd RestStiffness::precondition(const Matrix3Xd& force) const {
+    if (!is_large() || impl_->free_count == 0) return solve(force);
+    return impl_->two_levels().cycle(impl_->conditions.constrained.select(0.0, force));
+}
+
+Matrix3Xd RestStiffness::solve_iteratively(const Matrix3Xd& force, const NodalConditions& conditions,
+                                           double relative_tolerance) const {
+    if (!is_large() || impl_->free_count == 0) return solve(force, conditions, relative_tolerance);
+    impl_->require_compatible(conditions);
+    const auto about = [this](const Matrix3Xd& r) { return precondition(r); };
+    return impl_->conjugate_gradients(conditions.constrained.select(0.0, force), conditions, about, relative_tolerance);
 }
 
 // K_ff u_f = f_f + springs' targets − K_fc u_c: the imposed values enter with the residual of u = (0, u_c).

@@ -46,9 +46,17 @@ public:
     /// K⁻¹ of many forces at once, 3N × k, the nodes' vectors one after the other: several times as fast as one by one.
     [[nodiscard]] Eigen::MatrixXd solve_columns(const Eigen::MatrixXd& forces) const;
 
-    /// Displacements of covariance K⁻¹ from columns of independent numbers of variance 1, both 3N × k, zero on the
-    /// constrained degrees of freedom.
-    [[nodiscard]] Eigen::MatrixXd colour_columns(const Eigen::MatrixXd& white) const;
+    /// Of more nodes than this the following are found without a factor, whose entries and work grow too fast.
+    static constexpr int most_factorised_nodes = 15000;
+    [[nodiscard]] bool is_large() const;
+
+    /// About K⁻¹ f, 3 × N, symmetric and positive definite: with the factor, or of a large mesh by a cycle of two
+    /// levels (docs/decisions/rest_stiffness.md).
+    [[nodiscard]] Eigen::Matrix3Xd precondition(const Eigen::Matrix3Xd& force) const;
+
+    /// As solve() with a tolerance, by conjugate gradients with that as preconditioner.
+    [[nodiscard]] Eigen::Matrix3Xd solve_iteratively(const Eigen::Matrix3Xd& force, const NodalConditions& conditions,
+                                                     double relative_tolerance) const;
 
     /// Linear-elastic displacement under the conditions, imposed values included (3 × N, mm).
     [[nodiscard]] Eigen::Matrix3Xd linear_solution(const NodalConditions& conditions) const;

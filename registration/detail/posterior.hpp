@@ -6,7 +6,6 @@
 
 #include <Eigen/Core>
 
-#include <cstdint>
 #include <utility>
 #include <vector>
 
@@ -34,16 +33,12 @@ public:
     /// Covariances of the displacements of nodes, mm².
     [[nodiscard]] std::vector<Eigen::Matrix3d> covariances(const std::vector<int>& nodes) const;
 
-    /// Displacements drawn from it, 3N × count, the nodes' vectors one after the other, mm. The same seed draws the
-    /// same ones.
-    [[nodiscard]] Eigen::MatrixXd samples(int count, std::uint64_t seed) const;
-
-    /// The inverse of K times forces, 3N × k, mN: displacements, mm. Where the placement is free, the ground's hold on
-    /// motions as a whole is taken out of K.
+    /// The inverse of K times forces, 3N × k, mN: displacements, mm. Where
+    /// the placement is free, the ground's hold on motions as a whole is taken out of K.
     [[nodiscard]] Eigen::MatrixXd inverse(const Eigen::MatrixXd& forces) const;
 
-    /// K.
-    [[nodiscard]] const tled::RestStiffness& stiffness() const { return stiffness_; }
+    /// K, taken out.
+    [[nodiscard]] tled::RestStiffness stiffness() && { return std::move(stiffness_); }
 
 private:
     Posterior(const PreparedModel& prepared, const WeighedSprings& springs, tled::RestStiffness stiffness);

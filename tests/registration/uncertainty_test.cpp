@@ -1,6 +1,8 @@
 /// The posterior, and what is made of it.
 #include "registration/uncertainty.hpp"
 #include "core/errors.hpp"
+#include "registration/detail/coarse_twin.hpp"
+#include "registration/detail/data_uncertainty.hpp"
 #include "registration/detail/ground.hpp"
 #include "registration/detail/posterior.hpp"
 #include "registration/detail/unknown_loads.hpp"
@@ -12,7 +14,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 
 namespace tissuewarp::registration {
 namespace {
@@ -40,9 +41,8 @@ PointPairs pairs_on_the_left(double deviation_mm) {
     return pairs;
 }
 
-// The simple twin: covariances by unit forces at single nodes. 800 samples show a variance to 5 % (1 σ); with the wrong
-// triangle of the factor, or without the free placement's share, they differ by a factor.
-TEST(Posterior, SamplesHaveItsCovariance) {
+// The simple twin: the inverse, column by column.
+TEST(Posterior, CovariancesAreBlocksOfItsInverse) {
     const PreparedModel prepared = organ();
     detail::WeighedSprings springs;
     springs.energy = 40;
@@ -52,16 +52,14 @@ TEST(Posterior, SamplesHaveItsCovariance) {
     for (const bool free_placement : {false, true}) {
         springs.free_placement = free_placement;
         const detail::Posterior posterior(prepared, springs);
-        const std::vector<int> nodes{3, 10, 200, prepared.rest.node_count - 1};
-        const auto exact = posterior.covariances(nodes);
-        const Eigen::MatrixXd samples = posterior.samples(800, 7);
+        const std::vector<int> nodes{3, 200, prepared.rest.node_count - 1};
+        const auto covariances = posterior.covariances(nodes);
         for (std::size_t n = 0; n < nodes.size(); ++n) {
-            const Matrix3Xd drawn = samples.middleRows<3>(3 * nodes[n]);
-            const Eigen::Matrix3d found = drawn * drawn.transpose() / double(samples.cols());
-            EXPECT_LT((found - exact[n]).norm(), 0.25 * exact[n].norm()) << free_placement << ' ' << n;
+            Eigen::MatrixXd forces = Eigen::MatrixXd::Zero(3 * prepared.rest.node_count, 3);
+            forces.middleRows<3>(3 * nodes[n]).setIdentity();
+            const Eigen::Matrix3d block = springs.energy * posterior.inverse(forces).middleRows<3>(3 * nodes[n]);
+            EXPECT_LT((covariances[n] - block).norm(), 1e-9 * block.norm()) << free_placement << ' ' << n;
         }
-        EXPECT_EQ(samples.leftCols(2), posterior.samples(800, 7).leftCols(2));
-        EXPECT_NE(samples.leftCols(2), posterior.samples(800, 8).leftCols(2));
     }
 }
 
@@ -135,6 +133,49 @@ TEST(Uncertainty, TellsWhetherPointsShowEnough) {
     EXPECT_NEAR(of_few.expected()->mean_mm / expected_error(prepared, few).mean_mm, 1, 1e-9);
     EXPECT_THAT(doubts_of(of_few, 1), too_little);
     EXPECT_THAT(doubts_of(of_enough, 1), testing::IsEmpty()) << of_enough.expected()->mean_mm;
+}
+
+TEST(CoarseTwin, CarriesLinearFieldsAndAllOfTheStiffness) {
+    const PreparedModel prepared = organ();
+    const Matrix3Xd& nodes = prepared.model.mesh.nodes;
+    const Matrix3Xd inside = 0.7 * nodes.leftCols(50);
+    EXPECT_LT((detail::carried(prepared.model.mesh, 2 * nodes, inside) - 2 * inside).cwiseAbs().maxCoeff(), 1e-9);
+    PointPairs pairs = pairs_on_the_left(1);
+    const UpdateResult result = update(prepared, {.points = pairs}, on_cpu());
+    const detail::CoarseTwin twin = detail::coarse_twin(prepared, result, silent_observer());
+    const auto trace = [](const std::vector<tled::Spring>& springs) {
+        double sum = 0;
+        for (const tled::Spring& spring : springs) sum += spring.stiffness.trace();
+        return sum;
+    };
+    EXPECT_NEAR(trace(twin.pulls.data) / trace(result.pulls.data), 1, 1e-9);
+    EXPECT_NEAR(trace(twin.pulls.ground) / trace(result.pulls.ground), 1, 0.01);
+}
+
+// The simple twin: the factor of the large mesh. Springs added up along other normals, displacements of other nodes, or
+// covariances of another order are off by half and more.
+TEST(Uncertainty, OfLargeMeshesIsThatOfTheirFactorNearly) {
+    PrepareOptions options;
+    options.meshing.edge_length = 2.7;
+    const PreparedModel large = prepare(shapes::organ_labels({}), options);
+    ASSERT_TRUE(large.stiffness.is_large()) << large.rest.node_count;
+    PointPairs all_over = pairs_on_the_left(1);
+    all_over.fixed.row(1).array() += 3;
+    for (const Intraoperative& seen : {Intraoperative{.labels = large.labels}, Intraoperative{.points = all_over}}) {
+        const UpdateResult result = update(large, seen, on_cpu());
+        const Uncertainty found = uncertainty(large, result);
+        const detail::DataUncertainty exact = detail::data_uncertainty(
+            large, detail::posteriors_of(large, result.pulls), result.deformation.displacement, 64, 1);
+        const std::vector<ErrorEstimate> nodal = found.at_nodes();
+        double about = 0, expected = 0;
+        for (std::size_t n = 0; n < nodal.size(); ++n) {
+            about += nodal[n].data_mm * nodal[n].data_mm;
+            expected += exact.covariance.col(static_cast<Eigen::Index>(n)).head<3>().sum();
+            EXPECT_TRUE(std::isfinite(nodal[n].discretisation_mm));
+        }
+        EXPECT_NEAR(std::sqrt(about / expected), 1, 0.15);
+        EXPECT_EQ(found.expected().has_value(), exact.expected.has_value());
+    }
 }
 
 TEST(Uncertainty, ExpectsNothingBeforehandWhereLabelsShowTheOrgan) {

@@ -93,11 +93,10 @@ struct CholmodFactor::Impl {
     Impl(const Impl&) = delete;
     Impl& operator=(const Impl&) = delete;
 
-    // With the system that CHOLMOD calls `system`.
-    [[nodiscard]] Eigen::MatrixXd solved(int system, const Eigen::MatrixXd& b) const {
+    [[nodiscard]] Eigen::MatrixXd solved(const Eigen::MatrixXd& b) const {
         cholmod_dense right = view(b);
         const SingleBlasThread single;  // a triangular solve is bound by memory
-        cholmod_solve2(system, L, &right, nullptr, &x, nullptr, &y, &e, &common);
+        cholmod_solve2(CHOLMOD_A, L, &right, nullptr, &x, nullptr, &y, &e, &common);
         require_success("solve with");
         return Eigen::Map<const Eigen::MatrixXd>(static_cast<const double*>(x->x), b.rows(), b.cols());
     }
@@ -182,11 +181,7 @@ Eigen::VectorXd CholmodFactor::solve(const Eigen::VectorXd& b) const {
 }
 
 Eigen::MatrixXd CholmodFactor::solve_columns(const Eigen::MatrixXd& b) const {
-    return impl_->solved(CHOLMOD_A, b);
-}
-
-Eigen::MatrixXd CholmodFactor::colour_columns(const Eigen::MatrixXd& white) const {
-    return impl_->solved(CHOLMOD_Pt, impl_->solved(CHOLMOD_Lt, white));
+    return impl_->solved(b);
 }
 
 long long CholmodFactor::nonzeros() const {

@@ -30,8 +30,6 @@ public:
     [[nodiscard]] Eigen::VectorXd solve(const Eigen::VectorXd& b) const;
     /// The same for every column at once: the factor is read once for all.
     [[nodiscard]] Eigen::MatrixXd solve_columns(const Eigen::MatrixXd& b) const;
-    /// Pᵀ L⁻ᵀ b of A = Pᵀ L Lᵀ P: white noise becomes noise of covariance A⁻¹.
-    [[nodiscard]] Eigen::MatrixXd colour_columns(const Eigen::MatrixXd& white) const;
 
     /// Entries of L.
     [[nodiscard]] long long nonzeros() const;

@@ -1,5 +1,6 @@
 #include "tled/detail/enrichment.hpp"
 
+#include "tled/detail/chebyshev.hpp"
 #include "tled/detail/parallel.hpp"
 #include "tled/detail/springs.hpp"
 
@@ -40,7 +41,12 @@ Enrichment::Enrichment(const HierarchicalTissue& tissue, const BubbleConditions&
         }
         block = block.inverse().eval();
     });
-    largest_ = largest_eigenvalue();
+    Matrix3Xd rough = Matrix3Xd::Zero(3, space_.size());
+    for (int i = space_.corner_count; i < space_.size(); ++i)
+        rough.col(i) << 1.0, (i % 2 == 0 ? 1.0 : -1.0), (i % 3) - 1.0;
+    constrain(rough);
+    largest_ = largest_eigenvalue([this](const Matrix3Xd& x) { return multiply(x); },
+                                  [this](const Matrix3Xd& x) { return divide_by_blocks(x); }, std::move(rough));
 }
 
 void Enrichment::constrain(Matrix3Xd& x) const {
@@ -69,39 +75,16 @@ Matrix3Xd Enrichment::divide_by_blocks(const Matrix3Xd& residual) const {
     return result;
 }
 
-// By the power method from an arbitrary vector, a tenth above what it finds.
-double Enrichment::largest_eigenvalue() const {
-    constexpr int steps = 10;
-    Matrix3Xd x = Matrix3Xd::Zero(3, space_.size());
-    for (int i = space_.corner_count; i < space_.size(); ++i) x.col(i) << 1.0, (i % 2 == 0 ? 1.0 : -1.0), (i % 3) - 1.0;
-    constrain(x);
-    double value = 1.0;
-    for (int k = 0; k < steps && value > 0.0; ++k) {
-        x = divide_by_blocks(multiply(x / value));
-        value = x.norm();
-    }
-    return value > 0.0 ? 1.1 * value : 1.0;
-}
-
-// Two Chebyshev steps for eigenvalues between a quarter and all of the largest one (Saad, Iterative Methods for Sparse
-// Linear Systems, algorithm 12.1).
 void Enrichment::smooth(Matrix3Xd& x, Matrix3Xd& residual) const {
-    const double centre = 0.625 * largest_, radius = 0.375 * largest_, ratio = centre / radius;
-    const auto apply = [&](const Matrix3Xd& step) {
-        x += step;
-        residual -= multiply(step);
-    };
-    const Matrix3Xd first = divide_by_blocks(residual) / centre;
-    apply(first);
-    const double rho = 1.0 / (2.0 * ratio - 1.0 / ratio);
-    apply(rho / ratio * first + 2.0 * rho / radius * divide_by_blocks(residual));
+    chebyshev_steps([this](const Matrix3Xd& y) { return multiply(y); },
+                    [this](const Matrix3Xd& y) { return divide_by_blocks(y); }, largest_, x, residual);
 }
 
 Matrix3Xd Enrichment::precondition(Matrix3Xd& residual) const {
     Matrix3Xd z = Matrix3Xd::Zero(3, space_.size());
     smooth(z, residual);
     Matrix3Xd coarse = Matrix3Xd::Zero(3, space_.size());
-    coarse.leftCols(space_.corner_count) = corners_.solve(residual.leftCols(space_.corner_count));
+    coarse.leftCols(space_.corner_count) = corners_.precondition(residual.leftCols(space_.corner_count));
     z += coarse;
     residual -= multiply(coarse);
     smooth(z, residual);

@@ -13,8 +13,8 @@
 namespace tissuewarp::tled::detail {
 
 /// Tangent stiffness of corners and bubbles with springs and constraints, and a cycle of two levels as preconditioner:
-/// Chebyshev steps on the bubbles (Adams, Brezina, Hu, Tuminaro, J. Comput. Phys. 188 (2003) 593), K₀⁻¹ on the corners,
-/// the same steps again (hierarchical bases as in Bank, Acta Numerica 5 (1996) 1, section 5).
+/// Chebyshev steps on the bubbles (Adams, Brezina, Hu, Tuminaro, J. Comput. Phys. 188 (2003) 593), about K₀⁻¹ on the
+/// corners, the same steps again (hierarchical bases as in Bank, Acta Numerica 5 (1996) 1, section 5).
 class Enrichment {
 public:
     /// Keeps references. Precondition: the constraints of `corners` and `conditions` are the same.
@@ -36,7 +36,6 @@ private:
     /// Adds to x what the bubbles' steps make of the residual, and takes their forces off it.
     void smooth(Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& residual) const;
     [[nodiscard]] Eigen::Matrix3Xd divide_by_blocks(const Eigen::Matrix3Xd& residual) const;
-    [[nodiscard]] double largest_eigenvalue() const;
     void constrain(Eigen::Matrix3Xd& x) const;
 
     const HierarchicalSpace& space_;

@@ -1,14 +1,11 @@
 #pragma once
 /// The slowest mode of K x = λ D x without a factor of K.
 
+#include "tled/detail/product.hpp"
+
 #include <Eigen/Core>
 
-#include <functional>
-
 namespace tissuewarp::tled::detail {
-
-/// Vectors to K times them.
-using Product = std::function<Eigen::Matrix3Xd(const Eigen::Matrix3Xd&)>;
 
 /// Smallest λ from above, within some per cent, for K symmetric and positive definite where nothing is constrained
 /// (products are zero elsewhere) and D diagonal: the lowest of affine fields of `position`, made better by conjugate

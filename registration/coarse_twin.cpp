@@ -1,0 +1,99 @@
+#include "registration/detail/coarse_twin.hpp"
+
+#include "registration/detail/pull.hpp"
+
+#include <utility>
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+PrepareOptions coarse_options(const PreparedModel& prepared) {
+    PrepareOptions options = prepared.options;
+    options.meshing.edge_length = suggested_edge_length(prepared.labels);
+    options.meshing.label_edge_length.clear();
+    options.anchors.clear();  // among the springs
+    options.rigid_neighbours.clear();
+    return options;
+}
+
+/// Near, or as far outside as coarse meshes cut corners off.
+std::optional<meshing::Location> place_of(const meshing::PointLocator& locator, const Eigen::Vector3d& point) {
+    for (const double tolerance : {0.5, 1.0, 2.0, 4.0}) {
+        auto found = tolerance > 0.5 ? locator.find(point, tolerance) : locate_near(locator, point);
+        if (!found) continue;
+        found->barycentric = found->barycentric.cwiseMax(0.0);
+        found->barycentric /= found->barycentric.sum();
+        return found;
+    }
+    return std::nullopt;
+}
+
+std::vector<tled::Spring> moved(const std::vector<tled::Spring>& springs, const Eigen::Matrix3Xd& from,
+                                const meshing::TetMesh& to, const meshing::PointLocator& locator) {
+    std::vector<Pull> pulls;
+    for (const tled::Spring& spring : springs)
+        if (const auto at = place_of(locator, from.col(spring.node)))
+            pulls.push_back({*at, Eigen::Vector3d::Zero(), spring.stiffness});
+    return lumped_springs(to, pulls, Eigen::Matrix3Xd::Zero(3, to.nodes.cols()));
+}
+
+double total(const std::vector<tled::Spring>& springs) {
+    double sum = 0;
+    for (const tled::Spring& spring : springs) sum += spring.stiffness.trace();
+    return sum;
+}
+
+/// On every interface node that of the nearest, all together as stiff as they were. Summed up, springs along normals
+/// that differ would hold a coarse mesh along its surface too.
+std::vector<tled::Spring> sampled(const std::vector<tled::Spring>& springs, const Eigen::Matrix3Xd& from,
+                                  const PreparedModel& to) {
+    if (springs.empty()) return {};
+    Eigen::Matrix3Xd places(3, static_cast<Eigen::Index>(springs.size()));
+    for (std::size_t s = 0; s < springs.size(); ++s)
+        places.col(static_cast<Eigen::Index>(s)) = from.col(springs[s].node);
+    std::vector<tled::Spring> result;
+    for (const InterfaceNode& node : to.interfaces.nodes()) {
+        Eigen::Index nearest = 0;
+        (places.colwise() - to.model.mesh.nodes.col(node.node)).colwise().squaredNorm().minCoeff(&nearest);
+        result.push_back({node.node, springs[static_cast<std::size_t>(nearest)].stiffness, Eigen::Vector3d::Zero()});
+    }
+    const double share = total(springs) / total(result);
+    for (tled::Spring& spring : result) spring.stiffness *= share;
+    return result;
+}
+
+}  // namespace
+
+Eigen::MatrixXd carried(const meshing::TetMesh& from, const Eigen::MatrixXd& nodal, const Eigen::Matrix3Xd& to) {
+    const meshing::PointLocator locator(from);
+    Eigen::MatrixXd result(nodal.rows(), to.cols());
+    for (Eigen::Index p = 0; p < to.cols(); ++p) {
+        if (const auto at = place_of(locator, to.col(p))) {
+            result.col(p) = meshing::interpolate(from, nodal, *at);
+            continue;
+        }
+        Eigen::Index nearest = 0;
+        (from.nodes.colwise() - to.col(p)).colwise().squaredNorm().minCoeff(&nearest);
+        result.col(p) = nodal.col(nearest);
+    }
+    return result;
+}
+
+CoarseTwin coarse_twin(const PreparedModel& prepared, const UpdateResult& result, Observer& observer) {
+    PreparedModel coarse = prepare(prepared.labels, coarse_options(prepared), observer);
+    const meshing::TetMesh& mesh = coarse.model.mesh;
+    const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
+    const meshing::PointLocator locator(mesh);
+    LastPulls pulls;
+    const bool labels = !result.pulls.holds.empty();
+    pulls.data = labels ? sampled(result.pulls.data, nodes, coarse) : moved(result.pulls.data, nodes, mesh, locator);
+    pulls.ground = moved(result.pulls.ground, nodes, mesh, locator);
+    pulls.supports = moved(result.pulls.supports, nodes, mesh, locator);
+    pulls.energy = result.pulls.energy;
+    pulls.free_placement = result.pulls.free_placement;
+    Eigen::Matrix3Xd displacement = carried(prepared.model.mesh, result.deformation.displacement, mesh.nodes);
+    return {std::move(coarse), std::move(pulls), std::move(displacement)};
+}
+
+}  // namespace tissuewarp::registration::detail

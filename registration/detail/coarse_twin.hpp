@@ -1,0 +1,23 @@
+#pragma once
+/// The same registration on a coarser mesh, for what varies smoothly and asks for a factor.
+
+#include "registration/pipeline.hpp"
+
+#include <Eigen/Core>
+
+namespace tissuewarp::registration::detail {
+
+/// Tissue, what pulled at it last, and where it went.
+struct CoarseTwin {
+    PreparedModel prepared;
+    LastPulls pulls;                ///< springs and prior alone, on the nodes about
+    Eigen::Matrix3Xd displacement;  ///< 3 × N, mm
+};
+
+/// Of the label map, with the edges that suggested_edge_length tells. Throws InvalidInput, Cancelled.
+CoarseTwin coarse_twin(const PreparedModel& prepared, const UpdateResult& result, Observer& observer);
+
+/// Values at the nodes of `from` (C × N) at the places `to` (3 × P): between them, and of the nearest element outside.
+Eigen::MatrixXd carried(const meshing::TetMesh& from, const Eigen::MatrixXd& nodal, const Eigen::Matrix3Xd& to);
+
+}  // namespace tissuewarp::registration::detail
