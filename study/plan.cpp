@@ -49,6 +49,8 @@ public:
         add([](Setting&) {});
         for (const double tolerance : axes.base_tolerances) add([&](Setting& s) { s.tolerance_mm = tolerance; });
         std::vector<int> meshes = axes.elements;
+        if (base_.processor == tled::Processor::Gpu)
+            meshes.insert(meshes.end(), axes.gpu_elements.begin(), axes.gpu_elements.end());
         meshes.push_back(base_.elements);
         for (const int elements : meshes) {
             add([&](Setting& s) { s.elements = elements; });
