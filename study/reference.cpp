@@ -48,12 +48,6 @@ Matrix3Xd newton(const tled::DiscreteEnergy& energy, const tled::NodalConditions
     return tled::newton_equilibrium(energy, conditions, options, observer).displacement;
 }
 
-tled::NodalConditions scaled(tled::NodalConditions conditions, double factor) {
-    conditions.imposed *= factor;
-    conditions.spring_force *= factor;
-    return conditions;
-}
-
 /// By central differences of a small part of the load: of third order in it, and large enough for the line search,
 /// which compares energies that rounding blurs.
 Matrix3Xd linear_answer(const tled::DiscreteEnergy& energy, const tled::NodalConditions& conditions,

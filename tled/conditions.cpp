@@ -90,4 +90,13 @@ NodalConditions nodal_conditions(const Conditions& conditions, int node_count) {
     return without_effects(conditions, node_count);
 }
 
+NodalConditions scaled(NodalConditions conditions, double part) {
+    conditions.spring_force *= part;
+    conditions.imposed *= part;
+    conditions.external_force *= part;
+    conditions.effects.surface.pressure *= part;
+    if (conditions.effects.fluid) conditions.effects.fluid->weight *= part;
+    return conditions;
+}
+
 }  // namespace tissuewarp::tled

@@ -49,4 +49,7 @@ NodalConditions nodal_conditions(const Conditions& conditions, const RestState& 
 /// there are any.
 NodalConditions nodal_conditions(const Conditions& conditions, int node_count);
 
+/// Forces, pressures, weights, targets of springs and imposed displacements times `part`; what holds is as it was.
+NodalConditions scaled(NodalConditions conditions, double part);
+
 }  // namespace tissuewarp::tled

@@ -48,14 +48,10 @@ private:
     };
 
     [[nodiscard]] NodalConditions at(double load) const {
+        if (from_rest_) return scaled(conditions_, load);
         NodalConditions partial = conditions_;
         const Matrix3Xd origin = conditions_.constrained.select(origin_, Matrix3Xd::Zero(3, origin_.cols()));
         partial.imposed = origin + load * (conditions_.imposed - origin);
-        if (!from_rest_) return partial;
-        partial.spring_force *= load;
-        partial.external_force *= load;
-        partial.effects.surface.pressure *= load;
-        if (partial.effects.fluid) partial.effects.fluid->weight *= load;
         return partial;
     }
 

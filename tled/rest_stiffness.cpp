@@ -343,14 +343,6 @@ Matrix3Xd RestStiffness::linear_solution(const NodalConditions& conditions) cons
     return conditions.imposed + solve(impl_->linear_force(conditions), conditions, tolerance);
 }
 
-Matrix3Xd RestStiffness::approximate_linear_solution(const NodalConditions& conditions,
-                                                     double relative_tolerance) const {
-    const Matrix3Xd inverse_diagonal = diagonal(conditions).cwiseInverse();
-    const auto precondition = [&](const Matrix3Xd& r) { return inverse_diagonal.cwiseProduct(r); };
-    const Matrix3Xd force = conditions.constrained.select(0.0, impl_->linear_force(conditions));
-    return conditions.imposed + impl_->conjugate_gradients(force, conditions, precondition, relative_tolerance);
-}
-
 Matrix3Xd RestStiffness::diagonal(const NodalConditions& conditions) const {
     impl_->require_compatible(conditions);
     std::vector<Matrix3d> blocks = *impl_->elastic_diagonal;

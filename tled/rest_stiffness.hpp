@@ -61,11 +61,6 @@ public:
     /// Linear-elastic displacement under the conditions, imposed values included (3 × N, mm).
     [[nodiscard]] Eigen::Matrix3Xd linear_solution(const NodalConditions& conditions) const;
 
-    /// The same up to a residual of `relative_tolerance` times that of rest, by conjugate gradients preconditioned with
-    /// the diagonal: no factor is needed.
-    [[nodiscard]] Eigen::Matrix3Xd approximate_linear_solution(const NodalConditions& conditions,
-                                                               double relative_tolerance) const;
-
     /// Diagonal of K₀ + springs of `conditions`, 3 × N, mN/mm; ones where constrained.
     [[nodiscard]] Eigen::Matrix3Xd diagonal(const NodalConditions& conditions) const;
 

@@ -28,6 +28,16 @@ constexpr double slowest = 0.95;         // contraction of a window that is stil
 constexpr double estimate_safety = 1.5;  // of the error: modes and directions do not add up to a bound
 constexpr int most_idle_windows = 12;    // without the movement falling by a tenth
 
+/// Tells nothing, and asks whether to stop.
+class CancelOnly : public Observer {
+public:
+    explicit CancelOnly(Observer& whole) : whole_(whole) {}
+    bool cancel_requested() override { return whole_.cancel_requested(); }
+
+private:
+    Observer& whole_;
+};
+
 class SelfCheckedRelaxation {
 public:
     explicit SelfCheckedRelaxation(EquilibriumSearch& search)
@@ -54,22 +64,66 @@ private:
     [[nodiscard]] double unknown_error() const { return 1e3 * search_.options.tolerance_mm; }
 
     /// The start, or rest; where displacements are imposed on tissue at rest, which they would tear, about the linear
-    /// answer.
+    /// answer, or what a factor makes of it.
     Matrix3Xd first_state(const Matrix3Xd* start) {
         const NodalConditions& conditions = search_.conditions;
         const Matrix3Xd rest = Matrix3Xd::Zero(3, conditions.constrained.cols());
         const Matrix3Xd imposed = conditions.constrained.select(conditions.imposed, rest);
-        if (start == nullptr && !imposed.isZero(0)) return about_linear_answer();
+        const double part = start == nullptr ? harmless_part() : 1;
+        search_.engine.set_conditions(conditions);
+        if (part < 1) {
+            const std::optional<Matrix3Xd> linear = about_linear_answer(part);
+            if (linear) return *linear;
+            search_.observer.note("no start from a small part of the load; the stiffness is factorised for one");
+            return search_.begin(nullptr);
+        }
         const Matrix3Xd u = conditions.constrained.select(imposed, start != nullptr ? *start : rest);
         return search_.admissible(u) ? u : search_.begin(start);
     }
 
-    Matrix3Xd about_linear_answer() {
-        for (const double tolerance : {0.02, 0.002}) {
-            Matrix3Xd u = search_.stiffness.approximate_linear_solution(search_.conditions, tolerance);
-            if (search_.admissible(u) && search_.engine.smallest_jacobian().value > least_starting_jacobian) return u;
+    /// Where a small part of all loads leads, drawn out.
+    std::optional<Matrix3Xd> about_linear_answer(double part) {
+        constexpr double accuracy = 0.1;  // of the largest displacement imposed
+        const NodalConditions conditions = scaled(search_.conditions, part);
+        EquilibriumOptions options = search_.options;
+        options.tolerance_mm = accuracy * largest_norm(conditions.imposed);
+        CancelOnly observer(search_.observer);
+        EquilibriumSearch search(search_.engine, search_.stiffness, conditions, options, observer);
+        std::optional<EquilibriumResult> found;
+        try {
+            found = SelfCheckedRelaxation(search).run(&conditions.imposed);
+        } catch (const SolverFailure&) {
         }
-        return search_.begin(nullptr);
+        search_.engine.set_conditions(search_.conditions);
+        if (!found) return std::nullopt;
+        search_.require_evaluations(found->force_evaluations);
+        const Matrix3Xd u =
+            search_.conditions.constrained.select(search_.conditions.imposed, found->displacement / part);
+        const bool fit = search_.admissible(u) && search_.engine.smallest_jacobian().value > least_starting_jacobian;
+        return fit ? std::optional(u) : std::nullopt;
+    }
+
+    /// Of the imposed displacements: tissue at rest answers it about linearly where it meets it.
+    [[nodiscard]] double harmless_part() {
+        constexpr double nearly = 0.1, least = 1e-6;
+        if (search_.conditions.imposed.isZero(0)) return 1;
+        double part = 1;
+        std::optional<Matrix3Xd> force = force_at(part);
+        for (; part > least; part /= 2) {
+            const std::optional<Matrix3Xd> half = force_at(part / 2);
+            if (force && half && (2 * *half - *force).norm() <= nearly * force->norm()) return part;
+            force = half;
+        }
+        return part;
+    }
+
+    /// Internal forces with a part of the displacements imposed on tissue at rest; none where it is inverted.
+    [[nodiscard]] std::optional<Matrix3Xd> force_at(double part) {
+        const NodalConditions conditions = scaled(search_.conditions, part);
+        search_.engine.set_conditions(conditions);
+        if (!search_.admissible(conditions.imposed)) return std::nullopt;
+        search_.require_evaluations(1);
+        return search_.engine.internal_force();
     }
 
     /// Where steps lead; nothing where tissue was inverted.

@@ -179,29 +179,13 @@ TEST_P(RestStiffnessTest, DiagonalAndLowestEigenvalueAgreeWithADenseSolver) {
     EXPECT_NEAR(stiffness.lowest_eigenvalue(), modes.eigenvalues()[0], 1e-3 * modes.eigenvalues()[0]);
 }
 
-TEST_P(RestStiffnessTest, AnswersWithoutAFactorAreAboutThoseWithOne) {
+TEST_P(RestStiffnessTest, TheLowestEigenvalueWithoutAFactorIsAboutThatWithOne) {
     model.mesh = meshing::box_mesh({60.0, 30.0, 30.0}, {10, 5, 5}, 0.1, 5);
     rest = rest_state(model);
-    Conditions held = held_with_springs(0.3);
-    held.prescribed.front().displacement << 1, -2, 3;
-    const NodalConditions c = nodal_conditions(held, rest.node_count);
-    const RestStiffness stiffness(rest, c);
+    const RestStiffness stiffness(rest, nodal_conditions(held_with_springs(0.3), rest.node_count));
     const double about = stiffness.approximate_lowest_eigenvalue(), exact = stiffness.lowest_eigenvalue();
     EXPECT_GE(about, (1 - 1e-4) * exact);
     EXPECT_LE(about, 1.05 * exact);
-    const Matrix3Xd linear = stiffness.linear_solution(c);
-    EXPECT_LT((stiffness.approximate_linear_solution(c, 1e-10) - linear).norm(), 1e-6 * linear.norm());
-    const Eigen::SparseMatrix<double> K = dense_free(c);
-    const auto residual = [&](const Matrix3Xd& u) {  // in the norm of the inverse diagonal
-        const Matrix3Xd missing = c.constrained.select(0.0, linear - u);
-        const Eigen::VectorXd force = K * missing.reshaped();
-        return std::sqrt(force.dot(force.cwiseQuotient(K.diagonal())));
-    };
-    for (const double tolerance : {0.1, 1e-3}) {
-        const Matrix3Xd close = stiffness.approximate_linear_solution(c, tolerance);
-        EXPECT_LT(residual(close), 1.01 * tolerance * residual(c.imposed)) << tolerance;
-        EXPECT_EQ((close.col(0) - Vector3d(1, -2, 3)).norm(), 0.0);
-    }
 }
 
 TEST_P(RestStiffnessTest, TwoFactorsMadeTogetherAreThoseMadeOneByOne) {
