@@ -60,7 +60,7 @@ study::NamedProblem problem_named(const std::string& name, const StudyOptions& o
                 }};
     if (name == "brain") {
         require_folder(repository_brain, name, here);
-        return {name, [body = body_options(options, 25000, 4000)](Observer&) {
+        return {name, [body = body_options(options, 12000, 4000)](Observer&) {
                     const auto labels = imaging::read_labels(fs::path(repository_brain) / "preop_labels.nii.gz");
                     return study::body_problem(study::indented_organ(labels), body);
                 }};

@@ -4,16 +4,16 @@ namespace tissuewarp::registration::detail {
 
 const char* const shipped_fronts_text = R"json({
  "alignment_labels": {
-  "constant_s": 0.07339,
-  "slope_s": 0.4294
+  "constant_s": 0.0601,
+  "slope_s": 0.3287
  },
  "alignment_partial": {
-  "constant_s": 0.04583,
+  "constant_s": 0.03847,
   "slope_s": 0.0
  },
  "fields": {
   "constant_s": 0.0,
-  "slope_s": 0.03783
+  "slope_s": 0.0327
  },
  "machine": "CPU float32, AVX3, 2 threads",
  "points": [
@@ -22,10 +22,10 @@ const char* const shipped_fronts_text = R"json({
    "edges_per_organ": 6.0,
    "error_95_mm": 2.394,
    "error_mm": 1.232,
-   "fields_s": 0.1589,
-   "preparation_s": 0.1326,
-   "rounds_95_s": 0.01705,
-   "rounds_s": 0.01023,
+   "fields_s": 0.135,
+   "preparation_s": 0.09586,
+   "rounds_95_s": 0.01423,
+   "rounds_s": 0.008062,
    "tetrahedra": 2141.0
   },
   {
@@ -33,10 +33,10 @@ const char* const shipped_fronts_text = R"json({
    "edges_per_organ": 8.0,
    "error_95_mm": 2.385,
    "error_mm": 1.288,
-   "fields_s": 0.1711,
-   "preparation_s": 0.1565,
-   "rounds_95_s": 0.03166,
-   "rounds_s": 0.02241,
+   "fields_s": 0.1257,
+   "preparation_s": 0.1133,
+   "rounds_95_s": 0.02676,
+   "rounds_s": 0.01577,
    "tetrahedra": 4947.0
   },
   {
@@ -44,10 +44,10 @@ const char* const shipped_fronts_text = R"json({
    "edges_per_organ": 10.0,
    "error_95_mm": 2.386,
    "error_mm": 1.286,
-   "fields_s": 0.192,
-   "preparation_s": 0.2498,
-   "rounds_95_s": 0.06543,
-   "rounds_s": 0.0421,
+   "fields_s": 0.1493,
+   "preparation_s": 0.2045,
+   "rounds_95_s": 0.05204,
+   "rounds_s": 0.03516,
    "tetrahedra": 9712.0
   },
   {
@@ -55,10 +55,10 @@ const char* const shipped_fronts_text = R"json({
    "edges_per_organ": 12.0,
    "error_95_mm": 2.392,
    "error_mm": 1.295,
-   "fields_s": 0.2007,
-   "preparation_s": 0.4017,
-   "rounds_95_s": 0.1083,
-   "rounds_s": 0.0731,
+   "fields_s": 0.158,
+   "preparation_s": 0.3142,
+   "rounds_95_s": 0.09718,
+   "rounds_s": 0.0535,
    "tetrahedra": 16640.0
   },
   {
@@ -66,10 +66,10 @@ const char* const shipped_fronts_text = R"json({
    "edges_per_organ": 15.0,
    "error_95_mm": 2.399,
    "error_mm": 1.303,
-   "fields_s": 0.2005,
-   "preparation_s": 0.8082,
-   "rounds_95_s": 0.2715,
-   "rounds_s": 0.1592,
+   "fields_s": 0.1808,
+   "preparation_s": 0.5935,
+   "rounds_95_s": 0.2563,
+   "rounds_s": 0.1259,
    "tetrahedra": 32270.0
   },
   {
@@ -77,10 +77,10 @@ const char* const shipped_fronts_text = R"json({
    "edges_per_organ": 18.0,
    "error_95_mm": 2.402,
    "error_mm": 1.302,
-   "fields_s": 0.2479,
-   "preparation_s": 1.364,
-   "rounds_95_s": 0.5494,
-   "rounds_s": 0.3271,
+   "fields_s": 0.2241,
+   "preparation_s": 1.042,
+   "rounds_95_s": 0.4824,
+   "rounds_s": 0.2573,
    "tetrahedra": 56060.0
   },
   {
@@ -88,95 +88,95 @@ const char* const shipped_fronts_text = R"json({
    "edges_per_organ": 22.0,
    "error_95_mm": 2.404,
    "error_mm": 1.305,
-   "fields_s": 0.3179,
-   "preparation_s": 2.412,
-   "rounds_95_s": 1.031,
-   "rounds_s": 0.7334,
+   "fields_s": 0.2694,
+   "preparation_s": 1.71,
+   "rounds_95_s": 0.9248,
+   "rounds_s": 0.5899,
    "tetrahedra": 102000.0
   },
   {
    "data": "partial",
    "edges_per_organ": 6.0,
-   "error_95_mm": 2.762,
-   "error_mm": 1.506,
-   "fields_s": 0.1455,
-   "preparation_s": 0.1326,
-   "rounds_95_s": 0.04298,
-   "rounds_s": 0.02781,
+   "error_95_mm": 2.77,
+   "error_mm": 1.503,
+   "fields_s": 0.1323,
+   "preparation_s": 0.09586,
+   "rounds_95_s": 0.05742,
+   "rounds_s": 0.03214,
    "tetrahedra": 2141.0
   },
   {
    "data": "partial",
    "edges_per_organ": 8.0,
-   "error_95_mm": 2.466,
-   "error_mm": 1.435,
-   "fields_s": 0.1815,
-   "preparation_s": 0.1565,
-   "rounds_95_s": 0.11,
-   "rounds_s": 0.07819,
+   "error_95_mm": 2.473,
+   "error_mm": 1.427,
+   "fields_s": 0.1224,
+   "preparation_s": 0.1133,
+   "rounds_95_s": 0.08763,
+   "rounds_s": 0.05428,
    "tetrahedra": 4947.0
   },
   {
    "data": "partial",
    "edges_per_organ": 10.0,
-   "error_95_mm": 2.335,
-   "error_mm": 1.387,
-   "fields_s": 0.1901,
-   "preparation_s": 0.2498,
-   "rounds_95_s": 0.2456,
-   "rounds_s": 0.1791,
+   "error_95_mm": 2.337,
+   "error_mm": 1.379,
+   "fields_s": 0.1513,
+   "preparation_s": 0.2045,
+   "rounds_95_s": 0.2132,
+   "rounds_s": 0.105,
    "tetrahedra": 9712.0
   },
   {
    "data": "partial",
    "edges_per_organ": 12.0,
-   "error_95_mm": 2.283,
-   "error_mm": 1.322,
-   "fields_s": 0.1724,
-   "preparation_s": 0.4017,
-   "rounds_95_s": 0.5435,
-   "rounds_s": 0.4412,
+   "error_95_mm": 2.285,
+   "error_mm": 1.315,
+   "fields_s": 0.1664,
+   "preparation_s": 0.3142,
+   "rounds_95_s": 0.3535,
+   "rounds_s": 0.1857,
    "tetrahedra": 16640.0
   },
   {
    "data": "partial",
    "edges_per_organ": 15.0,
    "error_95_mm": 2.172,
-   "error_mm": 1.351,
-   "fields_s": 0.2031,
-   "preparation_s": 0.8082,
-   "rounds_95_s": 2.384,
-   "rounds_s": 1.492,
+   "error_mm": 1.344,
+   "fields_s": 0.1878,
+   "preparation_s": 0.5935,
+   "rounds_95_s": 0.6356,
+   "rounds_s": 0.4411,
    "tetrahedra": 32270.0
   },
   {
    "data": "partial",
    "edges_per_organ": 18.0,
-   "error_95_mm": 2.198,
-   "error_mm": 1.337,
-   "fields_s": 0.2548,
-   "preparation_s": 1.364,
-   "rounds_95_s": 6.847,
-   "rounds_s": 4.093,
+   "error_95_mm": 2.199,
+   "error_mm": 1.333,
+   "fields_s": 0.2202,
+   "preparation_s": 1.042,
+   "rounds_95_s": 1.265,
+   "rounds_s": 0.9658,
    "tetrahedra": 56060.0
   },
   {
    "data": "partial",
    "edges_per_organ": 22.0,
-   "error_95_mm": 2.177,
+   "error_95_mm": 2.179,
    "error_mm": 1.349,
-   "fields_s": 0.3351,
-   "preparation_s": 2.412,
-   "rounds_95_s": 18.43,
-   "rounds_s": 12.44,
+   "fields_s": 0.2558,
+   "preparation_s": 1.71,
+   "rounds_95_s": 3.58,
+   "rounds_s": 2.118,
    "tetrahedra": 102000.0
   }
  ],
  "schema": "tissuewarp.fronts",
  "schema_version": 3,
  "warp": {
-  "constant_s": 5.706e-05,
-  "slope_s": 0.02508
+  "constant_s": 1.916e-05,
+  "slope_s": 0.01995
  }
 }
 )json";
