@@ -58,9 +58,9 @@ ExpectedError expected_error(const PreparedModel& prepared, const UpdateResult& 
 }
 
 /// Tissue 5 mm off is a registration that failed. The expected error is a root mean square over patients like this one:
-/// a third above it is not rare.
+/// one in twenty-five is 1.7 times as far off (docs/results.md).
 std::string doubt_of_data(const ExpectedError& expected) {
-    constexpr double most_mm = 5.0 / 1.33;
+    constexpr double most_mm = 5.0 / 1.7;
     if (expected.mean_mm <= most_mm) return {};
     char text[256];
     std::snprintf(text, sizeof text,
