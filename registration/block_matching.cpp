@@ -1,4 +1,5 @@
 #include "registration/detail/block_cost.hpp"
+#include "registration/detail/block_search.hpp"
 #include "registration/detail/local_affine.hpp"
 #include "registration/detail/matching_grid.hpp"
 #include "registration/detail/quadratic_fit.hpp"
@@ -219,11 +220,10 @@ std::vector<std::size_t> near_after_near(const Eigen::Matrix3Xd& points) {
 /// The whole search: the template's points that may be seen, and where they are expected.
 class BlockSearch {
 public:
-    BlockSearch(const detail::TemplateImages& moving, const Volume& fixed, const Eigen::Matrix3Xd& points,
+    BlockSearch(const detail::TemplateImages& moving, const detail::SeenImage& fixed, const Eigen::Matrix3Xd& points,
                 const Eigen::Matrix3Xd& predicted, const BlockMatchingOptions& options)
         : moving_(moving),
-          fixed_(fixed.as(CV_32F)),
-          seen_(detail::seen_region(fixed_)),
+          fixed_(fixed),
           points_(points),
           predicted_(predicted),
           options_(options),
@@ -256,7 +256,7 @@ public:
 
 private:
     const detail::TemplateImages& moving_;
-    Volume fixed_, seen_;
+    const detail::SeenImage& fixed_;
     const Eigen::Matrix3Xd& points_;
     Eigen::Matrix3Xd predicted_;
     const BlockMatchingOptions& options_;
@@ -297,8 +297,11 @@ private:
         const imaging::Geometry grid =
             detail::grid_about(predicted, options_.rotation * moving.grid.direction, spacing, margin * spacing);
         const detail::SearchRegion region(grid, predicted, margin);
-        Level result{
-            moving, detail::matching_image(fixed_, seen_, grid, region, moving_.options.similarity), reach, {}, {}};
+        Level result{moving,
+                     detail::matching_image(fixed_.image, fixed_.seen, grid, region, moving_.options.similarity),
+                     reach,
+                     {},
+                     {}};
         // Blocks of a coarse grid overlap so much that some tell the story of all.
         const std::size_t coarser = std::size_t{1} << (moving_.options.levels - 1 - level);
         const std::size_t step = std::clamp(points.size() / least_searched, std::size_t{1}, coarser);
@@ -399,17 +402,23 @@ std::vector<int> in_both_images(const detail::TemplateImages& moving, const Volu
 
 }  // namespace
 
-std::vector<BlockMatch> match_blocks(const MatchingTemplate& moving, const Volume& fixed,
-                                     const Eigen::Matrix3Xd& predicted, const BlockMatchingOptions& options,
-                                     Observer& observer) {
-    const detail::TemplateImages& images = moving.images();
+std::vector<BlockMatch> detail::search_blocks(const MatchingTemplate& moving, const SeenImage& fixed,
+                                              const Eigen::Matrix3Xd& predicted, const BlockMatchingOptions& options,
+                                              Observer& observer) {
+    const TemplateImages& images = moving.images();
     require_usable(images, predicted, options);
-    detail::require_finite(fixed, "block matching: the fixed image");
-    const std::vector<int> usable = in_both_images(images, fixed, predicted);
+    require_finite(fixed.image, "block matching: the fixed image");
+    const std::vector<int> usable = in_both_images(images, fixed.image, predicted);
     const Eigen::Matrix3Xd from = images.points(Eigen::all, usable), to = predicted(Eigen::all, usable);
     std::vector<BlockMatch> matches = BlockSearch(images, fixed, from, to, options).run(observer);
     for (BlockMatch& match : matches) match.point = usable[static_cast<std::size_t>(match.point)];
     return matches;
+}
+
+std::vector<BlockMatch> match_blocks(const MatchingTemplate& moving, const Volume& fixed,
+                                     const Eigen::Matrix3Xd& predicted, const BlockMatchingOptions& options,
+                                     Observer& observer) {
+    return detail::search_blocks(moving, detail::SeenImage(fixed), predicted, options, observer);
 }
 
 }  // namespace tissuewarp::registration

@@ -4,6 +4,7 @@
 #include "registration/field.hpp"
 
 #include <algorithm>
+#include <optional>
 
 namespace tissuewarp::registration::detail {
 
@@ -26,10 +27,7 @@ class CpuDenseEngine : public DenseEngine {
 public:
     explicit CpuDenseEngine(const PreparedModel& prepared) : prepared_(prepared) {}
 
-    void set_fixed(const imaging::Volume& fixed) override {
-        fixed_ = fixed.as(CV_32F);
-        seen_ = seen_region(fixed_);
-    }
+    void set_fixed(const SeenImage& fixed) override { fixed_ = fixed; }
 
     DenseForces forces(const State& state, std::size_t level) override {
         const meshing::TetMesh& mesh = prepared_.model.mesh;
@@ -38,13 +36,13 @@ public:
         const imaging::Volume field = displacement_near_mesh({mesh, state.displacement, state.placement},
                                                              GridSamples::with_rim(moving.grid), descriptor_extent);
         const MatchingImage pulled_back =
-            pulled_back_image(fixed_, seen_, moving.grid, images.region(moving.grid), field);
+            pulled_back_image(fixed_->image, fixed_->seen, moving.grid, images.region(moving.grid), field);
         return dense_forces(moving, pulled_back, voxels_in(mesh, moving.grid));
     }
 
 private:
     const PreparedModel& prepared_;
-    imaging::Volume fixed_, seen_;
+    std::optional<SeenImage> fixed_;
 };
 
 }  // namespace

@@ -27,10 +27,9 @@ Eigen::Matrix3Xd directions_for(const Eigen::Matrix3d& axes) {
 
 }  // namespace
 
-FieldOfView::FieldOfView(const imaging::Volume& image)
-    : directions_(directions_for(image.geometry.direction)),
+FieldOfView::FieldOfView(const imaging::Volume& seen)
+    : directions_(directions_for(seen.geometry.direction)),
       support_(Eigen::VectorXd::Constant(directions_.cols(), -std::numeric_limits<double>::infinity())) {
-    const imaging::Volume seen = seen_region(image.as(CV_32F));
     const auto& size = seen.geometry.size;
     Eigen::MatrixXd of_slices = support_.replicate(1, size[2]);
     tbb::parallel_for(0, size[2], [&](int k) {

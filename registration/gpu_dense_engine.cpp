@@ -125,9 +125,9 @@ public:
           levels_(levels_of(device_, prepared)),
           memory_(device_, static_cast<std::size_t>(prepared.model.mesh.node_count()), levels_.back()) {}
 
-    void set_fixed(const imaging::Volume& fixed) override {
-        fixed_ = fixed.as(CV_32F);
-        const imaging::Volume seen = seen_region(fixed_);
+    void set_fixed(const SeenImage& fixed) override {
+        fixed_ = fixed.image;
+        const imaging::Volume& seen = fixed.seen;
         std::vector<std::uint32_t> words((seen.voxels.total() + 3) / 4);
         std::memcpy(words.data(), seen.voxels.data, seen.voxels.total());
         fixed_seen_.reset();

@@ -29,11 +29,11 @@ ImageEvidence::ImageEvidence(const PreparedModel& prepared, const imaging::Volum
     : prepared_(prepared),
       fixed_(fixed),
       options_(options),
-      view_(fixed),
+      view_(fixed_.seen),
       locator_(prepared.model.mesh),
       energy_(energy) {
     if (!dense) return;
-    dense->set_fixed(fixed);
+    dense->set_fixed(fixed_);
     dense_.emplace(prepared, *dense);
 }
 
@@ -58,7 +58,7 @@ std::vector<BlockMatch> ImageEvidence::block_search(const State& state, Observer
     BlockMatchingOptions matching = options_.matching;
     matching.rotation = state.placement.linear();
     if (dense_) matching.finest = FinestGrid::UndescribedPoints;
-    return match_blocks(blocks, fixed_, deformed(blocks.points(), state), matching, observer);
+    return search_blocks(blocks, fixed_, deformed(blocks.points(), state), matching, observer);
 }
 
 Eigen::Matrix3Xd ImageEvidence::deformed(const Eigen::Matrix3Xd& points, const State& state) const {

@@ -16,8 +16,8 @@ public:
     /// Forces on the moving grid of a level of the template, from the fixed image pulled back by the model's map
     /// φ(X) = placement · (X + u(X)). Within eight voxels outside the mesh φ continues what lies next to it.
     virtual DenseForces forces(const State& state, std::size_t level) = 0;
-    /// The intraoperative image of the calls that follow, float32.
-    virtual void set_fixed(const imaging::Volume& fixed) = 0;
+    /// The intraoperative image of the calls that follow.
+    virtual void set_fixed(const SeenImage& fixed) = 0;
 };
 
 /// `prepared.image` is there, its template made of self-similarity descriptors; `prepared` outlives the engine.

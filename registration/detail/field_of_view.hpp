@@ -7,11 +7,11 @@
 
 namespace tissuewarp::registration::detail {
 
-/// The convex hull of what an image shows, exactly constant regions left out, from outside: the half-spaces of a few
-/// hundred directions. Air beside the tissue lies in it when there is tissue around; padding beyond a plane does not.
+/// The convex hull of what an image shows (its mask, uint8) from outside: the half-spaces of a few hundred directions.
+/// Air beside the tissue lies in it when there is tissue around; padding beyond a plane does not.
 class FieldOfView {
 public:
-    explicit FieldOfView(const imaging::Volume& image);
+    explicit FieldOfView(const imaging::Volume& seen);
     /// mm from a point (LPS) to the hull's furthest half-space: positive outside, negative inside.
     [[nodiscard]] double distance(const Eigen::Vector3d& point) const;
 

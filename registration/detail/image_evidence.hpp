@@ -1,6 +1,7 @@
 #pragma once
 /// A bare intraoperative volume: blocks of the preoperative image, then all of it, belong where they were found.
 
+#include "registration/detail/block_search.hpp"
 #include "registration/detail/dense_search.hpp"
 #include "registration/detail/evidence.hpp"
 #include "registration/detail/field_of_view.hpp"
@@ -34,7 +35,7 @@ public:
 
 private:
     const PreparedModel& prepared_;
-    const imaging::Volume& fixed_;
+    SeenImage fixed_;
     const ImageOptions& options_;
     FieldOfView view_;  // of `fixed_`
     meshing::PointLocator locator_;

@@ -37,4 +37,10 @@ MatchingImage pulled_back_image(const imaging::Volume& image, const imaging::Vol
 /// padding beyond a field of view leaves them.
 imaging::Volume seen_region(const imaging::Volume& image);
 
+/// An image as float32, and what it shows: made once, looked at by all that search in it.
+struct SeenImage {
+    imaging::Volume image, seen;
+    explicit SeenImage(const imaging::Volume& given) : image(given.as(CV_32F)), seen(seen_region(image)) {}
+};
+
 }  // namespace tissuewarp::registration::detail

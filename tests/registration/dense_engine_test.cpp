@@ -63,8 +63,8 @@ double deviation(const DenseForce& force) {
 TEST(DenseEngine, TheDeviceSaysWhatTheProcessorSays) {
     const Scene scene;
     const auto cpu = make_cpu_dense_engine(scene.prepared), gpu = make_gpu_dense_engine(scene.prepared);
-    cpu->set_fixed(scene.fixed);
-    gpu->set_fixed(scene.fixed);
+    cpu->set_fixed(SeenImage(scene.fixed));
+    gpu->set_fixed(SeenImage(scene.fixed));
     for (const std::size_t level : {0U, 1U}) {
         const DenseForces expected = cpu->forces(scene.state, level), found = gpu->forces(scene.state, level);
         ASSERT_GT(expected.forces.size(), level == 0 ? 10U : 100U);
@@ -87,13 +87,13 @@ TEST(DenseEngine, TheDeviceSaysWhatTheProcessorSays) {
 TEST(DenseEngine, TheDeviceRepeatsItselfAndTakesAnotherImage) {
     const Scene scene;
     const auto gpu = make_gpu_dense_engine(scene.prepared);
-    gpu->set_fixed(scene.fixed);
+    gpu->set_fixed(SeenImage(scene.fixed));
     const DenseForces first = gpu->forces(scene.state, 1);
     Volume still = scene.prepared.image->image;
-    gpu->set_fixed(still);
+    gpu->set_fixed(SeenImage(still));
     const State rest{Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, scene.state.displacement.cols())};
     EXPECT_NEAR(gpu->forces(rest, 1).agreement, 1, 0.02);
-    gpu->set_fixed(scene.fixed);
+    gpu->set_fixed(SeenImage(scene.fixed));
     const DenseForces again = gpu->forces(scene.state, 1);
     ASSERT_EQ(first.forces.size(), again.forces.size());
     for (std::size_t n = 0; n < first.forces.size(); ++n) {
