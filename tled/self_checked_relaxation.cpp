@@ -69,16 +69,19 @@ private:
         const NodalConditions& conditions = search_.conditions;
         const Matrix3Xd rest = Matrix3Xd::Zero(3, conditions.constrained.cols());
         const Matrix3Xd imposed = conditions.constrained.select(conditions.imposed, rest);
-        const double part = start == nullptr ? harmless_part() : 1;
-        search_.engine.set_conditions(conditions);
-        if (part < 1) {
-            const std::optional<Matrix3Xd> linear = about_linear_answer(part);
-            if (linear) return *linear;
-            search_.observer.note("no start from a small part of the load; the stiffness is factorised for one");
-            return search_.begin(nullptr);
+        if (start == nullptr && !imposed.isZero(0)) {
+            const double part = harmless_part();
+            if (part < 1) return drawn_out(part);
         }
         const Matrix3Xd u = conditions.constrained.select(imposed, start != nullptr ? *start : rest);
         return search_.admissible(u) ? u : search_.begin(start);
+    }
+
+    Matrix3Xd drawn_out(double part) {
+        const std::optional<Matrix3Xd> linear = about_linear_answer(part);
+        if (linear) return *linear;
+        search_.observer.note("no start from a small part of the load; the stiffness is factorised for one");
+        return search_.begin(nullptr);
     }
 
     /// Where a small part of all loads leads, drawn out.
@@ -106,14 +109,14 @@ private:
     /// Of the imposed displacements: tissue at rest answers it about linearly where it meets it.
     [[nodiscard]] double harmless_part() {
         constexpr double nearly = 0.1, least = 1e-6;
-        if (search_.conditions.imposed.isZero(0)) return 1;
         double part = 1;
         std::optional<Matrix3Xd> force = force_at(part);
         for (; part > least; part /= 2) {
             const std::optional<Matrix3Xd> half = force_at(part / 2);
-            if (force && half && (2 * *half - *force).norm() <= nearly * force->norm()) return part;
+            if (force && half && (2 * *half - *force).norm() <= nearly * force->norm()) break;
             force = half;
         }
+        search_.engine.set_conditions(search_.conditions);
         return part;
     }
 
