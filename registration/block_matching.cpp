@@ -407,7 +407,6 @@ std::vector<BlockMatch> detail::search_blocks(const MatchingTemplate& moving, co
                                               Observer& observer) {
     const TemplateImages& images = moving.images();
     require_usable(images, predicted, options);
-    require_finite(fixed.image, "block matching: the fixed image");
     const std::vector<int> usable = in_both_images(images, fixed.image, predicted);
     const Eigen::Matrix3Xd from = images.points(Eigen::all, usable), to = predicted(Eigen::all, usable);
     std::vector<BlockMatch> matches = BlockSearch(images, fixed, from, to, options).run(observer);

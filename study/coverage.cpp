@@ -1,5 +1,6 @@
 #include "study/coverage.hpp"
 
+#include "core/cancel_only.hpp"
 #include "core/errors.hpp"
 #include "meshing/point_location.hpp"
 
@@ -87,16 +88,6 @@ private:
     Observer& observer_;
 };
 
-/// Passes on requests to stop, and what is worth telling; the stages within a phantom are not progress of the study.
-class Within : public Observer {
-public:
-    explicit Within(Observer& outer) : outer_(outer) {}
-    bool cancel_requested() override { return outer_.cancel_requested(); }
-
-private:
-    Observer& outer_;
-};
-
 }  // namespace
 
 const char* name_of(Evidence evidence) {
@@ -127,7 +118,7 @@ std::vector<CoverageRow> measured_coverage(const fs::path& folder, const Coverag
     require_valid(options);
     fs::create_directories(folder);
     Progress progress(options, observer);
-    Within within(observer);
+    CancelOnly within(observer);
     std::vector<CoverageRow> rows;
     for (std::uint64_t seed = options.first_seed; seed <= options.last_seed; ++seed) {
         progress.before(seed);

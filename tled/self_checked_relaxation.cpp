@@ -2,6 +2,7 @@
 // movement contracts: the stiffness at rest is multiplied with, and never factorised. Its work grows as the nodes times
 // the square root of the condition, and on a GPU nothing but states leaves the device.
 
+#include "core/cancel_only.hpp"
 #include "tled/detail/heavy_ball.hpp"
 
 #include <algorithm>
@@ -27,16 +28,6 @@ constexpr double neper_a_window = 1;     // foreseen decay between two looks
 constexpr double slowest = 0.95;         // contraction of a window that is still believed
 constexpr double estimate_safety = 1.5;  // of the error: modes and directions do not add up to a bound
 constexpr int most_idle_windows = 12;    // without the movement falling by a tenth
-
-/// Tells nothing, and asks whether to stop.
-class CancelOnly : public Observer {
-public:
-    explicit CancelOnly(Observer& whole) : whole_(whole) {}
-    bool cancel_requested() override { return whole_.cancel_requested(); }
-
-private:
-    Observer& whole_;
-};
 
 class SelfCheckedRelaxation {
 public:

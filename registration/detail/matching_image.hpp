@@ -40,7 +40,8 @@ imaging::Volume seen_region(const imaging::Volume& image);
 /// An image as float32, and what it shows: made once, looked at by all that search in it.
 struct SeenImage {
     imaging::Volume image, seen;
-    explicit SeenImage(const imaging::Volume& given) : image(given.as(CV_32F)), seen(seen_region(image)) {}
+    /// Throws InvalidInput where the image is empty, a field of vectors or not finite.
+    explicit SeenImage(const imaging::Volume& given);
 };
 
 }  // namespace tissuewarp::registration::detail

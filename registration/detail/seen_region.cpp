@@ -1,3 +1,4 @@
+#include "registration/detail/matching_grid.hpp"
 #include "registration/detail/matching_image.hpp"
 
 #include <tbb/parallel_for.h>
@@ -57,6 +58,12 @@ Volume seen_region(const Volume& image) {
     all(1, first.data(), second.data());
     all(2, second.data(), seen.data<std::uint8_t>());
     return seen;
+}
+
+SeenImage::SeenImage(const Volume& given) {
+    image = given.as(CV_32F);  // which may overflow
+    require_finite(image, "block matching: the fixed image");
+    seen = seen_region(image);
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -250,6 +250,10 @@ TEST(ImageMatching, RefusesHostileInput) {
     const MatchingTemplate moving(image, points);
     EXPECT_THROW(match_blocks(moving, broken, points), InvalidInput);
     EXPECT_THROW(match_blocks(moving, Volume(), points), InvalidInput);
+    EXPECT_THROW(match_blocks(moving, Volume(image.geometry, CV_32FC3), points), InvalidInput);
+    Volume large(image.geometry, CV_64FC1);
+    large.data<double>()[77] = 1e300;  // no float32
+    EXPECT_THROW(match_blocks(moving, large, points), InvalidInput);
     EXPECT_THROW(match_blocks(moving, image, Eigen::Matrix3Xd::Zero(3, 3)), InvalidInput);
     EXPECT_THROW(match_blocks(moving, image, infinite), InvalidInput);
     EXPECT_THROW(match_blocks(moving, image, far_off), InvalidInput);
