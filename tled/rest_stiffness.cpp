@@ -15,6 +15,7 @@
 #include "tled/detail/lowest_mode.hpp"
 #include "tled/detail/parallel_pair.hpp"
 #include "tled/detail/single_blas_thread.hpp"
+#include "tled/detail/smooth_space.hpp"
 #include "tled/detail/springs.hpp"
 #include "tled/detail/stiffness.hpp"
 #include "tled/detail/two_level.hpp"
@@ -39,6 +40,12 @@ struct Analysis {
     std::unique_ptr<const detail::CholmodFactor> factor;  // without numbers
 };
 
+/// What stiffnesses of one tissue and other springs share, made by the first that needs it.
+struct Outline {
+    std::once_flag made;
+    std::unique_ptr<const detail::SmoothSpace> space;
+};
+
 }  // namespace
 
 struct RestStiffness::Impl {
@@ -47,6 +54,7 @@ struct RestStiffness::Impl {
         elastic;  // K₀ with membranes and sliding pairs, without springs, all degrees of freedom
     std::shared_ptr<const std::vector<Matrix3d>> elastic_diagonal;  // of every node
     std::shared_ptr<Analysis> analysis = std::make_shared<Analysis>();
+    std::shared_ptr<Outline> outline = std::make_shared<Outline>();
     Matrix3Xd position;      // at rest, mm
     std::vector<int> index;  // degree of freedom 3·node + component → free number or −1
     int free_count = 0;
@@ -89,7 +97,8 @@ struct RestStiffness::Impl {
     void number_free(const NodalConditions& present);
     void factorise() const;
     [[nodiscard]] const detail::CholmodFactor& factor() const;
-    [[nodiscard]] detail::BlockRows free_rows() const;
+    [[nodiscard]] detail::BlockRows free_rows(const NodalConditions& springs) const;
+    [[nodiscard]] const detail::SmoothSpace& smooth_space() const;
     [[nodiscard]] const detail::TwoLevel& two_levels() const;
     [[nodiscard]] Eigen::SparseMatrix<double> lower_triangle() const;
     void analyse(const std::function<Eigen::SparseMatrix<double>()>& lower) const;
@@ -224,10 +233,10 @@ const detail::CholmodFactor& RestStiffness::Impl::factor() const {
 }
 
 /// All rows of `elastic` + springs, zero where constrained.
-detail::BlockRows RestStiffness::Impl::free_rows() const {
+detail::BlockRows RestStiffness::Impl::free_rows(const NodalConditions& springs) const {
     detail::BlockRows K = detail::assembled(*elastic, detail::Triangle::Full);
-    for (std::size_t s = 0; s < conditions.spring_node.size(); ++s)
-        K.diagonal(conditions.spring_node[s]) += detail::spring_matrix(conditions, static_cast<int>(s));
+    for (std::size_t s = 0; s < springs.spring_node.size(); ++s)
+        K.diagonal(springs.spring_node[s]) += detail::spring_matrix(springs, static_cast<int>(s));
     for (int i = 0; i < K.rows(); ++i)
         for (int k = K.offset[i]; k < K.offset[i + 1]; ++k)
             for (int c = 0; c < 3; ++c) {
@@ -242,9 +251,17 @@ const detail::TwoLevel& RestStiffness::Impl::two_levels() const {
         const auto product = [this](const Matrix3Xd& x) {
             return Matrix3Xd(conditions.constrained.select(0.0, multiply(x, conditions)));
         };
-        levels = std::make_unique<const detail::TwoLevel>(free_rows(), product, position, conditions.constrained);
+        levels =
+            std::make_unique<const detail::TwoLevel>(free_rows(conditions), product, position, conditions.constrained);
     });
     return *levels;
+}
+
+const detail::SmoothSpace& RestStiffness::Impl::smooth_space() const {
+    std::call_once(outline->made, [this] {
+        outline->space = std::make_unique<const detail::SmoothSpace>(free_rows({}), position, conditions.constrained);
+    });
+    return *outline->space;
 }
 
 RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& conditions)
@@ -276,6 +293,7 @@ RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& condi
     impl_->elastic = other.impl_->elastic;
     impl_->elastic_diagonal = other.impl_->elastic_diagonal;
     impl_->analysis = other.impl_->analysis;
+    impl_->outline = other.impl_->outline;
     impl_->position = rest.position;
     impl_->number_free(conditions);
 }
@@ -367,8 +385,9 @@ double RestStiffness::approximate_lowest_eigenvalue() const {
         return Matrix3Xd(impl_->conditions.constrained.select(0.0, impl_->multiply(x, impl_->conditions)));
     };
     std::call_once(impl_->approximation_known, [&] {
+        const Matrix3Xd D = diagonal(impl_->conditions);
         impl_->lowest_approximation =
-            detail::lowest_mode(multiply, diagonal(impl_->conditions), impl_->position, impl_->conditions.constrained);
+            detail::lowest_mode(multiply, D, impl_->smooth_space().slowest(impl_->conditions, D));
     });
     return impl_->lowest_approximation;
 }

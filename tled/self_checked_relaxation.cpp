@@ -31,8 +31,10 @@ constexpr int most_idle_windows = 12;    // without the movement falling by a te
 
 class SelfCheckedRelaxation {
 public:
-    explicit SelfCheckedRelaxation(EquilibriumSearch& search)
+    /// Of a load of which this is a part, and whose answer is to be drawn out, errors may be a tenth.
+    explicit SelfCheckedRelaxation(EquilibriumSearch& search, double part_of_load = 1)
         : search_(search),
+          part_of_load_(part_of_load),
           mass_(search.stiffness.diagonal(search.conditions)),
           lowest_at_rest_(search.stiffness.approximate_lowest_eigenvalue()) {
         search_.engine.set_mass(mass_);
@@ -41,18 +43,28 @@ public:
     EquilibriumResult run(const Matrix3Xd* start) {
         search_.keep(first_state(start), unknown_error());
         spectrum_ = spectrum_at(search_, mass_, search_.residual(), lowest_at_rest_);
-        while (!(open() && settle())) spectrum_ = restarted(search_, mass_, ++restarts_, lowest_at_rest_);
+        if (open() && settle()) return search_.finish();
+        if (start == nullptr && start_from_part() && open() && settle()) return search_.finish();
+        do spectrum_ = restarted(search_, mass_, ++restarts_, lowest_at_rest_);
+        while (!(open() && settle()));
         return search_.finish();
     }
 
 private:
     EquilibriumSearch& search_;
+    double part_of_load_;
     Matrix3Xd mass_;
     double lowest_at_rest_;
     Spectrum spectrum_;
     int restarts_ = 0;
 
     [[nodiscard]] double unknown_error() const { return 1e3 * search_.options.tolerance_mm; }
+
+    [[nodiscard]] double allowed(const Matrix3Xd& answer) const {
+        constexpr double of_part = 0.1;
+        const double tolerance = search_.options.tolerance_mm;
+        return part_of_load_ < 1 ? std::max(tolerance, of_part * largest_norm(answer)) : tolerance;
+    }
 
     /// The start, or rest; where displacements are imposed on tissue at rest, which they would tear, about the linear
     /// answer, or what a factor makes of it.
@@ -69,23 +81,36 @@ private:
     }
 
     Matrix3Xd drawn_out(double part) {
-        const std::optional<Matrix3Xd> linear = about_linear_answer(part);
+        const std::optional<Matrix3Xd> linear = answer_drawn_out(part);
         if (linear) return *linear;
         search_.observer.note("no start from a small part of the load; the stiffness is factorised for one");
         return search_.begin(nullptr);
     }
 
-    /// Where a small part of all loads leads, drawn out.
-    std::optional<Matrix3Xd> about_linear_answer(double part) {
-        constexpr double accuracy = 0.1;  // of the largest displacement imposed
+    /// Springs that pull at once at a fine surface move its first layer before what is below follows, and tear it. The
+    /// answer to a part of all loads, in turn begun with a part of that where it tears too, is a start that does not.
+    bool start_from_part() {
+        constexpr double part = 0.25, least = 1e-4;
+        if (part * part_of_load_ < least || !search_.conditions.imposed.isZero(0)) return false;
+        const std::optional<Matrix3Xd> drawn = answer_drawn_out(part);
+        if (!drawn) return false;
+        search_.observer.note("loads that would tear tissue at once: begun with the answer to a part of them");
+        search_.keep(*drawn, unknown_error());
+        spectrum_ = spectrum_at(search_, mass_, search_.residual(), lowest_at_rest_);
+        return true;
+    }
+
+    /// Where a part of all loads leads, times 1/part.
+    std::optional<Matrix3Xd> answer_drawn_out(double part) {
         const NodalConditions conditions = scaled(search_.conditions, part);
         EquilibriumOptions options = search_.options;
-        options.tolerance_mm = accuracy * largest_norm(conditions.imposed);
+        options.tolerance_mm *= part;
         CancelOnly observer(search_.observer);
         EquilibriumSearch search(search_.engine, search_.stiffness, conditions, options, observer);
+        const Matrix3Xd* start = conditions.imposed.isZero(0) ? nullptr : &conditions.imposed;
         std::optional<EquilibriumResult> found;
         try {
-            found = SelfCheckedRelaxation(search).run(&conditions.imposed);
+            found = SelfCheckedRelaxation(search, part * part_of_load_).run(start);
         } catch (const SolverFailure&) {
         }
         search_.engine.set_conditions(search_.conditions);
@@ -153,7 +178,7 @@ private:
             const double error =
                 estimate_safety * contraction / (1 - contraction) * std::max(moved, contraction * last);
             search_.keep(*after, window == 0 ? unknown_error() : error);
-            if (window > 0 && error <= search_.options.tolerance_mm) return true;
+            if (window > 0 && error <= allowed(*after)) return true;
             if (window > 1 && std::log(seen) > -0.4 * neper_a_window) spectrum_.lowest *= 0.6;
             if (window == 0 || moved < 0.9 * least) idle = 0, least = moved;
             if (++idle > most_idle_windows) search_.fail_stalled();

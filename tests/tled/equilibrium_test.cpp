@@ -318,6 +318,32 @@ TEST(SelfCheckedRelaxation, StartsWhereImposedDisplacementsDoNotTear) {
     EXPECT_LT(largest_difference(found.displacement, solved(EquilibriumMethod::Lbfgs, 0.003).displacement), 0.05);
 }
 
+// Springs stiffer than the layer of tissue that they pull at press it through the next one.
+TEST(SelfCheckedRelaxation, BeginsWithAPartOfLoadsThatTearTissueAtOnce) {
+    constexpr double height = 60, pressed = 12;  // mm
+    Model model;
+    model.mesh = meshing::box_mesh({20, 20, height}, {3, 3, 60});
+    model.materials[1] = neo_hookean_lnj(3.0, 0.3);
+    const RestState rest = rest_state(model);
+    Conditions held;
+    for (int node = 0; node < rest.node_count; ++node) {
+        const double z = model.mesh.nodes(2, node);
+        if (z < 1e-9) held.prescribed.push_back({node, {true, true, true}, {0, 0, 0}});
+        if (z > height - 1e-9) held.springs.push_back({node, 500 * Eigen::Matrix3d::Identity(), {0, 0, -pressed}});
+    }
+    const NodalConditions conditions = nodal_conditions(held, rest.node_count);
+    const RestStiffness stiffness(rest, conditions);
+    const auto engine = make_cpu_engine(rest, Scalar::Float64);
+    Listener listener;
+    const auto found =
+        equilibrium(*engine, stiffness, conditions,
+                    {.tolerance_mm = 0.01, .method = EquilibriumMethod::SelfCheckedRelaxation}, nullptr, listener);
+    const Matrix3Xd exact =
+        newton_equilibrium(rest, conditions, {.tolerance_mm = 1e-8, .start = found.displacement}).displacement;
+    EXPECT_LT(largest_difference(found.displacement, exact), 0.01) << found.force_evaluations;
+    EXPECT_THAT(listener.notes, ::testing::ElementsAre(::testing::HasSubstr("a part of them")));
+}
+
 /// A held cube whose top is sheared: nearly incompressible.
 struct StiffVolume {
     Model model;

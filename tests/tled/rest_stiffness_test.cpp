@@ -182,10 +182,23 @@ TEST_P(RestStiffnessTest, DiagonalAndLowestEigenvalueAgreeWithADenseSolver) {
 TEST_P(RestStiffnessTest, TheLowestEigenvalueWithoutAFactorIsAboutThatWithOne) {
     model.mesh = meshing::box_mesh({60.0, 30.0, 30.0}, {10, 5, 5}, 0.1, 5);
     rest = rest_state(model);
-    const RestStiffness stiffness(rest, nodal_conditions(held_with_springs(0.3), rest.node_count));
-    const double about = stiffness.approximate_lowest_eigenvalue(), exact = stiffness.lowest_eigenvalue();
-    EXPECT_GE(about, (1 - 1e-4) * exact);
-    EXPECT_LE(about, 1.05 * exact);
+    const auto held = [&](double springs) { return nodal_conditions(held_with_springs(springs), rest.node_count); };
+    const RestStiffness first(rest, held(0.3)), softer(rest, held(1e-4), first), stiffer(rest, held(300), first);
+    for (const RestStiffness* stiffness : {&first, &softer, &stiffer}) {
+        const double about = stiffness->approximate_lowest_eigenvalue(), exact = stiffness->lowest_eigenvalue();
+        EXPECT_GE(about, (1 - 1e-4) * exact);
+        EXPECT_LE(about, 1.05 * exact);
+    }
+}
+
+TEST_P(RestStiffnessTest, TheLowestEigenvalueOfFewNodesNeedsNoFactor) {
+    model.mesh = meshing::box_mesh({20.0, 20.0, 20.0}, {1, 1, 1});
+    rest = rest_state(model);
+    for (const double springs : {1e-6, 1.0, 1e6}) {
+        const RestStiffness stiffness(rest, nodal_conditions(held_with_springs(springs), rest.node_count));
+        const double exact = stiffness.lowest_eigenvalue();
+        EXPECT_NEAR(stiffness.approximate_lowest_eigenvalue(), exact, 0.05 * exact) << springs;
+    }
 }
 
 TEST_P(RestStiffnessTest, TwoFactorsMadeTogetherAreThoseMadeOneByOne) {

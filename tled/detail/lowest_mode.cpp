@@ -67,31 +67,14 @@ Direction combined(const std::vector<Direction>& basis, const VectorXd& weights)
     return sum;
 }
 
-/// Each component constant, or as a coordinate.
-std::vector<Direction> smooth_fields(const Product& multiply_K, const Matrix3Xd& position,
-                                     const Eigen::Matrix<bool, 3, Eigen::Dynamic>& constrained) {
-    Eigen::Matrix4Xd affine(4, position.cols());
-    affine << Eigen::RowVectorXd::Ones(position.cols()), position.colwise() - position.rowwise().mean();
-    std::vector<Direction> fields;
-    for (int component = 0; component < 3; ++component)
-        for (int k = 0; k < 4; ++k) {
-            Matrix3Xd x = Matrix3Xd::Zero(3, position.cols());
-            x.row(component) = affine.row(k);
-            x = constrained.select(0.0, x);
-            fields.push_back({x, multiply_K(x)});
-        }
-    return fields;
-}
-
 }  // namespace
 
-double lowest_mode(const Product& multiply_K, const Matrix3Xd& D, const Matrix3Xd& position,
-                   const Eigen::Matrix<bool, 3, Eigen::Dynamic>& constrained) {
-    constexpr int most_steps = 1000, window = 10;
+double lowest_mode(const Product& multiply_K, const Matrix3Xd& D, const Matrix3Xd& start) {
+    constexpr int most_steps = 1000, window = 5;
     constexpr double least_gain = 0.01;
-    std::vector<Direction> basis = orthonormal(smooth_fields(multiply_K, position, constrained), D);
+    std::vector<Direction> basis = orthonormal({{start, multiply_K(start)}}, D);
+    Direction mode = basis.front(), last;
     RitzPair lowest = lowest_in(basis);
-    Direction mode = combined(basis, lowest.weights), last;
     double before = lowest.value;
     for (int step = 1; step <= most_steps; ++step) {
         const Matrix3Xd downhill = mode.Kx.cwiseQuotient(D) - lowest.value * mode.x;

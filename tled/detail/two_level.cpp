@@ -1,14 +1,13 @@
 #include "tled/detail/two_level.hpp"
 
-#include "core/errors.hpp"
 #include "tled/detail/chebyshev.hpp"
 #include "tled/detail/parallel.hpp"
+#include "tled/detail/smooth_space.hpp"
 
 #include <Eigen/LU>
 
 #include <cmath>
 #include <memory>
-#include <numeric>
 #include <utility>
 
 namespace tissuewarp::tled::detail {
@@ -18,27 +17,6 @@ using Eigen::Matrix3Xd;
 using Eigen::MatrixXd;
 
 namespace {
-
-/// Where few nodes lie in a cell some motions of its corners move none of them: what holds those is next to nothing
-/// beside tissue, and what they are changes no displacement.
-constexpr double hold = 1e-9;
-
-CholmodFactor factor_of(BlockRows K) {
-    for (int p = 0; p < K.rows(); ++p) {
-        Matrix3d& block = K.diagonal(p);
-        for (int c = 0; c < 3; ++c) block(c, c) = block(c, c) > 0 ? (1 + hold) * block(c, c) : 1.0;
-    }
-    std::vector<int> index(3 * static_cast<std::size_t>(K.rows())), node_of;
-    std::iota(index.begin(), index.end(), 0);
-    for (const int d : index) node_of.push_back(d / 3);
-    const Eigen::SparseMatrix<double> lower = scalar_matrix(K, index, Triangle::Lower);
-    CholmodFactor factor(lower, node_of);
-    if (!factor.factorize(lower))
-        throw InvalidInput(
-            "the stiffness at rest is not positive definite: springs and prescribed displacements hold the tissue too "
-            "weakly; hold it at more nodes or with stiffer springs");
-    return factor;
-}
 
 Product division_by_blocks(const BlockRows& K) {
     auto inverse = std::make_shared<std::vector<Matrix3d>>(K.rows());
@@ -70,7 +48,7 @@ TwoLevel::TwoLevel(const BlockRows& K, Product multiply, const Matrix3Xd& positi
       multiply_(std::move(multiply)),
       divide_(division_by_blocks(K)),
       constrained_(constrained),
-      smooth_(factor_of(galerkin(lattice_, K))) {
+      smooth_(smooth_factor(galerkin(lattice_, K))) {
     largest_ = largest_eigenvalue(multiply_, divide_, constrained_.select(0.0, rough(position.cols())));
 }
 
