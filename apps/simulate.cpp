@@ -27,27 +27,38 @@ using nlohmann::json;
 json summary_json(const SimulateOptions& options, const simulation::BuiltScene& built,
                   const simulation::RunSummary& run, const std::vector<std::string>& notes, double building) {
     const simulation::Scene& scene = built.scene;
-    return {{"schema", "tissuewarp.simulation"},
-            {"schema_version", 1},
-            {"version", program_version()},
-            {"title", scene.title},
-            {"scene", {{"file", options.scene.string()}, {"sha256", sha256_of_file(options.scene)}}},
-            {"kind", scene.solve.kind == simulation::Solve::Kind::Dynamics ? "dynamics" : "equilibrium"},
-            {"nodes", built.mesh().node_count()},
-            {"tetrahedra", built.mesh().tet_count()},
-            {"frames", run.frames},
-            {"largest_displacement_mm", run.largest_displacement},
-            {"min_jacobian", run.min_jacobian},
-            {"estimated_error_mm", run.estimated_error_mm},
-            {"force_evaluations", run.steps},
-            {"time_step_s", run.time_step},
-            {"engine", run.engine},
-            {"seconds", {{"building", building}, {"solving", run.seconds}}},
-            {"notes", notes}};
+    const tled::RestState& simulated = built.stages.front().rest;
+    json summary = {{"schema", "tissuewarp.simulation"},
+                    {"schema_version", 1},
+                    {"version", program_version()},
+                    {"title", scene.title},
+                    {"scene", {{"file", options.scene.string()}, {"sha256", sha256_of_file(options.scene)}}},
+                    {"kind", scene.solve.kind == simulation::Solve::Kind::Dynamics ? "dynamics" : "equilibrium"},
+                    {"nodes", simulated.node_count},
+                    {"tetrahedra", simulated.element_count()},
+                    {"frames", run.frames},
+                    {"largest_displacement_mm", run.largest_displacement},
+                    {"min_jacobian", run.min_jacobian},
+                    {"estimated_error_mm", run.estimated_error_mm},
+                    {"force_evaluations", run.steps},
+                    {"time_step_s", run.time_step},
+                    {"engine", run.engine},
+                    {"seconds", {{"building", building}, {"solving", run.seconds}}},
+                    {"notes", notes}};
+    if (built.left_out)
+        summary["left_out"] = {{"tetrahedra", built.left_out->tetrahedra},
+                               {"of", built.mesh.tet_count()},
+                               {"estimated_change_mm", built.left_out->estimated_change_mm}};
+    return summary;
 }
 
 void print_summary(const simulation::BuiltScene& built, const simulation::RunSummary& run, const fs::path& folder) {
-    fmt::print("{} nodes, {} tetrahedra, {}\n", built.mesh().node_count(), built.mesh().tet_count(), run.engine);
+    const tled::RestState& simulated = built.stages.front().rest;
+    fmt::print("{} nodes, {} tetrahedra, {}\n", simulated.node_count, simulated.element_count(), run.engine);
+    if (built.left_out)
+        fmt::print("{}\n", simulation::text_of(*built.left_out));
+    else if (built.scene.leave_out)
+        fmt::print("no tissue is left out: the probes need it all\n");
     fmt::print("{} frames in {:.2f} s, {} force evaluations; largest displacement {:.3f} mm, least det F {:.3f}\n",
                run.frames, run.seconds, run.steps, run.largest_displacement, run.min_jacobian);
     if (run.estimated_error_mm > 0) fmt::print("estimated error {:.4f} mm\n", run.estimated_error_mm);

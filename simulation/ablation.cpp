@@ -38,7 +38,7 @@ Outcome run(const Scene& scene, const meshing::TetMesh& mesh, Observer& observer
         built,
         [&](const Frame& frame) {
             if (frame.index < scene.solve.frames) return;
-            outcome.nodes = on_first_stage(built, frame);
+            outcome.nodes = on_scene_mesh(built, frame);
             outcome.probes = probe_displacements(built, frame);
         },
         observer);

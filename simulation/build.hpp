@@ -3,6 +3,7 @@
 
 #include "core/observer.hpp"
 #include "meshing/point_location.hpp"
+#include "simulation/leave_out.hpp"
 #include "simulation/scene.hpp"
 #include "simulation/tissue_mesh.hpp"
 #include "tled/conditions.hpp"
@@ -13,15 +14,16 @@
 
 namespace tissuewarp::simulation {
 
-/// The tissue from a time on, until the next resection. Nodes and tetrahedra count anew in each stage.
+/// The tissue that is simulated from a time on, until the next resection. Nodes and tetrahedra count anew in each
+/// stage.
 struct Stage {
     double begin = 0.0;  ///< s
     tled::Model model;
     tled::RestState rest;
     std::vector<tled::SurfacePressure> growth;  ///< what growth comes down to besides moduli (tled/growth.hpp)
-    std::vector<int> node;                      ///< of the first stage's mesh, ascending
+    std::vector<int> node;                      ///< of the scene's mesh, ascending
     std::vector<int> tet;                       ///< likewise
-    std::vector<int> place;                     ///< node of the first stage → node of this one, −1 where it is gone
+    std::vector<int> place;  ///< node of the scene's mesh → node of this one, −1 where it is gone
 };
 
 /// Components of a node that are held or moved.
@@ -31,16 +33,16 @@ struct HeldNode {
     static constexpr int none = -2, fixed = -1;
 };
 
-/// Everything that does not change with time is found here once. Nodes are those of the first stage.
+/// Everything that does not change with time is found here once. Nodes are those of the scene's mesh.
 struct BuiltScene {
     Scene scene;
+    meshing::TetMesh mesh;       ///< all tissue at rest, opened where it slides
     std::vector<Stage> stages;   ///< one at least, in the order of time
     std::vector<HeldNode> held;  ///< by node
     std::vector<tled::Spring> springs;
     tled::Effects effects;  ///< pressures and levels where their curves are 1, obstacles where they are at rest
-    std::vector<meshing::Location> probes;  ///< of Scene::probes, in the first stage's mesh
-
-    [[nodiscard]] const meshing::TetMesh& mesh() const { return stages.front().model.mesh; }
+    std::vector<meshing::Location> probes;  ///< of Scene::probes, in that mesh
+    std::optional<LeftOut> left_out;        ///< by Scene::leave_out
 };
 
 /// Meshes and checks. Throws InvalidInput as require_valid(), mesh_of(), RegionFinder and obstacle() do, for probes

@@ -49,7 +49,7 @@ void add_loads(const BuiltScene& built, std::vector<PlannedEffect>& all) {
         all.push_back({"gravity", scene.gravity->from ? "turns, from the image's direction" : "grows", {}});
     for (const auto& [label, tissue] : scene.tissues)
         if (!tissue.viscosity.terms.empty() && scene.solve.kind == Solve::Kind::Dynamics) {
-            const auto tets = static_cast<double>((built.mesh().labels.array() == label).count());
+            const auto tets = static_cast<double>((built.stages.front().model.mesh.labels.array() == label).count());
             const auto terms = static_cast<double>(tissue.viscosity.terms.size());
             all.push_back({"viscosity",
                            "label " + std::to_string(label) + ", " + count(static_cast<Eigen::Index>(terms), "terms"),
@@ -60,8 +60,8 @@ void add_loads(const BuiltScene& built, std::vector<PlannedEffect>& all) {
 void add_effects(const BuiltScene& built, std::vector<PlannedEffect>& all) {
     const tled::Effects& effects = built.effects;
     if (effects.fluid)
-        all.push_back(
-            {"fluid", count(built.mesh().node_count(), "nodes"), times(built.mesh().node_count(), fluid_of_node)});
+        all.push_back({"fluid", count(built.stages.front().model.mesh.node_count(), "nodes"),
+                       times(built.stages.front().model.mesh.node_count(), fluid_of_node)});
     const auto faces = [&](const char* name, const Eigen::Matrix3Xi& list, const Work& each) {
         all.push_back({name, count(list.cols(), "faces"), times(static_cast<double>(list.cols()), each)});
     };
@@ -86,7 +86,7 @@ double memory_of(const BuiltScene& built) {
     bytes += static_cast<double>(rest.pressure.count()) * 16;
     for (const auto& [label, series] : built.stages.front().model.viscosity)
         bytes += 24.0 * static_cast<double>(series.terms.size()) *
-                 static_cast<double>((built.mesh().labels.array() == label).count());
+                 static_cast<double>((built.stages.front().model.mesh.labels.array() == label).count());
     if (built.effects.contact)
         for (const tled::Obstacle& obstacle : built.effects.contact->obstacles)
             bytes += 4.0 * static_cast<double>(obstacle.surface.distance.size());
@@ -109,7 +109,7 @@ Plan plan_of(const BuiltScene& built) {
     Plan plan;
     plan.nodes = stage.rest.node_count;
     plan.tetrahedra = stage.rest.element_count();
-    plan.outer_faces = meshing::boundary_surface(built.mesh()).surface.triangle_count();
+    plan.outer_faces = meshing::boundary_surface(stage.model.mesh).surface.triangle_count();
     plan.element =
         stage.model.element == tled::Element::T4 ? "linear tetrahedra" : "linear tetrahedra with averaged pressure";
     for (const auto& [label, tissue] : built.scene.tissues) plan.laws.push_back(law_of(label, tissue));

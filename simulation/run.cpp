@@ -178,21 +178,21 @@ RunSummary simulate(const BuiltScene& built, const std::function<void(const Fram
     return Run(built, on_frame, observer).run();
 }
 
-Matrix3Xd on_first_stage(const BuiltScene& built, const Frame& frame) {
+Matrix3Xd on_scene_mesh(const BuiltScene& built, const Frame& frame) {
     const Stage& stage = built.stages[static_cast<std::size_t>(frame.stage)];
-    Matrix3Xd all = Matrix3Xd::Constant(3, built.mesh().node_count(), std::numeric_limits<double>::quiet_NaN());
+    Matrix3Xd all = Matrix3Xd::Constant(3, built.mesh.node_count(), std::numeric_limits<double>::quiet_NaN());
     all(Eigen::all, stage.node) = frame.displacement;
     return all;
 }
 
 Matrix3Xd probe_displacements(const BuiltScene& built, const Frame& frame) {
     const Stage& stage = built.stages[static_cast<std::size_t>(frame.stage)];
-    const Matrix3Xd all = on_first_stage(built, frame);
+    const Matrix3Xd all = on_scene_mesh(built, frame);
     Matrix3Xd probes(3, static_cast<Eigen::Index>(built.probes.size()));
     for (std::size_t p = 0; p < built.probes.size(); ++p) {
         const bool there = std::binary_search(stage.tet.begin(), stage.tet.end(), built.probes[p].tet);
         probes.col(static_cast<Eigen::Index>(p)) =
-            there ? Eigen::Vector3d(meshing::interpolate(built.mesh(), all, built.probes[p]))
+            there ? Eigen::Vector3d(meshing::interpolate(built.mesh, all, built.probes[p]))
                   : Eigen::Vector3d(Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
     }
     return probes;

@@ -44,7 +44,7 @@ RunSummary simulate(
 /// Displacement of each probe (mm, 3 × probes) in a frame; NaN where its tissue is gone.
 Eigen::Matrix3Xd probe_displacements(const BuiltScene& built, const Frame& frame);
 
-/// Displacement by node of the first stage, mm; NaN where tissue is gone.
-Eigen::Matrix3Xd on_first_stage(const BuiltScene& built, const Frame& frame);
+/// Displacement by node of the scene's mesh, mm; NaN where tissue is gone or left out.
+Eigen::Matrix3Xd on_scene_mesh(const BuiltScene& built, const Frame& frame);
 
 }  // namespace tissuewarp::simulation

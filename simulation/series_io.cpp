@@ -54,9 +54,9 @@ struct SeriesWriter::Impl {
           folder(where),
           record(folder / "displacement.h5", "tissuewarp simulation", format_version),
           probes(folder / "probes.csv", std::ios::binary) {
-        record.columns<double>("mesh/nodes", built.mesh().nodes, "mm, LPS");
-        record.columns<int>("mesh/tetrahedra", built.mesh().tets, "");
-        record.vector<int>("mesh/labels", built.mesh().labels, "");
+        record.columns<double>("mesh/nodes", built.mesh.nodes, "mm, LPS");
+        record.columns<int>("mesh/tetrahedra", built.mesh.tets, "");
+        record.vector<int>("mesh/labels", built.mesh.labels, "");
         probes << "time_s,probe,x_mm,y_mm,z_mm,dx_mm,dy_mm,dz_mm\n";
         require_written();
     }
@@ -96,7 +96,7 @@ SeriesWriter::~SeriesWriter() = default;
 void SeriesWriter::add(const Frame& frame) {
     impl_->add_vtu(frame);
     impl_->add_probes(frame);
-    const Matrix3Xd all = on_first_stage(impl_->built, frame);
+    const Matrix3Xd all = on_scene_mesh(impl_->built, frame);
     impl_->record.append("displacement", all.data(), {static_cast<hsize_t>(all.cols()), 3}, "mm");
     impl_->times.push_back(frame.time);
     impl_->stages.push_back(frame.stage);
@@ -110,7 +110,7 @@ void SeriesWriter::finish() {
     series.record.vector<int>(
         "stage",
         Eigen::Map<const Eigen::VectorXi>(series.stages.data(), static_cast<Eigen::Index>(series.stages.size())), "");
-    for (std::size_t s = 1; s < series.built.stages.size(); ++s) {
+    for (std::size_t s = series.built.left_out ? 0 : 1; s < series.built.stages.size(); ++s) {
         const std::vector<int>& tets = series.built.stages[s].tet;
         series.record.vector<int>(
             "remaining/" + std::to_string(s),

@@ -122,76 +122,6 @@ Matrix3d admissible(const Matrix3d& A) {
     return modes.eigenvectors() * modes.eigenvalues().cwiseMax(0.0).asDiagonal() * modes.eigenvectors().transpose();
 }
 
-/// What the tissue left out does to the nodes where it meets the region.
-class FarTissue {
-public:
-    FarTissue(const Part& far, const Part& near, const Conditions& whole, const Matrix3Xd& force)
-        : far_(far), rest_(rest_state(far.model)), conditions_(conditions_on(far, whole)) {
-        std::vector<bool> prescribed(far.node_of.size(), false);
-        for (const PrescribedDisplacement& each : conditions_.prescribed)
-            prescribed[static_cast<std::size_t>(each.node)] = true;
-        for (std::size_t a = 0; a < far.node_of.size(); ++a) {
-            if (renumbered(near, far.node_of[a]) < 0 || prescribed[a]) continue;
-            interface_.push_back(static_cast<int>(a));
-            conditions_.prescribed.push_back({static_cast<int>(a), {true, true, true}, {0, 0, 0}});
-        }
-        conditions_.external_force = force;
-        loaded_ = nodal_conditions(conditions_, rest_.node_count);
-        if (!interface_.empty()) stiffness_.emplace(rest_, loaded_);
-    }
-
-    /// Adds springs and forces to the region's conditions.
-    void act_on(const Part& near, Conditions& conditions) const {
-        if (interface_.empty()) return;
-        const Matrix3Xd held = force_on_interface(loaded_);
-        NodalConditions moved = loaded_;
-        moved.external_force.setZero();
-        moved.spring_force.setZero();
-        moved.imposed.setZero();
-        std::vector<Matrix3d> stiffness(interface_.size(), Matrix3d::Zero());
-        for (int c = 0; c < 3; ++c) {
-            for (const int a : interface_) moved.imposed.col(a) = Vector3d::Unit(c);
-            const Matrix3Xd resistance = force_on_interface(moved);
-            for (std::size_t i = 0; i < interface_.size(); ++i)
-                stiffness[i].col(c) = -resistance.col(static_cast<Eigen::Index>(i));
-        }
-        for (std::size_t i = 0; i < interface_.size(); ++i) {
-            const int node = renumbered(near, far_.node_of[static_cast<std::size_t>(interface_[i])]);
-            conditions.springs.push_back({node, admissible(stiffness[i]), Vector3d::Zero()});
-            conditions.external_force.col(node) += held.col(static_cast<Eigen::Index>(i));
-        }
-    }
-
-private:
-    /// Linear-elastic force of the far tissue on the interface nodes under conditions that impose their displacement.
-    [[nodiscard]] Matrix3Xd force_on_interface(const NodalConditions& conditions) const {
-        const Matrix3Xd u = stiffness_->linear_solution(conditions);
-        constexpr double small = 1e-6;  // of the displacement: forces are linear in it
-        const Matrix3Xd elastic = internal_force(rest_, small * u) / small;
-        Matrix3Xd force(3, static_cast<Eigen::Index>(interface_.size()));
-        for (std::size_t i = 0; i < interface_.size(); ++i)
-            force.col(static_cast<Eigen::Index>(i)) =
-                conditions.external_force.col(interface_[i]) - elastic.col(interface_[i]);
-        return force;
-    }
-
-    const Part& far_;
-    RestState rest_;
-    Conditions conditions_;
-    NodalConditions loaded_;
-    std::vector<int> interface_;  // nodes of the far part that the region has too, and that nothing prescribes
-    std::optional<RestStiffness> stiffness_;
-};
-
-/// Linear-elastic displacement; lift at rest.
-Matrix3Xd linear_answer(const Model& model, const Conditions& conditions) {
-    const RestState rest = rest_state(model);
-    NodalConditions nodal = nodal_conditions(conditions, rest);
-    nodal.external_force = constant_force(rest, nodal) +
-                           surface_force(nodal.effects.surface, rest.position, Matrix3Xd::Zero(3, rest.node_count));
-    return RestStiffness(rest, nodal).linear_solution(nodal);
-}
-
 void require_usable(const Model& whole, const std::vector<bool>& keep, const std::vector<int>& targets) {
     if (whole.hexahedra.count() > 0) throw InvalidInput("a region is cut out of tetrahedra: the model has hexahedra");
     if (keep.size() != static_cast<std::size_t>(whole.mesh.tet_count()))
@@ -207,30 +137,123 @@ void require_usable(const Model& whole, const std::vector<bool>& keep, const std
 
 }  // namespace
 
-Region region_of(const Model& whole, const Conditions& conditions, const std::vector<bool>& keep,
-                 const std::vector<int>& targets) {
-    require_usable(whole, keep, targets);
-    const Part near = part_of(whole, keep, true), far = part_of(whole, keep, false);
+struct FarTissue::Impl {
+    Part near, far;
+    RestState whole, rest;      // of all, and of the far part
+    Eigen::VectorXd far_share;  // of the mass of every node of the whole
+    std::vector<int> interface,
+        nodes;  // nodes of the far part that the region has too and nothing prescribes; of the whole
+    std::optional<RestStiffness> stiffness;
+
+    Impl(const Model& all, const Conditions& conditions, const std::vector<bool>& keep)
+        : near(part_of(all, keep, true)), far(part_of(all, keep, false)), whole(rest_state(all)) {
+        far_share = Eigen::VectorXd::Ones(whole.node_count) - mass_share(near, rest_state(near.model), whole);
+        if (far.node_of.empty()) return;
+        rest = rest_state(far.model);
+        std::vector<bool> prescribed(far.node_of.size(), false);
+        for (const PrescribedDisplacement& each : conditions_on(far, conditions).prescribed)
+            prescribed[static_cast<std::size_t>(each.node)] = true;
+        for (std::size_t a = 0; a < far.node_of.size(); ++a) {
+            if (renumbered(near, far.node_of[a]) < 0 || prescribed[a]) continue;
+            interface.push_back(static_cast<int>(a));
+            nodes.push_back(far.node_of[a]);
+        }
+        if (!interface.empty()) stiffness.emplace(rest, held(conditions));
+    }
+
+    /// Of the far part, its interface held.
+    [[nodiscard]] NodalConditions held(const Conditions& conditions) const {
+        Conditions result = conditions_on(far, conditions);
+        for (const int a : interface) result.prescribed.push_back({a, {true, true, true}, {0, 0, 0}});
+        const Matrix3Xd force = constant_force(whole, nodal_conditions(conditions, whole)) * far_share.asDiagonal();
+        result.external_force = force(Eigen::all, far.node_of);
+        return nodal_conditions(result, rest.node_count);
+    }
+
+    /// Linear-elastic force of the far tissue on the interface nodes under conditions that impose their displacement.
+    [[nodiscard]] Matrix3Xd force_on_interface(const NodalConditions& conditions) const {
+        const Matrix3Xd u = stiffness->linear_solution(conditions);
+        constexpr double small = 1e-6;  // of the displacement: forces are linear in it
+        const Matrix3Xd elastic = internal_force(rest, small * u) / small;
+        return (conditions.external_force - elastic)(Eigen::all, interface);
+    }
+};
+
+FarTissue::FarTissue(const Model& whole, const Conditions& conditions, const std::vector<bool>& keep) {
+    require_usable(whole, keep, {});
+    impl_ = std::make_unique<Impl>(whole, conditions, keep);
+}
+FarTissue::~FarTissue() = default;
+
+const std::vector<int>& FarTissue::nodes() const {
+    return impl_->nodes;
+}
+
+std::vector<Spring> FarTissue::springs(const Conditions& conditions) const {
+    const Impl& far = *impl_;
+    std::vector<Spring> springs;
+    if (far.interface.empty()) return springs;
+    NodalConditions moved = far.held(conditions);
+    moved.external_force.setZero();
+    moved.spring_force.setZero();
+    moved.imposed.setZero();
+    std::vector<Matrix3d> stiffness(far.interface.size(), Matrix3d::Zero());
+    for (int c = 0; c < 3; ++c) {
+        for (const int a : far.interface) moved.imposed.col(a) = Vector3d::Unit(c);
+        const Matrix3Xd resistance = far.force_on_interface(moved);
+        for (std::size_t i = 0; i < stiffness.size(); ++i)
+            stiffness[i].col(c) = -resistance.col(static_cast<Eigen::Index>(i));
+    }
+    for (std::size_t i = 0; i < stiffness.size(); ++i)
+        springs.push_back({far.nodes[i], admissible(stiffness[i]), Vector3d::Zero()});
+    return springs;
+}
+
+Matrix3Xd FarTissue::force(const Conditions& conditions) const {
+    if (impl_->interface.empty()) return Matrix3Xd(3, 0);
+    return impl_->force_on_interface(impl_->held(conditions));
+}
+
+Matrix3Xd linear_answer(const Model& model, const Conditions& conditions) {
+    const RestState rest = rest_state(model);
+    NodalConditions nodal = nodal_conditions(conditions, rest);
+    nodal.external_force = constant_force(rest, nodal) +
+                           surface_force(nodal.effects.surface, rest.position, Matrix3Xd::Zero(3, rest.node_count));
+    return RestStiffness(rest, nodal).linear_solution(nodal);
+}
+
+Region region_of(const Model& whole, const Conditions& conditions, const FarTissue& far,
+                 const std::vector<int>& targets, const Matrix3Xd& answer) {
+    const Part& near = far.impl_->near;
     for (const int node : targets)
         if (renumbered(near, node) < 0)
             throw InvalidInput("target node " + std::to_string(node) + " is outside the region: widen it");
 
-    const RestState rest = rest_state(whole), rest_of_near = rest_state(near.model);
-    const NodalConditions nodal = nodal_conditions(conditions, rest);
-    const Eigen::VectorXd share = mass_share(near, rest_of_near, rest);
     Region region{near.model, near.node_of, conditions_on(near, conditions), 0.0};
     region.conditions.effects = effects_on(near, conditions.effects);
-    region.conditions.external_force = (nodal.external_force * share.asDiagonal())(Eigen::all, near.node_of);
-    if (!far.node_of.empty()) {
-        const Matrix3Xd on_far = constant_force(rest, nodal) * (1 - share.array()).matrix().asDiagonal();
-        FarTissue(far, near, conditions, on_far(Eigen::all, far.node_of)).act_on(near, region.conditions);
+    const Eigen::VectorXd share = Eigen::VectorXd::Ones(whole.mesh.node_count()) - far.impl_->far_share;
+    const Matrix3Xd external = nodal_conditions(conditions, far.impl_->whole).external_force;
+    region.conditions.external_force = (external * share.asDiagonal())(Eigen::all, near.node_of);
+    const Matrix3Xd force = far.force(conditions);
+    for (Spring& spring : far.springs(conditions)) {
+        spring.node = renumbered(near, spring.node);
+        region.conditions.springs.push_back(spring);
     }
+    for (std::size_t i = 0; i < far.nodes().size(); ++i)
+        region.conditions.external_force.col(renumbered(near, far.nodes()[i])) +=
+            force.col(static_cast<Eigen::Index>(i));
 
-    const Matrix3Xd all = linear_answer(whole, conditions), part = linear_answer(region.model, region.conditions);
+    const Matrix3Xd part = linear_answer(region.model, region.conditions);
     for (const int node : targets)
         region.estimated_change_mm =
-            std::max(region.estimated_change_mm, (all.col(node) - part.col(renumbered(near, node))).norm());
+            std::max(region.estimated_change_mm, (answer.col(node) - part.col(renumbered(near, node))).norm());
     return region;
+}
+
+Region region_of(const Model& whole, const Conditions& conditions, const std::vector<bool>& keep,
+                 const std::vector<int>& targets) {
+    require_usable(whole, keep, targets);
+    return region_of(whole, conditions, FarTissue(whole, conditions, keep), targets, linear_answer(whole, conditions));
 }
 
 }  // namespace tissuewarp::tled

@@ -49,8 +49,8 @@ double sag_of_top(double gravity) {
 
 /// Mean z displacement of a set's faces: the cells' pattern favours some nodes, by tenths of a millimetre.
 double mean_on(const BuiltScene& built, const std::string& set, const Matrix3Xd& displacement) {
-    const TissueMesh tissue = closed(built.mesh());
-    const Eigen::VectorXd area = nodal_areas(built.mesh(), RegionFinder(tissue, built.scene.sets).faces(set));
+    const TissueMesh tissue = closed(built.mesh);
+    const Eigen::VectorXd area = nodal_areas(built.mesh, RegionFinder(tissue, built.scene.sets).faces(set));
     return displacement.row(2).dot(area) / area.sum();
 }
 
@@ -109,10 +109,10 @@ TEST(Simulate, PrescribedMotionFollowsItsCurve) {
     const BuiltScene built = build(scene);
     std::vector<double> top;
     simulate(built, [&](const Frame& frame) {
-        top.push_back(frame.displacement(2, built.mesh().node_count() - 1));
+        top.push_back(frame.displacement(2, built.mesh.node_count() - 1));
         if (frame.index < 4) return;
-        for (int n = 0; n < built.mesh().node_count(); ++n) {  // even, without lateral strain: Poisson's ratio is 0
-            const Vector3d expected(0, 0, -0.1 * built.mesh().nodes(2, n));
+        for (int n = 0; n < built.mesh.node_count(); ++n) {  // even, without lateral strain: Poisson's ratio is 0
+            const Vector3d expected(0, 0, -0.1 * built.mesh.nodes(2, n));
             EXPECT_LT((frame.displacement.col(n) - expected).norm(), 5e-3);
         }
     });
@@ -173,8 +173,8 @@ TEST(Simulate, SlowMotionInDynamicsEndsAtItsTarget) {
     scene.solve.damping = 20.0;
     const BuiltScene built = build(scene);
     const Result result = run(built);
-    for (int n = 0; n < built.mesh().node_count(); ++n)
-        EXPECT_LT((result.displacement.col(n) - Vector3d(0, 0, -0.2 * built.mesh().nodes(2, n))).norm(), 0.05);
+    for (int n = 0; n < built.mesh.node_count(); ++n)
+        EXPECT_LT((result.displacement.col(n) - Vector3d(0, 0, -0.2 * built.mesh.nodes(2, n))).norm(), 0.05);
 }
 
 TEST(Simulate, ResectionLeavesTheRestWhereItWas) {
@@ -217,7 +217,7 @@ TEST(Simulate, FreeTissueGrowsByItsStretch) {
     test::stand_freely(scene);
     const BuiltScene built = build(scene);
     const Result result = run(built);
-    EXPECT_LT((result.displacement - 0.1 * built.mesh().nodes).colwise().norm().maxCoeff(), 5e-3);
+    EXPECT_LT((result.displacement - 0.1 * built.mesh.nodes).colwise().norm().maxCoeff(), 5e-3);
 }
 
 TEST(Simulate, BodyInContactStopsTheTissue) {
@@ -232,8 +232,8 @@ TEST(Simulate, BodyInContactStopsTheTissue) {
     scene.solve.frames = 2;
     const BuiltScene built = build(scene);
     const Result result = run(built);
-    for (int n = 0; n < built.mesh().node_count(); ++n) {
-        const double expected = -5 - 15 * built.mesh().nodes(2, n) / 100;
+    for (int n = 0; n < built.mesh.node_count(); ++n) {
+        const double expected = -5 - 15 * built.mesh.nodes(2, n) / 100;
         EXPECT_NEAR(result.displacement(2, n), expected, 0.05);
     }
 }
@@ -253,9 +253,9 @@ TEST(Simulate, LayersSlideOnOneAnother) {
         const BuiltScene built = build(each);
         const Result result = run(built);
         double shear = 0;  // difference of x along the edges of each layer
-        for (int e = 0; e < built.mesh().tet_count(); ++e)
-            shear = std::max(shear, result.displacement(0, built.mesh().tets.col(e)).maxCoeff() -
-                                        result.displacement(0, built.mesh().tets.col(e)).minCoeff());
+        for (int e = 0; e < built.mesh.tet_count(); ++e)
+            shear = std::max(shear, result.displacement(0, built.mesh.tets.col(e)).maxCoeff() -
+                                        result.displacement(0, built.mesh.tets.col(e)).minCoeff());
         return shear;
     };
     EXPECT_GT(largest_strain(scene), 1.9) << "joined: 8 mm over four cells";

@@ -59,11 +59,11 @@ TEST(Series, HoldsEveryFrameInEveryFormat) {
     EXPECT_THAT(probes, HasSubstr("\n1,\"high\",50,50,75,nan,nan,nan\n"));
 
     const Hdf5Input record(folder / "displacement.h5", "tissuewarp simulation", 1);
-    EXPECT_EQ(record.columns<double>("mesh/nodes", 3), built.mesh().nodes);
+    EXPECT_EQ(record.columns<double>("mesh/nodes", 3), built.mesh.nodes);
     EXPECT_EQ(record.vector<double>("time", 3), Eigen::Vector3d(0, 0.5, 1));
     EXPECT_EQ(record.vector<int>("stage", 3), Eigen::Vector3i(0, 0, 1));
     EXPECT_EQ(record.vector<int>("remaining/1").size(), built.stages[1].rest.element_count());
-    EXPECT_NO_THROW(record.require_shape("displacement", {3, static_cast<hsize_t>(built.mesh().node_count()), 3}));
+    EXPECT_NO_THROW(record.require_shape("displacement", {3, static_cast<hsize_t>(built.mesh.node_count()), 3}));
     fs::remove_all(folder);
 }
 
