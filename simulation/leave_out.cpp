@@ -168,7 +168,7 @@ std::optional<LeftOut> left_out(const BuiltScene& built, Observer& observer) {
 std::string text_of(const LeftOut& left_out) {
     char text[160];
     std::snprintf(text, sizeof text,
-                  "%d of %zu tetrahedra are left out: by the linear answer no probe moves by %.2g mm",
+                  "%d of %zu tetrahedra are left out; by linear answers that moves no probe by more than %.2g mm",
                   left_out.tetrahedra, left_out.keep.size(), left_out.estimated_change_mm);
     return text;
 }

@@ -139,10 +139,10 @@ void require_usable(const Model& whole, const std::vector<bool>& keep, const std
 
 struct FarTissue::Impl {
     Part near, far;
-    RestState whole, rest;      // of all, and of the far part
-    Eigen::VectorXd far_share;  // of the mass of every node of the whole
-    std::vector<int> interface,
-        nodes;  // nodes of the far part that the region has too and nothing prescribes; of the whole
+    RestState whole, rest;       // of all, and of the far part
+    Eigen::VectorXd far_share;   // of the mass of every node of the whole
+    std::vector<int> interface;  // nodes of the far part that the region has too and nothing prescribes
+    std::vector<int> nodes;      // the same, of the whole
     std::optional<RestStiffness> stiffness;
 
     Impl(const Model& all, const Conditions& conditions, const std::vector<bool>& keep)
