@@ -1,38 +1,32 @@
-#include "registration/detail/block_cost.hpp"
 #include "registration/detail/block_search.hpp"
 #include "registration/detail/local_affine.hpp"
 #include "registration/detail/matching_grid.hpp"
 #include "registration/detail/quadratic_fit.hpp"
-#include "registration/detail/template_images.hpp"
+#include "registration/detail/squared_differences.hpp"
 
 #include <Eigen/Eigenvalues>
 
-#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 
 namespace tissuewarp::registration {
 
-using detail::Block;
-using detail::BlockCosts;
+using detail::BlockSight;
 using detail::CostLattice;
+using detail::FixedBlocks;
 using detail::MatchingImage;
-using detail::Surroundings;
+using detail::SoughtBlock;
 using detail::Voxel;
 using imaging::Volume;
 
 namespace {
 
 constexpr int least_searched = 1000;  // points on a coarse grid: from there on, every second, fourth … is left out
-constexpr int first_look = 3;         // every third row of a block, over the whole lattice
-constexpr std::size_t candidate_share = 20;  // one place in so many is then compared in full
-constexpr int most_steps = 8;                // downhill
-constexpr double independent_share = 0.1;    // of a block's voxels: the others repeat them (docs/method.md)
-constexpr double least_deviation = 0.05;     // voxels: what interpolation leaves of the best match
+constexpr double independent_share = 0.1;  // of a block's voxels: the others repeat them (docs/method.md)
+constexpr double least_deviation = 0.05;   // voxels: what interpolation leaves of the best match
 
 Voxel nearest_voxel(const imaging::Geometry& grid, const Eigen::Vector3d& point) {
     const Eigen::Vector3d index = grid.index(point);
@@ -52,7 +46,6 @@ Eigen::Vector3d as_vector(const Voxel& v) {
 struct Minimum {
     Voxel at{0, 0, 0};
     double cost = 0;
-    double uniqueness = 0;
     detail::Quadratic fit{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()};
 
     [[nodiscard]] Eigen::Vector3d index() const { return as_vector(at) + fit.minimum; }
@@ -83,87 +76,18 @@ double uniqueness(const CostLattice& lattice, const Minimum& minimum) {
     return found && mean_rise > 0 ? std::clamp(least / mean_rise, 0.0, 1.0) : 0.0;
 }
 
-/// The lowest place of a lattice; none when nothing of it is seen.
-std::optional<Voxel> lowest_of(const CostLattice& lattice) {
-    const auto lowest = std::min_element(lattice.costs.begin(), lattice.costs.end());
-    if (!std::isfinite(*lowest)) return std::nullopt;
-    return lattice.place(static_cast<std::size_t>(lowest - lattice.costs.begin()));
-}
-
-bool adjoin(const Voxel& a, const Voxel& b) {
-    return std::abs(a[0] - b[0]) <= 1 && std::abs(a[1] - b[1]) <= 1 && std::abs(a[2] - b[2]) <= 1;
-}
-
-/// The places that a first look puts lowest, one of those that adjoin, the lowest first.
-std::vector<Voxel> candidates(const CostLattice& first) {
-    std::vector<std::pair<double, std::size_t>> ranked;
-    for (std::size_t n = 0; n < first.costs.size(); ++n)
-        if (std::isfinite(first.costs[n])) ranked.emplace_back(first.costs[n], n);
-    const std::size_t count = std::min(ranked.size(), 1 + first.costs.size() / candidate_share);
-    std::partial_sort(ranked.begin(), ranked.begin() + static_cast<std::ptrdiff_t>(count), ranked.end());
-    std::vector<Voxel> result;
-    for (std::size_t n = 0; n < count; ++n) {
-        const Voxel place = first.place(ranked[n].second);
-        if (std::none_of(result.begin(), result.end(), [&](const Voxel& other) { return adjoin(place, other); }))
-            result.push_back(place);
-    }
-    return result;
-}
-
-/// The lowest candidate by all rows of the block. Along an edge many places are nearly as low, and the one that a few
-/// rows prefer is no minimum of all of them.
-std::optional<Voxel> lowest_of_candidates(BlockCosts& costs, const CostLattice& first) {
-    const std::vector<Voxel> places = candidates(first);
-    if (places.size() == 1) return places.front();
-    std::optional<Voxel> lowest;
-    double least = std::numeric_limits<double>::infinity();
-    for (const Voxel& place : places) {
-        const double cost = costs.lattice(place, 0, 1).costs[0];
-        if (cost < least) lowest = place;
-        least = std::min(least, cost);
-    }
-    return lowest;
-}
-
-/// Walks from a place to the lowest of its 27 until that is itself. Returns the costs about it.
-std::optional<CostLattice> descend(BlockCosts& costs, Voxel at) {
-    for (int step = 0; step < most_steps; ++step) {
-        const CostLattice near = costs.lattice(at, 1, 1);
-        const auto lowest = lowest_of(near);
-        if (!lowest) return std::nullopt;
-        if (!(near.cost(*lowest) < near.cost(at))) return near;
-        at = *lowest;
-    }
-    return std::nullopt;
-}
-
-/// The minimum that lies downhill of a place.
-std::optional<Minimum> minimum_below(BlockCosts& costs, const Voxel& from) {
-    const auto near = descend(costs, from);
-    if (!near) return std::nullopt;
+/// The minimum of the costs about a place.
+std::optional<Minimum> minimum_of(const CostLattice& near) {
     std::array<double, 27> about{};
-    std::copy(near->costs.begin(), near->costs.end(), about.begin());
+    std::copy(near.costs.begin(), near.costs.end(), about.begin());
     const auto fit = detail::fit_quadratic(about);
     if (!fit) return std::nullopt;
-    return Minimum{near->centre, about[13], 0, *fit};
+    return Minimum{near.centre, about[13], *fit};
 }
 
-/// The lowest minimum within reach of a place.
-std::optional<Minimum> find_block(BlockCosts& costs, const Voxel& start, int reach) {
-    const CostLattice lattice = costs.lattice(start, reach, first_look);
-    const auto lowest = lowest_of_candidates(costs, lattice);
-    if (!lowest) return std::nullopt;
-    auto minimum = minimum_below(costs, *lowest);
-    if (minimum) minimum->uniqueness = uniqueness(lattice, *minimum);
-    return minimum;
-}
-
-/// Error (voxels) of the way back, along what the block shows: the block about the match, searched downhill in the
-/// moving image, should lie where the first one lay.
-std::optional<double> back_match(BlockCosts& costs, const Block& block, const Minimum& forward) {
-    const auto back = minimum_below(costs, block.centre);
-    if (!back) return std::nullopt;
-    const Eigen::Vector3d error = back->index() - as_vector(block.centre) + forward.fit.minimum;
+/// Error (voxels) of the way back, along what the block shows: it should lead to where the first block lay.
+double back_error(const Minimum& back, const Voxel& block, const Minimum& forward) {
+    const Eigen::Vector3d error = back.index() - as_vector(block) + forward.fit.minimum;
     return std::sqrt(error.dot(forward.fit.hessian * error) / forward.fit.hessian.operatorNorm());
 }
 
@@ -186,14 +110,10 @@ Eigen::Matrix3d information(const Minimum& minimum, const imaging::Geometry& gri
 
 struct Level {
     const MatchingImage& moving;
-    MatchingImage fixed;
+    imaging::Geometry grid;  // of the fixed image
+    std::unique_ptr<FixedBlocks> fixed;
     int reach;
     std::vector<std::size_t> searched, left_out;  // points
-};
-
-/// Memory of a thread.
-struct Windows {
-    detail::BlockWindow moving, fixed;
 };
 
 /// Mean inverse standard deviation of the blocks that were searched, 1/mm; those not found count as 0.
@@ -220,10 +140,10 @@ std::vector<std::size_t> near_after_near(const Eigen::Matrix3Xd& points) {
 /// The whole search: the template's points that may be seen, and where they are expected.
 class BlockSearch {
 public:
-    BlockSearch(const detail::TemplateImages& moving, const detail::SeenImage& fixed, const Eigen::Matrix3Xd& points,
+    BlockSearch(const detail::TemplateImages& moving, detail::BlockEngine& engine, const Eigen::Matrix3Xd& points,
                 const Eigen::Matrix3Xd& predicted, const BlockMatchingOptions& options)
         : moving_(moving),
-          fixed_(fixed),
+          engine_(engine),
           points_(points),
           predicted_(predicted),
           options_(options),
@@ -256,7 +176,7 @@ public:
 
 private:
     const detail::TemplateImages& moving_;
-    const detail::SeenImage& fixed_;
+    detail::BlockEngine& engine_;
     const Eigen::Matrix3Xd& points_;
     Eigen::Matrix3Xd predicted_;
     const BlockMatchingOptions& options_;
@@ -297,11 +217,7 @@ private:
         const imaging::Geometry grid =
             detail::grid_about(predicted, options_.rotation * moving.grid.direction, spacing, margin * spacing);
         const detail::SearchRegion region(grid, predicted, margin);
-        Level result{moving,
-                     detail::matching_image(fixed_.image, fixed_.seen, grid, region, moving_.options.similarity),
-                     reach,
-                     {},
-                     {}};
+        Level result{moving, grid, engine_.fixed_on(grid, region, static_cast<std::size_t>(level)), reach, {}, {}};
         // Blocks of a coarse grid overlap so much that some tell the story of all.
         const std::size_t coarser = std::size_t{1} << (moving_.options.levels - 1 - level);
         const std::size_t step = std::clamp(points.size() / least_searched, std::size_t{1}, coarser);
@@ -312,37 +228,38 @@ private:
 
     /// Fills in the entries of some points; `point` stays −1 where the block was not found.
     void match(const Level& level, const std::vector<std::size_t>& points, std::vector<BlockMatch>& matches) const {
-        tbb::enumerable_thread_specific<Windows> windows;
-        tbb::parallel_for(std::size_t{0}, points.size(), [&](std::size_t place) {
-            const std::size_t n = points[place];
-            const auto found = match_point(level, static_cast<Eigen::Index>(n), windows.local());
-            if (found) matches[n] = *found;
+        std::vector<SoughtBlock> blocks;
+        for (const std::size_t n : points) blocks.push_back(sought(level, static_cast<Eigen::Index>(n)));
+        level.fixed->look(blocks, level.reach, options_.least_share, [&](std::size_t place, const BlockSight& sight) {
+            const auto found = match_of(level, blocks[place].moving, sight);
+            if (!found) return;
+            matches[points[place]] = *found;
+            matches[points[place]].point = static_cast<int>(points[place]);
         });
     }
 
-    [[nodiscard]] std::optional<BlockMatch> match_point(const Level& level, Eigen::Index n, Windows& windows) const {
-        const Block block{nearest_voxel(level.moving.grid, points_.col(n)), moving_.options.block_radius,
-                          options_.least_share};
+    /// The block about a point of the template, and where it is expected.
+    [[nodiscard]] SoughtBlock sought(const Level& level, Eigen::Index n) const {
+        const Voxel centre = nearest_voxel(level.moving.grid, points_.col(n));
+        const Eigen::Vector3d moving = level.moving.grid.point(as_vector(centre));
+        const Eigen::Vector3d expected = predicted_.col(n) + options_.rotation * (moving - points_.col(n));
+        return {centre, nearest_voxel(level.grid, expected)};
+    }
+
+    [[nodiscard]] std::optional<BlockMatch> match_of(const Level& level, const Voxel& block,
+                                                     const BlockSight& sight) const {
+        if (!sight.forward || !sight.back) return std::nullopt;
+        const auto found = minimum_of(*sight.forward), back = minimum_of(*sight.back);
+        if (!found || !back) return std::nullopt;
+        const double error = back_error(*back, block, *found), scaled = error / options_.back_match_voxels;
         BlockMatch result;
-        result.moving = level.moving.grid.point(as_vector(block.centre));
-        const Eigen::Vector3d expected = predicted_.col(n) + options_.rotation * (result.moving - points_.col(n));
-        const Voxel start = nearest_voxel(level.fixed.grid, expected);
-        Surroundings here(level.moving, block.centre, block.radius + detail::back_reach, windows.moving),
-            there(level.fixed, start, block.radius + level.reach + 1, windows.fixed);
-        BlockCosts forward(here, there, block);
-        const auto found = find_block(forward, start, level.reach);
-        if (!found) return std::nullopt;
-        BlockCosts backward(there, here, {found->at, block.radius, block.least_share});
-        const auto back = back_match(backward, block, *found);
-        if (!back) return std::nullopt;
-        const double error = *back / options_.back_match_voxels;
-        result.point = static_cast<int>(n);
-        result.fixed = level.fixed.grid.point(found->index());
+        result.moving = level.moving.grid.point(as_vector(block));
+        result.fixed = level.grid.point(found->index());
         result.cost = found->cost;
-        result.uniqueness = found->uniqueness;
-        result.back_match_mm = *back * level.fixed.grid.spacing[0];
-        result.confidence = found->uniqueness * std::exp(-0.5 * error * error);
-        result.information = information(*found, level.fixed.grid, block.radius);
+        result.uniqueness = uniqueness(sight.first, *found);
+        result.back_match_mm = error * level.grid.spacing[0];
+        result.confidence = result.uniqueness * std::exp(-0.5 * scaled * scaled);
+        result.information = information(*found, level.grid, moving_.options.block_radius);
         return result;
     }
 
@@ -388,11 +305,11 @@ void require_usable(const detail::TemplateImages& moving, const Eigen::Matrix3Xd
         throw InvalidInput("block matching: the rotation is not orthonormal; give the linear part of a rigid motion");
 }
 
-std::vector<int> in_both_images(const detail::TemplateImages& moving, const Volume& fixed,
+std::vector<int> in_both_images(const detail::TemplateImages& moving, const imaging::Geometry& fixed,
                                 const Eigen::Matrix3Xd& predicted) {
     std::vector<int> result;
     for (Eigen::Index n = 0; n < predicted.cols(); ++n)
-        if (detail::in_image(moving.image, moving.points.col(n)) && detail::in_image(fixed.geometry, predicted.col(n)))
+        if (detail::in_image(moving.image, moving.points.col(n)) && detail::in_image(fixed, predicted.col(n)))
             result.push_back(static_cast<int>(n));
     if (result.empty())
         throw InvalidInput("block matching: none of " + std::to_string(predicted.cols()) +
@@ -402,14 +319,14 @@ std::vector<int> in_both_images(const detail::TemplateImages& moving, const Volu
 
 }  // namespace
 
-std::vector<BlockMatch> detail::search_blocks(const MatchingTemplate& moving, const SeenImage& fixed,
-                                              const Eigen::Matrix3Xd& predicted, const BlockMatchingOptions& options,
-                                              Observer& observer) {
+std::vector<BlockMatch> detail::search_blocks(const MatchingTemplate& moving, const imaging::Geometry& fixed,
+                                              BlockEngine& engine, const Eigen::Matrix3Xd& predicted,
+                                              const BlockMatchingOptions& options, Observer& observer) {
     const TemplateImages& images = moving.images();
     require_usable(images, predicted, options);
-    const std::vector<int> usable = in_both_images(images, fixed.image, predicted);
+    const std::vector<int> usable = in_both_images(images, fixed, predicted);
     const Eigen::Matrix3Xd from = images.points(Eigen::all, usable), to = predicted(Eigen::all, usable);
-    std::vector<BlockMatch> matches = BlockSearch(images, fixed, from, to, options).run(observer);
+    std::vector<BlockMatch> matches = BlockSearch(images, engine, from, to, options).run(observer);
     for (BlockMatch& match : matches) match.point = usable[static_cast<std::size_t>(match.point)];
     return matches;
 }
@@ -417,7 +334,9 @@ std::vector<BlockMatch> detail::search_blocks(const MatchingTemplate& moving, co
 std::vector<BlockMatch> match_blocks(const MatchingTemplate& moving, const Volume& fixed,
                                      const Eigen::Matrix3Xd& predicted, const BlockMatchingOptions& options,
                                      Observer& observer) {
-    return detail::search_blocks(moving, detail::SeenImage(fixed), predicted, options, observer);
+    const detail::SeenImage seen(fixed);
+    const auto engine = detail::make_cpu_block_engine(moving.images(), seen);
+    return detail::search_blocks(moving, fixed.geometry, *engine, predicted, options, observer);
 }
 
 }  // namespace tissuewarp::registration

@@ -35,7 +35,7 @@ BlockMatch as_match(const DenseForce& force, const meshing::TetMesh& mesh, const
 
 }  // namespace
 
-DenseSearch::DenseSearch(const PreparedModel& prepared, DenseEngine& engine) : prepared_(prepared), engine_(engine) {}
+DenseSearch::DenseSearch(const PreparedModel& prepared, ImageEngine& engine) : prepared_(prepared), engine_(engine) {}
 
 DenseMatches DenseSearch::matches(const State& state, int coarsening, const std::vector<BlockMatch>& known,
                                   const meshing::PointLocator& locator) const {

@@ -26,7 +26,7 @@ void require_usable(const PreparedModel& prepared, const Intraoperative& seen) {
 }
 
 EvidenceSet::EvidenceSet(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options,
-                         DenseEngine* dense)
+                         ImageEngine* dense)
     : energy(strain_energy_unit(prepared, options.tissue)) {
     const TissuePrior& tissue = options.tissue;
     if (seen.image) image.emplace(prepared, *seen.image, options.image, dense, energy);

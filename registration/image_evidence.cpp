@@ -25,16 +25,21 @@ double median_distance(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
 }  // namespace
 
 ImageEvidence::ImageEvidence(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
-                             DenseEngine* dense, double energy)
+                             ImageEngine* engine, double energy)
     : prepared_(prepared),
       fixed_(fixed),
       options_(options),
       view_(fixed_.seen),
       locator_(prepared.model.mesh),
       energy_(energy) {
-    if (!dense) return;
-    dense->set_fixed(fixed_);
-    dense_.emplace(prepared, *dense);
+    if (!engine) {
+        own_blocks_ = make_cpu_block_engine(prepared.image->blocks.images(), fixed_);
+        block_engine_ = own_blocks_.get();
+        return;
+    }
+    engine->set_fixed(fixed_);
+    block_engine_ = &engine->blocks();
+    dense_.emplace(prepared, *engine);
 }
 
 int ImageEvidence::searches() const {
@@ -58,7 +63,8 @@ std::vector<BlockMatch> ImageEvidence::block_search(const State& state, Observer
     BlockMatchingOptions matching = options_.matching;
     matching.rotation = state.placement.linear();
     if (dense_) matching.finest = FinestGrid::UndescribedPoints;
-    return search_blocks(blocks, fixed_, deformed(blocks.points(), state), matching, observer);
+    return search_blocks(blocks, fixed_.image.geometry, *block_engine_, deformed(blocks.points(), state), matching,
+                         observer);
 }
 
 Eigen::Matrix3Xd ImageEvidence::deformed(const Eigen::Matrix3Xd& points, const State& state) const {

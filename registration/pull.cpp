@@ -2,6 +2,8 @@
 
 #include <Eigen/Eigenvalues>
 
+#include <tbb/parallel_for.h>
+
 namespace tissuewarp::registration::detail {
 
 namespace {
@@ -50,12 +52,14 @@ std::vector<tled::Spring> lumped_springs(const meshing::TetMesh& mesh, const std
         }
     }
     std::vector<tled::Spring> springs;
-    for (int node = 0; node < mesh.node_count(); ++node) {
-        const Sum& sum = sums[static_cast<std::size_t>(node)];
-        if (sum.stiffness.trace() <= 0) continue;
-        springs.push_back(
-            {node, sum.stiffness, displacement.col(node) + least_norm_solution(sum.stiffness, sum.force)});
-    }
+    for (int node = 0; node < mesh.node_count(); ++node)
+        if (sums[static_cast<std::size_t>(node)].stiffness.trace() > 0) springs.emplace_back().node = node;
+    tbb::parallel_for(std::size_t{0}, springs.size(), [&](std::size_t n) {
+        tled::Spring& spring = springs[n];
+        const auto& [stiffness, force] = sums[static_cast<std::size_t>(spring.node)];
+        spring.stiffness = stiffness;
+        spring.target = displacement.col(spring.node) + least_norm_solution(stiffness, force);
+    });
     return springs;
 }
 

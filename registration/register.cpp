@@ -229,13 +229,13 @@ struct Updater::Impl {
     const PreparedModel& prepared;
     UpdateOptions options;
     std::unique_ptr<tled::Engine> solver;
-    std::unique_ptr<detail::DenseEngine> dense;  // where the model has an image of descriptors
+    std::unique_ptr<detail::ImageEngine> dense;  // where the model has an image of descriptors
 
     Impl(const PreparedModel& model, const UpdateOptions& given, Observer& observer)
         : prepared(model), options(given), solver(detail::make_engine(model, given, observer)) {
         const bool described =
             model.image && model.image->blocks.options().similarity == Similarity::SelfSimilarityContext;
-        if (described) dense = detail::make_dense_engine(model, given, observer);
+        if (described) dense = detail::make_image_engine(model, given, observer);
     }
 };
 

@@ -135,9 +135,11 @@ struct MatchKernel {
 };
 
 const std::array<MatchKernel, match_pass_count> match_kernels{{
+    {"match_blur", {}},
     {"match_field", {"match.field"}},
     {"match_grow", {"match.field"}},
     {"match_sample", {"match.field"}},
+    {"match_sample", {"match.still"}},
     {"match_difference", {"match.octahedron"}},
     {"match_mean", {}},
     {"match_distance", {"match.octahedron", "match.patch"}},
@@ -145,6 +147,8 @@ const std::array<MatchKernel, match_pass_count> match_kernels{{
     {"match_erode", {}},
     {"match_describe", {"match.octahedron"}},
     {"match_forces", {}},
+    {"match_look", {"match.block"}},
+    {"match_walk", {"match.block"}},
 }};
 
 }  // namespace
@@ -316,6 +320,7 @@ ProgramSource match_program(MatchPass pass, int descriptor_reach) {
     if (pass == MatchPass::Difference) source.defines["PARTIALS"] = number(match_partials);
     if (pass == MatchPass::Mean) source.defines["WORKGROUP_SIZE"] = std::to_string(match_partials);
     if (pass == MatchPass::Erode) source.defines["DESCRIPTOR_REACH"] = number(descriptor_reach);
+    if (pass == MatchPass::Walk) source.defines["MOST_STEPS"] = number(match_walk_steps);
     if (pass == MatchPass::Forces) {
         source.defines["CELL_SIDE"] = number(match_cell_side);
         source.defines["WORKGROUP_SIZE"] = std::to_string(match_cell_side * match_cell_side * match_cell_side);

@@ -121,9 +121,27 @@ ProgramSource warp_rasterise_program();
 ProgramSource warp_image_program(WarpContinuation continuation, WarpTakes takes);
 ProgramSource warp_field_program(WarpContinuation continuation);
 
-/// Image matching (registration/detail/gpu_dense_force.hpp), in the order of its passes: kernels match_*.comp.
-enum class MatchPass { Field, Grow, Sample, Difference, Mean, Distance, Smooth, Erode, Describe, Forces };
-inline constexpr int match_pass_count = 10;
+/// Image matching (registration/detail/match_device.hpp), in the order of its passes: kernels match_*.comp.
+/// SampleStill reads the fixed image where it lies.
+enum class MatchPass {
+    Blur,
+    Field,
+    Grow,
+    Sample,
+    SampleStill,
+    Difference,
+    Mean,
+    Distance,
+    Smooth,
+    Erode,
+    Describe,
+    Forces,
+    Look,
+    Walk
+};
+inline constexpr int match_pass_count = 14;
+/// Steps downhill of MatchPass::Walk, at most.
+inline constexpr int match_walk_steps = 8;
 /// Workgroups of MatchPass::Difference, and invocations of MatchPass::Mean, which merges what they leave.
 inline constexpr int match_partials = 128;
 /// Voxels along each axis of a cell of forces; its cube is the workgroup of MatchPass::Forces.

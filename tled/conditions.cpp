@@ -2,10 +2,11 @@
 
 #include "core/errors.hpp"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Cholesky>
 
-#include <map>
+#include <algorithm>
 #include <string>
+#include <vector>
 
 namespace tissuewarp::tled {
 
@@ -20,32 +21,35 @@ void require_node(int node, int node_count, const char* what) {
 void require_stiffness(const Spring& spring) {
     const Eigen::Matrix3d& k = spring.stiffness;
     const double size = k.norm();
+    const Eigen::LLT<Eigen::Matrix3d> raised(k + 1e-9 * size * Eigen::Matrix3d::Identity());
     const bool valid = k.allFinite() && spring.target.allFinite() && (k - k.transpose()).norm() <= 1e-9 * size &&
-                       k.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff() >= -1e-9 * size;
+                       (size == 0 || raised.info() == Eigen::Success);
     if (!valid)
         throw InvalidInput("the spring at node " + std::to_string(spring.node) +
                            " needs a finite target and a symmetric positive semi-definite stiffness (mN/mm)");
 }
 
 void sum_springs(const std::vector<Spring>& springs, int node_count, NodalConditions& nodal) {
-    std::map<int, std::pair<Eigen::Matrix3d, Eigen::Vector3d>> sums;
     for (const Spring& spring : springs) {
         require_node(spring.node, node_count, "a spring");
         require_stiffness(spring);
-        auto [entry, fresh] = sums.try_emplace(spring.node, Eigen::Matrix3d::Zero(), Eigen::Vector3d::Zero());
-        entry->second.first += spring.stiffness;
-        entry->second.second += spring.stiffness * spring.target;
+        nodal.spring_node.push_back(spring.node);
     }
-    const auto count = static_cast<Eigen::Index>(sums.size());
-    nodal.spring_stiffness.resize(6, count);
-    nodal.spring_force.resize(3, count);
-    nodal.spring_node.reserve(sums.size());
-    for (const auto& [node, sum] : sums) {
-        const auto column = static_cast<Eigen::Index>(nodal.spring_node.size());
-        const Eigen::Matrix3d& k = sum.first;
-        nodal.spring_stiffness.col(column) << k(0, 0), k(1, 1), k(2, 2), k(0, 1), k(1, 2), k(2, 0);
-        nodal.spring_force.col(column) = sum.second;
-        nodal.spring_node.push_back(node);
+    std::vector<int>& nodes = nodal.spring_node;
+    std::sort(nodes.begin(), nodes.end());
+    nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+    std::vector<Eigen::Index> column_of(static_cast<std::size_t>(node_count));
+    for (std::size_t n = 0; n < nodes.size(); ++n)
+        column_of[static_cast<std::size_t>(nodes[n])] = static_cast<Eigen::Index>(n);
+    nodal.spring_stiffness = Eigen::Matrix<double, 6, Eigen::Dynamic>::Zero(6, static_cast<Eigen::Index>(nodes.size()));
+    nodal.spring_force = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(nodes.size()));
+    for (const Spring& spring : springs) {
+        const Eigen::Index column = column_of[static_cast<std::size_t>(spring.node)];
+        const Eigen::Matrix3d& k = spring.stiffness;
+        Eigen::Matrix<double, 6, 1> entries;
+        entries << k(0, 0), k(1, 1), k(2, 2), k(0, 1), k(1, 2), k(2, 0);
+        nodal.spring_stiffness.col(column) += entries;
+        nodal.spring_force.col(column) += k * spring.target;
     }
 }
 

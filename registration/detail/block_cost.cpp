@@ -11,18 +11,6 @@ namespace {
 constexpr double nowhere = std::numeric_limits<double>::infinity();
 constexpr double full_difference = 255.0 * 255.0 * descriptor_channels;
 
-/// The first of every `stride`-th row, from the edge of the block: as many are left out at its other edge, if it can
-/// be.
-int first_row(const Block& block, int stride) {
-    return 2 * block.radius % stride / 2;
-}
-
-/// Voxels that the rows of a block hold when all are seen.
-double voxels_of(const Block& block, int stride) {
-    const int side = 2 * block.radius + 1, rows = (side + stride - 1) / stride;
-    return double(side) * rows * rows;
-}
-
 Voxel corner(const Voxel& centre, int radius) {
     return {centre[0] - radius, centre[1] - radius, centre[2] - radius};
 }
@@ -57,8 +45,8 @@ double correlation_cost(const MatchingImage& moving, const MatchingImage& fixed,
     CorrelationSums sums;
     const int r = block.radius, first = std::max({-r, -block.centre[0], -at[0]}),
               last = std::min({r, moving.grid.size[0] - 1 - block.centre[0], fixed.grid.size[0] - 1 - at[0]});
-    for (int dk = first_row(block, stride) - r; dk <= r; dk += stride)
-        for (int dj = first_row(block, stride) - r; dj <= r; dj += stride) {
+    for (int dk = first_row(block.radius, stride) - r; dk <= r; dk += stride)
+        for (int dj = first_row(block.radius, stride) - r; dj <= r; dj += stride) {
             const Voxel m{block.centre[0] + first, block.centre[1] + dj, block.centre[2] + dk};
             const Voxel f{at[0] + first, at[1] + dj, at[2] + dk};
             if (!on_grid(moving, m[1], m[2]) || !on_grid(fixed, f[1], f[2])) continue;
@@ -66,7 +54,7 @@ double correlation_cost(const MatchingImage& moving, const MatchingImage& fixed,
             for (int n = first; n <= last; ++n, ++a, ++b)
                 if (moving.seen[a] && fixed.seen[b]) sums.add(moving.values[a], fixed.values[b]);
         }
-    return double(sums.voxels) < std::max(1.0, block.least_share * voxels_of(block, stride)) ? nowhere : sums.cost();
+    return double(sums.voxels) < least_voxels(block.radius, stride, block.least_share) ? nowhere : sums.cost();
 }
 
 }  // namespace
@@ -89,9 +77,9 @@ void BlockCosts::descriptor_costs(CostLattice& lattice, int stride) {
     shown_.cover(block_.centre, block_.radius);
     looked_at_.cover(lattice.centre, block_.radius + lattice.reach);
     const int shifts = lattice.side();
-    const RowComparison comparison{2 * block_.radius + 1, first_row(block_, stride), stride, shifts,
+    const RowComparison comparison{2 * block_.radius + 1, first_row(block_.radius, stride), stride, shifts,
                                    descriptor_channels};
-    const double least = std::max(1.0, block_.least_share * voxels_of(block_, stride));
+    const double least = least_voxels(block_.radius, stride, block_.least_share);
     differences_.resize(static_cast<std::size_t>(shifts));
     voxels_.resize(differences_.size());
     const VoxelRows block = shown_.rows(corner(block_.centre, block_.radius));

@@ -1,13 +1,13 @@
 #pragma once
-/// Block matching in an image whose mask is known.
+/// Block matching by an engine.
 
-#include "registration/detail/matching_image.hpp"
+#include "registration/detail/block_engine.hpp"
 
 namespace tissuewarp::registration::detail {
 
-/// match_blocks() without the making of `fixed`.
-std::vector<BlockMatch> search_blocks(const MatchingTemplate& moving, const SeenImage& fixed,
-                                      const Eigen::Matrix3Xd& predicted, const BlockMatchingOptions& options,
-                                      Observer& observer);
+/// match_blocks() in the image that an engine looks at, whose grid is `fixed`.
+std::vector<BlockMatch> search_blocks(const MatchingTemplate& moving, const imaging::Geometry& fixed,
+                                      BlockEngine& engine, const Eigen::Matrix3Xd& predicted,
+                                      const BlockMatchingOptions& options, Observer& observer);
 
 }  // namespace tissuewarp::registration::detail

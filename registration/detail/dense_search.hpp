@@ -2,7 +2,7 @@
 /// Dense forces of a bare intraoperative volume on a model in some state.
 
 #include "meshing/point_location.hpp"
-#include "registration/detail/dense_engine.hpp"
+#include "registration/detail/image_engine.hpp"
 
 namespace tissuewarp::registration::detail {
 
@@ -14,7 +14,7 @@ struct DenseMatches {
 class DenseSearch {
 public:
     /// `engine` has been made for `prepared` and given the fixed image.
-    DenseSearch(const PreparedModel& prepared, DenseEngine& engine);
+    DenseSearch(const PreparedModel& prepared, ImageEngine& engine);
 
     /// What `known`, found before, and the whole image say about where tissue belongs, on the grid that is `coarsening`
     /// times doubled from the template's finest (or its coarsest): a match for each cell of voxels that has a force,
@@ -25,7 +25,7 @@ public:
 
 private:
     const PreparedModel& prepared_;
-    DenseEngine& engine_;
+    ImageEngine& engine_;
 };
 
 }  // namespace tissuewarp::registration::detail

@@ -1,7 +1,7 @@
 #pragma once
 /// Where the equilibrium and the forces of images are computed.
 
-#include "registration/detail/dense_engine.hpp"
+#include "registration/detail/image_engine.hpp"
 
 namespace tissuewarp::registration::detail {
 
@@ -12,7 +12,7 @@ std::unique_ptr<tled::Engine> make_engine(const PreparedModel& prepared, const U
 
 /// The same of dense forces, for which every hardware GPU is worth while. The model has an image, whose template is
 /// made of self-similarity descriptors.
-std::unique_ptr<DenseEngine> make_dense_engine(const PreparedModel& prepared, const UpdateOptions& options,
+std::unique_ptr<ImageEngine> make_image_engine(const PreparedModel& prepared, const UpdateOptions& options,
                                                Observer& observer);
 
 }  // namespace tissuewarp::registration::detail

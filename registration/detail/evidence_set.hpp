@@ -28,7 +28,7 @@ struct EvidenceSet {
 
     /// `dense` computes the forces of an image; may be null. Throws InvalidInput for data that cannot be used.
     EvidenceSet(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options,
-                DenseEngine* dense);
+                ImageEngine* dense);
 
     /// Labels say where every boundary is, and an image holds what it does not show.
     [[nodiscard]] bool only_points() const { return !labels && !image; }

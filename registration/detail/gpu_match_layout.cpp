@@ -46,11 +46,11 @@ std::vector<std::uint32_t> counting(const MatchingImage& moving, const MatchLayo
 
 }  // namespace
 
-MatchGridBlock match_grid_block(const imaging::Geometry& wide, const imaging::Geometry& fixed, const CellGrid& cells,
-                                const Eigen::Isometry3d& placement) {
+MatchGridBlock match_grid_block(const imaging::Geometry& wide, const imaging::Geometry& fixed,
+                                const std::array<int, 3>& cells, const Eigen::Isometry3d& placement) {
     const Eigen::Matrix3d shift = fixed.point_to_index() * placement.linear(), matrix = shift * wide.index_to_point();
     const Eigen::Vector3d start = fixed.index(placement * wide.origin);
-    MatchGridBlock block{packed(wide.size), packed(fixed.size), packed(cells.centres().size), {}, {}};
+    MatchGridBlock block{packed(wide.size), packed(fixed.size), packed(cells), {}, {}};
     for (std::size_t axis = 0; axis < 3; ++axis) {
         const auto row = static_cast<Eigen::Index>(axis);
         block.to_fixed_index[axis] = packed(matrix.row(row).transpose(), start[row]);

@@ -19,8 +19,8 @@ struct MatchGridBlock {
     Uint4 wide_size, fixed_size, cell_count;
     std::array<Float4, 3> to_fixed_index, shift_to_index;
 };
-MatchGridBlock match_grid_block(const imaging::Geometry& wide, const imaging::Geometry& fixed, const CellGrid& cells,
-                                const Eigen::Isometry3d& placement);
+MatchGridBlock match_grid_block(const imaging::Geometry& wide, const imaging::Geometry& fixed,
+                                const std::array<int, 3>& cells, const Eigen::Isometry3d& placement);
 
 /// An entry of the storage block MatchElements.
 struct MatchElement {

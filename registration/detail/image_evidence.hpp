@@ -11,10 +11,11 @@ namespace tissuewarp::registration::detail {
 
 class ImageEvidence {
 public:
-    /// `prepared.image` is there. `dense` computes forces after the first search; none without it. `energy` (mN mm)
+    /// `prepared.image` is there. `engine` finds blocks, and forces after the first search; without it
+    /// the processor finds blocks, and that is all. `energy` (mN mm)
     /// weighs as much as one standard deviation of a match.
     ImageEvidence(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
-                  DenseEngine* dense, double energy);
+                  ImageEngine* engine, double energy);
 
     /// Finds the blocks about where the model is; the later times, how all of the image is to shift there.
     void search(const State& state, Observer& observer);
@@ -39,7 +40,9 @@ private:
     const ImageOptions& options_;
     FieldOfView view_;  // of `fixed_`
     meshing::PointLocator locator_;
-    double energy_;  // mN mm that one standard deviation of a match weighs
+    double energy_;                            // mN mm that one standard deviation of a match weighs
+    std::unique_ptr<BlockEngine> own_blocks_;  // where no engine was given
+    BlockEngine* block_engine_ = nullptr;
     std::optional<DenseSearch> dense_;
     int searches_done_ = 0;
     struct Located {

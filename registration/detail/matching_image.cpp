@@ -59,8 +59,6 @@ void take_values(const GridSamples& samples, const SearchRegion& region, Matchin
     for (float& value : result.values) value -= mean;
 }
 
-constexpr double smoothing = 0.4;  // voxels of the working grid
-
 MatchingImage described(const GridSamples& samples, const imaging::Geometry& grid, const SearchRegion& region) {
     Descriptors descriptors = self_similarity_context(samples, grid, region);
     return {grid, std::move(descriptors.channels), {}, std::move(descriptors.seen)};
@@ -70,7 +68,7 @@ MatchingImage described(const GridSamples& samples, const imaging::Geometry& gri
 
 MatchingImage matching_image(const Volume& image, const Volume& seen, const imaging::Geometry& grid,
                              const SearchRegion& region, Similarity similarity) {
-    const double sigma = smoothing * grid.spacing[0];
+    const double sigma = working_deviation(grid.spacing[0]);
     const Cut cut(image, seen, grid, GridSamples::rim * grid.spacing[0] + 4 * sigma);
     const GridSamples samples(imaging::smooth(cut.image, sigma), cut.seen, grid, region);
     if (similarity == Similarity::SelfSimilarityContext) return described(samples, grid, region);
@@ -80,7 +78,7 @@ MatchingImage matching_image(const Volume& image, const Volume& seen, const imag
 }
 
 Volume smoothed_for(const Volume& image, const imaging::Geometry& grid) {
-    return imaging::smooth(image, smoothing * grid.spacing[0]);
+    return imaging::smooth(image, working_deviation(grid.spacing[0]));
 }
 
 MatchingImage pulled_back_image(const Volume& image, const Volume& seen, const imaging::Geometry& grid,

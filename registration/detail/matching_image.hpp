@@ -19,12 +19,17 @@ struct MatchingImage {
     }
 };
 
-/// Samples `image` (float32, whose voxels `seen` != 0 count) in a region of `grid`, smoothed by a Gaussian of 0.4 of
-/// its spacing. Voxels whose descriptor reaches beyond what is seen are not seen.
+/// Samples `image` (float32, whose voxels `seen` != 0 count) in a region of `grid`, smoothed for
+/// it. Voxels whose descriptor reaches beyond what is seen are not seen.
 MatchingImage matching_image(const imaging::Volume& image, const imaging::Volume& seen, const imaging::Geometry& grid,
                              const SearchRegion& region, Similarity similarity);
 
-/// An image smoothed by a Gaussian of 0.4 of a working grid's spacing.
+/// Standard deviation (mm) of the Gaussian that smooths an image for a working grid: 0.4 of its spacing.
+constexpr double working_deviation(double spacing_mm) {
+    return 0.4 * spacing_mm;
+}
+
+/// An image so smoothed.
 imaging::Volume smoothed_for(const imaging::Volume& image, const imaging::Geometry& grid);
 
 /// Descriptors of self-similarity of the image that has at each voxel of `grid` what `image` shows where a deformation

@@ -38,6 +38,10 @@
 #define BINDING_MATCH_COUNTS 19
 #define BINDING_MATCH_CELLS 20
 
+// Blocks, of which one image is bound as descriptors and what is shown, the other as moving and what is seen.
+#define BINDING_MATCH_SEARCH 21
+#define BINDING_MATCH_BLOCKS 22
+
 const int match_rim = 8;         // GridSamples::rim
 const int octahedron_radius = 2; // voxels from a voxel to the six neighbours whose patches are compared
 const int patch_radius = 4;      // voxels, where a Gaussian of one voxel has ended

@@ -1,6 +1,9 @@
 /// Dense forces on a device (Mesa's llvmpipe where there is no GPU) against their twin on the processor.
-#include "registration/detail/dense_engine.hpp"
+#include "registration/detail/image_engine.hpp"
 
+#include "core/errors.hpp"
+#include "imaging/filters.hpp"
+#include "registration/detail/block_search.hpp"
 #include "registration/detail/growth.hpp"
 #include "registration/evaluation.hpp"
 #include "tests/registration/textured_phantom.hpp"
@@ -60,9 +63,9 @@ double deviation(const DenseForce& force) {
 /// Both say something in the same cells, where it lies, by how much and how surely; rounding moves a level of eight
 /// bits in a few channels. A displacement read from another element, a rim off by a voxel or a window along the wrong
 /// axis moves the image pulled back by tenths of voxels.
-TEST(DenseEngine, TheDeviceSaysWhatTheProcessorSays) {
+TEST(ImageEngine, TheDeviceSaysWhatTheProcessorSays) {
     const Scene scene;
-    const auto cpu = make_cpu_dense_engine(scene.prepared), gpu = make_gpu_dense_engine(scene.prepared);
+    const auto cpu = make_cpu_image_engine(scene.prepared), gpu = make_gpu_image_engine(scene.prepared);
     cpu->set_fixed(SeenImage(scene.fixed));
     gpu->set_fixed(SeenImage(scene.fixed));
     for (const std::size_t level : {0U, 1U}) {
@@ -84,9 +87,9 @@ TEST(DenseEngine, TheDeviceSaysWhatTheProcessorSays) {
 }
 
 // What an image leaves behind must not reach the next one.
-TEST(DenseEngine, TheDeviceRepeatsItselfAndTakesAnotherImage) {
+TEST(ImageEngine, TheDeviceRepeatsItselfAndTakesAnotherImage) {
     const Scene scene;
-    const auto gpu = make_gpu_dense_engine(scene.prepared);
+    const auto gpu = make_gpu_image_engine(scene.prepared);
     gpu->set_fixed(SeenImage(scene.fixed));
     const DenseForces first = gpu->forces(scene.state, 1);
     Volume still = scene.prepared.image->image;
@@ -100,6 +103,79 @@ TEST(DenseEngine, TheDeviceRepeatsItselfAndTakesAnotherImage) {
         EXPECT_EQ(first.forces[n].shift, again.forces[n].shift);
         EXPECT_EQ(first.forces[n].information, again.forces[n].information);
     }
+}
+
+/// Blocks of a turned and cut image: the same are found, where the processor finds them, and as surely. A row of a
+/// block left out, a walk that stops early or a mask read from another voxel moves matches by voxels, or loses them.
+TEST(ImageEngine, TheDeviceFindsTheBlocksThatTheProcessorFinds) {
+    const Scene scene;
+    const MatchingTemplate& blocks = scene.prepared.image->blocks;
+    const Eigen::Matrix3Xd expected = scene.state.placement * blocks.points();
+    BlockMatchingOptions options;
+    options.rotation = scene.state.placement.linear();
+    options.search_mm = 12;
+    const auto cpu = make_cpu_image_engine(scene.prepared), gpu = make_gpu_image_engine(scene.prepared);
+    const auto& size = scene.fixed.geometry.size;
+    const SeenImage seen(imaging::crop(scene.fixed, {0, 0, 0}, {2 * size[0] / 3, size[1], size[2]}));
+    for (const auto& engine : {&cpu, &gpu}) (*engine)->set_fixed(seen);
+    const auto search = [&](const std::unique_ptr<ImageEngine>& engine) {
+        return search_blocks(blocks, seen.image.geometry, engine->blocks(), expected, options, silent_observer());
+    };
+    const auto by_cpu = search(cpu), by_gpu = search(gpu);
+    ASSERT_GT(by_cpu.size(), 100U);
+    ASSERT_LT(by_cpu.size(), 200U) << "blocks cut off are meant to be missing";
+    ASSERT_EQ(by_gpu.size(), by_cpu.size());
+    std::vector<double> distances;
+    for (std::size_t n = 0; n < by_cpu.size(); ++n) {
+        ASSERT_EQ(by_gpu[n].point, by_cpu[n].point);
+        EXPECT_EQ(by_gpu[n].moving, by_cpu[n].moving);
+        EXPECT_NEAR(by_gpu[n].cost, by_cpu[n].cost, 1e-4);
+        EXPECT_NEAR(by_gpu[n].uniqueness, by_cpu[n].uniqueness, 0.02);
+        EXPECT_NEAR(by_gpu[n].information.norm() / by_cpu[n].information.norm(), 1, 0.05);
+        distances.push_back((by_gpu[n].fixed - by_cpu[n].fixed).norm() / spacing_mm);
+    }
+    EXPECT_LT(summarise(distances).percentile_95, 0.01);
+    EXPECT_LT(summarise(distances).maximum, 0.1);
+}
+
+// Buffers that the larger search of an image before left behind must not show.
+TEST(ImageEngine, TheDeviceLooksForFewerBlocksAsForMany) {
+    const Scene scene;
+    const auto& images = scene.prepared.image->blocks.images();
+    const auto gpu = make_gpu_image_engine(scene.prepared);
+    gpu->set_fixed(SeenImage(scene.prepared.image->image));
+    const imaging::Geometry& grid = images.levels[1].grid;
+    std::vector<SoughtBlock> blocks;
+    for (Eigen::Index n = 0; n < 60; ++n) {
+        const Eigen::Vector3d index = grid.index(images.points.col(n));
+        const Voxel centre{int(std::lround(index[0])), int(std::lround(index[1])), int(std::lround(index[2]))};
+        blocks.push_back({centre, {centre[0] + 1, centre[1] - 2, centre[2]}});
+    }
+    const auto fixed = gpu->blocks().fixed_on(grid, SearchRegion(grid), 1);
+    const auto found = [&](std::size_t first, int reach) {
+        const std::vector<SoughtBlock> some(blocks.begin() + static_cast<std::ptrdiff_t>(first), blocks.end());
+        std::vector<Voxel> result(some.size());
+        fixed->look(some, reach, 0.05, [&](std::size_t n, const BlockSight& sight) {
+            if (sight.back) result[n] = sight.back->centre;
+        });
+        return result;
+    };
+    const auto many = found(0, 6), few = found(40, 3);
+    for (std::size_t n = 0; n < few.size(); ++n) {
+        EXPECT_EQ(few[n], many[40 + n]);
+        EXPECT_EQ(few[n], blocks[40 + n].moving);
+    }
+}
+
+TEST(ImageEngine, RefusesBlocksThatItsSumsDoNotHold) {
+    PreparedModel prepared = textured_model();
+    ImageModelOptions image;
+    image.features.count = 50;
+    image.blocks.grid_spacing_mm = spacing_mm;
+    image.blocks.levels = 1;
+    image.blocks.block_radius = 9;
+    prepare_image(prepared, Volume(prepared.image->image), image);
+    EXPECT_THROW(static_cast<void>(make_gpu_image_engine(prepared)), GpuUnavailable);
 }
 
 // A ball grows by the octahedra of the city-block distance; a front that turns a corner too early or leaves the grid

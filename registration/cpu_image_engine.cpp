@@ -1,4 +1,4 @@
-#include "registration/detail/dense_engine.hpp"
+#include "registration/detail/image_engine.hpp"
 #include "registration/detail/rasterisation.hpp"
 #include "registration/detail/template_images.hpp"
 #include "registration/field.hpp"
@@ -23,11 +23,14 @@ std::vector<std::uint8_t> voxels_in(const meshing::TetMesh& mesh, const imaging:
     return inside;
 }
 
-class CpuDenseEngine : public DenseEngine {
+class CpuImageEngine : public ImageEngine {
 public:
-    explicit CpuDenseEngine(const PreparedModel& prepared) : prepared_(prepared) {}
+    explicit CpuImageEngine(const PreparedModel& prepared) : prepared_(prepared) {}
 
-    void set_fixed(const SeenImage& fixed) override { fixed_ = fixed; }
+    void set_fixed(const SeenImage& fixed) override {
+        fixed_ = fixed;
+        blocks_ = make_cpu_block_engine(prepared_.image->blocks.images(), *fixed_);
+    }
 
     DenseForces forces(const State& state, std::size_t level) override {
         const meshing::TetMesh& mesh = prepared_.model.mesh;
@@ -40,15 +43,18 @@ public:
         return dense_forces(moving, pulled_back, voxels_in(mesh, moving.grid));
     }
 
+    BlockEngine& blocks() override { return *blocks_; }
+
 private:
     const PreparedModel& prepared_;
     std::optional<SeenImage> fixed_;
+    std::unique_ptr<BlockEngine> blocks_;
 };
 
 }  // namespace
 
-std::unique_ptr<DenseEngine> make_cpu_dense_engine(const PreparedModel& prepared) {
-    return std::make_unique<CpuDenseEngine>(prepared);
+std::unique_ptr<ImageEngine> make_cpu_image_engine(const PreparedModel& prepared) {
+    return std::make_unique<CpuImageEngine>(prepared);
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -1,0 +1,153 @@
+#include "registration/detail/match_device.hpp"
+
+#include "core/errors.hpp"
+#include "registration/detail/template_images.hpp"
+
+#include <cstring>
+
+namespace tissuewarp::registration::detail {
+
+using shaders::MatchPass;
+using shaders::Program;
+
+namespace {
+
+void require_limits(const shaders::Device& device) {
+    constexpr int blocks_of_describe = 11;
+    if (device.limits().storage_blocks < blocks_of_describe)
+        throw GpuUnavailable("image matching: " + device.renderer() + " offers " +
+                             std::to_string(device.limits().storage_blocks) +
+                             " storage blocks per shader; it needs 11; take another device or the CPU");
+}
+
+}  // namespace
+
+MatchDevice::Scratch::Scratch(const shaders::Device& device, std::size_t wide)
+    : value(device, wide, "image on the working grid"),
+      seen(device, wide, "what it shows"),
+      smoothed{GpuFloats(device, wide, "smoothed differences"), GpuFloats(device, wide, "smoothed differences")},
+      eroded{GpuWords(device, wide, "what descriptors show"), GpuWords(device, wide, "what descriptors show")},
+      distance{GpuFloats(device, wide, "patch distances"), GpuFloats(device, wide, "patch distances"),
+               GpuFloats(device, wide, "patch distances"), GpuFloats(device, wide, "patch distances"),
+               GpuFloats(device, wide, "patch distances"), GpuFloats(device, wide, "patch distances")} {}
+
+MatchDevice::MatchDevice(int gpu_index)
+    : device_(gpu_index),
+      programs_(device_),
+      grid_(device_, 1, "grids of matching"),
+      partial_(device_, shaders::match_partials, "partial sums of differences"),
+      mean_(device_, 1, "mean difference") {
+    require_limits(device_);
+}
+
+void MatchDevice::set_fixed(const SeenImage& fixed) {
+    fixed_ = fixed.image;
+    const std::size_t voxels = fixed_.voxels.total(), words = (voxels + 3) / 4;
+    reserve(fixed_voxels_, device_, voxels, "fixed image");
+    reserve(blurred_, device_, voxels, "fixed image along one axis");
+    reserve(fixed_seen_, device_, words, "what the fixed image shows");
+    const shaders::CurrentContext current = device_.make_current();
+    fixed_voxels_->upload(std::span(fixed_.data<float>(), voxels));
+    fixed_seen_->write(0, std::as_bytes(std::span(fixed.seen.data<std::uint8_t>(), voxels)));
+    for (auto& [spacing, smoothed] : smoothed_) smoothed.current = false;
+}
+
+const Program& MatchDevice::program(MatchPass pass) {
+    return programs_.get(shaders::match_program(pass, descriptor_reach));
+}
+
+void MatchDevice::run(MatchPass pass, std::size_t invocations, std::initializer_list<const GpuBlocks*> blocks) {
+    const Program& what = program(pass);
+    for (const shaders::StorageBlock& block : what.storage_blocks())
+        for (const GpuBlocks* known : blocks)
+            if (const auto found = known->find(block.name); found != known->end()) found->second->bind(block.binding);
+    what.dispatch(invocations);
+    shaders::storage_barrier();
+}
+
+GpuBlocks MatchDevice::fixed_for(const imaging::Geometry& wide, double spacing, const Eigen::Isometry3d& placement,
+                                 const std::array<int, 3>& cells) {
+    grid_.upload(std::array{match_grid_block(wide, fixed_.geometry, cells, placement)});
+    return {{"MatchGrid", &grid_}, {"MatchFixed", &smoothed_for(spacing)}, {"MatchFixedSeen", &*fixed_seen_}};
+}
+
+const GpuFloats& MatchDevice::smoothed_for(double spacing) {
+    Smoothed& smoothed = smoothed_[spacing];
+    reserve(smoothed.voxels, device_, fixed_.voxels.total(), "smoothed image");
+    if (!smoothed.current) {
+        const double deviation = working_deviation(spacing);
+        blur(0, deviation, *fixed_voxels_, *smoothed.voxels);
+        blur(1, deviation, *smoothed.voxels, *blurred_);
+        blur(2, deviation, *blurred_, *smoothed.voxels);
+        smoothed.current = true;
+    }
+    return *smoothed.voxels;
+}
+
+void MatchDevice::blur(std::uint32_t axis, double deviation_mm, const GpuFloats& from, const GpuFloats& to) {
+    const GpuBlocks own{{"MatchGrid", &grid_}, {"MatchSource", &from}, {"MatchTarget", &to}};
+    program(MatchPass::Blur).set(0, axis);
+    program(MatchPass::Blur)
+        .set(1, static_cast<float>(deviation_mm / fixed_.geometry.spacing[static_cast<Eigen::Index>(axis)]));
+    run(MatchPass::Blur, fixed_.voxels.total(), {&own});
+}
+
+void MatchDevice::reserve_wide(std::size_t voxels) {
+    if (scratch_ && scratch_->value.size() >= voxels) return;
+    scratch_.reset();
+    scratch_.emplace(device_, voxels);
+}
+
+GpuBlocks MatchDevice::samples() const {
+    return {{"MatchValue", &scratch_->value}, {"MatchSeen", &scratch_->seen}};
+}
+
+void MatchDevice::describe(const imaging::Geometry& wide, const GpuWords& words, const GpuWords& shown) {
+    const auto count = static_cast<std::size_t>(wide.voxel_count());
+    Scratch& s = *scratch_;
+    GpuBlocks blocks = samples();
+    blocks["MatchGrid"] = &grid_;
+    blocks["MatchPartial"] = &partial_;
+    blocks["MatchMean"] = &mean_;
+    blocks["MatchDescriptors"] = &words;
+    blocks["MatchShown"] = &shown;
+    for (std::size_t pair = 0; pair < 6; ++pair) blocks["MatchDistance" + std::to_string(pair)] = &s.distance[pair];
+    const auto workgroup = static_cast<std::size_t>(program(MatchPass::Difference).workgroup_size());
+    run(MatchPass::Difference, shaders::match_partials * workgroup, {&blocks});
+    run(MatchPass::Mean, shaders::match_partials, {&blocks});
+    const GpuBlocks differences{{"MatchTarget", &s.smoothed[0]}};
+    for (std::uint32_t pair = 0; pair < 6; ++pair) {
+        program(MatchPass::Distance).set(0, pair);
+        run(MatchPass::Distance, count, {&blocks, &differences});
+        smooth(count, 1, s.smoothed[0], s.smoothed[1]);
+        smooth(count, 2, s.smoothed[1], s.distance[pair]);
+    }
+    erode(count, 0, s.seen, s.eroded[0]);
+    erode(count, 1, s.eroded[0], s.eroded[1]);
+    erode(count, 2, s.eroded[1], s.eroded[0]);
+    const GpuBlocks eroded{{"MatchSeen", &s.eroded[0]}};
+    run(MatchPass::Describe, shown.size(), {&blocks, &eroded});
+}
+
+void MatchDevice::smooth(std::size_t wide, std::uint32_t axis, const GpuFloats& from, const GpuFloats& to) {
+    const GpuBlocks own{{"MatchGrid", &grid_}, {"MatchSource", &from}, {"MatchTarget", &to}};
+    program(MatchPass::Smooth).set(0, axis);
+    run(MatchPass::Smooth, wide, {&own});
+}
+
+void MatchDevice::erode(std::size_t wide, std::uint32_t axis, const GpuWords& from, const GpuWords& to) {
+    const GpuBlocks own{{"MatchGrid", &grid_}, {"MatchMaskSource", &from}, {"MatchMaskTarget", &to}};
+    program(MatchPass::Erode).set(0, axis);
+    run(MatchPass::Erode, wide, {&own});
+}
+
+std::span<const std::byte> MatchDevice::fetch(const shaders::StorageBuffer& source, std::size_t bytes) {
+    if (bytes > readback_bytes_) {
+        readback_.reset();
+        readback_ = std::make_unique<shaders::Readback>(device_, bytes, "results of matching on their way down");
+        readback_bytes_ = bytes;
+    }
+    return readback_->fetch(source, bytes);
+}
+
+}  // namespace tissuewarp::registration::detail

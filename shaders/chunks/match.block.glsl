@@ -1,0 +1,64 @@
+// Gives: blocks of one described image compared with places of another (registration/detail/block_cost.hpp).
+// Needs: match.
+
+/// A cost where too little is seen; costs are 0 to 1.
+const float nowhere = 1e30;
+
+layout(std430, binding = BINDING_MATCH_SEARCH) readonly buffer MatchSearch {
+    ivec4 shown_size, looked_size;  // voxels along i, j, k of the image that shows the blocks, and of that looked at
+    int block_radius;               // voxels
+    int reach;                      // of a first look
+    int look_stride;                // rows of a block from one that it takes to the next
+    int look_first;                 // row
+    float look_least, walk_least;   // voxels that must be seen in both
+    uint block_count;
+    uint unused;
+};
+
+/// Centres of a block and of where it is expected; with them the first of its candidates and their number.
+struct SoughtBlock { ivec4 shown, looked; };
+layout(std430, binding = BINDING_MATCH_BLOCKS) readonly buffer MatchBlocks { SoughtBlock sought[]; };
+
+/// Twelve channels of eight bits a voxel, three words; and which voxels count.
+layout(std430, binding = BINDING_MATCH_MOVING) readonly buffer MatchShownWords { uint shown_word[]; };
+layout(std430, binding = BINDING_MATCH_SEEN) readonly buffer MatchShownSeen { uint shown_seen[]; };
+layout(std430, binding = BINDING_MATCH_DESCRIPTORS) readonly buffer MatchLookedWords { uint looked_word[]; };
+layout(std430, binding = BINDING_MATCH_SHOWN) readonly buffer MatchLookedSeen { uint looked_seen[]; };
+
+/// Of four channels each.
+uint squared_difference(uint a, uint b) {
+    ivec4 d = ivec4(uvec4(a, a >> 8, a >> 16, a >> 24) & 0xffu) - ivec4(uvec4(b, b >> 8, b >> 16, b >> 24) & 0xffu);
+    d *= d;
+    return uint(d.x + d.y + d.z + d.w);
+}
+
+/// Sum and count over the voxels of a row of the block that count in both images.
+uvec2 compare_row(ivec3 shown, ivec3 looked, ivec2 row) {
+    shown.yz += row;
+    looked.yz += row;
+    if (any(lessThan(shown.yz, ivec2(0))) || any(greaterThanEqual(shown.yz, shown_size.yz))) return uvec2(0u);
+    if (any(lessThan(looked.yz, ivec2(0))) || any(greaterThanEqual(looked.yz, looked_size.yz))) return uvec2(0u);
+    int first = max(-block_radius, max(-shown.x, -looked.x));
+    int last = min(block_radius, min(shown_size.x - 1 - shown.x, looked_size.x - 1 - looked.x));
+    int a = shown.x + first + shown_size.x * (shown.y + shown_size.y * shown.z);
+    int b = looked.x + first + looked_size.x * (looked.y + looked_size.y * looked.z);
+    uvec2 sum = uvec2(0u);
+    for (int n = first; n <= last; ++n, ++a, ++b) {
+        if ((shown_seen[a] & looked_seen[b]) == 0u) continue;
+        for (int part = 0; part < 3; ++part)
+            sum.x += squared_difference(shown_word[3 * a + part], looked_word[3 * b + part]);
+        ++sum.y;
+    }
+    return sum;
+}
+
+float cost_of(uvec2 sum, float least) {
+    const float full_difference = 255.0 * 255.0 * 12.0;
+    return float(sum.y) < least ? nowhere : float(sum.x) / (full_difference * float(sum.y));
+}
+
+/// An entry of the cube of places within some reach, i fastest.
+ivec3 place_in_cube(uint n, int cube_reach) {
+    int side = 2 * cube_reach + 1, m = int(n);
+    return ivec3(m % side, m / side % side, m / (side * side)) - cube_reach;
+}

@@ -1,0 +1,87 @@
+// One workgroup per block: from the lowest of its candidates, by all rows, downhill to the lowest of 27 places until that
+// is the place itself; and the costs about it.
+// Needs: index, match, match.block.
+//! define MOST_STEPS
+
+#define CUBE 27u
+#define CENTRE 13u
+
+/// Entries of the cube of places about where a block is expected.
+layout(std430, binding = BINDING_MATCH_SOURCE) readonly buffer MatchCandidates { uint candidate[]; };
+
+/// Where the walk ended, and 1; 0 in place of 1 where it led nowhere.
+struct Walk { ivec4 end; float costs[28]; };
+layout(std430, binding = BINDING_MATCH_TARGET) writeonly buffer MatchWalks { Walk walk[]; };
+
+shared ivec3 place[CUBE];
+shared uint difference[CUBE], voxels[CUBE];
+shared float cost[CUBE];
+
+/// Fills in `cost` of the first `count` places.
+void compare(ivec3 shown, uint count) {
+    uint local = gl_LocalInvocationID.x, side = uint(2 * block_radius + 1), rows = side * side;
+    if (local < CUBE) {
+        difference[local] = 0u;
+        voxels[local] = 0u;
+    }
+    barrier();
+    for (uint n = local; n < count * rows; n += WORKGROUP_SIZE) {
+        uint which = n / rows, row = n - which * rows;
+        uvec2 sum = compare_row(shown, place[which], ivec2(row % side, row / side) - block_radius);
+        if (sum.y == 0u) continue;
+        atomicAdd(difference[which], sum.x);
+        atomicAdd(voxels[which], sum.y);
+    }
+    barrier();
+    if (local < CUBE)
+        cost[local] = local < count ? cost_of(uvec2(difference[local], voxels[local]), walk_least) : nowhere;
+    barrier();
+}
+
+/// The first of the lowest costs.
+uint lowest() {
+    uint least = 0u;
+    for (uint n = 1u; n < CUBE; ++n)
+        if (cost[n] < cost[least]) least = n;
+    return least;
+}
+
+/// The lowest candidate; a single one is not compared.
+bool start(SoughtBlock block, out ivec3 at) {
+    uint first = uint(block.shown.w), count = uint(block.looked.w), local = gl_LocalInvocationID.x;
+    at = block.looked.xyz;
+    if (count == 1u) at += place_in_cube(candidate[first], reach);
+    float least = nowhere;
+    for (uint begin = 0u; begin < count && count > 1u; begin += CUBE) {
+        uint some = min(count - begin, CUBE);
+        if (local < some) place[local] = block.looked.xyz + place_in_cube(candidate[first + begin + local], reach);
+        barrier();
+        compare(block.shown.xyz, some);
+        uint best = lowest();
+        if (cost[best] < least) {
+            least = cost[best];
+            at = place[best];
+        }
+        barrier();
+    }
+    return count == 1u || least < nowhere;
+}
+
+void main() {
+    uint n = invocation_index() / WORKGROUP_SIZE, local = gl_LocalInvocationID.x;
+    if (n >= block_count) return;
+    ivec3 at;
+    bool walking = start(sought[n], at), arrived = false;
+    for (uint step = 0u; step < MOST_STEPS && walking; ++step) {
+        if (local < CUBE) place[local] = at + place_in_cube(local, 1);
+        barrier();
+        compare(sought[n].shown.xyz, CUBE);
+        uint best = lowest();
+        arrived = cost[best] < nowhere && !(cost[best] < cost[CENTRE]);
+        walking = cost[best] < nowhere && !arrived;
+        if (walking) at = place[best];
+        barrier();
+    }
+    if (local == 0u) walk[n].end = ivec4(at, arrived ? 1 : 0);
+    if (local < CUBE) walk[n].costs[local] = cost[local];
+}
