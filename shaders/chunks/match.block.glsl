@@ -38,7 +38,7 @@ uvec2 compare_row(ivec3 shown, ivec3 looked, ivec2 row) {
     looked.yz += row;
     if (any(lessThan(shown.yz, ivec2(0))) || any(greaterThanEqual(shown.yz, shown_size.yz))) return uvec2(0u);
     if (any(lessThan(looked.yz, ivec2(0))) || any(greaterThanEqual(looked.yz, looked_size.yz))) return uvec2(0u);
-    int first = max(-block_radius, max(-shown.x, -looked.x));
+    int first = -min(block_radius, min(shown.x, looked.x));  // docs/decisions/gpu_signs.md
     int last = min(block_radius, min(shown_size.x - 1 - shown.x, looked_size.x - 1 - looked.x));
     int a = shown.x + first + shown_size.x * (shown.y + shown_size.y * shown.z);
     int b = looked.x + first + looked_size.x * (looked.y + looked_size.y * looked.z);
