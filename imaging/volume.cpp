@@ -2,6 +2,8 @@
 
 #include "core/errors.hpp"
 
+#include <tbb/parallel_for.h>
+
 #include <string>
 #include <utility>
 
@@ -27,8 +29,14 @@ Volume::Volume(const Geometry& grid, cv::Mat data) : geometry(grid), voxels(std:
 
 Volume Volume::as(int cv_depth) const {
     if (voxels.depth() == cv_depth) return *this;
-    cv::Mat converted;
-    voxels.convertTo(converted, cv_depth);
+    if (empty()) return {geometry, cv::Mat()};
+    cv::Mat converted(3, voxels.size.p, CV_MAKETYPE(cv_depth, voxels.channels()));
+    const cv::Mat from = voxels.reshape(0, voxels.size[0]);
+    const cv::Mat to = converted.reshape(0, voxels.size[0]);
+    tbb::parallel_for(0, from.rows, [&](int k) {
+        cv::Mat row = to.row(k);
+        from.row(k).convertTo(row, cv_depth);
+    });
     return {geometry, std::move(converted)};
 }
 

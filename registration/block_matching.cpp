@@ -267,12 +267,12 @@ private:
     void predict(const std::vector<BlockMatch>& matches, const std::vector<std::size_t>& searched) {
         const auto neighbours =
             detail::nearest_neighbours(points_, std::vector<int>(searched.begin(), searched.end()), story_.neighbours);
-        detail::ScatteredMotion motion{points_, predicted_ - points_, {}};
-        for (std::size_t n = 0; n < matches.size(); ++n) {
+        detail::ScatteredMotion motion{points_, predicted_ - points_, std::vector<Eigen::Matrix3d>(matches.size())};
+        tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t n) {
             const auto column = static_cast<Eigen::Index>(n);
             if (matches[n].point >= 0) motion.displacements.col(column) = matches[n].fixed - matches[n].moving;
-            motion.weights.push_back(detail::neighbour_weight(matches[n]));
-        }
+            motion.weights[n] = detail::neighbour_weight(matches[n]);
+        });
         tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t n) {
             const auto column = static_cast<Eigen::Index>(n);
             const bool vouched = std::any_of(neighbours[n].begin(), neighbours[n].end(), [&](int other) {

@@ -48,6 +48,7 @@ DenseMatches DenseSearch::matches(const State& state, int coarsening, const std:
             found[n] = as_match(dense.forces[n], mesh, state, *at);
     });
     DenseMatches result{{}, dense.agreement};
+    result.matches.reserve(found.size() + known.size());
     for (const auto& match : found)
         if (match) result.matches.push_back(*match);
     std::copy_if(known.begin(), known.end(), std::back_inserter(result.matches),

@@ -51,8 +51,8 @@ void ImageEvidence::search(const State& state, Observer& observer) {
         use(consistent_matches(block_search(state, observer), options_.consistency));
     } else {
         const int coarsening = options_.dense_coarsening.at(static_cast<std::size_t>(searches_done_ - 1));
-        const DenseMatches found = dense_->matches(state, coarsening, blocks_.matches, locator_);
-        use(found.matches);
+        DenseMatches found = dense_->matches(state, coarsening, blocks_.matches, locator_);
+        use(std::move(found.matches));
         agreement_ = found.agreement;
     }
     ++searches_done_;
@@ -76,21 +76,24 @@ Eigen::Matrix3Xd ImageEvidence::deformed(const Eigen::Matrix3Xd& points, const S
     return state.placement * result;
 }
 
-void ImageEvidence::use(const std::vector<BlockMatch>& matches) {
-    matches_ = located(matches);
+void ImageEvidence::use(std::vector<BlockMatch> matches) {
+    matches_ = located(std::move(matches));
     if (searches_done_ == 0) blocks_ = matches_;
 }
 
-ImageEvidence::Located ImageEvidence::located(const std::vector<BlockMatch>& matches) const {
+ImageEvidence::Located ImageEvidence::located(std::vector<BlockMatch> matches) const {
     std::vector<std::optional<meshing::Location>> places(matches.size());
     tbb::parallel_for(std::size_t{0}, matches.size(),
                       [&](std::size_t n) { places[n] = locate_near(locator_, matches[n].moving); });
     Located result;
+    result.places.reserve(matches.size());
     for (std::size_t n = 0; n < matches.size(); ++n) {
         if (!places[n]) continue;
-        result.matches.push_back(matches[n]);
+        if (result.places.size() < n) matches[result.places.size()] = matches[n];
         result.places.push_back(*places[n]);
     }
+    matches.resize(result.places.size());
+    result.matches = std::move(matches);
     return result;
 }
 
@@ -170,11 +173,11 @@ double ImageEvidence::mean_residual(const std::vector<PulledMatch>& matches) {
 
 Contribution ImageEvidence::contribution(const RoundPlan& plan, const State& state) const {
     const std::vector<PulledMatch> matches = pulled(matches_, state);
-    std::vector<Pull> pulls;
-    for (const PulledMatch& match : matches) {
-        pulls.push_back(match.pull);
-        pulls.back().stiffness *= energy_ * match.confidence * robust_weight(match.residual_mm, plan.scale_mm);
-    }
+    std::vector<Pull> pulls(matches.size());
+    tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t n) {
+        pulls[n] = matches[n].pull;
+        pulls[n].stiffness *= energy_ * matches[n].confidence * robust_weight(matches[n].residual_mm, plan.scale_mm);
+    });
     Contribution result;
     result.candidates =
         std::max(static_cast<int>(prepared_.image->blocks.points().cols()), static_cast<int>(matches.size()));

@@ -11,13 +11,14 @@ namespace {
 
 detail::ScatteredMotion motion_of(const std::vector<BlockMatch>& matches) {
     const auto count = static_cast<Eigen::Index>(matches.size());
-    detail::ScatteredMotion motion{Eigen::Matrix3Xd(3, count), Eigen::Matrix3Xd(3, count), {}};
-    for (Eigen::Index n = 0; n < count; ++n) {
-        const BlockMatch& match = matches[static_cast<std::size_t>(n)];
-        motion.points.col(n) = match.moving;
-        motion.displacements.col(n) = match.fixed - match.moving;
-        motion.weights.push_back(detail::neighbour_weight(match));
-    }
+    detail::ScatteredMotion motion{Eigen::Matrix3Xd(3, count), Eigen::Matrix3Xd(3, count),
+                                   std::vector<Eigen::Matrix3d>(matches.size())};
+    tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t n) {
+        const auto column = static_cast<Eigen::Index>(n);
+        motion.points.col(column) = matches[n].moving;
+        motion.displacements.col(column) = matches[n].fixed - matches[n].moving;
+        motion.weights[n] = detail::neighbour_weight(matches[n]);
+    });
     return motion;
 }
 

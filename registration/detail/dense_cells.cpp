@@ -11,35 +11,55 @@ namespace tissuewarp::registration::detail {
 
 namespace {
 
-constexpr int window_passes = 2;           // of (¼, ½, ¼) along each axis: a window of one cell's deviation
 constexpr double independent_share = 0.2;  // of the voxels: descriptors and what they miss agree with those beside them
 constexpr double least_square = 1.0;       // of a channel's residual, steps of its eight bits
 constexpr double least_deviation = 0.05;   // voxels
 constexpr double leakage = 0.05;           // of the strongest axis: what a plane edge seems to show along itself
 constexpr double most_shift = 1.5;         // voxels
 
-/// Spreads each cell's sums over its window; their total stays, but for what leaves the grid.
-std::vector<CellSums> windowed(const std::vector<CellSums>& sums, const CellGrid& cells) {
-    std::vector<CellSums> from = sums, to(sums.size());
-    for (int pass = 0; pass < window_passes; ++pass)
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            tbb::parallel_for(std::size_t{0}, sums.size(), [&](std::size_t n) {
-                CellSums sum;
-                const auto take = [&](std::ptrdiff_t step, double weight) {
-                    const CellSums& other = from[static_cast<std::size_t>(static_cast<std::ptrdiff_t>(n) + step)];
-                    sum.normal += weight * other.normal;
-                    sum.right += weight * other.right;
-                    sum.squares += weight * other.squares;
-                    sum.voxels += weight * other.voxels;
-                };
-                take(0, 0.5);
-                const int at = cells.cell(n)[axis];
-                if (at > 0) take(-cells.stride(axis), 0.25);
-                if (at + 1 < cells.centres().size[axis]) take(cells.stride(axis), 0.25);
-                to[n] = sum;
-            });
-            from.swap(to);
-        }
+/// What of sums is spread: A (00, 11, 22, 01, 02, 12), b, squares and voxels.
+using Spread = Eigen::Array<double, 11, 1>;
+
+Spread spread_of(const CellSums& sums) {
+    const auto& A = sums.normal;
+    Spread result;
+    result << A(0, 0), A(1, 1), A(2, 2), A(0, 1), A(0, 2), A(1, 2), sums.right, sums.squares, sums.voxels;
+    return result;
+}
+
+CellSums sums_of(const Spread& s) {
+    CellSums result;
+    result.normal << s[0], s[3], s[4], s[3], s[1], s[5], s[4], s[5], s[2];
+    result.right = s.segment<3>(6);
+    result.squares = s[9];
+    result.voxels = s[10];
+    return result;
+}
+
+/// Spreads each cell's sums over a window of one cell's deviation, (1, 4, 6, 4, 1)/16 along each axis; their total
+/// stays, but for what leaves the grid.
+std::vector<Spread> windowed(const std::vector<CellSums>& sums, const CellGrid& cells) {
+    constexpr std::array<double, 3> weights{6.0 / 16, 4.0 / 16, 1.0 / 16};
+    std::vector<Spread> from(sums.size()), to(sums.size());
+    tbb::parallel_for(std::size_t{0}, sums.size(), [&](std::size_t n) { from[n] = spread_of(sums[n]); });
+    const auto& size = cells.centres().size;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        const std::ptrdiff_t stride = cells.stride(axis);
+        tbb::parallel_for(0, size[1] * size[2], [&](int row) {
+            for (int i = 0; i < size[0]; ++i) {
+                const std::ptrdiff_t n = i + cells.stride(1) * row;
+                const int at = std::array{i, row % size[1], row / size[1]}[axis];
+                Spread sum = weights[0] * from[static_cast<std::size_t>(n)];
+                for (int away = 1; away <= 2; ++away) {
+                    const double weight = weights[static_cast<std::size_t>(away)];
+                    if (at >= away) sum += weight * from[static_cast<std::size_t>(n - away * stride)];
+                    if (at + away < size[axis]) sum += weight * from[static_cast<std::size_t>(n + away * stride)];
+                }
+                to[static_cast<std::size_t>(n)] = sum;
+            }
+        });
+        from.swap(to);
+    }
     return from;
 }
 
@@ -96,18 +116,19 @@ CellSums cell_sums(const DescriptorProducts& products, double voxels, const Eige
 }
 
 DenseForces forces_of(const std::vector<CellSums>& own, const CellGrid& cells, const imaging::Geometry& grid) {
-    const std::vector<CellSums> windows = windowed(own, cells);
+    const std::vector<Spread> windows = windowed(own, cells);
     DenseForces result{{}, cells.centres(), std::vector<std::uint8_t>(own.size()), 0};
     std::vector<DenseForce> forces(own.size());
     tbb::parallel_for(std::size_t{0}, own.size(), [&](std::size_t n) {
         if (own[n].voxels < 1) return;
         const Eigen::Vector3d place = grid.point(own[n].index / own[n].voxels);
-        const std::optional<DenseForce> force = solved(windows[n], place, grid);
+        const std::optional<DenseForce> force = solved(sums_of(windows[n]), place, grid);
         if (!force) return;
         forces[n] = *force;
         result.said[n] = 1;
     });
     double common = 0, structure = 0;
+    result.forces.reserve(static_cast<std::size_t>(std::count(result.said.begin(), result.said.end(), 1)));
     for (std::size_t n = 0; n < own.size(); ++n) {
         common += own[n].normal.trace();
         structure += own[n].structure;

@@ -20,7 +20,7 @@ public:
     /// Finds the blocks about where the model is; the later times, how all of the image is to shift there.
     void search(const State& state, Observer& observer);
     /// Takes matches that were found before.
-    void use(const std::vector<BlockMatch>& matches);
+    void use(std::vector<BlockMatch> matches);
     /// The rigid motion that most matches agree on, the rest of them is for the tissue. Where part of the organ is out
     /// of view, a deformation of the part in view would turn it as a whole: then none, unless the headers are far off.
     /// Throws InvalidInput when too few blocks were found.
@@ -62,7 +62,7 @@ private:
         double residual_mm;  // along what the block shows best
     };
     /// Those that lie in the model.
-    [[nodiscard]] Located located(const std::vector<BlockMatch>& matches) const;
+    [[nodiscard]] Located located(std::vector<BlockMatch> matches) const;
     [[nodiscard]] std::vector<PulledMatch> pulled(const Located& located, const State& state) const;
     static double mean_residual(const std::vector<PulledMatch>& matches);
     [[nodiscard]] std::vector<BlockMatch> block_search(const State& state, Observer& observer) const;

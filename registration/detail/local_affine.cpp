@@ -66,16 +66,18 @@ LocalMotion fit_local_affine(const ScatteredMotion& motion, const Eigen::Vector3
     constexpr int concentration_steps = 4;
     const AffineFit fit(motion, point, neighbours);
     const auto kept = static_cast<std::ptrdiff_t>(std::ceil((1 - trimmed_share) * double(neighbours.size())));
-    std::vector<int> used = neighbours;
+    std::vector<int> used = neighbours, before;
     std::vector<std::pair<double, int>> residuals;
     Vector12d affine = fit.solve(used);
     for (int step = 0; step < concentration_steps && kept > 0; ++step) {
         residuals.clear();
         for (const int n : neighbours) residuals.emplace_back(fit.squared_residual(affine, n), n);
         std::nth_element(residuals.begin(), residuals.begin() + (kept - 1), residuals.end());
+        before.swap(used);
         used.clear();
         for (std::ptrdiff_t n = 0; n < kept; ++n) used.push_back(residuals[static_cast<std::size_t>(n)].second);
         std::sort(used.begin(), used.end());
+        if (used == before) break;
         affine = fit.solve(used);
     }
     const auto middle = static_cast<std::ptrdiff_t>(residuals.size() / 2);

@@ -3,7 +3,10 @@
 #include "core/errors.hpp"
 #include "imaging/labels.hpp"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <string>
 
@@ -33,7 +36,12 @@ Geometry grid_over(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper, c
 void require_finite(const Volume& image, const char* name) {
     if (image.empty() || image.channels() != 1)
         throw InvalidInput(std::string(name) + " is empty or a field of vectors; give a scalar volume");
-    if (!cv::checkRange(image.voxels.reshape(1, image.geometry.size[2])))
+    const cv::Mat rows = image.voxels.reshape(1, image.geometry.size[2]);
+    std::atomic<bool> finite = true;
+    tbb::parallel_for(0, rows.rows, [&](int k) {
+        if (!cv::checkRange(rows.row(k))) finite = false;
+    });
+    if (!finite)
         throw InvalidInput(std::string(name) + " has voxels that are not finite; replace them, or cut them off");
 }
 

@@ -22,19 +22,24 @@ double dot(const Matrix3Xd& a, const Matrix3Xd& b) {
     return a.cwiseProduct(b).sum();
 }
 
+/// In the inner product of D.
+double dot(const Matrix3Xd& a, const Matrix3Xd& D, const Matrix3Xd& b) {
+    return (a.array() * D.array() * b.array()).sum();
+}
+
 /// Directions of length 1 that are orthogonal in the inner product of D; those that depend on others are left out.
 std::vector<Direction> orthonormal(std::vector<Direction> directions, const Matrix3Xd& D) {
     constexpr double dependent = 1e-6;
     std::vector<Direction> result;
     for (Direction& d : directions) {
-        const double before = std::sqrt(dot(d.x, D.cwiseProduct(d.x)));
+        const double before = std::sqrt(dot(d.x, D, d.x));
         for (int pass = 0; pass < 2; ++pass)
             for (const Direction& other : result) {
-                const double share = dot(other.x, D.cwiseProduct(d.x));
+                const double share = dot(other.x, D, d.x);
                 d.x -= share * other.x;
                 d.Kx -= share * other.Kx;
             }
-        const double length = std::sqrt(dot(d.x, D.cwiseProduct(d.x)));
+        const double length = std::sqrt(dot(d.x, D, d.x));
         if (!(length > dependent * before)) continue;
         d.x /= length;
         d.Kx /= length;
@@ -70,8 +75,8 @@ Direction combined(const std::vector<Direction>& basis, const VectorXd& weights)
 }  // namespace
 
 double lowest_mode(const Product& multiply_K, const Matrix3Xd& D, const Matrix3Xd& start) {
-    constexpr int most_steps = 1000, window = 5;
-    constexpr double least_gain = 0.01;
+    constexpr int most_steps = 1000, window = 4;
+    constexpr double least_gain = 0.04;
     std::vector<Direction> basis = orthonormal({{start, multiply_K(start)}}, D);
     Direction mode = basis.front(), last;
     RitzPair lowest = lowest_in(basis);

@@ -1,6 +1,7 @@
 #include "tled/detail/smooth_space.hpp"
 
 #include "core/errors.hpp"
+#include "tled/detail/parallel_pair.hpp"
 #include "tled/detail/springs.hpp"
 
 #include <algorithm>
@@ -63,18 +64,22 @@ private:
     std::vector<Eigen::Matrix<double, 24, 24>> of_cell_;
 };
 
-}  // namespace
-
-CholmodFactor smooth_factor(BlockRows K) {
+/// The lower triangle, with a hold.
+Eigen::SparseMatrix<double> held_lower(BlockRows K) {
     for (int p = 0; p < K.rows(); ++p) {
         Matrix3d& block = K.diagonal(p);
         for (int c = 0; c < 3; ++c) block(c, c) = block(c, c) > 0 ? (1 + hold) * block(c, c) : 1.0;
     }
-    const std::vector<int> index = all_unknowns(K);
-    std::vector<int> node_of;
-    for (const int d : index) node_of.push_back(d / 3);
-    const Eigen::SparseMatrix<double> lower = scalar_matrix(K, index, Triangle::Lower);
-    CholmodFactor factor(lower, node_of);
+    return scalar_matrix(K, all_unknowns(K), Triangle::Lower);
+}
+
+CholmodFactor analysed(const Eigen::SparseMatrix<double>& lower) {
+    std::vector<int> node_of(static_cast<std::size_t>(lower.rows()));
+    for (std::size_t d = 0; d < node_of.size(); ++d) node_of[d] = static_cast<int>(d) / 3;
+    return {lower, node_of};
+}
+
+CholmodFactor factorised(CholmodFactor factor, const Eigen::SparseMatrix<double>& lower) {
     if (!factor.factorize(lower))
         throw InvalidInput(
             "the stiffness at rest is not positive definite: springs and prescribed displacements hold the tissue too "
@@ -82,11 +87,19 @@ CholmodFactor smooth_factor(BlockRows K) {
     return factor;
 }
 
+}  // namespace
+
+CholmodFactor smooth_factor(BlockRows K) {
+    const Eigen::SparseMatrix<double> lower = held_lower(std::move(K));
+    return factorised(analysed(lower), lower);
+}
+
 SmoothSpace::SmoothSpace(const BlockRows& elastic, const Matrix3Xd& position,
                          const Eigen::Matrix<bool, 3, Eigen::Dynamic>& constrained)
     : lattice_(lattice_about(position, cells_for(position.cols()))),
       constrained_(constrained),
-      elastic_(galerkin(lattice_, elastic)) {}
+      elastic_(galerkin(lattice_, elastic)),
+      analysis_(analysed(held_lower(elastic_))) {}
 
 Matrix3Xd SmoothSpace::slowest(const NodalConditions& springs, const Matrix3Xd& D) const {
     constexpr int iterations = 10;
@@ -96,14 +109,20 @@ Matrix3Xd SmoothSpace::slowest(const NodalConditions& springs, const Matrix3Xd& 
     };
     BlockRows K = elastic_, M = elastic_;
     NodeBlocks held(lattice_), mass(lattice_);
-    for (int s = 0; s < static_cast<int>(springs.spring_node.size()); ++s)
-        held.add(springs.spring_node[s], free(springs.spring_node[s], spring_matrix(springs, s)));
-    for (int i = 0; i < static_cast<int>(D.cols()); ++i) mass.add(i, free(i, D.col(i).asDiagonal()));
+    parallel_pair(
+        [&] {
+            for (int s = 0; s < static_cast<int>(springs.spring_node.size()); ++s)
+                held.add(springs.spring_node[s], free(springs.spring_node[s], spring_matrix(springs, s)));
+        },
+        [&] {
+            for (int i = 0; i < static_cast<int>(D.cols()); ++i) mass.add(i, free(i, D.col(i).asDiagonal()));
+        });
     held.add_to(K);
     std::fill(M.block.begin(), M.block.end(), Matrix3d::Zero());
     mass.add_to(M);
 
-    const CholmodFactor factor = smooth_factor(std::move(K));
+    const Eigen::SparseMatrix<double> lower = held_lower(std::move(K));
+    const CholmodFactor factor = factorised(analysis_.analysis(), lower);
     const Eigen::SparseMatrix<double> D_smooth = scalar_matrix(M, all_unknowns(M), Triangle::Full);
     VectorXd x(D_smooth.cols());
     for (Eigen::Index i = 0; i < x.size(); ++i) x[i] = 1.0 + 0.5 * std::sin(0.7 * static_cast<double>(i));

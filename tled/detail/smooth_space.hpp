@@ -26,7 +26,8 @@ public:
 private:
     Lattice lattice_;
     Eigen::Matrix<bool, 3, Eigen::Dynamic> constrained_;
-    BlockRows elastic_;  // Pᵀ K₀ P
+    BlockRows elastic_;       // Pᵀ K₀ P
+    CholmodFactor analysis_;  // of its pattern, without numbers
 };
 
 }  // namespace tissuewarp::tled::detail
