@@ -3,60 +3,87 @@
 
 #include <tbb/parallel_for.h>
 
+#include <memory>
+
 namespace tissuewarp::registration::detail {
 
 using imaging::Volume;
 
 namespace {
 
-/// to(n) = combine(n, before, after) for every voxel n and its neighbours along an axis, borders replicated.
-template <class Combine>
-void along_axis(const Volume& image, std::size_t axis, std::uint8_t* to, const Combine& combine) {
+using Bytes = std::unique_ptr<std::uint8_t[]>;
+
+/// Rows of a volume and their neighbours along an axis, borders replicated: calls visit(first, count, before, after)
+/// for runs of voxels whose neighbours lie at the same distances.
+template <class Visit>
+void along_axis(const Volume& image, std::size_t axis, const Visit& visit) {
     const auto& size = image.geometry.size;
     const std::array<std::ptrdiff_t, 3> strides{1, size[0], std::ptrdiff_t{size[0]} * size[1]};
-    const std::ptrdiff_t stride = strides[axis];
     tbb::parallel_for(0, size[2], [&](int k) {
         for (int j = 0; j < size[1]; ++j) {
-            const std::ptrdiff_t row = image.offset(0, j, k);
-            const int at = axis == 1 ? j : k;
-            const auto run = [&](int first, int last, std::ptrdiff_t before, std::ptrdiff_t after) {
-                for (std::ptrdiff_t n = row + first; n < row + last; ++n)
-                    to[n] = static_cast<std::uint8_t>(combine(n, n + before, n + after));
-            };
+            const std::ptrdiff_t row = image.offset(0, j, k), width = size[0];
             if (axis > 0) {
-                run(0, size[0], at > 0 ? -stride : 0, at + 1 < size[axis] ? stride : 0);
+                const int at = axis == 1 ? j : k;
+                visit(row, width, at > 0 ? -strides[axis] : 0, at + 1 < size[axis] ? strides[axis] : 0);
                 continue;
             }
-            run(0, 1, 0, size[0] > 1 ? 1 : 0);
-            run(1, size[0] - 1, -1, 1);
-            if (size[0] > 1) run(size[0] - 1, size[0], -1, 0);
+            visit(row, 1, 0, width > 1 ? 1 : 0);
+            if (width > 2) visit(row + 1, width - 2, -1, 1);
+            if (width > 1) visit(row + width - 1, 1, -1, 0);
         }
+    });
+}
+
+/// to = from of three voxels, or the values of the middle one and one beside it differ.
+void differ(const Volume& image, std::size_t axis, const std::uint8_t* from, std::uint8_t* __restrict to) {
+    const float* value = image.data<float>();
+    along_axis(image, axis,
+               [&](std::ptrdiff_t first, std::ptrdiff_t count, std::ptrdiff_t before, std::ptrdiff_t after) {
+                   const float* const v = value + first;
+                   const std::uint8_t* const f = from + first;
+                   std::uint8_t* __restrict const t = to + first;
+                   for (std::ptrdiff_t n = 0; n < count; ++n)
+                       t[n] = static_cast<std::uint8_t>(f[n + before] | f[n] | f[n + after] | (v[n + before] != v[n]) |
+                                                        (v[n + after] != v[n]));
+               });
+}
+
+/// to = all three voxels.
+void all(const Volume& image, std::size_t axis, const std::uint8_t* from, std::uint8_t* __restrict to) {
+    along_axis(image, axis,
+               [&](std::ptrdiff_t first, std::ptrdiff_t count, std::ptrdiff_t before, std::ptrdiff_t after) {
+                   const std::uint8_t* const f = from + first;
+                   std::uint8_t* __restrict const t = to + first;
+                   for (std::ptrdiff_t n = 0; n < count; ++n)
+                       t[n] = static_cast<std::uint8_t>(f[n + before] & f[n] & f[n + after]);
+               });
+}
+
+/// to = the voxel beside one along i has another value: where nothing is known before.
+void differ_along_i(const Volume& image, std::uint8_t* __restrict to) {
+    const float* value = image.data<float>();
+    along_axis(image, 0, [&](std::ptrdiff_t first, std::ptrdiff_t count, std::ptrdiff_t before, std::ptrdiff_t after) {
+        const float* const v = value + first;
+        std::uint8_t* __restrict const t = to + first;
+        for (std::ptrdiff_t n = 0; n < count; ++n)
+            t[n] = static_cast<std::uint8_t>((v[n + before] != v[n]) | (v[n + after] != v[n]));
     });
 }
 
 }  // namespace
 
 Volume seen_region(const Volume& image) {
-    const float* value = image.data<float>();
+    const auto voxels = static_cast<std::size_t>(image.geometry.voxel_count());
+    const Bytes one = std::make_unique_for_overwrite<std::uint8_t[]>(voxels),
+                other = std::make_unique_for_overwrite<std::uint8_t[]>(voxels);
     Volume seen(image.geometry, CV_8UC1);
-    std::vector<std::uint8_t> first(static_cast<std::size_t>(image.geometry.voxel_count())), second(first.size());
     // A cube is of one value when its three slices are, and their centres agree.
-    const auto differ = [&](std::size_t axis, const std::uint8_t* from, std::uint8_t* to) {
-        along_axis(image, axis, to, [=](std::ptrdiff_t n, std::ptrdiff_t before, std::ptrdiff_t after) {
-            return from[before] | from[n] | from[after] | (value[before] != value[n]) | (value[after] != value[n]);
-        });
-    };
-    const auto all = [&](std::size_t axis, const std::uint8_t* from, std::uint8_t* to) {
-        along_axis(image, axis, to, [=](std::ptrdiff_t n, std::ptrdiff_t before, std::ptrdiff_t after) {
-            return from[before] & from[n] & from[after];
-        });
-    };
-    differ(0, first.data(), second.data());
-    differ(1, second.data(), first.data());
-    differ(2, first.data(), second.data());
-    all(0, second.data(), first.data());
-    all(1, first.data(), second.data());
-    all(2, second.data(), seen.data<std::uint8_t>());
+    differ_along_i(image, one.get());
+    differ(image, 1, one.get(), other.get());
+    differ(image, 2, other.get(), one.get());
+    all(image, 0, one.get(), other.get());
+    all(image, 1, other.get(), one.get());
+    all(image, 2, one.get(), seen.data<std::uint8_t>());
     return seen;
 }
 

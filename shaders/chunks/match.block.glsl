@@ -32,24 +32,25 @@ uint squared_difference(uint a, uint b) {
     return uint(d.x + d.y + d.z + d.w);
 }
 
-/// Sum and count over the voxels of a row of the block that count in both images.
-uvec2 compare_row(ivec3 shown, ivec3 looked, ivec2 row) {
+/// Offsets of a row of the block in both images, of the voxel in its middle; and whether it lies on both grids.
+struct RowPair {
+    int shown, looked;  // offsets of the row's middle
+    bool on_grids;
+};
+
+RowPair row_pair(ivec3 shown, ivec3 looked, ivec2 row) {
     shown.yz += row;
     looked.yz += row;
-    if (any(lessThan(shown.yz, ivec2(0))) || any(greaterThanEqual(shown.yz, shown_size.yz))) return uvec2(0u);
-    if (any(lessThan(looked.yz, ivec2(0))) || any(greaterThanEqual(looked.yz, looked_size.yz))) return uvec2(0u);
-    int first = -min(block_radius, min(shown.x, looked.x));  // docs/decisions/gpu_signs.md
-    int last = min(block_radius, min(shown_size.x - 1 - shown.x, looked_size.x - 1 - looked.x));
-    int a = shown.x + first + shown_size.x * (shown.y + shown_size.y * shown.z);
-    int b = looked.x + first + looked_size.x * (looked.y + looked_size.y * looked.z);
-    uvec2 sum = uvec2(0u);
-    for (int n = first; n <= last; ++n, ++a, ++b) {
-        if ((shown_seen[a] & looked_seen[b]) == 0u) continue;
-        for (int part = 0; part < 3; ++part)
-            sum.x += squared_difference(shown_word[3 * a + part], looked_word[3 * b + part]);
-        ++sum.y;
-    }
-    return sum;
+    bool off = any(lessThan(shown.yz, ivec2(0))) || any(greaterThanEqual(shown.yz, shown_size.yz)) ||
+               any(lessThan(looked.yz, ivec2(0))) || any(greaterThanEqual(looked.yz, looked_size.yz));
+    return RowPair(shown.x + shown_size.x * (shown.y + shown_size.y * shown.z),
+                   looked.x + looked_size.x * (looked.y + looked_size.y * looked.z), !off);
+}
+
+/// Steps along i that stay in the block and on both grids: first and last.
+ivec2 steps_of(ivec3 shown, ivec3 looked) {
+    return ivec2(-min(block_radius, min(shown.x, looked.x)),  // docs/decisions/gpu_signs.md
+                 min(block_radius, min(shown_size.x - 1 - shown.x, looked_size.x - 1 - looked.x)));
 }
 
 float cost_of(uvec2 sum, float least) {

@@ -5,6 +5,7 @@
 
 #define CUBE 27u
 #define CENTRE 13u
+#define LANES 32u
 
 /// Entries of the cube of places about where a block is expected.
 layout(std430, binding = BINDING_MATCH_SOURCE) readonly buffer MatchCandidates { uint candidate[]; };
@@ -17,21 +18,40 @@ shared ivec3 place[CUBE];
 shared uint difference[CUBE], voxels[CUBE];
 shared float cost[CUBE];
 
-/// Fills in `cost` of the first `count` places.
+/// Sum and count of a place over a word of every voxel in a column of the block's rows: `word` counts the words of a
+/// row, three a voxel, of which the first counts the voxel.
+uvec2 compare_words(ivec3 shown, ivec3 looked, int word) {
+    ivec2 steps = steps_of(shown, looked);
+    int x = word / 3 - block_radius, part = word % 3;
+    uvec2 sum = uvec2(0u);
+    if (x < steps.x || x > steps.y) return sum;
+    for (int dk = -block_radius; dk <= block_radius; ++dk)
+        for (int dj = -block_radius; dj <= block_radius; ++dj) {
+            RowPair row = row_pair(shown, looked, ivec2(dj, dk));
+            if (!row.on_grids) continue;
+            int a = row.shown + x, b = row.looked + x;
+            if ((shown_seen[a] & looked_seen[b]) == 0u) continue;
+            sum += uvec2(squared_difference(shown_word[3 * a + part], looked_word[3 * b + part]), part == 0 ? 1u : 0u);
+        }
+    return sum;
+}
+
+/// Fills in `cost` of the first `count` places: LANES invocations side by side read a row's words, which lie side by
+/// side.
 void compare(ivec3 shown, uint count) {
-    uint local = gl_LocalInvocationID.x, side = uint(2 * block_radius + 1), rows = side * side;
+    uint local = gl_LocalInvocationID.x;
     if (local < CUBE) {
         difference[local] = 0u;
         voxels[local] = 0u;
     }
     barrier();
-    for (uint n = local; n < count * rows; n += WORKGROUP_SIZE) {
-        uint which = n / rows, row = n - which * rows;
-        uvec2 sum = compare_row(shown, place[which], ivec2(row % side, row / side) - block_radius);
-        if (sum.y == 0u) continue;
-        atomicAdd(difference[which], sum.x);
-        atomicAdd(voxels[which], sum.y);
-    }
+    uint words = uint(3 * (2 * block_radius + 1));
+    for (uint which = local / LANES; which < count; which += WORKGROUP_SIZE / LANES)
+        for (uint word = local % LANES; word < words; word += LANES) {
+            uvec2 sum = compare_words(shown, place[which], int(word));
+            atomicAdd(difference[which], sum.x);
+            atomicAdd(voxels[which], sum.y);
+        }
     barrier();
     if (local < CUBE)
         cost[local] = local < count ? cost_of(uvec2(difference[local], voxels[local]), walk_least) : nowhere;
