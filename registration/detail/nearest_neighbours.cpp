@@ -1,6 +1,7 @@
 #include "registration/detail/local_affine.hpp"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <numeric>
@@ -19,15 +20,17 @@ public:
     /// The nearest others of a column, by distance and then by index.
     [[nodiscard]] std::vector<int> nearest(int column, std::size_t count) const {
         Search search{points_.col(column), column, count, {}};
+        search.found.reserve(count);
         if (count > 0) gather(search, 0, order_.size(), 0);
         std::sort_heap(search.found.begin(), search.found.end());
         std::vector<int> result;
+        result.reserve(search.found.size());
         for (const auto& [distance, other] : search.found) result.push_back(other);
         return result;
     }
 
 private:
-    static constexpr std::size_t leaf = 8;
+    static constexpr std::size_t leaf = 8, worth_a_thread = 500;
     const Eigen::Matrix3Xd& points_;
     std::vector<int> order_;
 
@@ -44,8 +47,15 @@ private:
         const auto at = [&](std::size_t n) { return order_.begin() + static_cast<std::ptrdiff_t>(n); };
         std::nth_element(at(first), at(middle), at(last),
                          [&](int a, int b) { return points_(axis, a) < points_(axis, b); });
-        build(first, middle, (axis + 1) % 3);
-        build(middle + 1, last, (axis + 1) % 3);
+        const int next = (axis + 1) % 3;
+        const auto below = [&] { build(first, middle, next); };
+        const auto above = [&] { build(middle + 1, last, next); };
+        if (last - first > worth_a_thread) {
+            tbb::parallel_invoke(below, above);
+            return;
+        }
+        below();
+        above();
     }
 
     void offer(Search& search, std::size_t n) const {
