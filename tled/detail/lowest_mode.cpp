@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -18,56 +19,54 @@ struct Direction {
     Matrix3Xd x, Kx;
 };
 
-double dot(const Matrix3Xd& a, const Matrix3Xd& b) {
-    return a.cwiseProduct(b).sum();
-}
+/// xᵀ K x and xᵀ D x of directions.
+struct InnerProducts {
+    MatrixXd K, D;
+};
 
-/// In the inner product of D.
-double dot(const Matrix3Xd& a, const Matrix3Xd& D, const Matrix3Xd& b) {
-    return (a.array() * D.array() * b.array()).sum();
-}
-
-/// Directions of length 1 that are orthogonal in the inner product of D; those that depend on others are left out.
-std::vector<Direction> orthonormal(std::vector<Direction> directions, const Matrix3Xd& D) {
-    constexpr double dependent = 1e-6;
-    std::vector<Direction> result;
-    for (Direction& d : directions) {
-        const double before = std::sqrt(dot(d.x, D, d.x));
-        for (int pass = 0; pass < 2; ++pass)
-            for (const Direction& other : result) {
-                const double share = dot(other.x, D, d.x);
-                d.x -= share * other.x;
-                d.Kx -= share * other.Kx;
+/// In pieces that stay in the cache: large vectors are read once for all products.
+InnerProducts inner_products(const std::vector<Direction>& directions, const Matrix3Xd& D) {
+    constexpr Eigen::Index piece = 512;
+    const auto count = static_cast<Eigen::Index>(directions.size());
+    InnerProducts sum{MatrixXd::Zero(count, count), MatrixXd::Zero(count, count)};
+    for (Eigen::Index first = 0; first < D.size(); first += piece) {
+        const Eigen::Index size = std::min(piece, D.size() - first);
+        const auto part = [&](const Matrix3Xd& x) { return Eigen::Map<const VectorXd>(x.data() + first, size); };
+        for (Eigen::Index i = 0; i < count; ++i) {
+            const VectorXd weighted = part(D).cwiseProduct(part(directions[i].x));
+            for (Eigen::Index j = 0; j <= i; ++j) {
+                sum.D(i, j) += weighted.dot(part(directions[j].x));
+                sum.K(i, j) += part(directions[i].Kx).dot(part(directions[j].x));
             }
-        const double length = std::sqrt(dot(d.x, D, d.x));
-        if (!(length > dependent * before)) continue;
-        d.x /= length;
-        d.Kx /= length;
-        result.push_back(std::move(d));
+        }
     }
-    return result;
+    sum.K = sum.K.selfadjointView<Eigen::Lower>();
+    sum.D = sum.D.selfadjointView<Eigen::Lower>();
+    return sum;
 }
 
 struct RitzPair {
     double value;
-    VectorXd weights;
+    VectorXd weights;  // of the directions, for a vector of length 1 in the inner product of D
 };
 
-/// The lowest in the span of orthonormal directions.
-RitzPair lowest_in(const std::vector<Direction>& basis) {
-    const auto size = static_cast<Eigen::Index>(basis.size());
-    MatrixXd K(size, size);
-    for (Eigen::Index i = 0; i < size; ++i)
-        for (Eigen::Index j = 0; j <= i; ++j) K(i, j) = K(j, i) = dot(basis[i].x, basis[j].Kx);
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> ritz(K);
-    return {ritz.eigenvalues()[0], ritz.eigenvectors().col(0)};
+/// The lowest in a span. What of it depends on the rest, to a millionth of its length, is left out.
+RitzPair lowest_in(const InnerProducts& products) {
+    constexpr double dependent = 1e-12;
+    const VectorXd scale = products.D.diagonal().cwiseSqrt().cwiseInverse();
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> span(scale.asDiagonal() * products.D * scale.asDiagonal());
+    const Eigen::Index left_out = (span.eigenvalues().array() < dependent).count(), kept = scale.size() - left_out;
+    const MatrixXd basis = scale.asDiagonal() * span.eigenvectors().rightCols(kept) *
+                           span.eigenvalues().tail(kept).cwiseSqrt().cwiseInverse().asDiagonal();
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> ritz(basis.transpose() * products.K * basis);
+    return {ritz.eigenvalues()[0], basis * ritz.eigenvectors().col(0)};
 }
 
-Direction combined(const std::vector<Direction>& basis, const VectorXd& weights) {
-    Direction sum{weights[0] * basis[0].x, weights[0] * basis[0].Kx};
-    for (std::size_t k = 1; k < basis.size(); ++k) {
-        sum.x += weights[static_cast<Eigen::Index>(k)] * basis[k].x;
-        sum.Kx += weights[static_cast<Eigen::Index>(k)] * basis[k].Kx;
+Direction combined(const std::vector<Direction>& directions, const VectorXd& weights) {
+    Direction sum{weights[0] * directions[0].x, weights[0] * directions[0].Kx};
+    for (std::size_t k = 1; k < directions.size(); ++k) {
+        sum.x += weights[static_cast<Eigen::Index>(k)] * directions[k].x;
+        sum.Kx += weights[static_cast<Eigen::Index>(k)] * directions[k].Kx;
     }
     return sum;
 }
@@ -77,20 +76,20 @@ Direction combined(const std::vector<Direction>& basis, const VectorXd& weights)
 double lowest_mode(const Product& multiply_K, const Matrix3Xd& D, const Matrix3Xd& start) {
     constexpr int most_steps = 1000, window = 4;
     constexpr double least_gain = 0.04;
-    std::vector<Direction> basis = orthonormal({{start, multiply_K(start)}}, D);
-    Direction mode = basis.front(), last;
-    RitzPair lowest = lowest_in(basis);
+    std::vector<Direction> directions{{start, multiply_K(start)}};
+    RitzPair lowest = lowest_in(inner_products(directions, D));
+    Direction mode = combined(directions, lowest.weights), last;
     double before = lowest.value;
     for (int step = 1; step <= most_steps; ++step) {
         const Matrix3Xd downhill = mode.Kx.cwiseQuotient(D) - lowest.value * mode.x;
-        std::vector<Direction> directions{mode, {downhill, multiply_K(downhill)}};
-        if (last.x.size() > 0) directions.push_back(std::move(last));
-        basis = orthonormal(std::move(directions), D);
-        lowest = lowest_in(basis);
-        mode = combined(basis, lowest.weights);
+        if (downhill.isZero(0)) break;
+        directions = {std::move(mode), {downhill, multiply_K(downhill)}};
+        if (last.x.size() > 0 && !last.x.isZero(0)) directions.push_back(std::move(last));
+        lowest = lowest_in(inner_products(directions, D));
+        mode = combined(directions, lowest.weights);
         VectorXd onward = lowest.weights;
         onward[0] = 0;
-        last = combined(basis, onward);
+        last = combined(directions, onward);
         if (step % window != 0) continue;
         if (lowest.value > (1 - least_gain) * before) break;
         before = lowest.value;
