@@ -37,22 +37,23 @@ BlockMatch as_match(const DenseForce& force, const meshing::TetMesh& mesh, const
 
 DenseSearch::DenseSearch(const PreparedModel& prepared, ImageEngine& engine) : prepared_(prepared), engine_(engine) {}
 
-DenseMatches DenseSearch::matches(const State& state, int coarsening, const std::vector<BlockMatch>& known,
+DenseMatches DenseSearch::matches(const State& state, int coarsening, const LocatedMatches& known,
                                   const meshing::PointLocator& locator) const {
     const meshing::TetMesh& mesh = prepared_.model.mesh;
     const int finest = prepared_.image->blocks.options().levels - 1;
     const DenseForces dense = engine_.forces(state, static_cast<std::size_t>(std::max(0, finest - coarsening)));
-    std::vector<std::optional<BlockMatch>> found(dense.forces.size());
-    tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t n) {
-        if (const auto at = locate_near(locator, dense.forces[n].place))
-            found[n] = as_match(dense.forces[n], mesh, state, *at);
+    std::vector<std::optional<meshing::Location>> places(dense.forces.size());
+    std::vector<BlockMatch> matches(places.size());
+    tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t n) {
+        places[n] = locate_near(locator, dense.forces[n].place);
+        if (places[n]) matches[n] = as_match(dense.forces[n], mesh, state, *places[n]);
     });
     DenseMatches result{{}, dense.agreement};
-    result.matches.reserve(found.size() + known.size());
-    for (const auto& match : found)
-        if (match) result.matches.push_back(*match);
-    std::copy_if(known.begin(), known.end(), std::back_inserter(result.matches),
-                 [&](const BlockMatch& match) { return !dense.say_something_at(match.moving); });
+    result.found.reserve(places.size() + known.matches.size());
+    for (std::size_t n = 0; n < places.size(); ++n)
+        if (places[n]) result.found.add(matches[n], *places[n]);
+    for (std::size_t n = 0; n < known.matches.size(); ++n)
+        if (!dense.say_something_at(known.matches[n].moving)) result.found.add(known.matches[n], known.places[n]);
     return result;
 }
 

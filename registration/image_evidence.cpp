@@ -48,12 +48,13 @@ int ImageEvidence::searches() const {
 
 void ImageEvidence::search(const State& state, Observer& observer) {
     if (searches_done_ == 0) {
-        use(consistent_matches(block_search(state, observer), options_.consistency));
+        blocks_ = located(consistent_matches(block_search(state, observer), options_.consistency));
+        use(blocks_);
     } else {
         const int coarsening = options_.dense_coarsening.at(static_cast<std::size_t>(searches_done_ - 1));
-        DenseMatches found = dense_->matches(state, coarsening, blocks_.matches, locator_);
-        use(std::move(found.matches));
-        agreement_ = found.agreement;
+        DenseMatches dense = dense_->matches(state, coarsening, blocks_, locator_);
+        use(std::move(dense.found));
+        agreement_ = dense.agreement;
     }
     ++searches_done_;
 }
@@ -76,24 +77,24 @@ Eigen::Matrix3Xd ImageEvidence::deformed(const Eigen::Matrix3Xd& points, const S
     return state.placement * result;
 }
 
-void ImageEvidence::use(std::vector<BlockMatch> matches) {
-    matches_ = located(std::move(matches));
-    if (searches_done_ == 0) blocks_ = matches_;
+void ImageEvidence::use(LocatedMatches matches) {
+    matches_ = std::move(matches);
+    strongest_.resize(matches_.matches.size());
+    tbb::parallel_for(std::size_t{0}, strongest_.size(), [&](std::size_t n) {
+        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(matches_.matches[n].information,
+                                                                  Eigen::EigenvaluesOnly);
+        strongest_[n] = axes.eigenvalues()[2];
+    });
 }
 
-ImageEvidence::Located ImageEvidence::located(std::vector<BlockMatch> matches) const {
+LocatedMatches ImageEvidence::located(const std::vector<BlockMatch>& matches) const {
     std::vector<std::optional<meshing::Location>> places(matches.size());
     tbb::parallel_for(std::size_t{0}, matches.size(),
                       [&](std::size_t n) { places[n] = locate_near(locator_, matches[n].moving); });
-    Located result;
-    result.places.reserve(matches.size());
-    for (std::size_t n = 0; n < matches.size(); ++n) {
-        if (!places[n]) continue;
-        if (result.places.size() < n) matches[result.places.size()] = matches[n];
-        result.places.push_back(*places[n]);
-    }
-    matches.resize(result.places.size());
-    result.matches = std::move(matches);
+    LocatedMatches result;
+    result.reserve(matches.size());
+    for (std::size_t n = 0; n < matches.size(); ++n)
+        if (places[n]) result.add(matches[n], *places[n]);
     return result;
 }
 
@@ -141,23 +142,21 @@ ImageFit ImageEvidence::fit(const State& state) const {
     Eigen::Index shown = 0;
     for (Eigen::Index node = 0; node < nodes.cols(); ++node) shown += tree.distance(nodes.col(node)) < near_mm;
     fit.shown_share = double(shown) / double(nodes.cols());
-    fit.residual_mm = mean_residual(pulled(matches_, state));
+    fit.residual_mm = mean_residual(pulled(state));
     fit.agreement = agreement_;
     return fit;
 }
 
-std::vector<ImageEvidence::PulledMatch> ImageEvidence::pulled(const Located& located, const State& state) const {
+std::vector<ImageEvidence::PulledMatch> ImageEvidence::pulled(const State& state) const {
     const Eigen::Isometry3d back = state.placement.inverse();
-    std::vector<PulledMatch> result(located.matches.size());
+    std::vector<PulledMatch> result(matches_.matches.size());
     tbb::parallel_for(std::size_t{0}, result.size(), [&](std::size_t n) {
-        const BlockMatch& match = located.matches[n];
+        const BlockMatch& match = matches_.matches[n];
+        const meshing::Location& place = matches_.places[n];
         const Eigen::Matrix3d information = back.linear() * match.information * back.linear().transpose();
-        const Pull pull{located.places[n], back * match.fixed - match.moving, information};
-        const Eigen::Vector3d e =
-            pull.target - displacement_at(prepared_.model.mesh, state.displacement, located.places[n]);
-        const double strongest =
-            Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(information, Eigen::EigenvaluesOnly).eigenvalues()[2];
-        result[n] = {pull, match.confidence, std::sqrt(e.dot(information * e) / strongest)};
+        const Pull pull{place, back * match.fixed - match.moving, information};
+        const Eigen::Vector3d e = pull.target - displacement_at(prepared_.model.mesh, state.displacement, place);
+        result[n] = {pull, match.confidence, std::sqrt(e.dot(information * e) / strongest_[n])};
     });
     return result;
 }
@@ -171,8 +170,8 @@ double ImageEvidence::mean_residual(const std::vector<PulledMatch>& matches) {
     return weights > 0 ? sum / weights : 0;
 }
 
-Contribution ImageEvidence::contribution(const RoundPlan& plan, const State& state) const {
-    const std::vector<PulledMatch> matches = pulled(matches_, state);
+Contribution ImageEvidence::contribution(const RoundPlan& plan, const State& state) {
+    const std::vector<PulledMatch> matches = pulled(state);
     std::vector<Pull> pulls(matches.size());
     tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t n) {
         pulls[n] = matches[n].pull;
@@ -184,13 +183,19 @@ Contribution ImageEvidence::contribution(const RoundPlan& plan, const State& sta
     result.matched = static_cast<int>(matches.size());
     result.mean_residual_mm = mean_residual(matches);
     result.conditions.springs = lumped_springs(prepared_.model.mesh, pulls, state.displacement);
-    const auto expected_motion = [&](const InterfaceNode& node) {
-        const bool seen = in_view(state.placement * Eigen::Vector3d(prepared_.model.mesh.nodes.col(node.node)));
-        return seen ? options_.expected_motion_mm : options_.unseen_motion_mm;
-    };
-    for (const tled::Spring& spring : ground_springs(prepared_, energy_, expected_motion))
-        result.conditions.springs.push_back(spring);
+    for (const tled::Spring& spring : ground(state.placement)) result.conditions.springs.push_back(spring);
     return result;
+}
+
+const std::vector<tled::Spring>& ImageEvidence::ground(const Eigen::Isometry3d& placement) {
+    if (ground_.empty() || !ground_at_.isApprox(placement, 0)) {
+        ground_at_ = placement;
+        ground_ = ground_springs(prepared_, energy_, [&](const InterfaceNode& node) {
+            const bool seen = in_view(placement * Eigen::Vector3d(prepared_.model.mesh.nodes.col(node.node)));
+            return seen ? options_.expected_motion_mm : options_.unseen_motion_mm;
+        });
+    }
+    return ground_;
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -6,8 +6,23 @@
 
 namespace tissuewarp::registration::detail {
 
-struct DenseMatches {
+/// Matches and where they lie in the mesh.
+struct LocatedMatches {
     std::vector<BlockMatch> matches;
+    std::vector<meshing::Location> places;
+
+    void reserve(std::size_t count) {
+        matches.reserve(count);
+        places.reserve(count);
+    }
+    void add(const BlockMatch& match, const meshing::Location& place) {
+        matches.push_back(match);
+        places.push_back(place);
+    }
+};
+
+struct DenseMatches {
+    LocatedMatches found;
     double agreement = 0;  ///< of both images as far as they show the organ: DenseForces::agreement
 };
 
@@ -20,7 +35,7 @@ public:
     /// times doubled from the template's finest (or its coarsest): a match for each cell of voxels that has a force,
     /// and those known ones in whose cell the images say nothing. The fixed image is pulled back by the model to the
     /// moving grid, so that descriptors are compared which turned and stretched with the tissue.
-    [[nodiscard]] DenseMatches matches(const State& state, int coarsening, const std::vector<BlockMatch>& known,
+    [[nodiscard]] DenseMatches matches(const State& state, int coarsening, const LocatedMatches& known,
                                        const meshing::PointLocator& locator) const;
 
 private:

@@ -19,14 +19,12 @@ public:
 
     /// Finds the blocks about where the model is; the later times, how all of the image is to shift there.
     void search(const State& state, Observer& observer);
-    /// Takes matches that were found before.
-    void use(std::vector<BlockMatch> matches);
     /// The rigid motion that most matches agree on, the rest of them is for the tissue. Where part of the organ is out
     /// of view, a deformation of the part in view would turn it as a whole: then none, unless the headers are far off.
     /// Throws InvalidInput when too few blocks were found.
     [[nodiscard]] Eigen::Isometry3d rigid_motion() const;
     /// Pulls of the matches on the nodes.
-    [[nodiscard]] Contribution contribution(const RoundPlan& plan, const State& state) const;
+    [[nodiscard]] Contribution contribution(const RoundPlan& plan, const State& state);
 
     /// How the matches agree with a model in this state.
     [[nodiscard]] ImageFit fit(const State& state) const;
@@ -45,12 +43,11 @@ private:
     BlockEngine* block_engine_ = nullptr;
     std::optional<DenseSearch> dense_;
     int searches_done_ = 0;
-    struct Located {
-        std::vector<BlockMatch> matches;
-        std::vector<meshing::Location> places;  // in the mesh
-    };
-    Located blocks_, matches_;         // of the first search, and of the last
+    LocatedMatches blocks_, matches_;  // of the first search, and of the last
+    std::vector<double> strongest_;    // of each of `matches_`: the largest eigenvalue of its information
     std::optional<double> agreement_;  // of both images, in the last dense search
+    std::vector<tled::Spring> ground_;
+    Eigen::Isometry3d ground_at_ = Eigen::Isometry3d::Identity();
 
     /// Whether the fixed image could show tissue at a point of its frame.
     [[nodiscard]] bool in_view(const Eigen::Vector3d& point) const;
@@ -62,8 +59,11 @@ private:
         double residual_mm;  // along what the block shows best
     };
     /// Those that lie in the model.
-    [[nodiscard]] Located located(std::vector<BlockMatch> matches) const;
-    [[nodiscard]] std::vector<PulledMatch> pulled(const Located& located, const State& state) const;
+    [[nodiscard]] LocatedMatches located(const std::vector<BlockMatch>& matches) const;
+    void use(LocatedMatches matches);
+    [[nodiscard]] std::vector<PulledMatch> pulled(const State& state) const;
+    /// Springs of the outer surface, by what is expected of it in view and out of it.
+    [[nodiscard]] const std::vector<tled::Spring>& ground(const Eigen::Isometry3d& placement);
     static double mean_residual(const std::vector<PulledMatch>& matches);
     [[nodiscard]] std::vector<BlockMatch> block_search(const State& state, Observer& observer) const;
     /// Where points of the moving image are in the fixed one.
