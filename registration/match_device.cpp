@@ -13,11 +13,23 @@ using shaders::Program;
 namespace {
 
 void require_limits(const shaders::Device& device) {
-    constexpr int blocks_of_describe = 11;
-    if (device.limits().storage_blocks < blocks_of_describe)
+    constexpr int blocks_of_smooth = 13;
+    if (device.limits().storage_blocks < blocks_of_smooth)
         throw GpuUnavailable("image matching: " + device.renderer() + " offers " +
                              std::to_string(device.limits().storage_blocks) +
-                             " storage blocks per shader; it needs 11; take another device or the CPU");
+                             " storage blocks per shader; it needs 13; take another device or the CPU");
+}
+
+std::array<GpuFloats, 6> distance_maps(const shaders::Device& device, std::size_t wide) {
+    const auto map = [&] { return GpuFloats(device, wide, "patch distances"); };
+    return {map(), map(), map(), map(), map(), map()};
+}
+
+/// Blocks of six maps, by the beginning of their names.
+GpuBlocks maps(const std::string& name, const std::array<GpuFloats, 6>& buffers) {
+    GpuBlocks blocks;
+    for (std::size_t pair = 0; pair < buffers.size(); ++pair) blocks[name + std::to_string(pair)] = &buffers[pair];
+    return blocks;
 }
 
 }  // namespace
@@ -25,11 +37,8 @@ void require_limits(const shaders::Device& device) {
 MatchDevice::Scratch::Scratch(const shaders::Device& device, std::size_t wide)
     : value(device, wide, "image on the working grid"),
       seen(device, wide, "what it shows"),
-      smoothed{GpuFloats(device, wide, "smoothed differences"), GpuFloats(device, wide, "smoothed differences")},
       eroded{GpuWords(device, wide, "what descriptors show"), GpuWords(device, wide, "what descriptors show")},
-      distance{GpuFloats(device, wide, "patch distances"), GpuFloats(device, wide, "patch distances"),
-               GpuFloats(device, wide, "patch distances"), GpuFloats(device, wide, "patch distances"),
-               GpuFloats(device, wide, "patch distances"), GpuFloats(device, wide, "patch distances")} {}
+      distance{distance_maps(device, wide), distance_maps(device, wide)} {}
 
 MatchDevice::MatchDevice(int gpu_index)
     : device_(gpu_index),
@@ -111,28 +120,21 @@ void MatchDevice::describe(const imaging::Geometry& wide, const GpuWords& words,
     blocks["MatchMean"] = &mean_;
     blocks["MatchDescriptors"] = &words;
     blocks["MatchShown"] = &shown;
-    for (std::size_t pair = 0; pair < 6; ++pair) blocks["MatchDistance" + std::to_string(pair)] = &s.distance[pair];
     const auto workgroup = static_cast<std::size_t>(program(MatchPass::Difference).workgroup_size());
     run(MatchPass::Difference, shaders::match_partials * workgroup, {&blocks});
     run(MatchPass::Mean, shaders::match_partials, {&blocks});
-    const GpuBlocks differences{{"MatchTarget", &s.smoothed[0]}};
-    for (std::uint32_t pair = 0; pair < 6; ++pair) {
-        program(MatchPass::Distance).set(0, pair);
-        run(MatchPass::Distance, count, {&blocks, &differences});
-        smooth(count, 1, s.smoothed[0], s.smoothed[1]);
-        smooth(count, 2, s.smoothed[1], s.distance[pair]);
-    }
+    const GpuBlocks to_first = maps("MatchSmoothed", s.distance[0]), to_second = maps("MatchSmoothed", s.distance[1]),
+                    first = maps("MatchDistance", s.distance[0]), second = maps("MatchDistance", s.distance[1]);
+    run(MatchPass::Distance, count, {&blocks, &to_first});
+    program(MatchPass::Smooth).set(0, std::uint32_t{1});
+    run(MatchPass::Smooth, count, {&blocks, &first, &to_second});
+    program(MatchPass::Smooth).set(0, std::uint32_t{2});
+    run(MatchPass::Smooth, count, {&blocks, &second, &to_first});
     erode(count, 0, s.seen, s.eroded[0]);
     erode(count, 1, s.eroded[0], s.eroded[1]);
     erode(count, 2, s.eroded[1], s.eroded[0]);
     const GpuBlocks eroded{{"MatchSeen", &s.eroded[0]}};
-    run(MatchPass::Describe, shown.size(), {&blocks, &eroded});
-}
-
-void MatchDevice::smooth(std::size_t wide, std::uint32_t axis, const GpuFloats& from, const GpuFloats& to) {
-    const GpuBlocks own{{"MatchGrid", &grid_}, {"MatchSource", &from}, {"MatchTarget", &to}};
-    program(MatchPass::Smooth).set(0, axis);
-    run(MatchPass::Smooth, wide, {&own});
+    run(MatchPass::Describe, shown.size(), {&blocks, &first, &eroded});
 }
 
 void MatchDevice::erode(std::size_t wide, std::uint32_t axis, const GpuWords& from, const GpuWords& to) {

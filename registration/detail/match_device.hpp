@@ -68,9 +68,8 @@ private:
     struct Scratch {
         GpuFloats value;
         GpuWords seen;
-        std::array<GpuFloats, 2> smoothed;
         std::array<GpuWords, 2> eroded;
-        std::array<GpuFloats, 6> distance;
+        std::array<std::array<GpuFloats, 6>, 2> distance;
 
         Scratch(const shaders::Device& device, std::size_t wide);
     };
@@ -95,7 +94,6 @@ private:
 
     const GpuFloats& smoothed_for(double spacing);
     void blur(std::uint32_t axis, double deviation_mm, const GpuFloats& from, const GpuFloats& to);
-    void smooth(std::size_t wide, std::uint32_t axis, const GpuFloats& from, const GpuFloats& to);
     void erode(std::size_t wide, std::uint32_t axis, const GpuWords& from, const GpuWords& to);
 };
 

@@ -42,6 +42,14 @@
 #define BINDING_MATCH_SEARCH 21
 #define BINDING_MATCH_BLOCKS 22
 
+// Distance maps as a filter leaves them, which neither samples nor looks at masks.
+#define BINDING_MATCH_SMOOTHED_0 7
+#define BINDING_MATCH_SMOOTHED_1 8
+#define BINDING_MATCH_SMOOTHED_2 9
+#define BINDING_MATCH_SMOOTHED_3 11
+#define BINDING_MATCH_SMOOTHED_4 12
+#define BINDING_MATCH_SMOOTHED_5 13
+
 const int match_rim = 8;         // GridSamples::rim
 const int octahedron_radius = 2; // voxels from a voxel to the six neighbours whose patches are compared
 const int patch_radius = 4;      // voxels, where a Gaussian of one voxel has ended

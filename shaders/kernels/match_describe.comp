@@ -1,13 +1,7 @@
 // One invocation per voxel of the grid: its twelve channels of self-similarity context (Heinrich et al., MICCAI 2013),
 // exp(-D/V) of the patch distances D less the smallest, in eight bits, four to a word; and whether they count.
-// Needs: index, match, match.octahedron.
+// Needs: index, match, match.octahedron, match.distance.
 
-layout(std430, binding = BINDING_MATCH_DISTANCE_0) readonly buffer MatchDistance0 { float distance_0[]; };
-layout(std430, binding = BINDING_MATCH_DISTANCE_1) readonly buffer MatchDistance1 { float distance_1[]; };
-layout(std430, binding = BINDING_MATCH_DISTANCE_2) readonly buffer MatchDistance2 { float distance_2[]; };
-layout(std430, binding = BINDING_MATCH_DISTANCE_3) readonly buffer MatchDistance3 { float distance_3[]; };
-layout(std430, binding = BINDING_MATCH_DISTANCE_4) readonly buffer MatchDistance4 { float distance_4[]; };
-layout(std430, binding = BINDING_MATCH_DISTANCE_5) readonly buffer MatchDistance5 { float distance_5[]; };
 layout(std430, binding = BINDING_MATCH_MEAN) readonly buffer MatchMean { float mean_squared_difference; };
 layout(std430, binding = BINDING_MATCH_SEEN) readonly buffer MatchSeen { uint seen[]; };
 layout(std430, binding = BINDING_MATCH_DESCRIPTORS) writeonly buffer MatchDescriptors { uint descriptor[]; };

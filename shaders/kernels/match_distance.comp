@@ -1,13 +1,13 @@
-// One invocation per voxel of the wide grid: squared differences of a pair, smoothed along i.
-// Needs: index, match, match.octahedron, match.patch.
-
-layout(location = 0) uniform uint pair;
+// One invocation per voxel of the wide grid: squared differences of the six pairs, smoothed along i.
+// Needs: index, match, match.octahedron, match.patch, match.smoothed.
 
 layout(std430, binding = BINDING_MATCH_VALUE) readonly buffer MatchValue { float value[]; };
-layout(std430, binding = BINDING_MATCH_TARGET) writeonly buffer MatchTarget { float target[]; };
 
-float squared_difference(int offset, int away) {
-    float difference = value[offset + away] - value[offset];
+/// Of three pairs from `pair` on.
+vec3 squared_differences(int offset, uint pair) {
+    vec3 others = vec3(value[offset + wide_difference(step_of(pair))], value[offset + wide_difference(step_of(pair + 1u))],
+                       value[offset + wide_difference(step_of(pair + 2u))]);
+    vec3 difference = others - value[offset];
     return difference * difference;
 }
 
@@ -16,10 +16,11 @@ void main() {
     if (offset >= wide_count()) return;
     const uint reach = uint(octahedron_radius);
     if (!within(wide_voxel(offset), uvec3(reach + uint(patch_radius), reach, reach))) return;
-    int away = wide_difference(step_of(pair));
-    float sum = patch_window[0] * squared_difference(int(offset), away);
-    for (int t = 1; t <= patch_radius; ++t)
-        sum += patch_window[t] *
-               (squared_difference(int(offset) - t, away) + squared_difference(int(offset) + t, away));
-    target[offset] = sum;
+    vec3 first = vec3(0.0), last = vec3(0.0);
+    for (int t = -patch_radius; t <= patch_radius; ++t) {
+        float weight = patch_window[abs(t)];
+        first += weight * squared_differences(int(offset) + t, 0u);
+        last += weight * squared_differences(int(offset) + t, 3u);
+    }
+    leave(offset, first, last);
 }
