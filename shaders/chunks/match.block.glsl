@@ -32,26 +32,17 @@ uint squared_difference(uint a, uint b) {
     return uint(d.x + d.y + d.z + d.w);
 }
 
-/// Offsets of a row of the block in both images, of the voxel in its middle; and whether it lies on both grids.
-struct RowPair {
-    int shown, looked;  // offsets of the row's middle
-    bool on_grids;
-};
+/// Steps from the centre of the block that stay in it and on both grids, along i, j, k.
+struct Overlap { ivec3 first, last; };
 
-RowPair row_pair(ivec3 shown, ivec3 looked, ivec2 row) {
-    shown.yz += row;
-    looked.yz += row;
-    bool off = any(lessThan(shown.yz, ivec2(0))) || any(greaterThanEqual(shown.yz, shown_size.yz)) ||
-               any(lessThan(looked.yz, ivec2(0))) || any(greaterThanEqual(looked.yz, looked_size.yz));
-    return RowPair(shown.x + shown_size.x * (shown.y + shown_size.y * shown.z),
-                   looked.x + looked_size.x * (looked.y + looked_size.y * looked.z), !off);
+Overlap overlap_of(ivec3 shown, ivec3 looked) {
+    ivec3 shown_beyond = shown_size.xyz - 1 - shown, looked_beyond = looked_size.xyz - 1 - looked;
+    return Overlap(-min(ivec3(block_radius), min(shown, looked)),  // docs/decisions/gpu_signs.md
+                   min(ivec3(block_radius), min(shown_beyond, looked_beyond)));
 }
 
-/// Steps along i that stay in the block and on both grids: first and last.
-ivec2 steps_of(ivec3 shown, ivec3 looked) {
-    return ivec2(-min(block_radius, min(shown.x, looked.x)),  // docs/decisions/gpu_signs.md
-                 min(block_radius, min(shown_size.x - 1 - shown.x, looked_size.x - 1 - looked.x)));
-}
+int shown_offset(ivec3 voxel) { return voxel.x + shown_size.x * (voxel.y + shown_size.y * voxel.z); }
+int looked_offset(ivec3 voxel) { return voxel.x + looked_size.x * (voxel.y + looked_size.y * voxel.z); }
 
 float cost_of(uvec2 sum, float least) {
     const float full_difference = 255.0 * 255.0 * 12.0;

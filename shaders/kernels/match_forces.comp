@@ -18,6 +18,7 @@ layout(std430, binding = BINDING_MATCH_CELLS) writeonly buffer MatchCells { int 
 #define CELL_SUMS 16u
 
 shared int lane[CELL_SUMS][WORKGROUP_SIZE];
+shared uint counted;  // whether any voxel of the cell is
 
 ivec4 channels(uint word) { return ivec4(uvec4(word, word >> 8, word >> 16, word >> 24) & 0xffu); }
 
@@ -92,7 +93,14 @@ void main() {
         }
     }
     for (uint m = 0u; m < CELL_SUMS; ++m) lane[m][local] = sums[m];
+    if (local == 0u) counted = 0u;
     barrier();
+    if (sums[11] != 0) counted = 1u;
+    barrier();
+    if (counted == 0u) {  // outside of the organ, as most are
+        if (cell < cells && local < CELL_SUMS) cell_sum[CELL_SUMS * cell + local] = 0;
+        return;
+    }
     for (uint half_size = WORKGROUP_SIZE / 2u; half_size > 0u; half_size /= 2u) {
         if (local < half_size)
             for (uint m = 0u; m < CELL_SUMS; ++m) lane[m][local] += lane[m][local + half_size];

@@ -3,12 +3,10 @@
 
 layout(std430, binding = BINDING_MATCH_TARGET) writeonly buffer MatchLooks { float look_cost[]; };
 
-/// Sum and count over the voxels of a row of the block that count in both images.
-uvec2 compare_row(RowPair row, ivec2 steps) {
+/// Sum and count over some voxels side by side that count in both images.
+uvec2 compare_row(int a, int b, int count) {
     uvec2 sum = uvec2(0u);
-    if (!row.on_grids) return sum;
-    for (int x = steps.x; x <= steps.y; ++x) {
-        int a = row.shown + x, b = row.looked + x;
+    for (int end = a + count; a < end; ++a, ++b) {
         if ((shown_seen[a] & looked_seen[b]) == 0u) continue;
         for (int part = 0; part < 3; ++part)
             sum.x += squared_difference(shown_word[3 * a + part], looked_word[3 * b + part]);
@@ -23,10 +21,14 @@ void main() {
     if (block >= block_count) return;
     ivec3 shown = sought[block].shown.xyz;
     ivec3 looked = sought[block].looked.xyz + place_in_cube(place, reach);
-    ivec2 steps = steps_of(shown, looked);
+    Overlap overlap = overlap_of(shown, looked);
+    int count = overlap.last.x - overlap.first.x + 1;
     uvec2 sum = uvec2(0u);
-    for (int dk = look_first - block_radius; dk <= block_radius; dk += look_stride)
-        for (int dj = look_first - block_radius; dj <= block_radius; dj += look_stride)
-            sum += compare_row(row_pair(shown, looked, ivec2(dj, dk)), steps);
+    for (int k = look_first - block_radius; k <= overlap.last.z; k += look_stride)
+        for (int j = look_first - block_radius; j <= overlap.last.y; j += look_stride) {
+            if (k < overlap.first.z || j < overlap.first.y) continue;
+            ivec3 from = ivec3(overlap.first.x, j, k);
+            sum += compare_row(shown_offset(shown + from), looked_offset(looked + from), count);
+        }
     look_cost[n] = cost_of(sum, look_least);
 }

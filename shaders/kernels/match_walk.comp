@@ -18,21 +18,22 @@ shared ivec3 place[CUBE];
 shared uint difference[CUBE], voxels[CUBE];
 shared float cost[CUBE];
 
-/// Sum and count of a place over a word of every voxel in a column of the block's rows: `word` counts the words of a
-/// row, three a voxel, of which the first counts the voxel.
-uvec2 compare_words(ivec3 shown, ivec3 looked, int word) {
-    ivec2 steps = steps_of(shown, looked);
+/// Sum and count of a place over one word of the block's rows, of three a voxel; the first of them counts the voxel.
+uvec2 compare_word(ivec3 shown, ivec3 looked, int word) {
+    Overlap overlap = overlap_of(shown, looked);
     int x = word / 3 - block_radius, part = word % 3;
     uvec2 sum = uvec2(0u);
-    if (x < steps.x || x > steps.y) return sum;
-    for (int dk = -block_radius; dk <= block_radius; ++dk)
-        for (int dj = -block_radius; dj <= block_radius; ++dj) {
-            RowPair row = row_pair(shown, looked, ivec2(dj, dk));
-            if (!row.on_grids) continue;
-            int a = row.shown + x, b = row.looked + x;
+    if (x < overlap.first.x || x > overlap.last.x) return sum;
+    uint counts = part == 0 ? 1u : 0u;
+    for (int k = overlap.first.z; k <= overlap.last.z; ++k) {
+        int a = shown_offset(shown + ivec3(x, overlap.first.y, k));
+        int b = looked_offset(looked + ivec3(x, overlap.first.y, k));
+        for (int j = overlap.first.y; j <= overlap.last.y; ++j, a += shown_size.x, b += looked_size.x) {
             if ((shown_seen[a] & looked_seen[b]) == 0u) continue;
-            sum += uvec2(squared_difference(shown_word[3 * a + part], looked_word[3 * b + part]), part == 0 ? 1u : 0u);
+            sum.x += squared_difference(shown_word[3 * a + part], looked_word[3 * b + part]);
+            sum.y += counts;
         }
+    }
     return sum;
 }
 
@@ -48,7 +49,7 @@ void compare(ivec3 shown, uint count) {
     uint words = uint(3 * (2 * block_radius + 1));
     for (uint which = local / LANES; which < count; which += WORKGROUP_SIZE / LANES)
         for (uint word = local % LANES; word < words; word += LANES) {
-            uvec2 sum = compare_words(shown, place[which], int(word));
+            uvec2 sum = compare_word(shown, place[which], int(word));
             atomicAdd(difference[which], sum.x);
             atomicAdd(voxels[which], sum.y);
         }
