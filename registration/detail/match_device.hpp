@@ -37,7 +37,7 @@ struct DescribedOnDevice {
     const GpuWords& shown;  ///< one a voxel
 };
 
-/// All members but the first three need the context current.
+/// All members but the first three, reserve_wide() and samples() need the context current.
 class MatchDevice {
 public:
     explicit MatchDevice(int gpu_index);
@@ -45,7 +45,6 @@ public:
     [[nodiscard]] const shaders::Device& device() const { return device_; }
     void set_fixed(const SeenImage& fixed);
 
-    [[nodiscard]] const imaging::Geometry& fixed_grid() const { return fixed_.geometry; }
     /// The intraoperative image as match_sample reads it, smoothed for working grids of a spacing; and what it shows.
     /// `wide` is the grid that is to be sampled, whose block MatchGrid is uploaded.
     GpuBlocks fixed_for(const imaging::Geometry& wide, double spacing, const Eigen::Isometry3d& placement,
