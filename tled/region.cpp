@@ -1,7 +1,7 @@
 #include "tled/region.hpp"
 
 #include "core/errors.hpp"
-#include "tled/reference.hpp"
+#include "tled/nodal_effects.hpp"
 #include "tled/rest_stiffness.hpp"
 
 #include <Eigen/Eigenvalues>
@@ -19,6 +19,8 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Matrix3Xd;
 using Eigen::Vector3d;
+
+constexpr double answer_tolerance = 1e-7;  // of linear answers, in the norm of what preconditions them
 
 /// The elements with `keep` equal to `side`, and the numbering of their nodes.
 struct Part {
@@ -172,10 +174,8 @@ struct FarTissue::Impl {
 
     /// Linear-elastic force of the far tissue on the interface nodes under conditions that impose their displacement.
     [[nodiscard]] Matrix3Xd force_on_interface(const NodalConditions& conditions) const {
-        const Matrix3Xd u = stiffness->linear_solution(conditions);
-        constexpr double small = 1e-6;  // of the displacement: forces are linear in it
-        const Matrix3Xd elastic = internal_force(rest, small * u) / small;
-        return (conditions.external_force - elastic)(Eigen::all, interface);
+        const Matrix3Xd u = stiffness->linear_solution(conditions, answer_tolerance);
+        return (conditions.external_force - stiffness->elastic_resistance(u))(Eigen::all, interface);
     }
 };
 
@@ -219,7 +219,7 @@ Matrix3Xd linear_answer(const Model& model, const Conditions& conditions) {
     NodalConditions nodal = nodal_conditions(conditions, rest);
     nodal.external_force = constant_force(rest, nodal) +
                            surface_force(nodal.effects.surface, rest.position, Matrix3Xd::Zero(3, rest.node_count));
-    return RestStiffness(rest, nodal).linear_solution(nodal);
+    return RestStiffness(rest, nodal).linear_solution(nodal, answer_tolerance);
 }
 
 Region region_of(const Model& whole, const Conditions& conditions, const FarTissue& far,

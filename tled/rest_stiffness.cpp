@@ -361,6 +361,14 @@ Matrix3Xd RestStiffness::linear_solution(const NodalConditions& conditions) cons
     return conditions.imposed + solve(impl_->linear_force(conditions), conditions, tolerance);
 }
 
+Matrix3Xd RestStiffness::linear_solution(const NodalConditions& conditions, double relative_tolerance) const {
+    return conditions.imposed + solve_iteratively(impl_->linear_force(conditions), conditions, relative_tolerance);
+}
+
+Matrix3Xd RestStiffness::elastic_resistance(const Matrix3Xd& displacement) const {
+    return impl_->elastic->multiply(displacement);
+}
+
 Matrix3Xd RestStiffness::diagonal(const NodalConditions& conditions) const {
     impl_->require_compatible(conditions);
     std::vector<Matrix3d> blocks = *impl_->elastic_diagonal;

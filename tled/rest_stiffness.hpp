@@ -61,6 +61,12 @@ public:
     /// Linear-elastic displacement under the conditions, imposed values included (3 × N, mm).
     [[nodiscard]] Eigen::Matrix3Xd linear_solution(const NodalConditions& conditions) const;
 
+    /// The same to a relative error, as solve_iteratively(): of a large mesh without a factor.
+    [[nodiscard]] Eigen::Matrix3Xd linear_solution(const NodalConditions& conditions, double relative_tolerance) const;
+
+    /// K₀ u without springs, mN: the linear-elastic resistance, membranes and sliding pairs included (3 × N).
+    [[nodiscard]] Eigen::Matrix3Xd elastic_resistance(const Eigen::Matrix3Xd& displacement) const;
+
     /// Diagonal of K₀ + springs of `conditions`, 3 × N, mN/mm; ones where constrained.
     [[nodiscard]] Eigen::Matrix3Xd diagonal(const NodalConditions& conditions) const;
 

@@ -165,6 +165,13 @@ TEST_P(RestStiffnessTest, LinearSolutionBalancesSpringsAndForces) {
     EXPECT_EQ((u.col(0) - Vector3d(0.1, 0.2, 0.3)).norm(), 0.0);
 }
 
+TEST_P(RestStiffnessTest, ElasticResistanceIsThatOfSmallDisplacements) {
+    constexpr double small = 1e-6;
+    const RestStiffness stiffness(rest, nodal_conditions(held_with_springs(0.5), rest));
+    const Matrix3Xd u = random_forces(rest.node_count), expected = internal_force(rest, small * u) / small;
+    EXPECT_LT((stiffness.elastic_resistance(u) - expected).norm(), 1e-5 * expected.norm());
+}
+
 TEST_P(RestStiffnessTest, DiagonalAndLowestEigenvalueAgreeWithADenseSolver) {
     model.mesh = meshing::box_mesh({30.0, 20.0, 20.0}, {2, 2, 2}, 0.1, 5);
     rest = rest_state(model);

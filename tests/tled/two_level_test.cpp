@@ -163,6 +163,10 @@ TEST(LargeMeshes, AreSolvedAsWithTheFactor) {
     const Matrix3Xd iterated = stiffness.solve_iteratively(force, body.conditions, 1e-4),
                     exact = stiffness.solve(force);
     EXPECT_LT((iterated - exact).norm(), 1e-3 * exact.norm());
+    NodalConditions loaded = body.conditions;
+    loaded.external_force = force;
+    EXPECT_LT((stiffness.linear_solution(loaded, 1e-7) - stiffness.linear_solution(loaded)).norm(),
+              1e-6 * exact.norm());
     EXPECT_NEAR(force.cwiseProduct(stiffness.precondition(force)).sum() / force.cwiseProduct(exact).sum(), 1, 0.1);
 }
 
