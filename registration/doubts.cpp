@@ -19,13 +19,18 @@ std::string percent(double share) {
 }
 
 void doubt_surface(const SurfaceFit& fit, double deviation_mm, std::vector<std::string>& reasons) {
-    constexpr double least_inliers = 0.5, most_residual = 1.4, most_rival_support = 0.95;
+    constexpr double least_inliers = 0.5, most_residual = 1.4, most_rival_support = 0.95, least_coverage = 0.18;
     if (fit.inlier_share < least_inliers)
         reasons.push_back("only " + percent(fit.inlier_share) + " of the intraoperative surface lies on the model");
     if (fit.residual_mm > most_residual * std::max(deviation_mm, 0.3))
         reasons.push_back("points of the intraoperative surface lie " + to_text(fit.residual_mm) +
                           " mm from the model where " + to_text(deviation_mm) + " mm were stated");
     if (!fit.pose_searched) return;
+    if (fit.coverage < least_coverage)
+        reasons.push_back(
+            "the points show " + percent(fit.coverage) +
+            " of the organ's surface, too little to tell where it lies; show more of it, or give pairs of "
+            "points");
     if (fit.rival_support > most_rival_support)
         reasons.push_back("the points fit about as well with the organ placed " + to_text(fit.rival_mm) +
                           " mm elsewhere; give a wider patch, or landmarks");

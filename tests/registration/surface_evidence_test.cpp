@@ -219,6 +219,24 @@ TEST(SurfaceEvidence, PointsOfAnotherOrganAreDoubted) {
     EXPECT_FALSE(update(prepared, {.surface = seen}, on_cpu()).doubts.empty());
 }
 
+// A patch of a smooth organ fits elsewhere as well; where the headers hold, it need not tell where the organ lies.
+TEST(SurfaceEvidence, ASmallPatchDoesNotTellWhereAnOrganLies) {
+    const auto prepared = prepare(shapes::organ_labels({}), coarse());
+    const auto said = [&](double share, bool align) {
+        Numbers numbers(9);
+        const auto seen = seen_part(pear_surface(8), {0, 1, 0}, share, 500, 0.5, 0, numbers, true);
+        UpdateOptions options = on_cpu();
+        options.align = align;
+        const auto doubts = update(prepared, {.surface = seen}, options).doubts;
+        return std::any_of(doubts.begin(), doubts.end(), [](const std::string& reason) {
+            return reason.find("too little to tell where it lies") != std::string::npos;
+        });
+    };
+    EXPECT_TRUE(said(0.1, true));
+    EXPECT_FALSE(said(0.1, false));
+    EXPECT_FALSE(said(0.4, true));
+}
+
 TEST(SurfaceEvidence, PointsFarFromAModelThatMayNotMoveAreRefused) {
     Numbers numbers(8);
     const auto prepared = prepare(shapes::organ_labels({}), coarse());
