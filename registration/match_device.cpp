@@ -3,7 +3,7 @@
 #include "core/errors.hpp"
 #include "registration/detail/template_images.hpp"
 
-#include <cstring>
+#include <vector>
 
 namespace tissuewarp::registration::detail {
 
@@ -67,8 +67,11 @@ const Program& MatchDevice::program(MatchPass pass) {
 
 void MatchDevice::run(MatchPass pass, std::size_t invocations, std::initializer_list<const GpuBlocks*> blocks) {
     const Program& what = program(pass);
+    const GpuBlocks grids{{"MatchGrid", &grid_}};
+    std::vector<const GpuBlocks*> with_grids{&grids};
+    with_grids.insert(with_grids.end(), blocks.begin(), blocks.end());
     for (const shaders::StorageBlock& block : what.storage_blocks())
-        for (const GpuBlocks* known : blocks)
+        for (const GpuBlocks* known : with_grids)
             if (const auto found = known->find(block.name); found != known->end()) found->second->bind(block.binding);
     what.dispatch(invocations);
     shaders::storage_barrier();
@@ -77,7 +80,7 @@ void MatchDevice::run(MatchPass pass, std::size_t invocations, std::initializer_
 GpuBlocks MatchDevice::fixed_for(const imaging::Geometry& wide, double spacing, const Eigen::Isometry3d& placement,
                                  const std::array<int, 3>& cells) {
     grid_.upload(std::array{match_grid_block(wide, fixed_.geometry, cells, placement)});
-    return {{"MatchGrid", &grid_}, {"MatchFixed", &smoothed_for(spacing)}, {"MatchFixedSeen", &*fixed_seen_}};
+    return {{"MatchFixed", &smoothed_for(spacing)}, {"MatchFixedSeen", &*fixed_seen_}};
 }
 
 const GpuFloats& MatchDevice::smoothed_for(double spacing) {
@@ -94,7 +97,7 @@ const GpuFloats& MatchDevice::smoothed_for(double spacing) {
 }
 
 void MatchDevice::blur(std::uint32_t axis, double deviation_mm, const GpuFloats& from, const GpuFloats& to) {
-    const GpuBlocks own{{"MatchGrid", &grid_}, {"MatchSource", &from}, {"MatchTarget", &to}};
+    const GpuBlocks own{{"MatchSource", &from}, {"MatchTarget", &to}};
     program(MatchPass::Blur).set(0, axis);
     program(MatchPass::Blur)
         .set(1, static_cast<float>(deviation_mm / fixed_.geometry.spacing[static_cast<Eigen::Index>(axis)]));
@@ -115,7 +118,6 @@ void MatchDevice::describe(const imaging::Geometry& wide, const GpuWords& words,
     const auto count = static_cast<std::size_t>(wide.voxel_count());
     Scratch& s = *scratch_;
     GpuBlocks blocks = samples();
-    blocks["MatchGrid"] = &grid_;
     blocks["MatchPartial"] = &partial_;
     blocks["MatchMean"] = &mean_;
     blocks["MatchDescriptors"] = &words;
@@ -138,7 +140,7 @@ void MatchDevice::describe(const imaging::Geometry& wide, const GpuWords& words,
 }
 
 void MatchDevice::erode(std::size_t wide, std::uint32_t axis, const GpuWords& from, const GpuWords& to) {
-    const GpuBlocks own{{"MatchGrid", &grid_}, {"MatchMaskSource", &from}, {"MatchMaskTarget", &to}};
+    const GpuBlocks own{{"MatchMaskSource", &from}, {"MatchMaskTarget", &to}};
     program(MatchPass::Erode).set(0, axis);
     run(MatchPass::Erode, wide, {&own});
 }
