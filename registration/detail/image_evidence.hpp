@@ -11,9 +11,8 @@ namespace tissuewarp::registration::detail {
 
 class ImageEvidence {
 public:
-    /// `prepared.image` is there. `engine` finds blocks, and forces after the first search; without it
-    /// the processor finds blocks, and that is all. `energy` (mN mm)
-    /// weighs as much as one standard deviation of a match.
+    /// `prepared.image` is there. `engine` finds blocks, and forces after the first search; without it the processor
+    /// finds blocks, and that is all. `energy` (mN mm) weighs as much as one standard deviation of a match.
     ImageEvidence(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
                   ImageEngine* engine, double energy);
 
