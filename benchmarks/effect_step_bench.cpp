@@ -2,11 +2,12 @@
 // benchmarks/stretched_cube.hpp, compressed by 10 % so that its sides bulge, and everything over its whole surface.
 //     effect_step_bench [--device N] [--cells 24,55] [--element t4|averaged] [--law lnj|iso] [--engines
 //     cpu,gpu,two-passes]
-//                       [--rounds N] [--seconds S] [--approach N] [--mesh FILE.vtu]
+//                       [--rounds N] [--seconds S] [--approach N] [--mesh FILE.vtu] [--only TEXT]
 // Without options 24 and 55 cells an edge (82 944 and 998 250 tetrahedra), both elements, law iso, and the CPU engine,
 // the GPU's as it comes and the GPU's two passes. The tissue takes --approach steps (400) with its effects, so that it
 // lies against obstacles; from there each round times plain steps and steps with effects one after the other, for
-// --seconds (0.3) each, and the median of the ratios of --rounds (9) rounds is printed.
+// --seconds (0.3) each, and the median of the ratios of --rounds (9) rounds is printed. --only takes the effects whose
+// names hold TEXT.
 
 #include "benchmarks/stretched_cube.hpp"
 #include "core/errors.hpp"
@@ -35,7 +36,7 @@ struct Options {
     int device = -1;
     std::vector<int> cells{24, 55};
     std::vector<std::string> engines{"cpu", "gpu", "two-passes"};
-    std::string element, law = "iso", mesh;
+    std::string element, law = "iso", mesh, only;
     int rounds = 9;
     int approach = 400;
     double seconds = 0.3;
@@ -183,6 +184,7 @@ void report(tled::Engine& engine, const std::string& name, const Scene& scene, c
     const int steps = steps_for(options.seconds, engine, scene, step);
     const Matrix3Xd still = Matrix3Xd::Zero(3, scene.start.cols());
     for (const Case& each : cases(scene.mesh)) {
+        if (each.name.find(options.only) == std::string::npos) continue;
         tled::NodalConditions with = scene.conditions;
         with.effects = tled::nodal_effects(each.effects, rest);
         engine.set_conditions(with);
@@ -240,6 +242,8 @@ Options parsed(int argc, char** argv) {
             options.law = value;
         else if (name == "--mesh")
             options.mesh = value;
+        else if (name == "--only")
+            options.only = value;
         else if (name == "--rounds")
             options.rounds = std::max(1, std::stoi(value));
         else if (name == "--approach")

@@ -67,8 +67,10 @@ void add_nodal_forces(ProgramSource& source, const NodeEffects& effects) {
     add_effect(source, "node.fluid", "HAS_FLUID", effects.fluid);
 }
 
-void add_contact(ProgramSource& source, const NodeEffects& effects) {
+/// `settles` is the chunk whose settle() the program calls.
+void add_contact(ProgramSource& source, const NodeEffects& effects, const char* settles) {
     add_effect(source, "node.contact", "HAS_CONTACT", effects.contact);
+    if (effects.contact) source.chunks.emplace_back(settles);
 }
 
 ProgramSource node_program(std::string kernel, const NodeEffects& effects) {
@@ -192,7 +194,7 @@ ProgramSource surface_force_program(const SurfaceForces& forces) {
 
 ProgramSource node_step_program(const NodeEffects& effects, StoreResidual store) {
     ProgramSource source = node_program("node_step", effects);
-    add_contact(source, effects);
+    add_contact(source, effects, "node.settle");
     source.defines["STORES_RESIDUAL"] = flag(store == StoreResidual::Yes);
     return source;
 }
@@ -221,8 +223,10 @@ ProgramSource patch_step_program(const PatchTissue& tissue, const NodeEffects& e
         define("USES_SHEAR", flag(stages.forces));
     }
     add_nodal_forces(source, effects);
-    add_contact(source, effects);
-    for (const char* chunk : {"patch", "patch.exchange", "patch.nodes", "patch.units", "patch.fans"}) add(chunk);
+    for (const char* chunk : {"patch", "patch.state"}) add(chunk);
+    if (effects.springs || effects.external_force || effects.fluid || effects.contact) add("patch.node");
+    add_contact(source, effects, "patch.contact");
+    for (const char* chunk : {"patch.exchange", "patch.nodes", "patch.units", "patch.fans"}) add(chunk);
     if (stages.averages) add("patch.pressure.averaged");
     const bool stays = stages.persists && sizes.each_has_one;
     const bool stresses_stay = stays && stages.forces && tissue.prony_terms > 0 && sizes.places > 0;

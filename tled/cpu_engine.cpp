@@ -4,6 +4,7 @@
 
 #include "core/errors.hpp"
 #include "tled/detail/cpu_batches.hpp"
+#include "tled/detail/cpu_contact.hpp"
 #include "tled/detail/cpu_effects.hpp"
 #include "tled/detail/cpu_kernels.hpp"
 #include "tled/detail/cpu_pressures.hpp"
@@ -121,7 +122,7 @@ public:
                 displacement_[at] = T(displacement(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(node)));
                 increment_[at] = T(increment(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(node)));
             }
-        if (contact_) contact_->forget_clearances();
+        if (contact_) contact_->forget_looks();
         for (detail::ViscousBatches<T>& viscous : viscous_)
             std::fill(viscous.stress.begin(), viscous.stress.end(), T(0));
     }
@@ -142,7 +143,7 @@ public:
         displacement_ = kept_.displacement;
         increment_ = kept_.increment;
         viscous_ = kept_.viscous;
-        if (contact_) contact_->forget_clearances();
+        if (contact_) contact_->forget_looks();
     }
 
     void run(int steps, const StepCoefficients& coefficients) override {

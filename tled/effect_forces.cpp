@@ -183,18 +183,22 @@ Distance distance_to(const Obstacle& obstacle, const Vector3d& position) {
     return {value, to_grid.transpose() * slope};
 }
 
+Vector3d contact_correction(const Vector3d& normal, double depth, double friction, const Vector3d& v) {
+    const Vector3d slip = v - normal.dot(v) * normal;
+    const double length = slip.norm();
+    Vector3d correction = depth * normal;
+    if (length > 0) correction -= std::min(1.0, friction * depth / length) * slip;
+    return correction;
+}
+
 Motion in_contact(const std::vector<Obstacle>& obstacles, const Vector3d& X, const Motion& free) {
     Motion motion = free;
     for (const Obstacle& obstacle : obstacles) {
         const Distance distance = distance_to(obstacle, X + motion.u);
         const double steepness = distance.gradient.norm();
         if (!(distance.value < 0) || !(steepness > 0)) continue;
-        const Vector3d normal = distance.gradient / steepness;
-        const double depth = -distance.value / steepness;
-        const Vector3d slip = motion.v - normal.dot(motion.v) * normal;
-        const double length = slip.norm();
-        Vector3d correction = depth * normal;
-        if (length > 0) correction -= std::min(1.0, obstacle.friction * depth / length) * slip;
+        const Vector3d correction =
+            contact_correction(distance.gradient / steepness, -distance.value / steepness, obstacle.friction, motion.v);
         motion.u += correction;
         motion.v += correction;
     }

@@ -104,6 +104,8 @@ public:
         const CurrentContext current = device_.make_current();
         effects_.set(conditions, blocks_);
         over_patches_ = patches_ && patches_->take(effects_.on_nodes());
+        const auto& contact = conditions.effects.contact;
+        if (over_patches_) patches_->set_obstacles(contact ? contact->obstacles.size() : 0, blocks_);
         constrained_ = conditions.constrained;
         upload_inverse_mass();
         imposed_.upload(detail::packed(conditions.imposed));

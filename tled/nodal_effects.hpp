@@ -73,6 +73,11 @@ struct Distance {
 };
 Distance distance_to(const Obstacle& obstacle, const Eigen::Vector3d& position);
 
+/// What contact adds to displacement and increment v of a node `depth` (mm) inside an obstacle of outward unit normal
+/// `normal`.
+Eigen::Vector3d contact_correction(const Eigen::Vector3d& normal, double depth, double friction,
+                                   const Eigen::Vector3d& v);
+
 /// A node at rest position X that a step has brought to displacement u by the increment v, after contact with all
 /// obstacles in turn.
 struct Motion {

@@ -1,5 +1,5 @@
-// Needs: bindings, patch; the chunks node.* of the effects whose flags are 1.
-// Gives: the nodes of a patch in shared memory: load_node, node, advance_node, store_displacement.
+// Needs: bindings, patch, patch.state; the chunks of the effects whose flags are 1.
+// Gives: the nodes of a patch in shared memory: load_node, node, moving, advance_node, store_displacement.
 //! define STAYS
 //! define HAS_SPRINGS
 //! define HAS_EXTERNAL_FORCE
@@ -9,11 +9,6 @@
 /// Planes of all slots: X.x, X.y, X.z (mm, from a point of the patch), inverse mass or, where its components differ, a
 /// negative number, its components, and 1 / V_a (1/mm³) of the averaged pressure.
 layout(std430, binding = BINDING_PATCH_REST) readonly buffer PatchRest { float patch_rest[]; };
-/// Planes of all slots: u.x, u.y, u.z, v.x, v.y, v.z, mm.
-layout(std430, binding = BINDING_PATCH_STATE) buffer PatchState { float patch_state[]; };
-#if HAS_SPRINGS || HAS_EXTERNAL_FORCE || HAS_FLUID || HAS_CONTACT
-layout(std430, binding = BINDING_PATCH_NODE) readonly buffer PatchNode { uint node_of_slot[]; };
-#endif
 
 shared vec2 node_a[SLOTS], node_b[SLOTS], node_c[SLOTS];  // (X.xy), (X.z, u.x), (u.yz)
 
@@ -29,17 +24,6 @@ Node node(uint i) {
 vec3 rest_plane(uint s, uint plane) {
     return vec3(patch_rest[plane * slots_of_all + s], patch_rest[(plane + 1u) * slots_of_all + s],
                 patch_rest[(plane + 2u) * slots_of_all + s]);
-}
-
-vec3 state_plane(uint s, uint plane) {
-    return vec3(patch_state[plane * slots_of_all + s], patch_state[(plane + 1u) * slots_of_all + s],
-                patch_state[(plane + 2u) * slots_of_all + s]);
-}
-
-void store_state(uint s, uint plane, vec3 value) {
-    patch_state[plane * slots_of_all + s] = value.x;
-    patch_state[(plane + 1u) * slots_of_all + s] = value.y;
-    patch_state[(plane + 2u) * slots_of_all + s] = value.z;
 }
 
 /// Most nodes move freely: one number instead of three.
@@ -59,9 +43,27 @@ void load_node(uint s, uint i) {
 
 void store_displacement(uint s, uint i) { store_state(s, 0u, vec3(node_b[i].y, node_c[i])); }
 
+/// What a step takes of a slot beside its force: asked for before that, because memory is far.
+struct Moving {
+    vec3 weight, v;
+#if HAS_CONTACT
+    KeptTangent tangent;
+#endif
+};
+
+Moving moving(uint s) {
+    Moving m;
+    m.weight = inverse_mass(s);
+    m.v = state_plane(s, 3u);
+#if HAS_CONTACT
+    m.tangent = early_tangent(s);
+#endif
+    return m;
+}
+
 /// The time step in increment form under the internal force f, mN: v⁺ = momentum v + gain r / m, u⁺ = u + v⁺. Unless
 /// the patch stays in shared memory, u⁺ goes to memory too.
-void advance_node(uint s, uint i, vec3 f, float momentum, float gain) {
+void advance_node(uint s, uint i, Moving m, vec3 f, float momentum, float gain) {
     vec3 u = vec3(node_b[i].y, node_c[i]);
     vec3 residual = -f;
 #if HAS_SPRINGS
@@ -73,11 +75,10 @@ void advance_node(uint s, uint i, vec3 f, float momentum, float gain) {
 #if HAS_FLUID
     residual += fluid_force(node_of_slot[s], u);
 #endif
-    vec3 weight = inverse_mass(s);
-    vec3 v = momentum * state_plane(s, 3u) + gain * (residual * weight);
+    vec3 v = momentum * m.v + gain * (residual * m.weight);
     u += v;
 #if HAS_CONTACT
-    settle(node_of_slot[s], equal(weight, vec3(0.0)), u, v);
+    settle(s, equal(m.weight, vec3(0.0)), m.tangent, u, v);
 #endif
     store_state(s, 3u, v);
     node_b[i].y = u.x;

@@ -41,11 +41,12 @@ Patch begin_patch(uint p, out uvec4 fan, out uvec2 largest) {
 
 #if ADVANCES
 void advance_nodes(Patch here, uint step) {
-    uint moving = step == run_begin ? here.slots : here.shared_slots;
-    for (uint i = gl_LocalInvocationID.x; i < moving; i += WORKGROUP_SIZE) {
+    uint advancing = step == run_begin ? here.slots : here.shared_slots;
+    for (uint i = gl_LocalInvocationID.x; i < advancing; i += WORKGROUP_SIZE) {
         uint s = here.index * SLOTS + i;
+        Moving m = moving(s);
         vec3 f = i < here.shared_slots ? received_force(here, i, step & 1u) : own_force(s, step & 1u);
-        advance_node(s, i, f, momentum, gain);
+        advance_node(s, i, m, f, momentum, gain);
     }
 }
 #endif
@@ -90,7 +91,7 @@ void leave_forces(Patch here, uvec4 fan, inout uint largest, uint step) {
     tell_neighbours(here, 2u * step + 2u);
 #endif
     for (uint i = lane; i < here.slots; i += WORKGROUP_SIZE)
-        if (i >= sent) advance_node(first_slot + i, i, force_here(i, unit), momentum, gain);
+        if (i >= sent) advance_node(first_slot + i, i, moving(first_slot + i), force_here(i, unit), momentum, gain);
 }
 #endif
 

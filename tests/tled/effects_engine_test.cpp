@@ -365,5 +365,28 @@ TEST(GpuEffects, NoInterpolationIsFurtherBelowTheNearestSampleThanTheReach) {
     EXPECT_GT(closest, 0.1) << "the test does not come near the bound";
 }
 
+// Nodes that touch an obstacle go by its tangent. Too long a reach looks like a node that sinks into a curved wall.
+TEST(GpuEffects, NoDistanceStraysFurtherFromItsTangentThanTheReachAllows) {
+    std::mt19937 random(4);
+    std::uniform_real_distribution<double> noise(-1, 1), part(0, 1);
+    constexpr double tolerance = 1e-3;
+    double furthest = 0;
+    for (int trial = 0; trial < 200; ++trial) {
+        Obstacle obstacle;
+        obstacle.surface.size = {6, 6, 6};
+        for (int i = 0; i < 216; ++i) obstacle.surface.distance.push_back(static_cast<float>(0.3 * noise(random)));
+        const double reach = detail::tangent_reach(obstacle.surface, tolerance);
+        for (int point = 0; point < 50; ++point) {
+            const Vector3d x(2 + part(random), 2 + part(random), 2 + part(random));
+            const Vector3d way = reach * Vector3d(noise(random), noise(random), noise(random)).normalized();
+            const Distance here = distance_to(obstacle, x);
+            const double off = distance_to(obstacle, x + way).value - here.value - here.gradient.dot(way);
+            ASSERT_LT(std::abs(off), tolerance);
+            furthest = std::max(furthest, std::abs(off));
+        }
+    }
+    EXPECT_GT(furthest, 0.05 * tolerance) << "the test does not come near the bound";
+}
+
 }  // namespace
 }  // namespace tissuewarp::tled

@@ -2,7 +2,6 @@
 /// Effects (nodal_effects.hpp) by the internal numbers of the CPU engine. Nodal vectors are records.
 
 #include "tled/detail/cpu_kernels.hpp"
-#include "tled/detail/interpolation_reach.hpp"
 #include "tled/detail/parallel.hpp"
 #include "tled/nodal_effects.hpp"
 
@@ -189,74 +188,6 @@ private:
     };
     std::array<T, 3> up_;
     std::vector<Column> column_;  // by internal node
-};
-
-/// In float64 whatever the engine computes in: few nodes are near an obstacle, and its surface is a matter of
-/// micrometres. The others know how far they may go before they need to look again.
-class CpuContact {
-public:
-    CpuContact(const NodalContact& contact, const std::vector<std::uint32_t>& internal)
-        : obstacles_(contact.obstacles) {
-        for (const Obstacle& obstacle : obstacles_)
-            steepness_.push_back(std::max(interpolation_steepness(obstacle.surface), 1e-9));
-        for (std::size_t i = 0; i < contact.node.size(); ++i)
-            point_.push_back({internal[static_cast<std::size_t>(contact.node[i])],
-                              contact.rest_position.col(static_cast<Eigen::Index>(i)), 0.0});
-        std::sort(point_.begin(), point_.end(), [](const Point& x, const Point& y) { return x.node < y.node; });
-    }
-
-    /// To be called where nodes have moved otherwise than by steps.
-    void forget_clearances() {
-        for (Point& point : point_) point.clearance = 0;
-    }
-
-    /// Puts internal nodes [begin, end) that have entered an obstacle back, in components that are free.
-    template <class T>
-    void settle(std::size_t begin, std::size_t end, const T* free, T* v, T* u) {
-        const auto [first, last] = of_nodes(point_, begin, end);
-        for (Point* point = first; point != last; ++point) {
-            const std::size_t at = point->node * std::size_t{record};
-            const Motion before{vector_at(u + at), vector_at(v + at)};
-            point->clearance -= before.v.norm();
-            if (point->clearance > 0) continue;
-            const Motion after = in_contact(obstacles_, point->position, before);
-            if (after.u == before.u) {
-                point->clearance = clearance(point->position + before.u);
-                continue;
-            }
-            for (std::size_t c = 0; c < 3; ++c) {
-                if (free[at + c] == T(0)) continue;
-                u[at + c] = T(after.u[static_cast<Eigen::Index>(c)]);
-                v[at + c] = T(after.v[static_cast<Eigen::Index>(c)]);
-            }
-        }
-    }
-
-private:
-    struct Point {
-        std::uint32_t node;  // internal
-        Eigen::Vector3d position;
-        double clearance;  // mm that it may go without entering an obstacle
-    };
-
-    template <class T>
-    static Eigen::Vector3d vector_at(const T* record_of_node) {
-        return {double(record_of_node[0]), double(record_of_node[1]), double(record_of_node[2])};
-    }
-
-    /// None outside of a grid, whose border may lie inside the obstacle.
-    [[nodiscard]] double clearance(const Eigen::Vector3d& x) const {
-        double least = std::numeric_limits<double>::infinity();
-        for (std::size_t o = 0; o < obstacles_.size(); ++o) {
-            const double distance = distance_to(obstacles_[o], x).value;
-            least = std::min(least, std::isfinite(distance) ? distance / steepness_[o] : 0.0);
-        }
-        return least;
-    }
-
-    std::vector<Obstacle> obstacles_;
-    std::vector<double> steepness_;  // of each
-    std::vector<Point> point_;       // ascending
 };
 
 }  // namespace tissuewarp::tled::detail

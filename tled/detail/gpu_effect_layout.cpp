@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include <algorithm>
 #include <bit>
 
 namespace tissuewarp::tled::detail {
@@ -79,8 +80,10 @@ void put_obstacle(Words& words, const Obstacle& obstacle, const Vector3d& common
     words.push_back(first_sample);
     put(words, interpolation_reach(grid));
     put(words, obstacle.friction);
+    put(words, 1 / std::max(interpolation_steepness(grid), 1e-9));
+    put(words, std::min(tangent_reach(grid, tangent_tolerance_mm), 1e3));
 }
-constexpr std::size_t obstacle_words = 18;
+constexpr std::size_t obstacle_words = 20;
 
 }  // namespace
 
@@ -141,21 +144,21 @@ std::vector<Float4> gpu_fluid(const NodalFluid& fluid) {
 }
 
 Words gpu_contact(const NodalContact& contact, int node_count) {
-    const std::size_t header = 2;
-    Words words(header + static_cast<std::size_t>(node_count), 0U);
+    const std::size_t places = 1 + obstacle_words * contact.obstacles.size(),
+                      positions = places + static_cast<std::size_t>(node_count);
     const Vector3d common_point = contact.rest_position.rowwise().mean();
-    for (std::size_t i = 0; i < contact.node.size(); ++i) {
-        words[header + static_cast<std::size_t>(contact.node[i])] = place(words.size());
-        put(words, (contact.rest_position.col(static_cast<Eigen::Index>(i)) - common_point).eval());
-    }
-    words[0] = place(contact.obstacles.size());
-    words[1] = place(words.size());
-    std::size_t first_sample = words.size() + obstacle_words * contact.obstacles.size();
+    Words words{place(contact.obstacles.size())};
+    std::size_t first_sample = positions + 3 * contact.node.size();
     for (const Obstacle& obstacle : contact.obstacles) {
         put_obstacle(words, obstacle, common_point, place(first_sample));
         first_sample += obstacle.surface.distance.size();
     }
     words.reserve(first_sample);
+    words.resize(positions, 0U);
+    for (std::size_t i = 0; i < contact.node.size(); ++i) {
+        words[places + static_cast<std::size_t>(contact.node[i])] = place(words.size());
+        put(words, (contact.rest_position.col(static_cast<Eigen::Index>(i)) - common_point).eval());
+    }
     for (const Obstacle& obstacle : contact.obstacles)
         for (const float sample : obstacle.surface.distance) words.push_back(std::bit_cast<std::uint32_t>(sample));
     return words;

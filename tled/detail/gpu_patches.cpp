@@ -14,6 +14,8 @@ using shaders::Program;
 /// Recorded steps are handed over in portions of this many, so that the device starts while the host still records.
 constexpr int steps_per_flush = 64;
 constexpr int steps_per_dispatch = 500;
+/// Of shaders/chunks/patch.state.glsl, and of patch.contact.glsl for each obstacle.
+constexpr std::size_t state_planes = 6, tangent_planes = 8;
 
 bool every_node_has_tetrahedra(const RestState& rest) {
     const std::vector<int>& offset = rest.incidence.offset;
@@ -111,7 +113,8 @@ bool GpuPatches::suit(const RestState& rest, const shaders::Device& device) {
 
 GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& programs, const RestState& rest,
                        const GpuStepShape& shape, BlockBuffers& blocks)
-    : programs_(programs),
+    : device_(device),
+      programs_(programs),
       shape_(shape),
       averages_(rest.pressure.count() > 0),
       storage_blocks_(device.limits().storage_blocks),
@@ -130,7 +133,7 @@ GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& pro
     head.insert(head.end(), layout.fans.begin(), layout.fans.end());
     head_.emplace(device, head, "heads and fans of patches");
     rest_.emplace(device, layout.rest, "rest data of patches");
-    state_.emplace(device, 6 * slot_count_, "state of patches");
+    state_.emplace(device, state_planes * slot_count_, "state of patches");
     sources_.emplace(device, layout.sources, "sources of forces");
     neighbours_.emplace(device, layout.neighbours, "neighbours of patches");
     progress_.emplace(device, static_cast<std::size_t>(c.patches) + 1, "progress of patches");
@@ -150,6 +153,15 @@ GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& pro
     blocks.set("PatchSlot", *slot_of_node_);
     blocks.set("PatchForces", *forces_);
     blocks.set("PatchVolumes", *volumes_);
+}
+
+void GpuPatches::set_obstacles(std::size_t count, BlockBuffers& blocks) {
+    obstacles_ = count;
+    const std::size_t planes = state_planes + tangent_planes * count;
+    if (state_->size() == planes * slot_count_) return;
+    state_.emplace(device_, planes * slot_count_, "state of patches");
+    blocks.set("PatchState", *state_);
+    forget_state();
 }
 
 bool GpuPatches::take(const shaders::NodeEffects& effects) const {
@@ -218,7 +230,7 @@ int GpuPatches::workgroups_of(const PatchStages& stages) const {
     return stages.persists ? workgroups_ : capacity_.patches;
 }
 
-/// The uniforms of shaders/chunks/patch.glsl.
+/// The uniforms of shaders/chunks/patch.glsl and patch.contact.glsl.
 void GpuPatches::set_sizes(const Program& program, int workgroups) const {
     const auto set = [&](int location, auto value) { program.set(location, static_cast<std::uint32_t>(value)); };
     set(6, capacity_.patches);
@@ -228,6 +240,7 @@ void GpuPatches::set_sizes(const Program& program, int workgroups) const {
     set(10, capacity_.neighbours);
     set(11, workgroups);
     program.set(12, static_cast<float>(capacity_.contributions));
+    if (obstacles_ > 0) set(14, obstacles_);
 }
 
 void GpuPatches::dispatch(Stages stages, int repeats, int steps, const Run& run, const shaders::NodeEffects& effects,
@@ -259,6 +272,7 @@ void GpuPatches::dispatch(Stages stages, int repeats, int steps, const Run& run,
 /// State from nodes and elements to patches.
 void GpuPatches::load(const BlockBuffers& blocks) {
     largest_->clear();
+    if (obstacles_ > 0) state_->clear();
     const Program& load = programs_.get(shaders::patch_load_program());
     blocks.bind(load);
     load.dispatch(slot_count_);

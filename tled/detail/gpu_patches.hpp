@@ -30,6 +30,8 @@ public:
     [[nodiscard]] std::vector<Pass> passes(const shaders::NodeEffects& effects) const;
     /// As asked for, without many steps in a dispatch once the device has proved unable to run them.
     [[nodiscard]] GpuStepShape shape() const;
+    /// Makes room for what slots keep of so many obstacles.
+    void set_obstacles(std::size_t count, BlockBuffers& blocks);
     /// Displacement, Increment, masses or conditions were changed from outside.
     void forget_state() { loaded_ = false; }
 
@@ -55,12 +57,13 @@ private:
     /// Whether a patch waited too long for its neighbours: the state is then not that of any step.
     [[nodiscard]] bool gave_up() const;
 
+    const shaders::Device& device_;
     shaders::ProgramCache& programs_;
     std::optional<TissueOfPatches> tissue_;
     GpuStepShape shape_;
     bool averages_, many_steps_;
     int storage_blocks_;  ///< that the device offers a program
-    std::size_t node_count_, slot_count_;
+    std::size_t node_count_, slot_count_, obstacles_ = 0;
     PatchCapacity capacity_;
     int workgroups_;  ///< of a dispatch that persists
     shaders::PatchSizes sizes_;

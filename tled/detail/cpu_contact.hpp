@@ -1,0 +1,113 @@
+#pragma once
+/// Contact with rigid bodies (nodal_effects.hpp) by the internal numbers of the CPU engine.
+
+#include "tled/detail/cpu_effects.hpp"
+#include "tled/nodal_effects.hpp"
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+namespace tissuewarp::tled::detail {
+
+/// The tangent plane of an obstacle's distance where a node was when it last looked.
+struct Tangent {
+    Eigen::Vector3d from = Eigen::Vector3d::Zero();    ///< displacement of the node, mm
+    Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< outward, unit vector
+    double height = 0.0;         ///< of the node above the plane, mm; +∞ outside of the obstacle's grid
+    double reach_squared = 0.0;  ///< mm²; nearer to `from` the node is outside the obstacle if it is above the plane,
+                                 ///< and inside by its depth below it
+
+    [[nodiscard]] double height_at(const Eigen::Vector3d& u) const { return height + normal.dot(u - from); }
+    /// How far a node at displacement u may go and stay outside, mm.
+    [[nodiscard]] double free_way(const Eigen::Vector3d& u) const {
+        return std::min(height_at(u), std::sqrt(reach_squared) - (u - from).norm());
+    }
+};
+
+/// Steps look at the samples of an obstacle only where a node has left the reach of its last look: few nodes are near
+/// an obstacle, and those that touch it move by micrometres a step. In float64 whatever the engine computes in, because
+/// the surface is a matter of micrometres too.
+class CpuContact {
+public:
+    CpuContact(const NodalContact& contact, const std::vector<std::uint32_t>& internal);
+
+    /// To be called where nodes have moved otherwise than by steps: what follows does not depend on what went before.
+    void forget_looks();
+
+    /// Puts internal nodes [begin, end) that have entered an obstacle back, in components that are free. Arrays of
+    /// records, mm.
+    template <class T>
+    void settle(std::size_t begin, std::size_t end, const T* free, T* v, T* u) {
+        const auto [first, last] = of_nodes(point_, begin, end);
+        for (Point* point = first; point != last; ++point) {
+            const std::size_t at = point->node * std::size_t{record};
+            const Eigen::Vector3d here = vector_at(u + at);
+            if ((here - point->from).squaredNorm() < point->free_squared) continue;
+            const Motion after = settled(*point, {here, vector_at(v + at)});
+            if (after.u == here) {
+                set_free(*point, here);
+                continue;
+            }
+            for (std::size_t c = 0; c < 3; ++c) {
+                if (free[at + c] == T(0)) continue;
+                u[at + c] = T(after.u[static_cast<Eigen::Index>(c)]);
+                v[at + c] = T(after.v[static_cast<Eigen::Index>(c)]);
+            }
+        }
+    }
+
+private:
+    struct Point {
+        std::uint32_t node, entry;                       // internal; of NodalContact
+        Eigen::Vector3d from = Eigen::Vector3d::Zero();  // displacement, mm
+        double free_squared = 0.0;                       // mm²; nearer to `from` it is outside all obstacles
+    };
+
+    template <class T>
+    static Eigen::Vector3d vector_at(const T* record_of_node) {
+        return {double(record_of_node[0]), double(record_of_node[1]), double(record_of_node[2])};
+    }
+
+    Tangent& tangent(const Point& point, std::size_t obstacle) {
+        return tangent_[point.entry * obstacles_.size() + obstacle];
+    }
+
+    /// As in_contact() has it.
+    Motion settled(const Point& point, Motion motion) {
+        for (std::size_t o = 0; o < obstacles_.size(); ++o) {
+            Tangent& tangent = this->tangent(point, o);
+            if (!((motion.u - tangent.from).squaredNorm() < tangent.reach_squared))
+                tangent = look(o, position_.col(point.entry), motion.u);
+            const double depth = -tangent.height_at(motion.u);
+            if (!(depth > 0)) continue;
+            const Eigen::Vector3d correction =
+                contact_correction(tangent.normal, depth, obstacles_[o].friction, motion.v);
+            motion.u += correction;
+            motion.v += correction;
+        }
+        return motion;
+    }
+
+    /// After a step that found it outside all obstacles at displacement u.
+    void set_free(Point& point, const Eigen::Vector3d& u) {
+        double free = std::numeric_limits<double>::infinity();
+        for (std::size_t o = 0; o < obstacles_.size(); ++o) free = std::min(free, tangent(point, o).free_way(u));
+        point.from = u;
+        point.free_squared = free > 0 ? free * free : 0.0;
+    }
+
+    [[nodiscard]] Tangent look(std::size_t obstacle, const Eigen::Vector3d& X, const Eigen::Vector3d& u) const;
+
+    std::vector<Obstacle> obstacles_;
+    std::vector<double> steepness_, tangent_reach_;  // of each
+    Eigen::Matrix3Xd position_;                      // by entry of NodalContact, at rest, mm
+    std::vector<Point> point_;                       // ascending
+    std::vector<Tangent> tangent_;                   // of each entry, of each obstacle
+};
+
+}  // namespace tissuewarp::tled::detail
