@@ -3,6 +3,7 @@
 #include "core/detail/hdf5.hpp"
 #include "core/errors.hpp"
 #include "meshing/mesh_io.hpp"
+#include "simulation/xdmf.hpp"
 #include "tled/reference.hpp"
 
 #include <array>
@@ -46,8 +47,7 @@ struct SeriesWriter::Impl {
     Hdf5Output record;
     std::ofstream probes;
     std::string collection;
-    std::vector<double> times;
-    std::vector<int> stages;
+    XdmfSeries frames;
 
     Impl(const BuiltScene& scene, const std::filesystem::path& where)
         : built(scene),
@@ -57,6 +57,8 @@ struct SeriesWriter::Impl {
         record.columns<double>("mesh/nodes", built.mesh.nodes, "mm, LPS");
         record.columns<int>("mesh/tetrahedra", built.mesh.tets, "");
         record.vector<int>("mesh/labels", built.mesh.labels, "");
+        frames.record = "displacement.h5";
+        frames.nodes = built.mesh.node_count();
         probes << "time_s,probe,x_mm,y_mm,z_mm,dx_mm,dy_mm,dz_mm\n";
         require_written();
     }
@@ -74,6 +76,36 @@ struct SeriesWriter::Impl {
         meshing::write_vtu(stage.model.mesh, folder / name, {{"displacement", frame.displacement}},
                            {{"J", in_mesh.transpose()}});
         collection += "    <DataSet timestep=\"" + number(frame.time) + "\" part=\"0\" file=\"" + name + "\"/>\n";
+    }
+
+    void add_times() {
+        const auto count = static_cast<Eigen::Index>(frames.frames.size());
+        Eigen::VectorXd time(count);
+        Eigen::VectorXi stage(count);
+        for (Eigen::Index f = 0; f < count; ++f) {
+            const XdmfFrame& frame = frames.frames[static_cast<std::size_t>(f)];
+            time[f] = frame.time;
+            stage[f] = static_cast<int>(frame.stage);
+        }
+        record.vector<double>("time", time, "s");
+        record.vector<int>("stage", stage, "");
+    }
+
+    /// What of the mesh is left, where that is not all of it.
+    void add_stages() {
+        for (std::size_t s = 0; s < built.stages.size(); ++s) {
+            if (s == 0 && !built.left_out) {
+                frames.stages.push_back({"mesh/tetrahedra", "mesh/labels", built.mesh.tet_count()});
+                continue;
+            }
+            const std::vector<int>& tets = built.stages[s].tet;
+            const Eigen::Map<const Eigen::VectorXi> left(tets.data(), static_cast<Eigen::Index>(tets.size()));
+            const std::string name = "remaining/" + std::to_string(s), mesh = "remaining_mesh/" + std::to_string(s);
+            record.vector<int>(name, left, "");
+            record.columns<int>(mesh + "/tetrahedra", built.mesh.tets(Eigen::all, left), "");
+            record.vector<int>(mesh + "/labels", built.mesh.labels(left), "");
+            frames.stages.push_back({mesh + "/tetrahedra", mesh + "/labels", static_cast<int>(tets.size())});
+        }
     }
 
     void add_probes(const Frame& frame) {
@@ -98,24 +130,13 @@ void SeriesWriter::add(const Frame& frame) {
     impl_->add_probes(frame);
     const Matrix3Xd all = on_scene_mesh(impl_->built, frame);
     impl_->record.append("displacement", all.data(), {static_cast<hsize_t>(all.cols()), 3}, "mm");
-    impl_->times.push_back(frame.time);
-    impl_->stages.push_back(frame.stage);
+    impl_->frames.frames.push_back({frame.time, static_cast<std::size_t>(frame.stage)});
 }
 
 void SeriesWriter::finish() {
     Impl& series = *impl_;
-    series.record.vector<double>(
-        "time", Eigen::Map<const Eigen::VectorXd>(series.times.data(), static_cast<Eigen::Index>(series.times.size())),
-        "s");
-    series.record.vector<int>(
-        "stage",
-        Eigen::Map<const Eigen::VectorXi>(series.stages.data(), static_cast<Eigen::Index>(series.stages.size())), "");
-    for (std::size_t s = series.built.left_out ? 0 : 1; s < series.built.stages.size(); ++s) {
-        const std::vector<int>& tets = series.built.stages[s].tet;
-        series.record.vector<int>(
-            "remaining/" + std::to_string(s),
-            Eigen::Map<const Eigen::VectorXi>(tets.data(), static_cast<Eigen::Index>(tets.size())), "");
-    }
+    series.add_times();
+    series.add_stages();
     series.record.close();
     series.probes.close();
     series.require_written();
@@ -127,6 +148,7 @@ void SeriesWriter::finish() {
     if (!pvd)
         throw IoError("cannot write '" + (series.folder / "frames.pvd").string() +
                       "'; check that the folder exists and the disk has room");
+    write_xdmf(series.frames, series.folder / "frames.xdmf");
 }
 
 }  // namespace tissuewarp::simulation

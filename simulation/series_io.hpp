@@ -1,7 +1,8 @@
 #pragma once
 /// The frames of a run as files, in one folder:
 ///   frame_0000.vtu …, frames.pvd   mesh with displacement (mm) and J for ParaView, one file for each frame
-///   displacement.h5                the mesh once and the displacement of every frame (docs/manual/simulate.md)
+///   displacement.h5, frames.xdmf   the mesh once and the displacement of every frame (docs/manual/simulate.md), and
+///                                  what makes a series for ParaView of it
 ///   probes.csv                     time_s,probe,x_mm,y_mm,z_mm,dx_mm,dy_mm,dz_mm: where it was at rest, how far it
 ///   went
 

@@ -5,6 +5,7 @@ import json
 import pathlib
 import tempfile
 import unittest
+import xml.etree.ElementTree
 
 import h5py
 import numpy
@@ -39,12 +40,29 @@ class Simulate(unittest.TestCase):
         self.scene = self.folder / "scene.toml"
         self.scene.write_text(SMALL_CUBE)
 
+    def require_described(self, xdmf, displacement):
+        """Follows every reference of the description to a dataset of the shape it states."""
+        grids = xml.etree.ElementTree.parse(xdmf).findall("Domain/Grid/Grid")
+        self.assertEqual([float(grid.find("Time").get("Value")) for grid in grids], [0, 0.5, 1])
+        for frame, grid in enumerate(grids):
+            for item in grid.iter("DataItem"):
+                if item.get("Format") != "HDF":
+                    continue
+                name, dataset = item.text.split(":")
+                with h5py.File(xdmf.parent / name) as record:
+                    self.assertEqual(record[dataset].shape, tuple(map(int, item.get("Dimensions").split())))
+            slab, whole = grid.find("Attribute[@Name='displacement']/DataItem").findall("DataItem")
+            start, stride, count = numpy.array(slab.text.split(), int).reshape(3, 3)
+            self.assertEqual(count.tolist(), [1, *displacement.shape[1:]])
+            self.assertEqual((start.tolist(), stride.tolist()), ([frame, 0, 0], [1, 1, 1]))
+            self.assertEqual(whole.text, "displacement.h5:/displacement")
+
     def test_files_of_a_run(self):
         done = run("simulate", self.scene, "-o", self.folder / "out")
         self.assertEqual(done.returncode, 0, done.stderr)
         names = sorted(path.name for path in (self.folder / "out").iterdir())
         self.assertEqual(names, ["displacement.h5", "frame_0000.vtu", "frame_0001.vtu", "frame_0002.vtu", "frames.pvd",
-                                 "probes.csv", "summary.json"])
+                                 "frames.xdmf", "probes.csv", "summary.json"])
         with h5py.File(self.folder / "out" / "displacement.h5") as record:
             self.assertEqual(record.attrs["format"], "tissuewarp simulation")
             displacement = record["displacement"][:]
@@ -53,6 +71,7 @@ class Simulate(unittest.TestCase):
         self.assertEqual(displacement.shape, (3, 64, 3))
         self.assertTrue((displacement[0] == 0).all())
         self.assertTrue((displacement[2][nodes[:, 2] == 0] == 0).all())
+        self.require_described(self.folder / "out" / "frames.xdmf", displacement)
         rows = list(csv.DictReader((self.folder / "out" / "probes.csv").read_text().splitlines()))
         top = numpy.argmin(numpy.linalg.norm(nodes - [50, 50, 100], axis=1))
         self.assertEqual([row["time_s"] for row in rows], ["0", "0.5", "1"])

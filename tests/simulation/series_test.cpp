@@ -63,6 +63,12 @@ TEST(Series, HoldsEveryFrameInEveryFormat) {
     EXPECT_EQ(record.vector<double>("time", 3), Eigen::Vector3d(0, 0.5, 1));
     EXPECT_EQ(record.vector<int>("stage", 3), Eigen::Vector3i(0, 0, 1));
     EXPECT_EQ(record.vector<int>("remaining/1").size(), built.stages[1].rest.element_count());
+    const auto left = static_cast<hsize_t>(built.stages[1].rest.element_count());
+    EXPECT_NO_THROW(record.require_shape("remaining_mesh/1/tetrahedra", {left, 4}));
+    EXPECT_NO_THROW(record.require_shape("remaining_mesh/1/labels", {left}));
+    const std::string description = text_of(folder / "frames.xdmf");
+    EXPECT_THAT(description, HasSubstr("displacement.h5:/mesh/tetrahedra"));
+    EXPECT_THAT(description, HasSubstr("displacement.h5:/remaining_mesh/1/tetrahedra"));
     EXPECT_NO_THROW(record.require_shape("displacement", {3, static_cast<hsize_t>(built.mesh.node_count()), 3}));
     fs::remove_all(folder);
 }
