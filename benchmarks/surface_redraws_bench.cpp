@@ -168,7 +168,8 @@ void run(const Arguments& arguments) {
     std::vector<double> rigid_errors, errors;
     int failed = 0, failed_said = 0, doubted = 0;
     std::printf(
-        "| draw | coverage | outliers | start | rigid, mm | elastic, mm | inliers | residual, mm | rival, mm | "
+        "| draw | coverage (as found) | outliers | start | rigid, mm | elastic, mm | inliers | residual, mm | rival, "
+        "mm | "
         "expected, mm | s | doubts |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
     for (int seed = arguments.first; seed < arguments.first + arguments.count; ++seed) {
         const Draw draw = Drawing(truth, static_cast<unsigned>(seed)).draw(arguments.deviation_mm, seed % 2 == 0);
@@ -188,10 +189,11 @@ void run(const Arguments& arguments) {
         failed += errors.back() > failure_mm;
         failed_said += errors.back() > failure_mm && !result.doubts.empty();
         doubted += !result.doubts.empty();
-        std::printf("| %d | %.2f | %.2f | %.0f°, %.0f mm | %.2f | %.2f | %.2f | %.2f | %.0f at %.2f | %.2f | %.1f |",
-                    seed, draw.coverage, draw.outliers, draw.angle_deg, draw.shift_mm, rigid_errors.back(),
-                    errors.back(), result.surface->inlier_share, result.surface->residual_mm, result.surface->rival_mm,
-                    result.surface->rival_support, expected.mean_mm, seconds);
+        std::printf(
+            "| %d | %.2f (%.2f) | %.2f | %.0f°, %.0f mm | %.2f | %.2f | %.2f | %.2f | %.0f at %.2f | %.2f | %.1f |",
+            seed, draw.coverage, result.surface->coverage, draw.outliers, draw.angle_deg, draw.shift_mm,
+            rigid_errors.back(), errors.back(), result.surface->inlier_share, result.surface->residual_mm,
+            result.surface->rival_mm, result.surface->rival_support, expected.mean_mm, seconds);
         for (const std::string& doubt : result.doubts) std::printf(" %s;", doubt.c_str());
         std::printf(" |\n");
         std::fflush(stdout);

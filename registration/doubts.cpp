@@ -19,7 +19,7 @@ std::string percent(double share) {
 }
 
 void doubt_surface(const SurfaceFit& fit, double deviation_mm, std::vector<std::string>& reasons) {
-    constexpr double least_inliers = 0.5, most_residual = 1.4, most_rival_support = 0.95, least_coverage = 0.18;
+    constexpr double least_inliers = 0.5, most_residual = 1.4, most_rival_support = 0.95, least_coverage = 0.25;
     if (fit.inlier_share < least_inliers)
         reasons.push_back("only " + percent(fit.inlier_share) + " of the intraoperative surface lies on the model");
     if (fit.residual_mm > most_residual * std::max(deviation_mm, 0.3))
