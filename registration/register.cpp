@@ -204,6 +204,7 @@ private:
             tled::equilibrium(engine_, metric_ ? *metric_ : prepared_.stiffness, conditions, equilibrium_,
                               &state_.displacement, observer_);
         equilibrium_.method = solved.method;  // chosen and explained once, not in every round
+        equilibrium_.known_highest = solved.highest;
         record.largest_change_mm =
             std::sqrt((solved.displacement - state_.displacement).colwise().squaredNorm().maxCoeff());
         record.force_evaluations = solved.force_evaluations;

@@ -22,6 +22,8 @@ struct EquilibriumOptions {
     int max_steps = 4000;        ///< force evaluations
     int steps_per_check = 25;    ///< steps of dynamic relaxation recorded between two looks at the state
     EquilibriumMethod method = EquilibriumMethod::Automatic;
+    double known_highest = 0;         ///< EquilibriumResult::highest of a state and springs like these: self-checked
+                                      ///< relaxation then goes without a search for it, unless it finds it wrong
     const RestState* rest = nullptr;  ///< that of the engine: lets L-BFGS factorise a metric near the answer for tissue
                                       ///< of which almost only the volume is stiff
 };
@@ -32,6 +34,8 @@ struct EquilibriumResult {
     int force_evaluations = 0;
     int lifted_residuals = 0;  ///< triangular solves
     double min_jacobian = 1;
+    double highest = 0;  ///< eigenvalue of diag(K)⁻¹K, a little more; 0 where self-checked relaxation did not end with
+                         ///< steps for it
     EquilibriumMethod method = EquilibriumMethod::Automatic;  ///< the one used
     std::string reason;                                       ///< why this one
 };

@@ -12,10 +12,10 @@ struct LoadPathOptions {
 };
 
 /// Equilibrium under the conditions by way of smaller loads: imposed displacements go from those of `start` (3 × N mm;
-/// none: rest) to the prescribed ones, spring targets, forces, pressures and the weight of fluid grow from zero (from rest) or
-/// stand from the beginning (from a start). A part that fails is halved, one that succeeds is followed by a larger one, and each begins on the
-/// line through the last two equilibria. The evaluations of all parts are summed up in the result. Throws SolverFailure
-/// naming the part of the load that was reached.
+/// none: rest) to the prescribed ones, spring targets, forces, pressures and the weight of fluid grow from zero (from
+/// rest) or stand from the beginning (from a start). A part that fails is halved, one that succeeds is followed by a
+/// larger one, and each begins on the line through the last two equilibria. The evaluations of all parts are summed up
+/// in the result. Throws SolverFailure naming the part of the load that was reached.
 EquilibriumResult equilibrium_along_load(Engine& engine, const RestStiffness& stiffness,
                                          const NodalConditions& conditions, const LoadPathOptions& options = {},
                                          const Eigen::Matrix3Xd* start = nullptr,

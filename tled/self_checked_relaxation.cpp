@@ -42,12 +42,13 @@ public:
 
     EquilibriumResult run(const Matrix3Xd* start) {
         search_.keep(first_state(start), unknown_error());
+        if (settle_as_before()) return finished(search_.options.known_highest);
         spectrum_ = spectrum_at(search_, mass_, search_.residual(), lowest_at_rest_);
-        if (open() && settle()) return search_.finish();
-        if (start == nullptr && start_from_part() && open() && settle()) return search_.finish();
+        if (open() && settle()) return finished(spectrum_.highest);
+        if (start == nullptr && start_from_part() && open() && settle()) return finished(spectrum_.highest);
         do spectrum_ = restarted(search_, mass_, ++restarts_, lowest_at_rest_);
         while (!(open() && settle()));
-        return search_.finish();
+        return search_.finish();  // with steps shorter than the eigenvalue asks for
     }
 
 private:
@@ -57,6 +58,24 @@ private:
     double lowest_at_rest_;
     Spectrum spectrum_;
     int restarts_ = 0;
+    bool as_before_ = false;  // whether λ_max is that of another state
+
+    /// With λ_max as it is known; otherwise, and where that proves wrong, leaves the engine at the last good state.
+    bool settle_as_before() {
+        if (!(search_.options.known_highest > 0)) return false;
+        spectrum_ = spectrum_of(search_.options.known_highest, search_, mass_, lowest_at_rest_);
+        as_before_ = true;
+        const bool settled = open() && settle();
+        as_before_ = false;
+        if (!settled && !search_.admissible(search_.last_good())) search_.fail_stalled();
+        return settled;
+    }
+
+    EquilibriumResult finished(double highest) {
+        EquilibriumResult result = search_.finish();
+        result.highest = highest;
+        return result;
+    }
 
     [[nodiscard]] double unknown_error() const { return 1e3 * search_.options.tolerance_mm; }
 
@@ -105,6 +124,7 @@ private:
         const NodalConditions conditions = scaled(search_.conditions, part);
         EquilibriumOptions options = search_.options;
         options.tolerance_mm *= part;
+        options.known_highest = 0;
         CancelOnly observer(search_.observer);
         EquilibriumSearch search(search_.engine, search_.stiffness, conditions, options, observer);
         const Matrix3Xd* start = conditions.imposed.isZero(0) ? nullptr : &conditions.imposed;
@@ -172,8 +192,9 @@ private:
             const int steps = static_cast<int>(std::ceil(neper_a_window / decay(spectrum_)));
             std::optional<Matrix3Xd> after = stepped(steps, heavy_ball(spectrum_));
             if (!after) return false;
-            const double moved = largest_norm(*after - before), foreseen = std::exp(-neper_a_window);
+            const double moved = largest_difference(*after, before), foreseen = std::exp(-neper_a_window);
             const double seen = window == 0 ? slowest : moved / std::max(last, 1e-300);
+            if (as_before_ && seen > 1 && moves_as_the_stiffest()) return false;
             const double contraction = std::clamp(seen, foreseen, slowest);
             const double error =
                 estimate_safety * contraction / (1 - contraction) * std::max(moved, contraction * last);
@@ -181,10 +202,21 @@ private:
             if (window > 0 && error <= allowed(*after)) return true;
             if (window > 1 && std::log(seen) > -0.4 * neper_a_window) spectrum_.lowest *= 0.6;
             if (window == 0 || moved < 0.9 * least) idle = 0, least = moved;
-            if (++idle > most_idle_windows) search_.fail_stalled();
+            if (++idle > most_idle_windows) {
+                if (as_before_) return false;
+                search_.fail_stalled();
+            }
             before = std::move(*after);
             last = moved;
         }
+    }
+
+    /// Steps that are too long for the stiffest elements let these swing ever more: by the Rayleigh quotient of the
+    /// last increments, which smooth movement leaves small.
+    [[nodiscard]] bool moves_as_the_stiffest() {
+        search_.require_evaluations(2);
+        const Observation seen = search_.engine.observe();
+        return !(seen.increment_stiffness < 0.5 * spectrum_.highest * seen.increment_mass);
     }
 };
 

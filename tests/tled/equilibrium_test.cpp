@@ -302,6 +302,32 @@ TEST(SelfCheckedRelaxation, KeepsItsToleranceWhereSpringsAreMissing) {
     }
 }
 
+// Steps that are too long for the stiffest element grow until tissue is torn: what was known of another state must not
+// decide.
+TEST(SelfCheckedRelaxation, TakesAKnownHighestEigenvalueUntilItProvesWrong) {
+    for (const double poisson : {0.3, 0.49}) {
+        const PulledBox box(poisson);
+        const NodalConditions conditions = box.pulled(30);
+        const RestStiffness stiffness(box.rest, conditions);
+        const auto engine = make_cpu_engine(box.rest, Scalar::Float64);
+        const Matrix3Xd newton = newton_equilibrium(box.rest, conditions, {.tolerance_mm = 1e-8}).displacement;
+        const auto solved = [&](double known) {
+            return equilibrium(
+                *engine, stiffness, conditions,
+                {.tolerance_mm = 0.003, .method = EquilibriumMethod::SelfCheckedRelaxation, .known_highest = known});
+        };
+        const auto found = solved(0);
+        const auto again = solved(found.highest);
+        EXPECT_EQ(again.highest, found.highest);
+        EXPECT_LE(again.force_evaluations, found.force_evaluations);
+        for (const double part : {1.0, 0.9, 0.8, 0.6, 0.3, 0.01, 3.0}) {
+            const auto other = solved(part * found.highest);
+            EXPECT_LT(largest_difference(other.displacement, newton), 0.003) << part;
+        }
+        EXPECT_NEAR(solved(0.3 * found.highest).highest, found.highest, 0.1 * found.highest) << "it is found anew";
+    }
+}
+
 // Tissue at rest but for its top, which is 20 mm away, is torn: from there on fine meshes steps lead nowhere.
 TEST(SelfCheckedRelaxation, StartsWhereImposedDisplacementsDoNotTear) {
     const SeedCube cube(Element::AveragedPressureT4, 15);

@@ -1,9 +1,13 @@
 #include "tled/detail/gpu_layout.hpp"
 
+#include "tled/detail/parallel.hpp"
+
 #include "tled/detail/kernel_parameters.hpp"
 
 namespace tissuewarp::tled::detail {
 namespace {
+
+constexpr std::size_t nodes_at_once = 4096;  // of one task
 
 float single(double value) {
     return static_cast<float>(value);
@@ -129,17 +133,21 @@ GpuPressure gpu_pressure(const RestState& rest) {
 
 std::vector<Float4> packed(const Eigen::Matrix3Xd& vectors) {
     std::vector<Float4> result(static_cast<std::size_t>(vectors.cols()));
-    for (Eigen::Index a = 0; a < vectors.cols(); ++a)
-        result[static_cast<std::size_t>(a)] = {single(vectors(0, a)), single(vectors(1, a)), single(vectors(2, a)),
-                                               0.0F};
+    parallel_ranges(0, result.size(), nodes_at_once, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t a = begin; a < end; ++a) {
+            const auto v = vectors.col(static_cast<Eigen::Index>(a));
+            result[a] = {single(v[0]), single(v[1]), single(v[2]), 0.0F};
+        }
+    });
     return result;
 }
 
 Eigen::Matrix3Xd unpacked(const std::vector<Float4>& vectors) {
     Eigen::Matrix3Xd result(3, static_cast<Eigen::Index>(vectors.size()));
-    for (std::size_t a = 0; a < vectors.size(); ++a)
-        for (std::size_t c = 0; c < 3; ++c)
-            result(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(a)) = static_cast<double>(vectors[a][c]);
+    parallel_ranges(0, vectors.size(), nodes_at_once, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t a = begin; a < end; ++a)
+            result.col(static_cast<Eigen::Index>(a)) << vectors[a][0], vectors[a][1], vectors[a][2];
+    });
     return result;
 }
 

@@ -272,12 +272,20 @@ void GpuPatches::dispatch(Stages stages, int repeats, int steps, const Run& run,
 /// State from nodes and elements to patches.
 void GpuPatches::load(const BlockBuffers& blocks) {
     largest_->clear();
-    if (obstacles_ > 0) state_->clear();
+    forget_tangents();
     const Program& load = programs_.get(shaders::patch_load_program());
     blocks.bind(load);
     load.dispatch(slot_count_);
     shaders::storage_barrier();
     tissue_->load_stresses(programs_, blocks);
+}
+
+/// Of every slot and obstacle the reach, the first of their planes: with 0 the next step looks.
+void GpuPatches::forget_tangents() {
+    if (obstacles_ == 0) return;
+    const std::vector<float> none(slot_count_);
+    for (std::size_t o = 0; o < obstacles_; ++o)
+        state_->upload(none, (state_planes + tangent_planes * o) * slot_count_);
 }
 
 void GpuPatches::store(const BlockBuffers& blocks) {

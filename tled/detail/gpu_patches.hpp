@@ -53,6 +53,7 @@ private:
     void set_sizes(const shaders::Program& program, int workgroups) const;
     [[nodiscard]] Run next_steps(int steps, const StepCoefficients& coefficients) const;
     void load(const BlockBuffers& blocks);
+    void forget_tangents();
     void store(const BlockBuffers& blocks);
     /// Whether a patch waited too long for its neighbours: the state is then not that of any step.
     [[nodiscard]] bool gave_up() const;

@@ -31,6 +31,11 @@ double lowest_of_shifts(const NodalConditions& conditions, const Matrix3Xd& mass
     return shifts.eigenvalues().minCoeff();
 }
 
+Spectrum bounded(double highest, const EquilibriumSearch& search, const Matrix3Xd& mass, double lowest_at_rest) {
+    const double lowest = damping_factor * std::min(lowest_at_rest, lowest_of_shifts(search.conditions, mass));
+    return {std::clamp(lowest, least_ratio * highest, highest / 4), highest};
+}
+
 }  // namespace
 
 StepCoefficients heavy_ball(const Spectrum& spectrum) {
@@ -71,8 +76,12 @@ Spectrum spectrum_at(EquilibriumSearch& search, const Matrix3Xd& mass, const Mat
     const double highest = step_safety * eigen.eigenvalues().maxCoeff();
     if (!(highest > 0)) search.fail_stalled();
     search.engine.set_state(u, still);
-    const double lowest = damping_factor * std::min(lowest_at_rest, lowest_of_shifts(search.conditions, mass));
-    return {std::clamp(lowest, least_ratio * highest, highest / 4), highest};
+    return bounded(highest, search, mass, lowest_at_rest);
+}
+
+Spectrum spectrum_of(double highest, const EquilibriumSearch& search, const Matrix3Xd& mass, double lowest_at_rest) {
+    constexpr double reserve = 1.05;
+    return bounded(reserve * highest, search, mass, lowest_at_rest);
 }
 
 Spectrum restarted(EquilibriumSearch& search, const Matrix3Xd& mass, int restarts, double lowest_at_rest) {

@@ -24,8 +24,12 @@ double decay(const Spectrum& spectrum);
 Spectrum spectrum_at(EquilibriumSearch& search, const Eigen::Matrix3Xd& mass, const Eigen::Matrix3Xd& residual,
                      double lowest_at_rest);
 
-/// The same for the `restarts`th time, after steps that inverted tissue: back at the last good state, with λ_max taken
-/// 2^restarts times as large. Fails where that state is none, or after six.
+/// Of a λ_max that is known from elsewhere, with a reserve for what has changed since. The engine stays as it is.
+Spectrum spectrum_of(double highest, const EquilibriumSearch& search, const Eigen::Matrix3Xd& mass,
+                     double lowest_at_rest);
+
+/// spectrum_at() for the `restarts`th time, after steps that inverted tissue: back at the last good state, with λ_max
+/// taken 2^restarts times as large. Fails where that state is none, or after six.
 Spectrum restarted(EquilibriumSearch& search, const Eigen::Matrix3Xd& mass, int restarts, double lowest_at_rest);
 
 }  // namespace tissuewarp::tled::detail
