@@ -29,6 +29,15 @@ double value_at(const Curve& curve, double time, double duration) {
     return before.value + (after->value - before.value) * (time - before.time) / (after->time - before.time);
 }
 
+double slope_before(const Curve& curve, double time, double duration) {
+    if (curve.points.empty()) return time > 0 && time <= duration ? 1 / duration : 0.0;
+    for (std::size_t i = 1; i < curve.points.size(); ++i) {
+        const CurvePoint &from = curve.points[i - 1], &to = curve.points[i];
+        if (from.time < time && time <= to.time) return (to.value - from.value) / (to.time - from.time);
+    }
+    return 0.0;
+}
+
 double steepest(const Curve& curve, double duration) {
     if (curve.points.empty()) return 1 / duration;
     double slope = 0;

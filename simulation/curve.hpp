@@ -22,6 +22,9 @@ void require_valid(const Curve& curve, const char* what);
 /// Value at `time` (s) in a scene of length `duration` (s, > 0).
 double value_at(const Curve& curve, double time, double duration);
 
+/// Change of value per second just before `time`.
+double slope_before(const Curve& curve, double time, double duration);
+
 /// Largest |change of value| per second within [0, duration].
 double steepest(const Curve& curve, double duration);
 

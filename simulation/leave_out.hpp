@@ -26,7 +26,7 @@ struct LeftOut {
 };
 
 /// The most tissue that may be left out by Scene::leave_out: all but what is nearest to the probes and what a pressure,
-/// a membrane, growth, sliding or a body in contact acts on. The linear answers must foretell a third of the tolerance.
+/// a membrane, growth, sliding or a body in contact acts on. The linear answers must foretell a fifth of the tolerance.
 /// None where even a quarter of the tissue cannot be spared. `built` is whole.
 std::optional<LeftOut> left_out(const BuiltScene& built, Observer& observer);
 

@@ -124,6 +124,14 @@ double pressure_at(const BuiltScene& built, const Stage& stage, std::size_t inde
     return part(stated[index].curve, built, time) * stated[index].pressure;
 }
 
+void move_bodies(const BuiltScene& built, double time, std::vector<tled::Obstacle>& obstacles) {
+    for (std::size_t c = 0; c < obstacles.size(); ++c) {
+        const Contact& contact = built.scene.contacts[c];
+        obstacles[c].shift = part(contact.curve, built, time) * contact.motion;
+        obstacles[c].velocity = slope_before(contact.curve, time, built.scene.solve.duration) * contact.motion;
+    }
+}
+
 void move_effects(const BuiltScene& built, const Stage& stage, double time, tled::Effects& effects) {
     for (std::size_t p = 0; p < effects.pressures.size(); ++p)
         effects.pressures[p].pressure = pressure_at(built, stage, p, time);
@@ -131,10 +139,7 @@ void move_effects(const BuiltScene& built, const Stage& stage, double time, tled
         effects.fluid = fluid_of(built, level_at(*built.scene.fluid, built, time),
                                  gravity_at(*built.scene.gravity, time, built.scene.solve.duration));
     if (!effects.contact) return;
-    for (std::size_t c = 0; c < effects.contact->obstacles.size(); ++c) {
-        const Contact& contact = built.scene.contacts[c];
-        effects.contact->obstacles[c].shift = part(contact.curve, built, time) * contact.motion;
-    }
+    move_bodies(built, time, effects.contact->obstacles);
 }
 
 }  // namespace
@@ -191,11 +196,7 @@ const tled::NodalConditions& LoadsInTime::at(double time) {
                                gravity_at(*built_.scene.gravity, time, built_.scene.solve.duration));
         effects.fluid = tled::nodal_effects(fluid, stage_.rest).fluid;
     }
-    if (effects.contact)
-        for (std::size_t c = 0; c < effects.contact->obstacles.size(); ++c) {
-            const Contact& contact = built_.scene.contacts[c];
-            effects.contact->obstacles[c].shift = part(contact.curve, built_, time) * contact.motion;
-        }
+    if (effects.contact) move_bodies(built_, time, effects.contact->obstacles);
     Eigen::Index face = 0;
     for (std::size_t p = 0; p < pressure_faces_.size(); ++p) {
         effects.surface.pressure.segment(face, pressure_faces_[p]).setConstant(pressure_at(built_, stage_, p, time));
@@ -216,8 +217,9 @@ double hold_interval(const BuiltScene& built, const Stage& stage) {
                 shortest =
                     std::min(shortest, (mesh.nodes.col(mesh.tets(a, e)) - mesh.nodes.col(mesh.tets(b, e))).norm());
     double interval = duration;
+    constexpr int fewest = 20;  // of what changes by next to nothing
     const auto limit = [&](double most, double speed) {
-        if (speed > 0) interval = std::min(interval, most / speed);
+        if (speed > 0) interval = std::min({interval, most / speed, duration / fewest});
     };
     for (const Motion& motion : scene.motions)
         limit(small * shortest, motion.displacement.norm() * steepest(motion.curve, duration));

@@ -38,8 +38,13 @@ private:
 
 class Run {
 public:
-    Run(const BuiltScene& built, const std::function<void(const Frame&)>& on_frame, Observer& observer)
-        : built_(built), solve_(built.scene.solve), on_frame_(on_frame), observer_(observer) {}
+    Run(const BuiltScene& built, const MakeEngine& make_engine, const std::function<void(const Frame&)>& on_frame,
+        Observer& observer)
+        : built_(built),
+          solve_(built.scene.solve),
+          make_engine_(make_engine),
+          on_frame_(on_frame),
+          observer_(observer) {}
 
     RunSummary run() {
         const auto start = std::chrono::steady_clock::now();
@@ -88,7 +93,7 @@ private:
         if (shown_ > solve_.frames || (!last && time_of(shown_) >= end)) return;
         LoadsInTime loads(built_, stage, stage.begin);
         const tled::RestStiffness stiffness(stage.rest, loads.at(time_of(shown_)));
-        const auto engine = engine_for(solve_, stage.rest, observer_);
+        const auto engine = make_engine_(stage.rest);
         summary_.engine = engine->description();
         for (; shown_ <= solve_.frames && (last || time_of(shown_) < end);) {
             const double time = time_of(shown_);
@@ -124,7 +129,7 @@ private:
     void move(std::size_t s, double end) {
         const Stage& stage = built_.stages[s];
         LoadsInTime loads(built_, stage, stage.begin);
-        const auto engine = engine_for(solve_, stage.rest, observer_);
+        const auto engine = make_engine_(stage.rest);
         summary_.engine = engine->description();
         const Matrix3Xd mass = stage.rest.lumped_mass.transpose().replicate(3, 1);
         const bool last = s + 1 == built_.stages.size();
@@ -158,6 +163,7 @@ private:
 
     const BuiltScene& built_;
     const Solve& solve_;
+    const MakeEngine& make_engine_;
     const std::function<void(const Frame&)>& on_frame_;
     Observer& observer_;
     tled::DynamicsState state_;
@@ -174,8 +180,14 @@ std::unique_ptr<tled::Engine> engine_for(const Solve& solve, const tled::RestSta
 }
 
 RunSummary simulate(const BuiltScene& built, const std::function<void(const Frame&)>& on_frame, Observer& observer) {
+    const auto as_asked = [&](const tled::RestState& rest) { return engine_for(built.scene.solve, rest, observer); };
+    return simulate(built, as_asked, on_frame, observer);
+}
+
+RunSummary simulate(const BuiltScene& built, const MakeEngine& make_engine,
+                    const std::function<void(const Frame&)>& on_frame, Observer& observer) {
     require_supported(built.scene);
-    return Run(built, on_frame, observer).run();
+    return Run(built, make_engine, on_frame, observer).run();
 }
 
 Matrix3Xd on_scene_mesh(const BuiltScene& built, const Frame& frame) {

@@ -41,6 +41,11 @@ RunSummary simulate(
     const BuiltScene& built, const std::function<void(const Frame&)>& on_frame = [](const Frame&) {},
     Observer& observer = silent_observer());
 
+/// The same on engines of the caller's, one for each stage, whatever Solve::device says.
+using MakeEngine = std::function<std::unique_ptr<tled::Engine>(const tled::RestState&)>;
+RunSummary simulate(const BuiltScene& built, const MakeEngine& make_engine,
+                    const std::function<void(const Frame&)>& on_frame, Observer& observer = silent_observer());
+
 /// Displacement of each probe (mm, 3 × probes) in a frame; NaN where its tissue is gone.
 Eigen::Matrix3Xd probe_displacements(const BuiltScene& built, const Frame& frame);
 

@@ -149,6 +149,7 @@ public:
     void run(int steps, const StepCoefficients& coefficients) override {
         const T momentum = T(coefficients.momentum), gain = T(coefficients.gain);
         set_time_step(coefficients.time_step);
+        if (contact_) contact_->set_time_step(coefficients.time_step);
         T* u = displacement_.data();
         with_effects([&](auto surface, auto fluid, auto contact) {
             for (int step = 0; step < steps; ++step)

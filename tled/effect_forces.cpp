@@ -191,14 +191,14 @@ Vector3d contact_correction(const Vector3d& normal, double depth, double frictio
     return correction;
 }
 
-Motion in_contact(const std::vector<Obstacle>& obstacles, const Vector3d& X, const Motion& free) {
+Motion in_contact(const std::vector<Obstacle>& obstacles, const Vector3d& X, const Motion& free, double time_step) {
     Motion motion = free;
     for (const Obstacle& obstacle : obstacles) {
         const Distance distance = distance_to(obstacle, X + motion.u);
         const double steepness = distance.gradient.norm();
         if (!(distance.value < 0) || !(steepness > 0)) continue;
-        const Vector3d correction =
-            contact_correction(distance.gradient / steepness, -distance.value / steepness, obstacle.friction, motion.v);
+        const Vector3d correction = contact_correction(distance.gradient / steepness, -distance.value / steepness,
+                                                       obstacle.friction, motion.v - time_step * obstacle.velocity);
         motion.u += correction;
         motion.v += correction;
     }

@@ -52,12 +52,15 @@ struct DistanceGrid {
 /// A rigid body that tissue cannot enter but can leave.
 struct Obstacle {
     DistanceGrid surface;
-    Eigen::Vector3d shift = Eigen::Vector3d::Zero();  ///< translation of the body from where it was sampled, mm
-    double friction = 0.0;                            ///< Coulomb's coefficient
+    Eigen::Vector3d shift = Eigen::Vector3d::Zero();     ///< translation of the body from where it was sampled, mm
+    double friction = 0.0;                               ///< Coulomb's coefficient
+    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< of the body, mm/s, for friction alone: what moves the body
+                                                         ///< is its shift from one set of conditions to the next
 };
 
 /// Nodes of the tissue's surface that may touch the obstacles. In dynamics a node that enters one is put back onto its
-/// surface within the step and loses the velocity towards it, and up to `friction` times as much of that along it.
+/// surface within the step and loses the velocity towards it, and up to `friction` times as much of that along it,
+/// which is relative to the body.
 struct RigidContact {
     std::vector<int> nodes;
     std::vector<Obstacle> obstacles;

@@ -174,6 +174,7 @@ public:
         for (const Program* program : {&step, &last}) {
             program->set(1, static_cast<float>(coefficients.momentum));
             program->set(2, static_cast<float>(coefficients.gain));
+            effects_.set_time_step(*program, coefficients.time_step);
         }
         blocks_.set("Displacement", displacement_);
         blocks_.set("Residual", previous_residual_);

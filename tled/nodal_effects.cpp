@@ -174,6 +174,7 @@ void require_valid(const Obstacle& obstacle) {
     if (!grid.origin.allFinite() || !grid.steps.allFinite() || !(std::abs(grid.steps.determinant()) > 0))
         throw InvalidInput("the distance grid of an obstacle has steps that do not span space");
     if (!obstacle.shift.allFinite()) throw InvalidInput("the shift of an obstacle is not finite");
+    if (!obstacle.velocity.allFinite()) throw InvalidInput("the velocity of an obstacle is not finite");
     if (!std::all_of(grid.distance.begin(), grid.distance.end(), [](float d) { return std::isfinite(d); }))
         throw InvalidInput("the distance grid of an obstacle has a value that is not finite");
     if (!(obstacle.friction >= 0) || !std::isfinite(obstacle.friction))

@@ -73,16 +73,17 @@ struct Distance {
 };
 Distance distance_to(const Obstacle& obstacle, const Eigen::Vector3d& position);
 
-/// What contact adds to displacement and increment v of a node `depth` (mm) inside an obstacle of outward unit normal
-/// `normal`.
+/// What contact adds to displacement and increment of a node `depth` (mm) inside an obstacle of outward unit normal
+/// `normal`; v is the increment less that of the obstacle (mm).
 Eigen::Vector3d contact_correction(const Eigen::Vector3d& normal, double depth, double friction,
                                    const Eigen::Vector3d& v);
 
-/// A node at rest position X that a step has brought to displacement u by the increment v, after contact with all
-/// obstacles in turn.
+/// A node at rest position X that a step of `time_step` (s) has brought to displacement u by the increment v, after
+/// contact with all obstacles in turn.
 struct Motion {
     Eigen::Vector3d u, v;
 };
-Motion in_contact(const std::vector<Obstacle>& obstacles, const Eigen::Vector3d& X, const Motion& free);
+Motion in_contact(const std::vector<Obstacle>& obstacles, const Eigen::Vector3d& X, const Motion& free,
+                  double time_step);
 
 }  // namespace tissuewarp::tled

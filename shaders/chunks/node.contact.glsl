@@ -3,13 +3,15 @@
 // contact_correction: what puts a node back onto it and takes the velocity towards it, and up to friction times as much of
 // that along it; place_in_contact(a). Residuals do not know of contact, so Rayleigh quotients of a step in contact are off.
 
+layout(location = 15) uniform float time_step;  // s
+
 /// Words, floats by their bits: the number of obstacles; obstacles; of each node the place of its rest position, 0 where it
 /// touches nothing; rest positions, mm, from a point near all of them; samples.
 layout(std430, binding = BINDING_CONTACT) readonly buffer Contact { uint contact[]; };
 
-const uint obstacle_words = 20u;  // rows of the map from mm to steps of the samples, 1/mm; place of sample (0, 0, 0), mm from
+const uint obstacle_words = 23u;  // rows of the map from mm to steps of the samples, 1/mm; place of sample (0, 0, 0), mm from
                                   // the same point; size; the first sample; reach of the interpolation, mm; friction; the
-                                  // inverse of the largest steepness; reach of a tangent, mm
+                                  // inverse of the largest steepness; reach of a tangent, mm; velocity, mm/s
 
 float contact_number(uint at) { return uintBitsToFloat(contact[at]); }
 vec3 contact_vector(uint at) { return vec3(contact_number(at), contact_number(at + 1u), contact_number(at + 2u)); }
@@ -19,6 +21,8 @@ uint place_of_obstacle(uint o) { return 1u + obstacle_words * o; }
 /// 0 where node a touches nothing.
 uint place_in_contact(uint a) { return contact[place_of_obstacle(obstacle_count()) + a]; }
 float friction_of(uint obstacle) { return contact_number(obstacle + 17u); }
+/// How far the obstacle itself goes in a step, mm.
+vec3 increment_of(uint obstacle) { return time_step * contact_vector(obstacle + 20u); }
 
 /// Weights of the four samples about a point a fraction t past the second, and their derivatives (Keys 1981, eq. 15 with
 /// a = -1/2).
@@ -91,7 +95,8 @@ Tangent tangent_at(uint obstacle, vec3 x) {
                    max(d.x * contact_number(obstacle + 18u), contact_number(obstacle + 19u)));
 }
 
-/// What an obstacle adds to displacement and increment v of a node so deep below its tangent, mm.
+/// What an obstacle adds to displacement and increment of a node so deep below its tangent, mm; v is the increment less
+/// that of the obstacle.
 vec3 contact_correction(vec3 normal, float depth, float friction, vec3 v) {
     vec3 slip = v - dot(normal, v) * normal;
     float slip_length = length(slip);

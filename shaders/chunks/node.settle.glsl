@@ -12,7 +12,8 @@ void settle(uint a, bvec3 constrained, inout vec3 u, inout vec3 v) {
         uint obstacle = place_of_obstacle(o);
         Tangent tangent = tangent_at(obstacle, X + settled_u);
         if (!(tangent.height < 0.0)) continue;
-        vec3 correction = contact_correction(tangent.normal, -tangent.height, friction_of(obstacle), settled_v);
+        vec3 correction = contact_correction(tangent.normal, -tangent.height, friction_of(obstacle),
+                                             settled_v - increment_of(obstacle));
         settled_u += correction;
         settled_v += correction;
     }

@@ -68,7 +68,9 @@ void settle(uint s, bvec3 constrained, KeptTangent tangent, inout vec3 u, inout 
         }
         float depth = -(tangent.height + dot(tangent.normal, way));
         if (!(depth > 0.0)) continue;
-        vec3 correction = contact_correction(tangent.normal, depth, friction_of(place_of_obstacle(o)), settled_v);
+        uint obstacle = place_of_obstacle(o);
+        vec3 correction =
+            contact_correction(tangent.normal, depth, friction_of(obstacle), settled_v - increment_of(obstacle));
         settled_u += correction;
         settled_v += correction;
     }

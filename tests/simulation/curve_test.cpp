@@ -25,6 +25,13 @@ TEST(Curves, AreLinearBetweenPointsAndConstantBeyond) {
     EXPECT_EQ(value_at(curve, 4, 5), -1);
     EXPECT_EQ(value_at(curve, 9, 5), -1);
     EXPECT_EQ(steepest(curve, 5), 1);
+    EXPECT_EQ(slope_before(curve, 1, 5), 0);
+    EXPECT_EQ(slope_before(curve, 1.5, 5), 0.5);
+    EXPECT_EQ(slope_before(curve, 2, 5), 0.5);
+    EXPECT_EQ(slope_before(curve, 4, 5), -1);
+    EXPECT_EQ(slope_before(curve, 4.5, 5), 0);
+    EXPECT_EQ(slope_before({}, 1, 5), 0.2);
+    EXPECT_EQ(slope_before({}, 0, 5), 0);
     EXPECT_EQ(steepest(curve, 1.5), 0.5) << "what lies after the scene does not count";
 }
 

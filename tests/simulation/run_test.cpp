@@ -177,6 +177,18 @@ TEST(Simulate, SlowMotionInDynamicsEndsAtItsTarget) {
         EXPECT_LT((result.displacement.col(n) - Vector3d(0, 0, -0.2 * built.mesh.nodes(2, n))).norm(), 0.05);
 }
 
+// A hundredth of an edge is 0.25 mm here, less than that was once no motion at all.
+TEST(Simulate, DynamicsMovesByNextToNothingToo) {
+    Scene scene = cube();
+    test::stand_freely(scene);
+    scene.motions.push_back({"above", {false, false, true}, {0, 0, -0.1}, Curve{{{0, 0}, {1, 1}}}});
+    scene.solve.kind = Solve::Kind::Dynamics;
+    scene.solve.duration = 2.0;
+    scene.solve.damping = 20.0;
+    const BuiltScene built = build(scene);
+    EXPECT_NEAR(mean_on(built, "above", run(built).displacement), -0.1, 1e-3);
+}
+
 TEST(Simulate, ResectionLeavesTheRestWhereItWas) {
     Scene scene = cube();
     test::stand_freely(scene);

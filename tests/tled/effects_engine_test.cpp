@@ -109,6 +109,7 @@ struct Scene {
         for (int node = 0; node < rest.node_count; ++node) contact.nodes.push_back(node);
         const Vector3d n = Vector3d(0.05, -1, 0.02).normalized(), ball = corner + Vector3d(45, 17, 16);
         contact.obstacles.push_back(touching([&](const Vector3d& x) { return n.dot(x); }, Vector3d::Zero(), 0.3));
+        contact.obstacles.back().velocity = {60, 5, -40};
         contact.obstacles.push_back(touching([&](const Vector3d& x) { return (x - ball).norm(); }, {4, -1, 2}, 0.0));
         return contact;
     }
@@ -145,13 +146,13 @@ Matrix3Xd whole_residual(const RestState& rest, const NodalConditions& condition
     return plain_residual(rest, conditions, u) + conditions.constrained.select(zero, effect_force(rest, conditions, u));
 }
 
-void settle(const NodalConditions& conditions, PlainState& state) {
+void settle(const NodalConditions& conditions, double time_step, PlainState& state) {
     if (!conditions.effects.contact) return;
     const NodalContact& contact = *conditions.effects.contact;
     for (std::size_t i = 0; i < contact.node.size(); ++i) {
         const int a = contact.node[i];
         const Motion motion = in_contact(contact.obstacles, contact.rest_position.col(static_cast<Eigen::Index>(i)),
-                                         {state.u.col(a), state.v.col(a)});
+                                         {state.u.col(a), state.v.col(a)}, time_step);
         for (int c = 0; c < 3; ++c) {
             if (conditions.constrained(c, a)) continue;
             state.u(c, a) = motion.u[c];
@@ -169,12 +170,14 @@ void plain_steps(const RestState& rest, const NodalConditions& conditions, int s
         const Matrix3Xd residual = whole_residual(rest, conditions, state.u);
         state.v = coefficients.momentum * state.v + coefficients.gain * residual.cwiseQuotient(lumped(rest)).eval();
         state.u += state.v;
-        settle(conditions, state);
+        settle(conditions, coefficients.time_step, state);
     }
 }
 
 class EffectsInEngines : public ::testing::TestWithParam<std::tuple<EngineUnderTest, Cells, unsigned>> {
 protected:
+    EffectsInEngines() { coefficients.time_step = 1e-3; }  // in which the wall goes 0.07 mm
+
     unsigned effects = std::get<2>(GetParam());
     Scene scene{std::get<1>(GetParam())};
     const RestState& rest = scene.rest;

@@ -138,15 +138,21 @@ TEST(EffectForces, ContactStopsWhatComesInAndRubsAlongTheSurface) {
     const DistanceGrid half_space = sampled({-8, -8, -8}, 2.0, 9, [](const Vector3d& x) { return x.z(); });
     const Vector3d X(1, 1, 1);
     const Motion free{{0.3, 0, -1.2}, {0.05, 0, -0.5}};  // 0.2 mm inside
-    const Motion smooth = in_contact({{half_space, Vector3d::Zero(), 0.0}}, X, free);
+    const Motion smooth = in_contact({{half_space, Vector3d::Zero(), 0.0}}, X, free, 1);
     EXPECT_LT((smooth.u - Vector3d(0.3, 0, -1.0)).norm(), 1e-6);
     EXPECT_LT((smooth.v - Vector3d(0.05, 0, -0.3)).norm(), 1e-6);
-    const Motion rubbed = in_contact({{half_space, Vector3d::Zero(), 0.1}}, X, free);
+    const Motion rubbed = in_contact({{half_space, Vector3d::Zero(), 0.1}}, X, free, 1);
     EXPECT_NEAR(rubbed.v.x(), 0.05 - 0.1 * 0.2, 1e-6);
-    const Motion held = in_contact({{half_space, Vector3d::Zero(), 0.5}}, X, free);
+    const Motion held = in_contact({{half_space, Vector3d::Zero(), 0.5}}, X, free, 1);
     EXPECT_NEAR(held.v.x(), 0, 1e-9);
-    const Motion leaving = in_contact({{half_space, Vector3d::Zero(), 0.5}}, X, {{0, 0, -0.9}, {0, 0, 0.1}});
+    const Motion leaving = in_contact({{half_space, Vector3d::Zero(), 0.5}}, X, {{0, 0, -0.9}, {0, 0, 0.1}}, 1);
     EXPECT_EQ(leaving.u.z(), -0.9);
+    // A body that goes faster than the node, by 0.75 mm a step, drags it along, and not up.
+    const Motion dragged = in_contact({{half_space, Vector3d::Zero(), 0.1, {8, 0, 5}}}, X, free, 0.1);
+    EXPECT_NEAR(dragged.v.x(), 0.05 + 0.1 * 0.2, 1e-6);
+    EXPECT_NEAR(dragged.v.z(), -0.3, 1e-6);
+    const Motion carried = in_contact({{half_space, Vector3d::Zero(), 0.5, {1, 0.5, 0}}}, X, free, 0.1);
+    EXPECT_LT((carried.v - Vector3d(0.1, 0.05, -0.3)).norm(), 1e-6);
 }
 
 TEST(EffectForces, NonsenseIsRefusedByName) {

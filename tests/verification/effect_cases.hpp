@@ -27,5 +27,7 @@ inline void PrintTo(const EffectCase& each, std::ostream* out) {
 std::vector<EffectCase> effect_cases();
 /// Those of contact and friction, which are among them.
 std::vector<EffectCase> contact_cases();
+/// Those of what changes in time, by whole scenes, which are among them too.
+std::vector<EffectCase> scene_cases();
 
 }  // namespace tissuewarp::verification

@@ -39,6 +39,9 @@ public:
     /// To be called where nodes have moved otherwise than by steps: what follows does not depend on what went before.
     void forget_looks();
 
+    /// s, of the steps that follow.
+    void set_time_step(double time_step) { time_step_ = time_step; }
+
     /// Puts internal nodes [begin, end) that have entered an obstacle back, in components that are free. Arrays of
     /// records, mm.
     template <class T>
@@ -85,8 +88,8 @@ private:
                 tangent = look(o, position_.col(point.entry), motion.u);
             const double depth = -tangent.height_at(motion.u);
             if (!(depth > 0)) continue;
-            const Eigen::Vector3d correction =
-                contact_correction(tangent.normal, depth, obstacles_[o].friction, motion.v);
+            const Eigen::Vector3d correction = contact_correction(tangent.normal, depth, obstacles_[o].friction,
+                                                                  motion.v - time_step_ * obstacles_[o].velocity);
             motion.u += correction;
             motion.v += correction;
         }
@@ -103,6 +106,7 @@ private:
 
     [[nodiscard]] Tangent look(std::size_t obstacle, const Eigen::Vector3d& X, const Eigen::Vector3d& u) const;
 
+    double time_step_ = 0;
     std::vector<Obstacle> obstacles_;
     std::vector<double> steepness_, tangent_reach_;  // of each
     Eigen::Matrix3Xd position_;                      // by entry of NodalContact, at rest, mm

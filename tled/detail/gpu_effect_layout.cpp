@@ -82,8 +82,9 @@ void put_obstacle(Words& words, const Obstacle& obstacle, const Vector3d& common
     put(words, obstacle.friction);
     put(words, 1 / std::max(interpolation_steepness(grid), 1e-9));
     put(words, std::min(tangent_reach(grid, tangent_tolerance_mm), 1e3));
+    put(words, obstacle.velocity);
 }
-constexpr std::size_t obstacle_words = 20;
+constexpr std::size_t obstacle_words = 23;
 
 }  // namespace
 

@@ -72,6 +72,10 @@ void GpuEffects::set_contact(const std::optional<NodalContact>& contact, BlockBu
     blocks.set("Contact", *contact_);
 }
 
+void GpuEffects::set_time_step(const shaders::Program& program, double time_step) const {
+    if (contact_) program.set(15, static_cast<float>(time_step));
+}
+
 void GpuEffects::bind(const BlockBuffers& blocks) const {
     if (surface_pass_) blocks.bind(*surface_pass_->program);
 }

@@ -24,6 +24,9 @@ public:
     /// What the programs over nodes take.
     [[nodiscard]] const shaders::NodeEffects& on_nodes() const { return on_nodes_; }
 
+    /// Of a program over nodes, s.
+    void set_time_step(const shaders::Program& program, double time_step) const;
+
     void bind(const BlockBuffers& blocks) const;
     /// Leaves the surface forces of whatever is bound as Displacement, where there are any; a barrier must follow.
     void dispatch() const;

@@ -254,6 +254,7 @@ void GpuPatches::dispatch(Stages stages, int repeats, int steps, const Run& run,
         programs.back()->set(3, static_cast<std::uint32_t>(steps));
         programs.back()->set(4, run.begin);
         programs.back()->set(5, run.end);
+        if (obstacles_ > 0) programs.back()->set(15, static_cast<float>(run.coefficients.time_step));
         set_sizes(*programs.back(), workgroups_of(each));
         if (each.forces) tissue_->set_places(*programs.back());
     }
