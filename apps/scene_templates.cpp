@@ -4,19 +4,18 @@
 #include "apps/scene_texts.hpp"
 #include "core/errors.hpp"
 
+#include <string_view>
+
 namespace tissuewarp::apps {
 
 namespace {
 
-constexpr const char* brain_in_source = "../brainshift/preop_labels.nii.gz";
-constexpr const char* brain_from_here = "data/brainshift/preop_labels.nii.gz";
+constexpr std::string_view brain_in_source = "../brainshift/preop_labels.nii.gz";
 
-std::string with_brain(std::string text, const std::filesystem::path& folder) {
+SceneTemplate with_labels(std::string text, const std::string& labels_name) {
     const auto at = text.find(brain_in_source);
-    std::error_code failure;
-    if (at == std::string::npos || !std::filesystem::is_regular_file(brain_from_here, failure)) return text;
-    const std::filesystem::path found = std::filesystem::relative(brain_from_here, folder.empty() ? "." : folder);
-    return text.replace(at, std::string(brain_in_source).size(), found.string());
+    if (at == std::string::npos) return {std::move(text), {}};
+    return {text.replace(at, brain_in_source.size(), labels_name), brain_labels()};
 }
 
 }  // namespace
@@ -27,9 +26,9 @@ std::vector<std::string> scene_template_names() {
     return names;
 }
 
-std::string scene_template(const std::string& name, const std::filesystem::path& folder) {
+SceneTemplate scene_template(const std::string& name, const std::string& labels_name) {
     for (const SceneText& scene : scene_texts())
-        if (scene.name == name) return with_brain(scene.text, folder);
+        if (scene.name == name) return with_labels(scene.text, labels_name);
     const std::string nearest = nearest_name(name, scene_template_names());
     std::string names;
     for (const std::string& each : scene_template_names()) names += (names.empty() ? "" : ", ") + each;

@@ -1,7 +1,6 @@
 #pragma once
 /// Commented scenes that run: the files of data/scenes, which are part of the program.
 
-#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -10,8 +9,12 @@ namespace tissuewarp::apps {
 /// "brain-shift", "breast", "cube", …
 std::vector<std::string> scene_template_names();
 
-/// The text for a scene file in `folder`. The label map of the brain is named from there where data/brainshift lies
-/// beside the present folder. Throws InvalidInput for an unknown name, with the nearest one.
-std::string scene_template(const std::string& name, const std::filesystem::path& folder);
+struct SceneTemplate {
+    std::string text;    ///< of the scene file
+    std::string labels;  ///< bytes of the label map that it names, to lie beside it; empty: it names none
+};
+
+/// Its label map is to be called `labels_name`. Throws InvalidInput for an unknown name, with the nearest one.
+SceneTemplate scene_template(const std::string& name, const std::string& labels_name);
 
 }  // namespace tissuewarp::apps

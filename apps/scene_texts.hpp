@@ -12,4 +12,7 @@ struct SceneText {
 
 const std::vector<SceneText>& scene_texts();
 
+/// The bytes of data/brainshift/preop_labels.nii.gz, which the brain's scene is of.
+std::string brain_labels();
+
 }  // namespace tissuewarp::apps

@@ -74,10 +74,20 @@ void apply_device(const DeviceChoice& device, simulation::Solve& solve) {
 /// --init: a scene to begin with.
 void write_template(const SimulateOptions& options) {
     const fs::path file = options.scene.empty() ? fs::path(options.init + ".toml") : options.scene;
-    const std::string text = scene_template(options.init, file.parent_path());
-    std::error_code failure;
-    if (fs::exists(file, failure)) throw InvalidInput("'" + file.string() + "' is there already; give another name");
-    write_text(text, file);
+    fs::path labels = file;
+    labels.replace_extension(".labels.nii.gz");
+    const SceneTemplate scene = scene_template(options.init, labels.filename().string());
+    const auto require_new = [](const fs::path& path) {
+        std::error_code failure;
+        if (fs::exists(path, failure))
+            throw InvalidInput("'" + path.string() + "' is there already; give another name");
+    };
+    require_new(file);
+    if (!scene.labels.empty()) {
+        require_new(labels);
+        write_text(scene.labels, labels);
+    }
+    write_text(scene.text, file);
     if (!options.common.quiet)
         fmt::print("{0}; run it with\n    tissuewarp simulate {0} --output {1}\n", file.string(), options.init);
 }

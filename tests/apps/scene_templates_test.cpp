@@ -87,8 +87,14 @@ TEST(Presets, StandInTheManualWithTheirSources) {
 TEST(SceneTemplates, AreWrittenAsTheyAre) {
     const auto names = scene_template_names();
     EXPECT_EQ(names, (std::vector<std::string>{"brain-shift", "breast", "cube", "liver", "resection", "retraction"}));
-    for (const std::string& name : names) EXPECT_NE(scene_template(name, ".").find("[geometry]"), std::string::npos);
-    EXPECT_THROW((void)scene_template("brainshift", "."), InvalidInput);
+    for (const std::string& name : names) {
+        const SceneTemplate scene = scene_template(name, "beside.nii.gz");
+        EXPECT_NE(scene.text.find("[geometry]"), std::string::npos);
+        EXPECT_EQ(scene.labels.empty(), name != "brain-shift");
+        EXPECT_EQ(scene.text.find("beside.nii.gz") == std::string::npos, scene.labels.empty()) << name;
+        EXPECT_EQ(scene.text.find("../"), std::string::npos) << name;
+    }
+    EXPECT_THROW((void)scene_template("brainshift", "beside.nii.gz"), InvalidInput);
 }
 
 }  // namespace

@@ -110,6 +110,18 @@ class Simulate(unittest.TestCase):
         self.assertEqual(again.returncode, 2)
         self.assertIn("there already", again.stderr)
 
+    def test_every_init_writes_a_scene_that_runs_anywhere(self):
+        for name in ["brain-shift", "breast", "liver", "resection", "retraction"]:
+            done = run("simulate", "--init", name, folder=self.folder)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            done = run("explain", name + ".toml", folder=self.folder)
+            self.assertEqual(done.returncode, 0, done.stderr)
+        again = run("simulate", "--init", "brain-shift", "brain-shift.labels.toml", folder=self.folder)
+        self.assertEqual(again.returncode, 0, again.stderr)
+        other = run("simulate", "--init", "brain-shift", folder=self.folder)
+        self.assertEqual(other.returncode, 2)
+        self.assertIn("there already", other.stderr)
+
     def test_init_of_an_unknown_scene(self):
         done = run("simulate", "--init", "brainshift", folder=self.folder)
         self.assertEqual(done.returncode, 2)
