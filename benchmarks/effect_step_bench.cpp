@@ -58,9 +58,7 @@ std::vector<int> nodes_of(const Matrix3Xi& faces) {
 
 /// Samples every 2.5 mm over the cube and 25 mm around it.
 tled::Obstacle obstacle(const std::function<double(const Vector3d&)>& distance, double friction) {
-    tled::Obstacle body;
-    body.friction = friction;
-    tled::DistanceGrid& grid = body.surface;
+    tled::DistanceGrid grid;
     grid.steps *= 2.5;
     grid.origin.setConstant(-25);
     grid.size.setConstant(61);
@@ -68,7 +66,7 @@ tled::Obstacle obstacle(const std::function<double(const Vector3d&)>& distance, 
         for (int j = 0; j < grid.size[1]; ++j)
             for (int i = 0; i < grid.size[0]; ++i)
                 grid.distance.push_back(static_cast<float>(distance(grid.origin + grid.steps * Vector3d(i, j, k))));
-    return body;
+    return {std::move(grid), Vector3d::Zero(), friction};
 }
 
 /// Beside the face x = edge: a wall, or a ball half as wide as the cube.

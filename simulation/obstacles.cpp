@@ -151,7 +151,9 @@ void make_room(tled::Obstacle& obstacle, const Contact& contact, const Matrix3Xd
     if (deepest > 0)
         observer.note("a body overlapped the tissue at rest by up to " + std::to_string(deepest) +
                       " mm and was made smaller by as much");
-    for (float& distance : obstacle.surface.distance) distance += static_cast<float>(deepest + contact.gap);
+    DistanceGrid smaller = *obstacle.surface;
+    for (float& distance : smaller.distance) distance += static_cast<float>(deepest + contact.gap);
+    obstacle.surface = std::move(smaller);
 }
 
 }  // namespace

@@ -89,7 +89,7 @@ double memory_of(const BuiltScene& built) {
                  static_cast<double>((built.stages.front().model.mesh.labels.array() == label).count());
     if (built.effects.contact)
         for (const tled::Obstacle& obstacle : built.effects.contact->obstacles)
-            bytes += 4.0 * static_cast<double>(obstacle.surface.distance.size());
+            bytes += 4.0 * static_cast<double>(obstacle.surface->distance.size());
     return bytes;
 }
 

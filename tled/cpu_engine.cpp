@@ -371,10 +371,12 @@ private:
     void set_effects(const NodalEffects& effects) {
         surface_.reset();
         fluid_.reset();
-        contact_.reset();
         if (!effects.surface.empty()) surface_.emplace(effects.surface, position_, internal_);
         if (effects.fluid) fluid_.emplace(*effects.fluid, internal_);
-        if (effects.contact) contact_.emplace(*effects.contact, internal_);
+        if (!effects.contact)
+            contact_.reset();
+        else if (!contact_ || !contact_->take(*effects.contact))
+            contact_.emplace(*effects.contact, internal_);
     }
 
     void patch_forces(const FanPatch& patch, const T* u, Advance advance, detail::PatchScratch<T>& scratch) {

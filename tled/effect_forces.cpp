@@ -150,7 +150,7 @@ double energy(const NodalEffects& effects, const Matrix3Xd& position, const Matr
 }
 
 Distance distance_to(const Obstacle& obstacle, const Vector3d& position) {
-    const DistanceGrid& grid = obstacle.surface;
+    const DistanceGrid& grid = *obstacle.surface;
     const Eigen::Matrix3d to_grid = grid.steps.inverse();
     const Vector3d at = to_grid * (position - obstacle.shift - grid.origin);
     const Vector3d corner = at.array().floor();

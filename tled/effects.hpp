@@ -5,7 +5,9 @@
 
 #include <Eigen/Core>
 
+#include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 namespace tissuewarp::tled {
@@ -49,9 +51,23 @@ struct DistanceGrid {
     std::vector<float> distance;                          ///< mm, i fastest
 };
 
+/// A grid that is shared where it would be copied: it may hold megabytes, and its body moves with every change of
+/// conditions.
+class SharedGrid {
+public:
+    SharedGrid(DistanceGrid grid = {}) : grid_(std::make_shared<const DistanceGrid>(std::move(grid))) {}
+    const DistanceGrid& operator*() const { return *grid_; }
+    const DistanceGrid* operator->() const { return grid_.get(); }
+    /// Whether it is the same grid, not one that is equal.
+    bool operator==(const SharedGrid&) const = default;
+
+private:
+    std::shared_ptr<const DistanceGrid> grid_;
+};
+
 /// A rigid body that tissue cannot enter but can leave.
 struct Obstacle {
-    DistanceGrid surface;
+    SharedGrid surface;
     Eigen::Vector3d shift = Eigen::Vector3d::Zero();     ///< translation of the body from where it was sampled, mm
     double friction = 0.0;                               ///< Coulomb's coefficient
     Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< of the body, mm/s, for friction alone: what moves the body

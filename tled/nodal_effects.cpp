@@ -3,6 +3,7 @@
 #include "tled/nodal_effects.hpp"
 
 #include "core/errors.hpp"
+#include "tled/detail/interpolation_reach.hpp"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -163,7 +164,7 @@ NodalFluid nodal_fluid(const Fluid& fluid, const RestState& rest) {
 }
 
 void require_valid(const Obstacle& obstacle) {
-    const DistanceGrid& grid = obstacle.surface;
+    const DistanceGrid& grid = *obstacle.surface;
     if (grid.size.minCoeff() < 4)
         throw InvalidInput("the distance grid of an obstacle has " + std::to_string(grid.size[0]) + " × " +
                            std::to_string(grid.size[1]) + " × " + std::to_string(grid.size[2]) +
@@ -188,6 +189,10 @@ NodalContact nodal_contact(const RigidContact& contact, const RestState& rest) {
     for (const Obstacle& obstacle : contact.obstacles) require_valid(obstacle);
     for (const int node : contact.nodes) require_node(node, rest, "a contact");
     nodal.obstacles = contact.obstacles;
+    for (const Obstacle& obstacle : contact.obstacles)
+        nodal.reach.push_back({detail::interpolation_reach(*obstacle.surface),
+                               std::max(detail::interpolation_steepness(*obstacle.surface), 1e-9),
+                               detail::tangent_reach(*obstacle.surface, detail::tangent_tolerance_mm)});
     nodal.node = contact.nodes;
     std::sort(nodal.node.begin(), nodal.node.end());
     nodal.node.erase(std::unique(nodal.node.begin(), nodal.node.end()), nodal.node.end());

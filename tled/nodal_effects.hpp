@@ -41,10 +41,18 @@ struct NodalFluid {
     Eigen::VectorXd column_height;  ///< N, cube root of the node's volume, mm
 };
 
+/// How little of an obstacle's grid must be read where contact is far (detail/interpolation_reach.hpp).
+struct GridReach {
+    double interpolation = 0;  ///< mm
+    double steepness = 0;      ///< mm/mm
+    double tangent = 0;        ///< mm
+};
+
 struct NodalContact {
     std::vector<int> node;           ///< ascending
     Eigen::Matrix3Xd rest_position;  ///< 3 × as many, mm
     std::vector<Obstacle> obstacles;
+    std::vector<GridReach> reach;  ///< of the obstacles, wherever they are shifted to
 };
 
 struct NodalEffects {

@@ -347,18 +347,18 @@ TEST(GpuEffects, NoInterpolationIsFurtherBelowTheNearestSampleThanTheReach) {
     std::uniform_real_distribution<double> noise(-1, 1), part(0, 1);
     double closest = 0;
     for (int trial = 0; trial < 200; ++trial) {
-        Obstacle obstacle;
-        obstacle.surface.size = {4, 4, 4};
+        DistanceGrid grid;
+        grid.size = {4, 4, 4};
         // Samples that alternate come closest to the bound.
         for (int i = 0; i < 64; ++i)
-            obstacle.surface.distance.push_back(
-                static_cast<float>(((i + i / 4 + i / 16) % 2 == 0 ? 1 : -1) + 0.3 * noise(random)));
-        const double reach = detail::interpolation_reach(obstacle.surface);
-        const double steepness = detail::interpolation_steepness(obstacle.surface);
+            grid.distance.push_back(static_cast<float>(((i + i / 4 + i / 16) % 2 == 0 ? 1 : -1) + 0.3 * noise(random)));
+        const double reach = detail::interpolation_reach(grid);
+        const double steepness = detail::interpolation_steepness(grid);
+        const Obstacle obstacle{grid};
         for (int point = 0; point < 50; ++point) {
             const Vector3d x(1 + part(random), 1 + part(random), 1 + part(random));
             const auto nearest = [&](int axis) { return static_cast<std::size_t>(std::lround(x[axis])); };
-            const double sample = double{obstacle.surface.distance[nearest(0) + 4 * (nearest(1) + 4 * nearest(2))]};
+            const double sample = double{grid.distance[nearest(0) + 4 * (nearest(1) + 4 * nearest(2))]};
             const double below = sample - distance_to(obstacle, x).value;
             ASSERT_LT(below, reach);
             ASSERT_LT(distance_to(obstacle, x).gradient.norm(), steepness);
@@ -375,10 +375,11 @@ TEST(GpuEffects, NoDistanceStraysFurtherFromItsTangentThanTheReachAllows) {
     constexpr double tolerance = 1e-3;
     double furthest = 0;
     for (int trial = 0; trial < 200; ++trial) {
-        Obstacle obstacle;
-        obstacle.surface.size = {6, 6, 6};
-        for (int i = 0; i < 216; ++i) obstacle.surface.distance.push_back(static_cast<float>(0.3 * noise(random)));
-        const double reach = detail::tangent_reach(obstacle.surface, tolerance);
+        DistanceGrid grid;
+        grid.size = {6, 6, 6};
+        for (int i = 0; i < 216; ++i) grid.distance.push_back(static_cast<float>(0.3 * noise(random)));
+        const double reach = detail::tangent_reach(grid, tolerance);
+        const Obstacle obstacle{grid};
         for (int point = 0; point < 50; ++point) {
             const Vector3d x(2 + part(random), 2 + part(random), 2 + part(random));
             const Vector3d way = reach * Vector3d(noise(random), noise(random), noise(random)).normalized();

@@ -1,22 +1,29 @@
 #include "tled/detail/cpu_contact.hpp"
 
-#include "tled/detail/interpolation_reach.hpp"
-
 #include <cmath>
 
 namespace tissuewarp::tled::detail {
 
 CpuContact::CpuContact(const NodalContact& contact, const std::vector<std::uint32_t>& internal)
-    : obstacles_(contact.obstacles),
+    : node_(contact.node),
+      obstacles_(contact.obstacles),
+      reach_(contact.reach),
       position_(contact.rest_position),
       tangent_(contact.node.size() * contact.obstacles.size()) {
-    for (const Obstacle& obstacle : obstacles_) {
-        steepness_.push_back(std::max(interpolation_steepness(obstacle.surface), 1e-9));
-        tangent_reach_.push_back(tangent_reach(obstacle.surface, tangent_tolerance_mm));
-    }
     for (std::size_t i = 0; i < contact.node.size(); ++i)
         point_.push_back({internal[static_cast<std::size_t>(contact.node[i])], static_cast<std::uint32_t>(i)});
     std::sort(point_.begin(), point_.end(), [](const Point& x, const Point& y) { return x.node < y.node; });
+}
+
+bool CpuContact::take(const NodalContact& contact) {
+    const auto in_place = [](const Obstacle& now, const Obstacle& before) {
+        return now.surface == before.surface && now.shift == before.shift;
+    };
+    if (node_ != contact.node ||
+        !std::equal(contact.obstacles.begin(), contact.obstacles.end(), obstacles_.begin(), obstacles_.end(), in_place))
+        return false;
+    obstacles_ = contact.obstacles;
+    return true;
 }
 
 void CpuContact::forget_looks() {
@@ -30,7 +37,7 @@ Tangent CpuContact::look(std::size_t obstacle, const Eigen::Vector3d& X, const E
     // Outside of a grid it looks again at once: the border may lie inside the obstacle.
     if (!std::isfinite(distance.value)) return {u, Eigen::Vector3d::Zero(), distance.value, 0.0};
     if (!(steepness > 0)) return {u, Eigen::Vector3d::Zero(), std::max(distance.value, 0.0), 0.0};
-    const double reach = std::max(distance.value / steepness_[obstacle], tangent_reach_[obstacle]);
+    const double reach = std::max(distance.value / reach_[obstacle].steepness, reach_[obstacle].tangent);
     return {u, distance.gradient / steepness, distance.value / steepness, reach * reach};
 }
 

@@ -36,6 +36,10 @@ class CpuContact {
 public:
     CpuContact(const NodalContact& contact, const std::vector<std::uint32_t>& internal);
 
+    /// Takes other conditions where the same nodes meet the same bodies at the same places, and what nodes have seen of
+    /// these stays true; else returns false.
+    bool take(const NodalContact& contact);
+
     /// To be called where nodes have moved otherwise than by steps: what follows does not depend on what went before.
     void forget_looks();
 
@@ -107,11 +111,12 @@ private:
     [[nodiscard]] Tangent look(std::size_t obstacle, const Eigen::Vector3d& X, const Eigen::Vector3d& u) const;
 
     double time_step_ = 0;
+    std::vector<int> node_;  // as they were given
     std::vector<Obstacle> obstacles_;
-    std::vector<double> steepness_, tangent_reach_;  // of each
-    Eigen::Matrix3Xd position_;                      // by entry of NodalContact, at rest, mm
-    std::vector<Point> point_;                       // ascending
-    std::vector<Tangent> tangent_;                   // of each entry, of each obstacle
+    std::vector<GridReach> reach_;  // of each
+    Eigen::Matrix3Xd position_;     // by entry of NodalContact, at rest, mm
+    std::vector<Point> point_;      // ascending
+    std::vector<Tangent> tangent_;  // of each entry, of each obstacle
 };
 
 }  // namespace tissuewarp::tled::detail

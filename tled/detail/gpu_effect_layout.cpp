@@ -1,7 +1,5 @@
 #include "tled/detail/gpu_effect_layout.hpp"
 
-#include "tled/detail/interpolation_reach.hpp"
-
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
@@ -71,17 +69,18 @@ Vector3d rest_map(const Corner& corner) {
     return {1 / a, -b / (a * c), 1 / c};
 }
 
-void put_obstacle(Words& words, const Obstacle& obstacle, const Vector3d& common_point, std::uint32_t first_sample) {
-    const DistanceGrid& grid = obstacle.surface;
+void put_obstacle(Words& words, const Obstacle& obstacle, const GridReach& reach, const Vector3d& common_point,
+                  std::uint32_t first_sample) {
+    const DistanceGrid& grid = *obstacle.surface;
     const Eigen::Matrix3d to_grid = grid.steps.inverse();
     for (int row = 0; row < 3; ++row) put(words, to_grid.row(row).transpose().eval());
     put(words, (grid.origin + obstacle.shift - common_point).eval());
     for (const int size : grid.size) put_node(words, size);
     words.push_back(first_sample);
-    put(words, interpolation_reach(grid));
+    put(words, reach.interpolation);
     put(words, obstacle.friction);
-    put(words, 1 / std::max(interpolation_steepness(grid), 1e-9));
-    put(words, std::min(tangent_reach(grid, tangent_tolerance_mm), 1e3));
+    put(words, 1 / reach.steepness);
+    put(words, std::min(reach.tangent, 1e3));
     put(words, obstacle.velocity);
 }
 constexpr std::size_t obstacle_words = 23;
@@ -144,24 +143,39 @@ std::vector<Float4> gpu_fluid(const NodalFluid& fluid) {
     return columns;
 }
 
-Words gpu_contact(const NodalContact& contact, int node_count) {
-    const std::size_t places = 1 + obstacle_words * contact.obstacles.size(),
-                      positions = places + static_cast<std::size_t>(node_count);
-    const Vector3d common_point = contact.rest_position.rowwise().mean();
+namespace {
+
+/// Place of the first rest position.
+std::size_t first_position(const NodalContact& contact, int node_count) {
+    return 1 + obstacle_words * contact.obstacles.size() + static_cast<std::size_t>(node_count);
+}
+
+Vector3d common_point(const NodalContact& contact) {
+    return contact.rest_position.rowwise().mean();
+}
+
+}  // namespace
+
+Words gpu_obstacles(const NodalContact& contact, int node_count) {
     Words words{place(contact.obstacles.size())};
-    std::size_t first_sample = positions + 3 * contact.node.size();
-    for (const Obstacle& obstacle : contact.obstacles) {
-        put_obstacle(words, obstacle, common_point, place(first_sample));
-        first_sample += obstacle.surface.distance.size();
+    std::size_t first_sample = first_position(contact, node_count) + 3 * contact.node.size();
+    for (std::size_t o = 0; o < contact.obstacles.size(); ++o) {
+        put_obstacle(words, contact.obstacles[o], contact.reach[o], common_point(contact), place(first_sample));
+        first_sample += contact.obstacles[o].surface->distance.size();
     }
-    words.reserve(first_sample);
-    words.resize(positions, 0U);
+    return words;
+}
+
+Words gpu_contact(const NodalContact& contact, int node_count) {
+    Words words = gpu_obstacles(contact, node_count);
+    const std::size_t places = words.size();
+    words.resize(first_position(contact, node_count), 0U);
     for (std::size_t i = 0; i < contact.node.size(); ++i) {
         words[places + static_cast<std::size_t>(contact.node[i])] = place(words.size());
-        put(words, (contact.rest_position.col(static_cast<Eigen::Index>(i)) - common_point).eval());
+        put(words, (contact.rest_position.col(static_cast<Eigen::Index>(i)) - common_point(contact)).eval());
     }
     for (const Obstacle& obstacle : contact.obstacles)
-        for (const float sample : obstacle.surface.distance) words.push_back(std::bit_cast<std::uint32_t>(sample));
+        for (const float sample : obstacle.surface->distance) words.push_back(std::bit_cast<std::uint32_t>(sample));
     return words;
 }
 

@@ -23,6 +23,8 @@ GpuSurface gpu_surface(const SurfaceEffects& effects, const Eigen::Matrix3Xd& po
 
 std::vector<Float4> gpu_fluid(const NodalFluid& fluid);
 
+/// All of contact, and its beginning, which is what changes when bodies move.
 std::vector<std::uint32_t> gpu_contact(const NodalContact& contact, int node_count);
+std::vector<std::uint32_t> gpu_obstacles(const NodalContact& contact, int node_count);
 
 }  // namespace tissuewarp::tled::detail

@@ -66,10 +66,16 @@ void GpuEffects::set_fluid(const std::optional<NodalFluid>& fluid, BlockBuffers&
 }
 
 void GpuEffects::set_contact(const std::optional<NodalContact>& contact, BlockBuffers& blocks) {
+    if (!contact) return contact_.reset();
+    std::vector<SharedGrid> grids;
+    for (const Obstacle& obstacle : contact->obstacles) grids.push_back(obstacle.surface);
+    const int node_count = static_cast<int>(position_.cols());
+    if (contact_ && contact_->node == contact->node && contact_->grids == grids)
+        return contact_->words.upload(gpu_obstacles(*contact, node_count));
     contact_.reset();
-    if (!contact) return;
-    contact_.emplace(device_, gpu_contact(*contact, static_cast<int>(position_.cols())), "obstacles");
-    blocks.set("Contact", *contact_);
+    contact_.emplace(
+        Contact{{device_, gpu_contact(*contact, node_count), "obstacles"}, contact->node, std::move(grids)});
+    blocks.set("Contact", contact_->words);
 }
 
 void GpuEffects::set_time_step(const shaders::Program& program, double time_step) const {

@@ -47,13 +47,20 @@ private:
         shaders::Buffer<Float4> force;
     };
 
+    struct Contact {
+        shaders::Buffer<std::uint32_t> words;
+        std::vector<int> node;
+        std::vector<SharedGrid> grids;
+    };
+
     const shaders::Device& device_;
     shaders::ProgramCache& programs_;
     Eigen::Matrix3Xd position_;  ///< 3 × N, mm, at rest
     shaders::NodeEffects on_nodes_;
     std::optional<shaders::Buffer<Float4>> external_force_, fluid_;
     std::optional<Surface> surface_;
-    std::optional<shaders::Buffer<std::uint32_t>> springs_, contact_;
+    std::optional<shaders::Buffer<std::uint32_t>> springs_;
+    std::optional<Contact> contact_;
     std::optional<Pass> surface_pass_;
 };
 
