@@ -29,8 +29,8 @@ void doubt_surface(const SurfaceFit& fit, double deviation_mm, std::vector<std::
     if (fit.coverage < least_coverage)
         reasons.push_back(
             "the points show " + percent(fit.coverage) +
-            " of the organ's surface, too little to tell where it lies; show more of it, or give pairs of "
-            "points");
+            " of the organ's surface, too little to tell where it lies; show more of it, give pairs of points, or "
+            "leave it where the headers place it if they are right (--no-align)");
     if (fit.rival_support > most_rival_support)
         reasons.push_back("the points fit about as well with the organ placed " + to_text(fit.rival_mm) +
                           " mm elsewhere; give a wider patch, or landmarks");
