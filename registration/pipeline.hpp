@@ -281,6 +281,9 @@ public:
     /// `prepared` outlives this. Throws GpuUnavailable when a GPU was demanded and there is none.
     explicit Updater(const PreparedModel& prepared, const UpdateOptions& options = {},
                      Observer& observer = silent_observer());
+    /// The same with an engine of the caller's, made of `prepared.rest`.
+    Updater(const PreparedModel& prepared, const UpdateOptions& options, std::unique_ptr<tled::Engine> solver,
+            Observer& observer = silent_observer());
     ~Updater();
     Updater(Updater&&) noexcept;
     Updater& operator=(Updater&&) noexcept;
@@ -288,7 +291,8 @@ public:
     /// Registers the model to what was seen during the operation. Throws InvalidInput when there is nothing to register
     /// to, a bare volume without prepare_image, label maps that share no label or do not meet, surface points, pairs
     /// of points or curves that cannot be used or lie nowhere near the model; SolverFailure when no trustworthy
-    /// equilibrium is found, GpuUnavailable when a device fails.
+    /// equilibrium is found, GpuUnavailable when a device fails that was demanded. Where it was not, the processor does
+    /// the update from its beginning and all later ones, with a note.
     UpdateResult update(const Intraoperative& seen, Observer& observer = silent_observer());
 
 private:

@@ -14,6 +14,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <utility>
 
 namespace tissuewarp::registration {
 
@@ -232,22 +234,18 @@ struct Updater::Impl {
     std::unique_ptr<tled::Engine> solver;
     std::unique_ptr<detail::ImageEngine> dense;  // where the model has an image of descriptors
 
-    Impl(const PreparedModel& model, const UpdateOptions& given, Observer& observer)
-        : prepared(model), options(given), solver(detail::make_engine(model, given, observer)) {
+    Impl(const PreparedModel& model, const UpdateOptions& given, std::unique_ptr<tled::Engine> engine,
+         Observer& observer)
+        : prepared(model), options(given), solver(std::move(engine)) {
         const bool described =
             model.image && model.image->blocks.options().similarity == Similarity::SelfSimilarityContext;
         if (described) dense = detail::make_image_engine(model, given, observer);
     }
+
+    UpdateResult update(const Intraoperative& given, Observer& observer);
 };
 
-Updater::Updater(const PreparedModel& prepared, const UpdateOptions& options, Observer& observer)
-    : impl_(std::make_unique<Impl>(prepared, options, observer)) {}
-Updater::~Updater() = default;
-Updater::Updater(Updater&&) noexcept = default;
-Updater& Updater::operator=(Updater&&) noexcept = default;
-
-UpdateResult Updater::update(const Intraoperative& given, Observer& observer) {
-    const auto& [prepared, options, solver, dense] = *impl_;
+UpdateResult Updater::Impl::update(const Intraoperative& given, Observer& observer) {
     const Intraoperative seen = detail::without_neighbours(given, prepared.options.rigid_neighbours);
     detail::require_usable(prepared, seen);
     detail::Pace pace(options.time_budget_s);
@@ -264,6 +262,29 @@ UpdateResult Updater::update(const Intraoperative& given, Observer& observer) {
     result.deformation = {prepared.model.mesh, displacement, result.alignment.placement};
     result.doubts = detail::doubts(prepared, seen, result);
     return result;
+}
+
+Updater::Updater(const PreparedModel& prepared, const UpdateOptions& options, Observer& observer)
+    : Updater(prepared, options, detail::make_engine(prepared, options, observer), observer) {}
+Updater::Updater(const PreparedModel& prepared, const UpdateOptions& options, std::unique_ptr<tled::Engine> solver,
+                 Observer& observer)
+    : impl_(std::make_unique<Impl>(prepared, options, std::move(solver), observer)) {}
+Updater::~Updater() = default;
+Updater::Updater(Updater&&) noexcept = default;
+Updater& Updater::operator=(Updater&&) noexcept = default;
+
+UpdateResult Updater::update(const Intraoperative& seen, Observer& observer) {
+    try {
+        return impl_->update(seen, observer);
+    } catch (const GpuUnavailable& failure) {
+        if (impl_->options.device != Device::Auto) throw;
+        observer.note(std::string("the CPU takes over, and the update begins again: ") + failure.what());
+        UpdateOptions options = impl_->options;
+        options.device = Device::Cpu;
+        impl_ = std::make_unique<Impl>(impl_->prepared, options,
+                                       detail::make_engine(impl_->prepared, options, observer), observer);
+        return impl_->update(seen, observer);
+    }
 }
 
 UpdateResult update(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options,
