@@ -36,6 +36,10 @@ private:
     double from_, to_;
 };
 
+double seconds_since(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
 class Run {
 public:
     Run(const BuiltScene& built, const MakeEngine& make_engine, const std::function<void(const Frame&)>& on_frame,
@@ -61,7 +65,7 @@ public:
                 move(s, end);
         }
         summary_.frames = shown_;
-        summary_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        summary_.seconds = seconds_since(start) - seconds_of_caller_;
         return summary_;
     }
 
@@ -70,7 +74,9 @@ private:
 
     void show(int index, double time, std::size_t stage, const Matrix3Xd& displacement) {
         summary_.largest_displacement = displacement.colwise().norm().maxCoeff();
+        const auto start = std::chrono::steady_clock::now();
         on_frame_({index, time, static_cast<int>(stage), displacement});
+        seconds_of_caller_ += seconds_since(start);
         shown_ = index + 1;
         observer_.checkpoint("simulation", time / solve_.duration);
     }
@@ -168,6 +174,7 @@ private:
     Observer& observer_;
     tled::DynamicsState state_;
     int shown_ = 0;
+    double seconds_of_caller_ = 0;
     RunSummary summary_;
 };
 

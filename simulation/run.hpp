@@ -25,7 +25,7 @@ struct RunSummary {
     double estimated_error_mm = 0;    ///< of equilibria, the largest; 0 in dynamics
     long long steps = 0;              ///< force evaluations
     double time_step = 0;             ///< s, the last one of dynamics
-    double seconds = 0;               ///< of the solution, building not included
+    double seconds = 0;               ///< of the solution, without building and `on_frame`
     std::string engine;
 };
 

@@ -106,8 +106,10 @@ public:
         over_patches_ = patches_ && patches_->take(effects_.on_nodes());
         const auto& contact = conditions.effects.contact;
         if (over_patches_) patches_->set_obstacles(contact ? contact->obstacles.size() : 0, blocks_);
-        constrained_ = conditions.constrained;
-        upload_inverse_mass();
+        if (constrained_ != conditions.constrained) {
+            constrained_ = conditions.constrained;
+            upload_inverse_mass();
+        }
         imposed_.upload(detail::packed(conditions.imposed));
         impose();
         state_changed();

@@ -5,6 +5,18 @@
 #include <string>
 
 namespace tissuewarp::tled::detail {
+namespace {
+
+/// Conditions that change as time goes on mostly keep their sizes, and a new buffer costs more than what goes into it.
+template <class T>
+void put(std::optional<shaders::Buffer<T>>& buffer, const shaders::Device& device, const std::vector<T>& values,
+         const char* what) {
+    if (buffer && buffer->size() == values.size()) return buffer->upload(values);
+    buffer.reset();
+    buffer.emplace(device, values, what);
+}
+
+}  // namespace
 
 GpuEffects::GpuEffects(const shaders::Device& device, shaders::ProgramCache& programs, const RestState& rest)
     : device_(device), programs_(programs), position_(rest.position) {}
@@ -23,28 +35,30 @@ void GpuEffects::set(const NodalConditions& conditions, BlockBuffers& blocks) {
 }
 
 void GpuEffects::set_springs(const NodalConditions& conditions, BlockBuffers& blocks) {
-    springs_.reset();
-    if (conditions.spring_node.empty()) return;
-    springs_.emplace(device_, gpu_springs(conditions, static_cast<int>(position_.cols())), "springs");
+    if (conditions.spring_node.empty()) return springs_.reset();
+    put(springs_, device_, gpu_springs(conditions, static_cast<int>(position_.cols())), "springs");
     blocks.set("Springs", *springs_);
 }
 
 void GpuEffects::set_external_force(const Eigen::Matrix3Xd& force, BlockBuffers& blocks) {
-    external_force_.reset();
-    if (force.size() == 0 || force.isZero(0.0)) return;
+    if (force.size() == 0 || force.isZero(0.0)) return external_force_.reset();
     if (force.cols() != position_.cols())
         throw InvalidInput("the external force has " + std::to_string(force.cols()) + " columns; the model has " +
                            std::to_string(position_.cols()) + " nodes");
-    external_force_.emplace(device_, packed(force), "external forces");
+    put(external_force_, device_, packed(force), "external forces");
     blocks.set("ExternalForce", *external_force_);
 }
 
 void GpuEffects::set_surface(const SurfaceEffects& effects, BlockBuffers& blocks) {
     surface_pass_.reset();
-    surface_.reset();
-    if (effects.empty()) return;
+    if (effects.empty()) return surface_.reset();
     const GpuSurface layout = gpu_surface(effects, position_);
-    surface_.emplace(device_, layout, static_cast<std::size_t>(position_.cols()));
+    if (surface_ && surface_->node == effects.node && surface_->words.size() == layout.words.size()) {
+        surface_->words.upload(layout.words);
+    } else {
+        surface_.reset();
+        surface_.emplace(device_, layout, effects.node, static_cast<std::size_t>(position_.cols()));
+    }
     blocks.set("SurfaceEffects", surface_->words);
     blocks.set("SurfaceForce", surface_->force);
     const shaders::SurfaceForces forces{.pressure = layout.pressure_lists > 0,
@@ -59,9 +73,8 @@ void GpuEffects::set_surface(const SurfaceEffects& effects, BlockBuffers& blocks
 }
 
 void GpuEffects::set_fluid(const std::optional<NodalFluid>& fluid, BlockBuffers& blocks) {
-    fluid_.reset();
-    if (!fluid) return;
-    fluid_.emplace(device_, gpu_fluid(*fluid), "columns of the fluid");
+    if (!fluid) return fluid_.reset();
+    put(fluid_, device_, gpu_fluid(*fluid), "columns of the fluid");
     blocks.set("Fluid", *fluid_);
 }
 

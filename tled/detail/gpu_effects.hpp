@@ -41,8 +41,10 @@ private:
     void set_contact(const std::optional<NodalContact>& contact, BlockBuffers& blocks);
 
     struct Surface {
-        Surface(const shaders::Device& device, const GpuSurface& layout, std::size_t nodes)
-            : words(device, layout.words, "surface effects"), force(device, nodes, "surface forces") {}
+        Surface(const shaders::Device& device, const GpuSurface& layout, const std::vector<int>& loaded,
+                std::size_t nodes)
+            : node(loaded), words(device, layout.words, "surface effects"), force(device, nodes, "surface forces") {}
+        std::vector<int> node;  ///< on which forces act; zero on the others
         shaders::Buffer<std::uint32_t> words;
         shaders::Buffer<Float4> force;
     };
