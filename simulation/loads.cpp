@@ -43,6 +43,12 @@ double level_at(const FluidLevel& fluid, const BuiltScene& built, double time) {
     return fluid.from + part(fluid.curve, built, time) * (fluid.to - fluid.from);
 }
 
+/// mm/s²
+Vector3d gravity_of(const BuiltScene& built, double time) {
+    if (!built.scene.gravity) return Vector3d::Zero();
+    return gravity_at(*built.scene.gravity, time, built.scene.solve.duration);
+}
+
 /// Weight and lift that the image was taken under, mN.
 Matrix3Xd image_load(const BuiltScene& built, const Stage& stage) {
     Matrix3Xd load = Matrix3Xd::Zero(3, stage.rest.node_count);
@@ -58,8 +64,7 @@ Matrix3Xd image_load(const BuiltScene& built, const Stage& stage) {
 /// Weight on every node at a time, less what the image shows, mN.
 Matrix3Xd weight_at(const BuiltScene& built, const Stage& stage, const Matrix3Xd& image_load, double time) {
     if (!built.scene.gravity) return -image_load;
-    return gravity_at(*built.scene.gravity, time, built.scene.solve.duration) * stage.rest.lumped_mass.transpose() -
-           image_load;
+    return gravity_of(built, time) * stage.rest.lumped_mass.transpose() - image_load;
 }
 
 /// That, and what tissue left out does, mN.
@@ -136,8 +141,7 @@ void move_effects(const BuiltScene& built, const Stage& stage, double time, tled
     for (std::size_t p = 0; p < effects.pressures.size(); ++p)
         effects.pressures[p].pressure = pressure_at(built, stage, p, time);
     if (built.scene.fluid)
-        effects.fluid = fluid_of(built, level_at(*built.scene.fluid, built, time),
-                                 gravity_at(*built.scene.gravity, time, built.scene.solve.duration));
+        effects.fluid = fluid_of(built, level_at(*built.scene.fluid, built, time), gravity_of(built, time));
     if (!effects.contact) return;
     move_bodies(built, time, effects.contact->obstacles);
 }
@@ -181,6 +185,18 @@ LoadsInTime::LoadsInTime(const BuiltScene& built, const Stage& stage, double tim
     const tled::Conditions conditions = conditions_at(built, stage, time);
     for (const tled::SurfacePressure& each : conditions.effects.pressures) pressure_faces_.push_back(each.faces.cols());
     conditions_ = tled::nodal_conditions(conditions, stage.rest);
+    gravity_ = gravity_of(built, time);
+}
+
+void LoadsInTime::turn_gravity(double time) {
+    const Vector3d gravity = gravity_of(built_, time);
+    if (gravity == gravity_ && !built_.left_out) return;
+    gravity_ = gravity;
+    conditions_.external_force = force_at(built_, stage_, image_load_, time);
+    if (!conditions_.effects.fluid) return;
+    tled::Effects fluid;
+    fluid.fluid = fluid_of(built_, level_at(*built_.scene.fluid, built_, time), gravity);
+    conditions_.effects.fluid = tled::nodal_effects(fluid, stage_.rest).fluid;
 }
 
 const tled::NodalConditions& LoadsInTime::at(double time) {
@@ -188,14 +204,9 @@ const tled::NodalConditions& LoadsInTime::at(double time) {
         const int node = stage_.place[static_cast<std::size_t>(held.node)];
         if (node >= 0) conditions_.imposed.col(node) = displacement_of(held, built_, time);
     }
-    conditions_.external_force = force_at(built_, stage_, image_load_, time);
+    turn_gravity(time);
     tled::NodalEffects& effects = conditions_.effects;
-    if (effects.fluid) {
-        tled::Effects fluid;
-        fluid.fluid = fluid_of(built_, level_at(*built_.scene.fluid, built_, time),
-                               gravity_at(*built_.scene.gravity, time, built_.scene.solve.duration));
-        effects.fluid = tled::nodal_effects(fluid, stage_.rest).fluid;
-    }
+    if (effects.fluid) effects.fluid->level = level_at(*built_.scene.fluid, built_, time);
     if (effects.contact) move_bodies(built_, time, effects.contact->obstacles);
     Eigen::Index face = 0;
     for (std::size_t p = 0; p < pressure_faces_.size(); ++p) {

@@ -22,11 +22,15 @@ public:
     const tled::NodalConditions& at(double time);
 
 private:
+    /// Weight, lift and what tissue left out does, which stay as they are while gravity stands.
+    void turn_gravity(double time);
+
     const BuiltScene& built_;
     const Stage& stage_;
     std::vector<Eigen::Index> pressure_faces_;  ///< of each pressure in this stage
     tled::NodalConditions conditions_;
     Eigen::Matrix3Xd image_load_;  ///< mN, what the image's own weight and lift take off
+    Eigen::Vector3d gravity_;      ///< mm/s², of the conditions
 };
 
 /// For how long (s) loads may be held so that no motion in one go exceeds a hundredth of the shortest edge and no load

@@ -46,15 +46,20 @@ void expect_equal(const tled::NodalConditions& a, const tled::NodalConditions& b
     EXPECT_EQ(a.effects.fluid->weight, b.effects.fluid->weight);
     EXPECT_EQ(a.effects.contact->node, b.effects.contact->node);
     EXPECT_EQ(a.effects.contact->obstacles[0].shift, b.effects.contact->obstacles[0].shift);
+    EXPECT_EQ(a.effects.contact->obstacles[0].velocity, b.effects.contact->obstacles[0].velocity);
 }
 
 TEST(LoadsInTime, AreTheConditionsOfThatTime) {
-    const BuiltScene built = build(with_everything());
-    ASSERT_EQ(built.stages.size(), 2u);
-    for (const Stage& stage : built.stages) {
-        LoadsInTime loads(built, stage, 0.0);
-        for (const double time : {0.0, 0.3, 0.65, 1.0, 0.2})
-            expect_equal(loads.at(time), tled::nodal_conditions(conditions_at(built, stage, time), stage.rest));
+    Scene stands = with_everything();  // gravity, for a while
+    stands.gravity->curve = Curve{{{0.25, 0}, {0.3, 1}, {0.8, 1}, {1, 0}}};
+    for (const Scene& scene : {with_everything(), stands}) {
+        const BuiltScene built = build(scene);
+        ASSERT_EQ(built.stages.size(), 2u);
+        for (const Stage& stage : built.stages) {
+            LoadsInTime loads(built, stage, 0.0);
+            for (const double time : {0.0, 0.1, 0.3, 0.65, 0.7, 1.0, 0.2})
+                expect_equal(loads.at(time), tled::nodal_conditions(conditions_at(built, stage, time), stage.rest));
+        }
     }
 }
 
