@@ -35,7 +35,9 @@ int print_table(const std::vector<Column>& engines) {
     std::printf("\n|---|---|---|---|---|---|");
     for (std::size_t i = 0; i < engines.size(); ++i) std::printf("---|");
     int missed = 0;
-    for (const verification::EffectCase& each : verification::effect_cases()) {
+    std::vector<verification::EffectCase> cases = verification::effect_cases();
+    for (const verification::EffectCase& each : verification::scene_cases()) cases.push_back(each);
+    for (const verification::EffectCase& each : cases) {
         std::printf("\n| %s | %s | %s (%s) | %s | %.5g | %.2g |", each.effect.c_str(), each.scene.c_str(),
                     each.quantity.c_str(), each.unit.c_str(), each.source.c_str(), each.reference, each.bound);
         for (const Column& engine : engines) {

@@ -23,11 +23,11 @@ inline void PrintTo(const EffectCase& each, std::ostream* out) {
     *out << each.scene << ", " << each.quantity;
 }
 
-/// All of them.
+/// All but those of whole scenes.
 std::vector<EffectCase> effect_cases();
 /// Those of contact and friction, which are among them.
 std::vector<EffectCase> contact_cases();
-/// Those of what changes in time, by whole scenes, which are among them too.
+/// What changes in time, by whole scenes; where simulation is built.
 std::vector<EffectCase> scene_cases();
 
 }  // namespace tissuewarp::verification

@@ -1,5 +1,5 @@
 /// Every effect against its verification case, on the engines.
-#include "tests/verification/effect_cases.hpp"
+#include "tests/verification/effect_engines.hpp"
 #include "tests/verification/problems.hpp"
 #include "tests/verification/solution.hpp"
 #include "tled/contact.hpp"
@@ -10,43 +10,18 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
-#include <tuple>
 
 namespace tissuewarp::verification {
 namespace {
 
-struct NamedEngine {
-    const char* name;
-    MakeEngine make;
-};
-const NamedEngine float64{
-    "CpuFloat64", [](const tled::RestState& rest) { return tled::make_cpu_engine(rest, tled::Scalar::Float64); }};
-const NamedEngine float32{
-    "CpuFloat32", [](const tled::RestState& rest) { return tled::make_cpu_engine(rest, tled::Scalar::Float32); }};
-
-const NamedEngine gpu{"Gpu", [](const tled::RestState& rest) { return tled::make_gpu_engine(rest); }};
-void PrintTo(const NamedEngine& engine, std::ostream* out) {
-    *out << engine.name;
-}
-
-class Effects : public ::testing::TestWithParam<std::tuple<NamedEngine, EffectCase>> {};
-std::string name_of(const ::testing::TestParamInfo<Effects::ParamType>& each) {
-    const auto& [engine, effect] = each.param;
-    std::string name = std::string(engine.name) + "_" + effect.effect + "_" + effect.quantity;
-    for (char& c : name)
-        if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
-    return name;
-}
 INSTANTIATE_TEST_SUITE_P(All, Effects,
-                         ::testing::Combine(::testing::Values(float64, float32, gpu),
-                                            ::testing::ValuesIn(effect_cases())),
-                         name_of);
+                         ::testing::Combine(::testing::ValuesIn(all_engines), ::testing::ValuesIn(effect_cases())),
+                         name_of_effect);
 
 TEST_P(Effects, AnswersAsTheReference) {
     const auto& [engine, effect] = GetParam();
-    if (engine.name == gpu.name && effect.effect == "pressure" && !tled::step_device(-1).hardware)
+    if (engine.name == all_engines.back().name && effect.effect == "pressure" && !tled::step_device(-1).hardware)
         GTEST_SKIP() << "some minutes on a software rasteriser; effects_engine_test.cpp has its forces there";
     EXPECT_NEAR(effect.measure(engine.make), effect.reference, effect.bound)
         << effect.scene << ", " << effect.quantity << " (" << effect.unit << "), from " << effect.source;
