@@ -140,6 +140,7 @@ std::map<std::string, Setter> setters() {
             {"tissue-strain", [](UpdateOptions& o, double v) { o.tissue.expected_strain = v; }},
             {"surface-patch", [](UpdateOptions& o, double v) { o.surface.patch_mm = v; }},
             {"free-motion", [](UpdateOptions& o, double v) { o.tissue.free_motion_mm = v; }},
+            {"load-shapes", [](UpdateOptions& o, double v) { o.tissue.load_shapes = int(v); }},
             {"held-motion", [](UpdateOptions& o, double v) { o.tissue.held_motion_mm = v; }},
             {"surface-outliers", [](UpdateOptions& o, double v) { o.surface.outlier_deviations = v; }},
             {"expected-motion", [](UpdateOptions& o, double v) { o.image.expected_motion_mm = v; }},

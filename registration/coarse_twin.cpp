@@ -8,9 +8,9 @@ namespace tissuewarp::registration::detail {
 
 namespace {
 
-PrepareOptions coarse_options(const PreparedModel& prepared) {
+PrepareOptions coarse_options(const PreparedModel& prepared, double edge_length) {
     PrepareOptions options = prepared.options;
-    options.meshing.edge_length = suggested_edge_length(prepared.labels);
+    options.meshing.edge_length = edge_length;
     options.meshing.label_edge_length.clear();
     options.anchors.clear();  // among the springs
     options.rigid_neighbours.clear();
@@ -34,7 +34,7 @@ std::vector<tled::Spring> moved(const std::vector<tled::Spring>& springs, const 
     std::vector<Pull> pulls;
     for (const tled::Spring& spring : springs)
         if (const auto at = place_of(locator, from.col(spring.node)))
-            pulls.push_back({*at, Eigen::Vector3d::Zero(), spring.stiffness});
+            pulls.push_back({*at, spring.target, spring.stiffness});
     return lumped_springs(to, pulls, Eigen::Matrix3Xd::Zero(3, to.nodes.cols()));
 }
 
@@ -80,19 +80,31 @@ Eigen::MatrixXd carried(const meshing::TetMesh& from, const Eigen::MatrixXd& nod
     return result;
 }
 
-CoarseTwin coarse_twin(const PreparedModel& prepared, const UpdateResult& result, Observer& observer) {
-    PreparedModel coarse = prepare(prepared.labels, coarse_options(prepared), observer);
+PreparedModel coarse_model(const PreparedModel& prepared, double edge_length, Observer& observer) {
+    return prepare(prepared.labels, coarse_options(prepared, edge_length), observer);
+}
+
+LastPulls pulls_on(const PreparedModel& coarse, const PreparedModel& prepared, const LastPulls& given) {
     const meshing::TetMesh& mesh = coarse.model.mesh;
     const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
     const meshing::PointLocator locator(mesh);
     LastPulls pulls;
-    const bool labels = !result.pulls.holds.empty();
-    pulls.data = labels ? sampled(result.pulls.data, nodes, coarse) : moved(result.pulls.data, nodes, mesh, locator);
-    pulls.ground = moved(result.pulls.ground, nodes, mesh, locator);
-    pulls.supports = moved(result.pulls.supports, nodes, mesh, locator);
-    pulls.energy = result.pulls.energy;
-    pulls.free_placement = result.pulls.free_placement;
-    Eigen::Matrix3Xd displacement = carried(prepared.model.mesh, result.deformation.displacement, mesh.nodes);
+    const bool labels = !given.holds.empty();
+    pulls.data = labels ? sampled(given.data, nodes, coarse) : moved(given.data, nodes, mesh, locator);
+    pulls.ground = moved(given.ground, nodes, mesh, locator);
+    pulls.supports = moved(given.supports, nodes, mesh, locator);
+    pulls.energy = given.energy;
+    pulls.free_placement = given.free_placement;
+    pulls.load_shapes = given.load_shapes;
+    pulls.load_size = given.load_size;
+    return pulls;
+}
+
+CoarseTwin coarse_twin(const PreparedModel& prepared, const UpdateResult& result, Observer& observer) {
+    PreparedModel coarse = coarse_model(prepared, suggested_edge_length(prepared.labels), observer);
+    LastPulls pulls = pulls_on(coarse, prepared, result.pulls);
+    Eigen::Matrix3Xd displacement =
+        carried(prepared.model.mesh, result.deformation.displacement, coarse.model.mesh.nodes);
     return {std::move(coarse), std::move(pulls), std::move(displacement)};
 }
 

@@ -129,6 +129,7 @@ struct TissuePrior {
     double strain_length_mm = 10;   ///< … of this size
     double free_motion_mm = 20;     ///< of the organ's surface, from where the organ lies as a whole
     double held_motion_mm = 5;      ///< the same where the images are in one frame: what is around holds the organ
+    int load_shapes = 48;  ///< of unknown loads that move what points do not show, where the placement is free; 0: none
 };
 
 /// What acts on the tissue in the operating room and did not when the preoperative image was taken. Only its size
@@ -251,9 +252,11 @@ struct LastPulls {
     std::vector<tled::Spring> ground;    ///< the prior where points alone show the organ; otherwise none
     std::vector<tled::Spring> supports;  ///< anchors, and contact with rigid neighbours
     Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();  ///< moving → fixed, as it was in that round
-    Eigen::Matrix3Xd loads;                                       ///< on the nodes, 3 × N, mN
+    Eigen::Matrix3Xd loads;       ///< on the nodes, 3 × N, mN, those found among them
     double energy = 1;            ///< mN mm that weighs as much as one standard deviation of a datum
     bool free_placement = false;  ///< nothing but the data says where the organ lies: the ground moves with it
+    int load_shapes = 0;          ///< of unknown loads that were looked for
+    double load_size = 0;         ///< of those found: their strain energy is about its square times `energy`; 0: none
 };
 
 struct UpdateResult {

@@ -6,6 +6,7 @@
 #include "registration/detail/doubts.hpp"
 #include "registration/detail/engine_choice.hpp"
 #include "registration/detail/evidence_set.hpp"
+#include "registration/detail/load_finder.hpp"
 #include "registration/detail/loads.hpp"
 #include "registration/detail/pace.hpp"
 #include "registration/detail/rigid_part.hpp"
@@ -36,9 +37,11 @@ void append(std::vector<tled::Spring>& springs, const std::vector<tled::Spring>&
 class Rematching {
 public:
     Rematching(const PreparedModel& prepared, tled::Engine& engine, detail::EvidenceSet& evidence,
-               const UpdateOptions& options, detail::Pace& pace, UpdateResult& result, Observer& observer)
+               detail::LoadFinder& load_finder, const UpdateOptions& options, detail::Pace& pace, UpdateResult& result,
+               Observer& observer)
         : prepared_(prepared),
           evidence_(evidence),
+          load_finder_(load_finder),
           options_(options),
           pace_(pace),
           result_(result),
@@ -58,9 +61,7 @@ public:
         pace_.begin_rounds();
         for (int done = 0; done < 2 * options_.rematches && round < options_.rematches; ++done) {
             search_image(round);
-            const Round record = attempt(round);
-            result_.rounds.push_back(record);
-            if (placement_is_free()) detail::give_rigid_part_to_placement(prepared_, state_);
+            const Round record = solve(round);
             observer_.checkpoint("registration", double(round + 1) / options_.rematches);
             pace_.lap();
             if (round < last && !pace_.room_for(2)) {
@@ -74,9 +75,11 @@ public:
                 record.largest_change_mm < (searches_left() ? settled_for_search_mm() : options_.settled_mm);
             round = settled ? std::max(round + 1, next_milestone(round)) : round + 1;
         }
+        explain_by_loads();
         settle_contact();
         result_.times.push_back({"correspondence", matching_seconds_});
         result_.times.push_back({"equilibrium", solving_seconds_});
+        if (finding_seconds_ > 0) result_.times.push_back({"unknown loads", finding_seconds_});
         result_.alignment.placement = state_.placement;
         judge();
         return state_.displacement;
@@ -85,6 +88,7 @@ public:
 private:
     const PreparedModel& prepared_;
     detail::EvidenceSet& evidence_;
+    detail::LoadFinder& load_finder_;
     const UpdateOptions& options_;
     detail::Pace& pace_;
     UpdateResult& result_;
@@ -92,13 +96,14 @@ private:
     tled::Engine& engine_;
     tled::EquilibriumOptions equilibrium_;
     Eigen::Matrix3Xd loads_;  // mN, 3 × N
+    double load_size_ = 0;    // of those among them that were found
     double step_mm_;
     detail::State state_;
     /// Data other than labels pull with other springs than those that the model was prepared with: what relaxes
     /// slowest, and what a factor would be of, follow from them.
     std::optional<tled::RestStiffness> metric_;
     bool relaxation_failed_ = false;
-    double matching_seconds_ = 0, solving_seconds_ = 0;
+    double matching_seconds_ = 0, solving_seconds_ = 0, finding_seconds_ = 0;
 
     /// Points show the organ wherever it lies, and nothing says where that is.
     [[nodiscard]] bool placement_is_free() const {
@@ -126,6 +131,44 @@ private:
         return round < last ? last : options_.rematches;
     }
 
+    /// What points show was done by loads that nobody stated; these also move what no point shows. A second time, since
+    /// the first brings more points within reach. Where tissue does not bear them, it stays as it was without.
+    void explain_by_loads() {
+        constexpr int times = 2;
+        const Eigen::Matrix3Xd stated = loads_;
+        for (int time = 0; time < times && loads_are_looked_for(); ++time) {
+            const detail::State before = state_;
+            const LastPulls pulls = result_.pulls;
+            detail::Stopwatch stopwatch;
+            const detail::FoundLoads found = load_finder_.find(result_.pulls, observer_);
+            finding_seconds_ += stopwatch.lap("").seconds;
+            try {
+                loads_ = stated + found.forces;
+                load_size_ = found.size;
+                settle_loads();
+            } catch (const SolverFailure& failure) {
+                observer_.note(std::string("unknown loads are left out: ") + failure.what());
+                state_ = before;
+                result_.pulls = pulls;
+                return;
+            }
+        }
+    }
+
+    /// Half of a time budget is kept for what follows.
+    [[nodiscard]] bool loads_are_looked_for() const {
+        return placement_is_free() && options_.tissue.load_shapes > 0 && !result_.cut_short && pace_.share_left() > 0.5;
+    }
+
+    void settle_loads() {
+        constexpr int most_rounds = 4;
+        const int last = options_.rematches - 1;
+        for (int done = 0; done < most_rounds; ++done) {
+            const Round record = solve(done == 0 ? std::max(0, last - 1) : last);
+            if (done > 0 && record.largest_change_mm < options_.settled_mm) break;
+        }
+    }
+
     /// Rounds that change the contact alone, until it is in balance.
     void settle_contact() {
         constexpr int most_rounds = 10;
@@ -139,6 +182,14 @@ private:
         evidence_.image->search(state_, observer_);
         metric_.reset();
         matching_seconds_ += stopwatch.lap("").seconds;
+    }
+
+    /// One round, kept.
+    Round solve(int round) {
+        const Round record = attempt(round);
+        result_.rounds.push_back(record);
+        if (placement_is_free()) detail::give_rigid_part_to_placement(prepared_, state_);
+        return record;
     }
 
     /// One round; where the equilibrium fails, again with half the step bound.
@@ -186,7 +237,8 @@ private:
         const detail::RoundPlan plan = plan_of(round);
         detail::Contribution data = evidence_.contribution(plan, state_);
         result_.pulls = {data.conditions.springs, data.holds, evidence_.ground, evidence_.supports(plan, state_),
-                         state_.placement,        loads_,     evidence_.energy, placement_is_free()};
+                         state_.placement,        loads_,     evidence_.energy, placement_is_free(),
+                         options_.tissue.load_shapes, load_size_};
         data.conditions.external_force = loads_;
         append(data.conditions.springs, result_.pulls.holds);
         append(data.conditions.springs, result_.pulls.ground);
@@ -233,10 +285,14 @@ struct Updater::Impl {
     UpdateOptions options;
     std::unique_ptr<tled::Engine> solver;
     std::unique_ptr<detail::ImageEngine> dense;  // where the model has an image of descriptors
+    detail::LoadFinder load_finder;
 
     Impl(const PreparedModel& model, const UpdateOptions& given, std::unique_ptr<tled::Engine> engine,
          Observer& observer)
-        : prepared(model), options(given), solver(std::move(engine)) {
+        : prepared(model),
+          options(given),
+          solver(std::move(engine)),
+          load_finder(model, given.tissue.load_shapes) {
         const bool described =
             model.image && model.image->blocks.options().similarity == Similarity::SelfSimilarityContext;
         if (described) dense = detail::make_image_engine(model, given, observer);
@@ -258,7 +314,7 @@ UpdateResult Updater::Impl::update(const Intraoperative& given, Observer& observ
     result.times.push_back(stopwatch.lap("boundary maps"));
 
     const Eigen::Matrix3Xd displacement =
-        Rematching(prepared, *solver, evidence, options, pace, result, observer).run();
+        Rematching(prepared, *solver, evidence, load_finder, options, pace, result, observer).run();
     result.deformation = {prepared.model.mesh, displacement, result.alignment.placement};
     result.doubts = detail::doubts(prepared, seen, result);
     return result;

@@ -4,8 +4,13 @@
 #include "registration/detail/white_noise.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace tissuewarp::registration::detail {
 
@@ -69,18 +74,34 @@ Columns unknown_loads(const PreparedModel& prepared, int count, std::uint64_t se
     const Eigen::VectorXd volumes = nodal_volumes(prepared.model.mesh), areas = nodal_areas(prepared);
     const double radius = radius_of(nodes);
     std::mt19937_64 generator(seed);
-    Columns loads(nodes.size(), count);
-    for (Eigen::Index k = 0; k < count; ++k) {
-        const Eigen::Vector3d body = white_noise(3, 1, generator) / radius;
-        const SmoothField traction(smooth_over * radius, generator);
-        for (Eigen::Index n = 0; n < nodes.cols(); ++n) {
-            loads.block<3, 1>(3 * n, k) = volumes[n] * body;
-            if (areas[n] > 0) loads.block<3, 1>(3 * n, k) += areas[n] * traction(nodes.col(n));
-        }
+    std::vector<Eigen::Vector3d> bodies;
+    std::vector<SmoothField> tractions;
+    for (int k = 0; k < count; ++k) {
+        bodies.emplace_back(white_noise(3, 1, generator) / radius);
+        tractions.emplace_back(smooth_over * radius, generator);
     }
+    Columns loads(nodes.size(), count);
+    tbb::parallel_for(0, count, [&](int k) {
+        const auto draw = static_cast<std::size_t>(k);
+        for (Eigen::Index n = 0; n < nodes.cols(); ++n) {
+            loads.block<3, 1>(3 * n, k) = volumes[n] * bodies[draw];
+            if (areas[n] > 0) loads.block<3, 1>(3 * n, k) += areas[n] * tractions[draw](nodes.col(n));
+        }
+    });
     // What holds the organ as a whole acts all over its surface.
     const Columns motions = rigid_motions(nodes), held = weighted(motions, areas);
     return loads - held * (motions.transpose() * held).ldlt().solve(motions.transpose() * loads);
+}
+
+Columns principal_loads(const PreparedModel& prepared, int count) {
+    constexpr int draws = 256;
+    constexpr std::uint64_t seed = 0x10ad5;  // an error estimate draws others
+    const Eigen::MatrixXd drawn = unknown_loads(prepared, draws, seed);
+    const meshing::TetMesh& mesh = prepared.model.mesh;
+    const Eigen::VectorXd sizes = nodal_areas(prepared) + nodal_volumes(mesh) / radius_of(mesh.nodes);
+    const Columns densities = weighted(drawn, sizes.cwiseInverse());  // tractions, where there is a surface
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(drawn.transpose() * densities);
+    return drawn * modes.eigenvectors().rightCols(std::min(count, draws)) / std::sqrt(double(draws));
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -14,6 +14,13 @@ struct CoarseTwin {
     Eigen::Matrix3Xd displacement;  ///< 3 × N, mm
 };
 
+/// The model of the same label map with other edges (mm), without anchors and rigid neighbours. Throws InvalidInput,
+/// Cancelled.
+PreparedModel coarse_model(const PreparedModel& prepared, double edge_length, Observer& observer);
+
+/// What pulls at a model, on the nodes of its coarse model nearby: springs and prior alone.
+LastPulls pulls_on(const PreparedModel& coarse, const PreparedModel& prepared, const LastPulls& pulls);
+
 /// Of the label map, with the edges that suggested_edge_length tells. Throws InvalidInput, Cancelled.
 CoarseTwin coarse_twin(const PreparedModel& prepared, const UpdateResult& result, Observer& observer);
 

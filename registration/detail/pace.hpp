@@ -25,6 +25,9 @@ public:
         return budget_s_ <= 0 || elapsed() + rounds * 4.0 / 3.0 * last_round_s_ <= budget_s_;
     }
 
+    /// Of the budget; 1 without one.
+    [[nodiscard]] double share_left() const { return budget_s_ <= 0 ? 1 : 1 - elapsed() / budget_s_; }
+
 private:
     using Clock = std::chrono::steady_clock;
     [[nodiscard]] double elapsed() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }

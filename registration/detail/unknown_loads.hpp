@@ -13,4 +13,8 @@ namespace tissuewarp::registration::detail {
 /// that vary smoothly over half the organ's radius, of about 1 kPa. Only their shape tells; their size is arbitrary.
 Eigen::MatrixXd unknown_loads(const PreparedModel& prepared, int count, std::uint64_t seed);
 
+/// The `count` principal shapes of such loads, 3N × count, mN: with independent coefficients of variance 1 their sum is
+/// distributed as they are, as nearly as so many shapes can be (Karhunen and Loève, of 256 draws).
+Eigen::MatrixXd principal_loads(const PreparedModel& prepared, int count);
+
 }  // namespace tissuewarp::registration::detail
