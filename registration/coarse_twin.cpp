@@ -95,8 +95,6 @@ LastPulls pulls_on(const PreparedModel& coarse, const PreparedModel& prepared, c
     pulls.supports = moved(given.supports, nodes, mesh, locator);
     pulls.energy = given.energy;
     pulls.free_placement = given.free_placement;
-    pulls.load_shapes = given.load_shapes;
-    pulls.load_size = given.load_size;
     return pulls;
 }
 

@@ -2,7 +2,6 @@
 
 #include "registration/detail/expected_error.hpp"
 #include "registration/detail/ground.hpp"
-#include "registration/detail/load_fit.hpp"
 #include "registration/detail/rigid_part.hpp"
 #include "registration/detail/unknown_loads.hpp"
 #include "registration/detail/white_noise.hpp"
@@ -73,15 +72,6 @@ Eigen::VectorXd unexplained_share(const Eigen::Matrix3Xd& nodes, const Eigen::Ma
     return variance(hidden).cwiseMin(variance(bending(hidden))).cwiseQuotient(variance(bending(free)));
 }
 
-/// What the registration's own loads show of those drawn is no longer hidden; they follow the noise of the data, too.
-void find_loads(const PreparedModel& prepared, const Posteriors& posteriors, const Eigen::MatrixXd& free,
-                Eigen::MatrixXd& hidden, Eigen::MatrixXd& noise) {
-    const LoadShapes shapes(prepared, posteriors.unseen, posteriors.springs.energy, posteriors.load_shapes);
-    const LoadFit fit(shapes, posteriors.seen);
-    hidden -= fit.answers(fit.coefficients(free - hidden, posteriors.load_size));
-    noise += fit.answers(fit.coefficients(noise, posteriors.load_size));
-}
-
 }  // namespace
 
 Posteriors posteriors_of(const PreparedModel& prepared, const LastPulls& pulls) {
@@ -95,17 +85,15 @@ Posteriors posteriors_of(const PreparedModel& prepared, const LastPulls& pulls) 
     WeighedSprings seen = unseen;
     seen.data.insert(seen.data.end(), pulls.data.begin(), pulls.data.end());
     auto [with_data, without] = Posterior::both(prepared, seen, unseen);
-    return {std::move(seen), std::move(with_data), std::move(without), points_alone, pulls.load_shapes, pulls.load_size};
+    return {std::move(seen), std::move(with_data), std::move(without), points_alone};
 }
 
 DataUncertainty data_uncertainty(const PreparedModel& prepared, const Posteriors& posteriors,
                                  const Eigen::Matrix3Xd& displacement, int samples, std::uint64_t seed) {
     const WeighedSprings& springs = posteriors.springs;
     const Eigen::MatrixXd loads = unknown_loads(prepared, samples, seed);
-    const Eigen::MatrixXd free = posteriors.unseen.inverse(loads);
-    Eigen::MatrixXd hidden = posteriors.seen.inverse(loads);
-    Eigen::MatrixXd noise = posteriors.seen.inverse(noise_forces(springs, loads.rows(), samples, seed + 1));
-    if (posteriors.load_size > 0) find_loads(prepared, posteriors, free, hidden, noise);
+    const Eigen::MatrixXd hidden = posteriors.seen.inverse(loads), free = posteriors.unseen.inverse(loads);
+    const Eigen::MatrixXd noise = posteriors.seen.inverse(noise_forces(springs, loads.rows(), samples, seed + 1));
     DataUncertainty result;
     result.covariance = load_size(prepared, springs.energy, displacement, free - hidden) * covariances_of(hidden) +
                         noise_share * covariances_of(noise);

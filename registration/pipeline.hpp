@@ -255,8 +255,8 @@ struct LastPulls {
     Eigen::Matrix3Xd loads;       ///< on the nodes, 3 × N, mN, those found among them
     double energy = 1;            ///< mN mm that weighs as much as one standard deviation of a datum
     bool free_placement = false;  ///< nothing but the data says where the organ lies: the ground moves with it
-    int load_shapes = 0;          ///< of unknown loads that were looked for
-    double load_size = 0;         ///< of those found: their strain energy is about its square times `energy`; 0: none
+    double load_size = 0;         ///< of unknown loads that were found: they strain tissue by about its square times
+                                  ///< `energy`; 0: none
 };
 
 struct UpdateResult {

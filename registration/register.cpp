@@ -238,7 +238,7 @@ private:
         detail::Contribution data = evidence_.contribution(plan, state_);
         result_.pulls = {data.conditions.springs, data.holds, evidence_.ground, evidence_.supports(plan, state_),
                          state_.placement,        loads_,     evidence_.energy, placement_is_free(),
-                         options_.tissue.load_shapes, load_size_};
+                         load_size_};
         data.conditions.external_force = loads_;
         append(data.conditions.springs, result_.pulls.holds);
         append(data.conditions.springs, result_.pulls.ground);

@@ -19,8 +19,6 @@ struct Posteriors {
     WeighedSprings springs;
     Posterior seen, unseen;
     bool points_alone = false;  ///< neither labels nor an image show the organ as a whole
-    int load_shapes = 0;        ///< of loads that the registration found,
-    double load_size = 0;       ///< and their size; 0: none
 };
 
 /// Throws InvalidInput where the springs do not hold the tissue, SolverFailure without memory for the factors.

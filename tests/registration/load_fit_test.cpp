@@ -1,0 +1,186 @@
+/// Loads found by what data show of them.
+#include "registration/detail/load_finder.hpp"
+#include "registration/detail/ground.hpp"
+#include "registration/detail/rigid_part.hpp"
+#include "registration/detail/unknown_loads.hpp"
+#include "registration/field.hpp"
+#include "tests/support/label_shapes.hpp"
+
+#include <Eigen/Cholesky>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace tissuewarp::registration {
+namespace {
+
+using Eigen::Matrix3Xd;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+PreparedModel organ(double edge_length) {
+    PrepareOptions options;
+    options.meshing.edge_length = edge_length;
+    return prepare(shapes::organ_labels({}), options);
+}
+
+UpdateOptions with_shapes(int count) {
+    UpdateOptions options;
+    options.device = Device::Cpu;
+    options.tissue.load_shapes = count;
+    return options;
+}
+
+detail::WeighedSprings prior(const PreparedModel& prepared, double energy) {
+    return {{}, detail::ground_springs(prepared, energy, [](const InterfaceNode&) { return 20.0; }), energy, true};
+}
+
+/// What smooth loads do to the free organ, 4 mm in root mean square: of a draw that no fit knows.
+Matrix3Xd bent(const PreparedModel& prepared) {
+    const MatrixXd u =
+        detail::Posterior(prepared, prior(prepared, 1)).inverse(detail::unknown_loads(prepared, 1, 2024));
+    const Matrix3Xd field = Eigen::Map<const Matrix3Xd>(u.data(), 3, u.size() / 3);
+    return 4 / std::sqrt(field.colwise().squaredNorm().mean()) * field;
+}
+
+/// Pairs all over the left two fifths of the organ, which is 100 mm long.
+PointPairs left_of_the_middle(const PreparedModel& prepared, const Matrix3Xd& displacement) {
+    const Matrix3Xd& nodes = prepared.model.mesh.nodes;
+    std::vector<Eigen::Index> chosen;
+    for (Eigen::Index n = 0; n < nodes.cols(); n += 1 + nodes.cols() / 400)
+        if (nodes(0, n) < -8) chosen.push_back(n);
+    return {nodes(Eigen::all, chosen), nodes(Eigen::all, chosen) + displacement(Eigen::all, chosen), 0.5};
+}
+
+/// Mean error at nodes right of the middle, mm.
+double error_on_the_right(const PreparedModel& prepared, const UpdateResult& result, const Matrix3Xd& truth) {
+    const Matrix3Xd& nodes = prepared.model.mesh.nodes;
+    const Matrix3Xd found = PointTransform(result.deformation)(nodes);
+    double sum = 0;
+    int count = 0;
+    for (Eigen::Index n = 0; n < nodes.cols(); ++n) {
+        if (nodes(0, n) < 12) continue;
+        sum += (found.col(n) - nodes.col(n) - truth.col(n)).norm();
+        ++count;
+    }
+    return sum / count;
+}
+
+// The simple twin: the mean of u given the data, by its covariance ε K⁻¹ + s² K⁻¹ B Bᵀ K⁻¹ between the nodes that
+// springs of stiffness k hold, whose noise has the covariance ε k⁻¹.
+TEST(LoadFit, IsTheMeanUnderThePriorOfSmoothLoads) {
+    const PreparedModel prepared = organ(12);
+    const double energy = 60, stiffness = 40, size = 3;
+    detail::WeighedSprings unseen = prior(prepared, energy);
+    unseen.free_placement = false;
+    detail::WeighedSprings seen = unseen;
+    const Matrix3Xd truth = bent(prepared);
+    std::vector<int> held;
+    for (int node = 2; node < prepared.rest.node_count; node += 9) held.push_back(node);
+    const Eigen::Index rows = 3 * Eigen::Index{prepared.rest.node_count};
+    VectorXd pulls = VectorXd::Zero(rows), targets(3 * held.size());
+    MatrixXd units = MatrixXd::Zero(rows, targets.size());
+    for (std::size_t k = 0; k < held.size(); ++k) {
+        const Vector3d target = 5 * truth.col(held[k]);
+        seen.data.push_back({held[k], stiffness * Eigen::Matrix3d::Identity(), target});
+        pulls.segment<3>(3 * held[k]) = stiffness * target;
+        targets.segment<3>(3 * Eigen::Index(k)) = target;
+        units.block<3, 3>(3 * held[k], 3 * Eigen::Index(k)).setIdentity();
+    }
+    const detail::Posterior with(prepared, seen), without(prepared, unseen);
+    const detail::LoadShapes shapes(prepared, without, energy, 8);
+    const detail::LoadFit fit(shapes, with);
+    const VectorXd shown = with.inverse(pulls), found = shown + fit.answers(fit.coefficients(shown, size));
+
+    const MatrixXd answers = without.inverse(units), loads = shapes.forces(prepared);
+    const MatrixXd covariance =
+        energy * answers + size * size * without.inverse(loads) * (loads.transpose() * answers);  // with the held nodes
+    const MatrixXd between = units.transpose() * covariance +
+                             energy / stiffness * MatrixXd::Identity(targets.size(), targets.size());
+    const VectorXd expected = covariance * between.ldlt().solve(targets);
+    EXPECT_LT((found - expected).norm(), 1e-6 * expected.norm());
+    EXPECT_GT((shown - expected).norm(), 0.02 * expected.norm());  // loads matter here
+
+    // And the likeliest size is that of the largest density of the targets, of those that are tried.
+    const auto density = [&](double s) {
+        const MatrixXd c = units.transpose() * (energy * answers + s * s * without.inverse(loads) *
+                                                                       (loads.transpose() * answers)) +
+                           energy / stiffness * MatrixXd::Identity(targets.size(), targets.size());
+        const Eigen::LLT<MatrixXd> root(c);
+        return -0.5 * targets.dot(root.solve(targets)) -
+               root.matrixLLT().diagonal().array().log().sum();
+    };
+    const double likeliest = fit.likeliest_size(shown);
+    EXPECT_GT(density(likeliest), density(likeliest * std::sqrt(2.0)));
+    EXPECT_GT(density(likeliest), density(likeliest / std::sqrt(2.0)));
+}
+
+TEST(LoadFit, LoadsOfSizeOneHaveTheStrainEnergyOfOneDeviation) {
+    const PreparedModel prepared = organ(12);
+    const double energy = 60;
+    const detail::Posterior unseen(prepared, prior(prepared, energy));
+    const MatrixXd loads = detail::LoadShapes(prepared, unseen, energy, 16).forces(prepared);
+    EXPECT_NEAR(0.5 * loads.cwiseProduct(unseen.inverse(loads)).sum() / energy, 1, 1e-9);
+}
+
+// A fifth as many shapes are nearly nine tenths of all: they are the principal ones.
+TEST(PrincipalLoads, AreMostOfTheVariance) {
+    const PreparedModel prepared = organ(12);
+    const double all = detail::principal_loads(prepared, 256).squaredNorm();
+    EXPECT_NEAR(detail::unknown_loads(prepared, 256, 7).squaredNorm() / 256 / all, 1, 0.1);
+    EXPECT_GT(detail::principal_loads(prepared, 48).squaredNorm(), 0.85 * all);
+}
+
+// Tissue that no pair shows is where smooth loads put it that bend what pairs show; strain energy alone lets it go.
+TEST(UnknownLoads, MoveWhatNoPairShows) {
+    const PreparedModel prepared = organ(10);
+    const Matrix3Xd truth = bent(prepared);
+    const PointPairs pairs = left_of_the_middle(prepared, truth);
+    const UpdateResult without = update(prepared, {.points = pairs}, with_shapes(0)),
+                       with = update(prepared, {.points = pairs}, with_shapes(48));
+    EXPECT_EQ(without.pulls.load_size, 0);
+    EXPECT_GT(with.pulls.load_size, 1);
+    const double before = error_on_the_right(prepared, without, truth), after = error_on_the_right(prepared, with, truth);
+    EXPECT_LT(after, 0.7 * before) << before << " mm without";
+    EXPECT_GT(with.min_jacobian, 0.5);
+}
+
+// Around an organ that is held, hold and loads are one.
+TEST(UnknownLoads, AreNotLookedForWhereTheOrganIsHeld) {
+    const PreparedModel prepared = organ(12);
+    UpdateOptions options = with_shapes(48);
+    options.align = false;
+    const UpdateResult result = update(prepared, {.points = left_of_the_middle(prepared, bent(prepared))}, options);
+    EXPECT_EQ(result.pulls.load_size, 0);
+    const UpdateResult of_labels = update(prepared, {.labels = prepared.labels}, with_shapes(48));
+    EXPECT_EQ(of_labels.pulls.load_size, 0);
+}
+
+// An updater keeps shapes, not what an earlier update found.
+TEST(UnknownLoads, DoNotDependOnTheUpdateBefore) {
+    const PreparedModel prepared = organ(12);
+    const Matrix3Xd truth = bent(prepared);
+    const PointPairs pairs = left_of_the_middle(prepared, truth), others = left_of_the_middle(prepared, -truth);
+    Updater fresh(prepared, with_shapes(48)), used(prepared, with_shapes(48));
+    static_cast<void>(used.update({.points = others}));
+    EXPECT_EQ(fresh.update({.points = pairs}).deformation.displacement,
+              used.update({.points = pairs}).deformation.displacement);
+}
+
+// Found on a coarser mesh of the organ, they do the same.
+TEST(UnknownLoads, OfALargeModelAreThoseOfASmallOne) {
+    const PreparedModel small = organ(6.5), large = organ(3.6);
+    ASSERT_GT(large.rest.node_count, 6000);
+    ASSERT_LT(small.rest.node_count, 6000);
+    const Matrix3Xd truth = bent(large);
+    const PointPairs pairs = left_of_the_middle(large, truth);
+    const UpdateResult of_large = update(large, {.points = pairs}, with_shapes(48)),
+                       of_small = update(small, {.points = pairs}, with_shapes(48)),
+                       without = update(large, {.points = pairs}, with_shapes(0));
+    EXPECT_NEAR(std::log2(of_large.pulls.load_size / of_small.pulls.load_size), 0, 1);
+    EXPECT_LT(error_on_the_right(large, of_large, truth), 0.7 * error_on_the_right(large, without, truth));
+}
+
+}  // namespace
+}  // namespace tissuewarp::registration
