@@ -3,6 +3,8 @@
 #include "apps/scene_parts.hpp"
 #include "meshing/mesh_io.hpp"
 
+#include <numbers>
+
 namespace tissuewarp::apps {
 
 using namespace simulation;
@@ -29,6 +31,21 @@ Body body_of(TomlReader& reader, const std::filesystem::path& folder, NameUses& 
     return bodies.front();
 }
 
+RigidMotion rigid_motion(TomlReader& reader) {
+    RigidMotion motion;
+    motion.displacement = reader.vector("displacement_mm", any_length).value_or(Eigen::Vector3d::Zero());
+    auto rotation = reader.table("rotation");
+    if (!rotation) return motion;
+    motion.point = rotation->required_vector("point_mm", any_length);
+    const auto axis = rotation->direction("axis");
+    if (!axis) throw InvalidInput(rotation->place() + ": a rotation needs an 'axis', [x, y, z]");
+    constexpr double most_degrees = 36000;
+    const double degrees = rotation->required_number("degrees", {-most_degrees, most_degrees, "degrees"});
+    motion.turn = degrees * std::numbers::pi / 180 * *axis;
+    rotation->finish();
+    return motion;
+}
+
 }  // namespace
 
 void read_neighbours(TomlReader& file, const std::filesystem::path& folder, Scene& scene, NameUses& uses) {
@@ -38,7 +55,7 @@ void read_neighbours(TomlReader& file, const std::filesystem::path& folder, Scen
         if (!contact.set.empty()) uses.sets.push_back({contact.set, reader.place("set")});
         contact.gap = reader.number("gap_mm", {0.0, 1000.0, "mm"}).value_or(0.0);
         contact.friction = reader.number("friction", {0.0, 10.0}).value_or(0.0);
-        contact.motion = reader.vector("displacement_mm", any_length).value_or(Eigen::Vector3d::Zero());
+        contact.motion = rigid_motion(reader);
         contact.curve = reader.curve();
         contact.body = body_of(reader, folder, uses);
         reader.finish();

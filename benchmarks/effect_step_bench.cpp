@@ -66,7 +66,7 @@ tled::Obstacle obstacle(const std::function<double(const Vector3d&)>& distance, 
         for (int j = 0; j < grid.size[1]; ++j)
             for (int i = 0; i < grid.size[0]; ++i)
                 grid.distance.push_back(static_cast<float>(distance(grid.origin + grid.steps * Vector3d(i, j, k))));
-    return {std::move(grid), Vector3d::Zero(), friction};
+    return {std::move(grid), {}, friction};
 }
 
 /// Beside the face x = edge: a wall, or a ball half as wide as the cube.

@@ -70,7 +70,9 @@ void add_nodal_forces(ProgramSource& source, const NodeEffects& effects) {
 /// `settles` is the chunk whose settle() the program calls.
 void add_contact(ProgramSource& source, const NodeEffects& effects, const char* settles) {
     add_effect(source, "node.contact", "HAS_CONTACT", effects.contact);
-    if (effects.contact) source.chunks.emplace_back(settles);
+    if (!effects.contact) return;
+    add_effect(source, "node.turning", "HAS_TURNING", effects.turning);
+    source.chunks.emplace_back(settles);
 }
 
 ProgramSource node_program(std::string kernel, const NodeEffects& effects) {
@@ -358,10 +360,18 @@ std::vector<Effects> combinations(const std::array<bool Effects::*, count>& flag
     return all;
 }
 
+/// The same, but of effects of which turning is one, which there is with contact only.
+template <std::size_t count>
+std::vector<NodeEffects> with_contact(const std::array<bool NodeEffects::*, count>& flags) {
+    std::vector<NodeEffects> all = combinations<NodeEffects, count>(flags);
+    std::erase_if(all, [](const NodeEffects& effects) { return effects.turning && !effects.contact; });
+    return all;
+}
+
 void add_node_passes(std::vector<ProgramSource>& all) {
     using E = NodeEffects;
-    for (const NodeEffects& effects :
-         combinations<E, 5>({&E::springs, &E::external_force, &E::surface_force, &E::fluid, &E::contact}))
+    for (const NodeEffects& effects : with_contact<6>(
+             {&E::springs, &E::external_force, &E::surface_force, &E::fluid, &E::contact, &E::turning}))
         for (const StoreResidual store : {StoreResidual::No, StoreResidual::Yes})
             all.push_back(node_step_program(effects, store));
     for (const NodeEffects& effects :
@@ -379,7 +389,7 @@ void add_node_passes(std::vector<ProgramSource>& all) {
 void add_patch_steps(std::vector<ProgramSource>& all) {
     using E = NodeEffects;
     const std::vector<NodeEffects> effects =
-        combinations<E, 4>({&E::springs, &E::external_force, &E::fluid, &E::contact});
+        with_contact<5>({&E::springs, &E::external_force, &E::fluid, &E::contact, &E::turning});
     for (const NodeEffects& each : effects) all.push_back(patch_step_program({}, each, {}, {.advances = true}));
     for (const PatchStages& stages : every_patch_stages) {
         for (int law = 0; law < law_count; ++law)

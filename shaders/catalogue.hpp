@@ -48,6 +48,7 @@ struct NodeEffects {
     bool surface_force = false;  ///< what surface_force_program leaves
     bool fluid = false;
     bool contact = false;
+    bool turning = false;  ///< of bodies in contact
 };
 
 /// Effects whose force on a node depends on where others are: chunks surface.*.glsl.

@@ -1,5 +1,7 @@
 #include "simulation/loads.hpp"
 
+#include "simulation/obstacles.hpp"
+
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -132,8 +134,10 @@ double pressure_at(const BuiltScene& built, const Stage& stage, std::size_t inde
 void move_bodies(const BuiltScene& built, double time, std::vector<tled::Obstacle>& obstacles) {
     for (std::size_t c = 0; c < obstacles.size(); ++c) {
         const Contact& contact = built.scene.contacts[c];
-        obstacles[c].shift = part(contact.curve, built, time) * contact.motion;
-        obstacles[c].velocity = slope_before(contact.curve, time, built.scene.solve.duration) * contact.motion;
+        const double now = part(contact.curve, built, time);
+        const double rate = slope_before(contact.curve, time, built.scene.solve.duration);
+        obstacles[c].placement = placement_at(contact.motion, now);
+        obstacles[c].velocity = velocity_at(contact.motion, now, rate);
     }
 }
 
@@ -234,8 +238,11 @@ double hold_interval(const BuiltScene& built, const Stage& stage) {
     };
     for (const Motion& motion : scene.motions)
         limit(small * shortest, motion.displacement.norm() * steepest(motion.curve, duration));
-    for (const Contact& contact : scene.contacts)
-        limit(small * shortest, contact.motion.norm() * steepest(contact.curve, duration));
+    for (std::size_t c = 0; c < scene.contacts.size(); ++c) {
+        const RigidMotion& motion = scene.contacts[c].motion;
+        const double reach = surface_reach(*built.effects.contact->obstacles[c].surface, motion);
+        limit(small * shortest, longest_way(motion, reach) * steepest(scene.contacts[c].curve, duration));
+    }
     if (!stage.growth.empty()) limit(small, 1 / duration);
     for (const Pressure& pressure : scene.pressures) limit(small, steepest(pressure.curve, duration));
     if (scene.gravity && scene.gravity->from != scene.gravity->to)

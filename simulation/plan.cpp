@@ -3,6 +3,7 @@
 #include "tled/critical_step.hpp"
 #include "tled/step_work.hpp"
 
+#include <algorithm>
 #include <set>
 
 namespace tissuewarp::simulation {
@@ -73,9 +74,12 @@ void add_effects(const BuiltScene& built, std::vector<PlannedEffect>& all) {
     if (!effects.contact) return;
     std::set<int> nodes(effects.contact->nodes.begin(), effects.contact->nodes.end());
     const auto bodies = effects.contact->obstacles.size();
+    const auto turning = std::count_if(built.scene.contacts.begin(), built.scene.contacts.end(),
+                                       [](const Contact& each) { return !each.motion.turn.isZero(0.0); });
     all.push_back({"contact",
                    count(static_cast<Eigen::Index>(nodes.size()), "nodes with ") +
-                       count(static_cast<Eigen::Index>(bodies), bodies == 1 ? "body" : "bodies"),
+                       count(static_cast<Eigen::Index>(bodies), bodies == 1 ? "body" : "bodies") +
+                       (turning > 0 ? ", of which " + std::to_string(turning) + (turning == 1 ? " turns" : " turn") : ""),
                    times(static_cast<double>(nodes.size() * bodies), contact_of_node)});
 }
 

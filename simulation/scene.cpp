@@ -91,7 +91,10 @@ void require_loads(const Scene& scene) {
 void require_neighbours(const Scene& scene) {
     for (const Contact& contact : scene.contacts) {
         require(contact.friction >= 0 && std::isfinite(contact.friction), "the friction of a contact is below 0");
-        require(std::isfinite(contact.gap) && contact.motion.allFinite(), "a contact has a number that is not finite");
+        const RigidMotion& motion = contact.motion;
+        require(std::isfinite(contact.gap) && motion.displacement.allFinite() && motion.turn.allFinite() &&
+                    motion.point.allFinite(),
+                "a contact has a number that is not finite");
         require_valid(contact.curve, "the curve of a contact");
         if (const auto* plane = std::get_if<HalfSpace>(&contact.body))
             require_unit(plane->normal, "the normal of a plane in contact");

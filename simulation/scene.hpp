@@ -6,6 +6,7 @@
 #include "meshing/tet_mesh.hpp"
 #include "simulation/curve.hpp"
 #include "simulation/region.hpp"
+#include "simulation/rigid_motion.hpp"
 #include "tled/model.hpp"
 
 #include <map>
@@ -124,7 +125,7 @@ struct Contact {
     Body body;
     double gap = 0.0;  ///< mm, by which the body is smaller than stated
     double friction = 0.0;
-    Eigen::Vector3d motion = Eigen::Vector3d::Zero();  ///< mm, where the curve is 1
+    RigidMotion motion{};  ///< all of it where the curve is 1
     Curve curve{};
 };
 

@@ -151,8 +151,10 @@ double energy(const NodalEffects& effects, const Matrix3Xd& position, const Matr
 
 Distance distance_to(const Obstacle& obstacle, const Vector3d& position) {
     const DistanceGrid& grid = *obstacle.surface;
+    const Eigen::Matrix3d& rotation = obstacle.placement.rotation;
     const Eigen::Matrix3d to_grid = grid.steps.inverse();
-    const Vector3d at = to_grid * (position - obstacle.shift - grid.origin);
+    const Vector3d in_body = rotation.transpose() * (position - obstacle.placement.shift);
+    const Vector3d at = to_grid * (in_body - grid.origin);
     const Vector3d corner = at.array().floor();
     if (!((corner.array() >= 1).all() && (corner.array() <= grid.size.cast<double>().array() - 3).all()))
         return {std::numeric_limits<double>::infinity(), Vector3d::Zero()};
@@ -180,7 +182,7 @@ Distance distance_to(const Obstacle& obstacle, const Vector3d& position) {
         value += z.value[k] * of_layer;
         slope += Vector3d(z.value[k] * along_x, z.value[k] * along_y, z.slope[k] * of_layer);
     }
-    return {value, to_grid.transpose() * slope};
+    return {value, rotation * (to_grid.transpose() * slope)};
 }
 
 Vector3d contact_correction(const Vector3d& normal, double depth, double friction, const Vector3d& v) {
@@ -197,8 +199,9 @@ Motion in_contact(const std::vector<Obstacle>& obstacles, const Vector3d& X, con
         const Distance distance = distance_to(obstacle, X + motion.u);
         const double steepness = distance.gradient.norm();
         if (!(distance.value < 0) || !(steepness > 0)) continue;
+        const Vector3d of_body = obstacle.velocity.of_origin + obstacle.velocity.spin.cross(X + motion.u);
         const Vector3d correction = contact_correction(distance.gradient / steepness, -distance.value / steepness,
-                                                       obstacle.friction, motion.v - time_step * obstacle.velocity);
+                                                       obstacle.friction, motion.v - time_step * of_body);
         motion.u += correction;
         motion.v += correction;
     }

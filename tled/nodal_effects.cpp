@@ -174,8 +174,12 @@ void require_valid(const Obstacle& obstacle) {
                            " values for " + std::to_string(grid.size.cast<long>().prod()) + " samples");
     if (!grid.origin.allFinite() || !grid.steps.allFinite() || !(std::abs(grid.steps.determinant()) > 0))
         throw InvalidInput("the distance grid of an obstacle has steps that do not span space");
-    if (!obstacle.shift.allFinite()) throw InvalidInput("the shift of an obstacle is not finite");
-    if (!obstacle.velocity.allFinite()) throw InvalidInput("the velocity of an obstacle is not finite");
+    if (!obstacle.placement.shift.allFinite()) throw InvalidInput("the shift of an obstacle is not finite");
+    const Eigen::Matrix3d& rotation = obstacle.placement.rotation;
+    if (!((rotation.transpose() * rotation).isIdentity(1e-6) && rotation.determinant() > 0))
+        throw InvalidInput("the rotation of an obstacle is no proper orthogonal matrix");
+    if (!obstacle.velocity.of_origin.allFinite() || !obstacle.velocity.spin.allFinite())
+        throw InvalidInput("the velocity of an obstacle is not finite");
     if (!std::all_of(grid.distance.begin(), grid.distance.end(), [](float d) { return std::isfinite(d); }))
         throw InvalidInput("the distance grid of an obstacle has a value that is not finite");
     if (!(obstacle.friction >= 0) || !std::isfinite(obstacle.friction))
@@ -201,6 +205,11 @@ NodalContact nodal_contact(const RigidContact& contact, const RestState& rest) {
 }
 
 }  // namespace
+
+bool turns(const std::vector<Obstacle>& obstacles) {
+    return std::any_of(obstacles.begin(), obstacles.end(),
+                       [](const Obstacle& each) { return !each.velocity.spin.isZero(0.0); });
+}
 
 NodalEffects nodal_effects(const Effects& effects, const RestState& rest) {
     NodalEffects nodal;

@@ -52,7 +52,7 @@ struct NodalContact {
     std::vector<int> node;           ///< ascending
     Eigen::Matrix3Xd rest_position;  ///< 3 × as many, mm
     std::vector<Obstacle> obstacles;
-    std::vector<GridReach> reach;  ///< of the obstacles, wherever they are shifted to
+    std::vector<GridReach> reach;  ///< of the obstacles, wherever they are
 };
 
 struct NodalEffects {

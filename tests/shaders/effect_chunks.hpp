@@ -24,6 +24,10 @@ inline constexpr std::array<EffectChunk<NodeEffects>, 5> on_nodes{{
     {&NodeEffects::contact, "chunks/node.contact.glsl", "Contact", "HAS_CONTACT", "contact"},
 }};
 
+/// Of bodies in contact, whose block it reads.
+inline constexpr EffectChunk<NodeEffects> turning{&NodeEffects::turning, "chunks/node.turning.glsl", "Contact",
+                                                  "HAS_TURNING", "turn_of"};
+
 /// Their lists share a block.
 inline constexpr std::array<EffectChunk<SurfaceForces>, 3> on_surfaces{{
     {&SurfaceForces::pressure, "chunks/surface.pressure.glsl", "SurfaceEffects", "HAS_PRESSURE", "pressure"},
@@ -31,7 +35,7 @@ inline constexpr std::array<EffectChunk<SurfaceForces>, 3> on_surfaces{{
     {&SurfaceForces::sliding, "chunks/surface.sliding.glsl", "SurfaceEffects", "HAS_SLIDING", "sliding"},
 }};
 
-inline constexpr NodeEffects all_on_nodes{true, true, true, true, true};
+inline constexpr NodeEffects all_on_nodes{true, true, true, true, true, true};
 inline constexpr SurfaceForces all_on_surfaces{true, true, true};
 
 template <class Flags>

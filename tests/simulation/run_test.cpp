@@ -11,6 +11,7 @@
 #include <Eigen/Geometry>
 
 #include <cmath>
+#include <numbers>
 
 namespace tissuewarp::simulation {
 namespace {
@@ -322,6 +323,45 @@ TEST(Simulate, StopsWhenAsked) {
     EXPECT_THROW(simulate(
                      built, [](const Frame&) {}, observer),
                  Cancelled);
+}
+
+/// A cube with a ball just above it, which is to be turned or displaced into it.
+Scene under_a_ball() {
+    Scene scene = cube(6, 0.3);
+    test::stand_freely(scene);
+    Contact ball;
+    ball.body = Ball{{50, 50, 140}, 39};
+    scene.contacts.push_back(ball);
+    scene.solve.frames = 2;
+    return scene;
+}
+
+// A ball that turns about an axis is a ball that is displaced along the arc: what differs is the path of the code, and
+// the samples, which turn with it.
+TEST(Simulate, BallThatTurnsPressesAsOneThatIsDisplacedToTheSamePlace) {
+    Scene turned = under_a_ball(), displaced = turned;
+    RigidMotion& turn = turned.contacts.back().motion;
+    turn = {{0, 0, 0}, {0, 0.4, 0}, {20, 50, 140}};
+    const tled::RigidPlacement end = placement_at(turn, 1);
+    const Vector3d centre(50, 50, 140), way = end.rotation * centre + end.shift - centre;
+    ASSERT_LT(way.z(), -11);
+    displaced.contacts.back().motion.displacement = way;
+    const Result by_turn = run(build(turned)), by_way = run(build(displaced));
+    EXPECT_GT(by_way.displacement.colwise().norm().maxCoeff(), 8);
+    EXPECT_LT((by_turn.displacement - by_way.displacement).colwise().norm().maxCoeff(), 0.05);
+}
+
+TEST(Simulate, BodyThatTurnsAllTheWayRoundLeavesTheTissueAsItWas) {
+    Scene scene = under_a_ball();
+    scene.contacts.back().body = Ball{{50, 50, 190}, 38};  // 8 mm deep half way
+    scene.contacts.back().motion = {{0, 0, 0}, {0, 2 * std::numbers::pi, 0}, {50, 50, 160}};
+    scene.solve.frames = 4;
+    const BuiltScene built = build(scene);
+    std::vector<double> largest;
+    simulate(built, [&](const Frame& frame) { largest.push_back(frame.displacement.colwise().norm().maxCoeff()); });
+    ASSERT_EQ(largest.size(), 5u);
+    EXPECT_GT(largest[2], 5);
+    EXPECT_LT(largest[4], 2e-3);
 }
 
 }  // namespace

@@ -43,7 +43,7 @@ TEST(Contact, RoundsOfSpringsFindTheActiveSetsSolution) {
     tled::RigidContact contact;
     for (int a = 0; a < rest.node_count; ++a)
         if (problem.may_touch(rest.position.col(a))) contact.nodes.push_back(a);
-    contact.obstacles.push_back({below_plane(problem.plane_height(problem.stages)), Eigen::Vector3d::Zero(), 0});
+    contact.obstacles.push_back({below_plane(problem.plane_height(problem.stages)), {}, 0});
     tled::Effects effects;
     effects.contact = contact;
     conditions.effects = tled::nodal_effects(effects, rest);

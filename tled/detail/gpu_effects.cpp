@@ -31,7 +31,8 @@ void GpuEffects::set(const NodalConditions& conditions, BlockBuffers& blocks) {
                  .external_force = external_force_.has_value(),
                  .surface_force = surface_.has_value(),
                  .fluid = fluid_.has_value(),
-                 .contact = contact_.has_value()};
+                 .contact = contact_.has_value(),
+                 .turning = contact_ && turns(conditions.effects.contact->obstacles)};
 }
 
 void GpuEffects::set_springs(const NodalConditions& conditions, BlockBuffers& blocks) {
