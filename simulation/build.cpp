@@ -19,6 +19,23 @@ using Eigen::Matrix3d;
 using Eigen::Matrix3Xi;
 using Eigen::Vector3d;
 
+/// Of each tetrahedron, 3 × M; empty where no tissue has fibres that vary.
+Eigen::Matrix3Xd fibre_directions(const Scene& scene, const meshing::TetMesh& mesh) {
+    const auto vary = [](const auto& tissue) { return tissue.second.fibres.index() != 0; };
+    if (std::none_of(scene.tissues.begin(), scene.tissues.end(), vary)) return {};
+    Eigen::Matrix3Xd fibres = Vector3d::UnitZ().replicate(1, mesh.tet_count());  // where no law asks for one
+    for (const auto& [label, tissue] : scene.tissues) {
+        const auto* law = std::get_if<tled::TransverselyIsotropic>(&tissue.material);
+        if (!law) continue;
+        Eigen::Matrix3Xd own = law->fibre.replicate(1, mesh.tet_count());
+        if (const auto* volume = std::get_if<FibreVolume>(&tissue.fibres)) own = fibres_of(*volume, mesh, label);
+        if (const auto* given = std::get_if<FibresOfTetrahedra>(&tissue.fibres)) own = fibres_of(*given, mesh, label);
+        for (int e = 0; e < mesh.tet_count(); ++e)
+            if (mesh.labels[e] == label) fibres.col(e) = own.col(e);
+    }
+    return fibres;
+}
+
 tled::Model model_of(const Scene& scene, const meshing::TetMesh& mesh) {
     tled::Model model;
     model.mesh = mesh;
@@ -27,6 +44,7 @@ tled::Model model_of(const Scene& scene, const meshing::TetMesh& mesh) {
         if (!tissue.viscosity.terms.empty()) model.viscosity[label] = tissue.viscosity;
     }
     model.density = scene.density;
+    model.fibre = fibre_directions(scene, mesh);
     model.element = scene.solve.element.value_or(tled::suggested_element(model.materials));
     return model;
 }
@@ -175,6 +193,7 @@ Stage remaining(const tled::Model& model, const Scene& scene, const std::vector<
     left.nodes = Eigen::Matrix3Xd(mesh.nodes(Eigen::all, stage.node));
     left.tets = Eigen::Matrix4Xi(mesh.tets(Eigen::all, stage.tet));
     left.labels = Eigen::VectorXi(mesh.labels(stage.tet));
+    if (model.fibre.size() > 0) stage.model.fibre = Eigen::Matrix3Xd(model.fibre(Eigen::all, stage.tet));
     for (int& node : left.tets.reshaped()) node = stage.place[static_cast<std::size_t>(node)];
     grow(stage, scene);
     if (scene.solve.kind == Solve::Kind::Equilibrium) stage.model = tled::relaxed(stage.model);

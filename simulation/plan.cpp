@@ -100,6 +100,8 @@ double memory_of(const BuiltScene& built) {
 std::string law_of(int label, const Tissue& tissue) {
     std::string text = "label " + std::to_string(label) + (tissue.name.empty() ? "" : ", " + tissue.name) + ": " +
                        tled::law_name(tissue.material);
+    if (std::holds_alternative<FibreVolume>(tissue.fibres)) text += ", fibres from a volume";
+    if (std::holds_alternative<FibresOfTetrahedra>(tissue.fibres)) text += ", fibres of each tetrahedron";
     if (!tissue.viscosity.terms.empty())
         text += ", viscous with " + std::to_string(tissue.viscosity.terms.size()) + " terms";
     if (tissue.growth != 1.0) text += ", grown by " + std::to_string(tissue.growth);

@@ -138,6 +138,10 @@ void require_valid(const Scene& scene) {
         tled::require_valid(tissue.viscosity, name);
         require(tissue.growth > 0.2 && tissue.growth < 5,
                 "the growth of " + name + " is " + std::to_string(tissue.growth) + "; it lies between 0.2 and 5");
+        if (std::holds_alternative<std::monostate>(tissue.fibres)) continue;
+        require(std::holds_alternative<tled::TransverselyIsotropic>(tissue.material),
+                name + " has fibres and the law " + tled::law_name(tissue.material) +
+                    ", which knows none; take transversely-isotropic");
     }
     require_positive(scene.density, "the density (kg/mm³) of the tissue");
     for (const auto& [name, region] : scene.sets) require_valid(region, name, scene.sets);

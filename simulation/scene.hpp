@@ -5,6 +5,7 @@
 #include "imaging/volume.hpp"
 #include "meshing/tet_mesh.hpp"
 #include "simulation/curve.hpp"
+#include "simulation/fibres.hpp"
 #include "simulation/region.hpp"
 #include "simulation/rigid_motion.hpp"
 #include "tled/model.hpp"
@@ -54,6 +55,7 @@ struct Tissue {
     /// g: unloaded, each length of the tissue becomes g times itself, over the length of the scene. On the way there
     /// the pressure of growth rises evenly and the moduli are those of the end (tled/growth.hpp, which names the laws).
     double growth = 1.0;
+    FibreField fibres{};  ///< of a transversely isotropic material, in place of its one direction
 };
 
 /// Displacement components that stay zero.

@@ -29,5 +29,7 @@ std::vector<EffectCase> effect_cases();
 std::vector<EffectCase> contact_cases();
 /// What changes in time, by whole scenes; where simulation is built.
 std::vector<EffectCase> scene_cases();
+/// Those of fibres that vary in space, which are among them.
+std::vector<EffectCase> fibre_cases();
 
 }  // namespace tissuewarp::verification

@@ -71,7 +71,7 @@ TEST(Contact, FrictionIsRefusedInAnEquilibrium) {
     const auto engine = tled::make_cpu_engine(rest);
     EXPECT_THROW(tled::equilibrium_in_contact(*engine, rest, conditions), InvalidInput);
     tled::Effects effects;
-    effects.contact = tled::RigidContact{{0}, {{below_plane(60), Eigen::Vector3d::Zero(), 0.1}}};
+    effects.contact = tled::RigidContact{{0}, {{below_plane(60), {}, 0.1}}};
     conditions.effects = tled::nodal_effects(effects, rest);
     EXPECT_THROW(tled::equilibrium_in_contact(*engine, rest, conditions), InvalidInput);
 }

@@ -87,7 +87,7 @@ constexpr double friction = 0.3, table_velocity = 100.0, table_time = 0.06;
 Scene block_on_table(const simulation::RigidMotion& motion_of_table) {
     Scene scene;
     scene.title = "block";
-    scene.geometry = simulation::BoxGeometry{Vector3d::Zero(), {10, 10, 4}, {4, 4, 2}};
+    scene.geometry = simulation::BoxGeometry{Vector3d::Zero(), {10, 10, 4}, {8, 8, 2}};
     scene.tissues[1].material = tled::neo_hookean_iso(2000.0, poisson);
     scene.density = density;
     scene.gravity = simulation::Gravity{std::nullopt, {0, 0, -1}, gravity, Curve{{{0, 1}}}};
@@ -171,7 +171,7 @@ double measured_distance_from_plane(const MakeEngine& make) {
 }  // namespace
 
 std::vector<EffectCase> scene_cases() {
-    return {
+    std::vector<EffectCase> cases{
         {"resection", "column under its weight loses its upper half", "sag of the top", "mm",
          "quadrature, of half the length", sag_of_half(), 0.01, measured_sag_after_resection},
         {"motion in time", "bar whose base goes up and back", "shift of the free end", "mm",
@@ -183,6 +183,9 @@ std::vector<EffectCase> scene_cases() {
         {"turning body", "hinged block on a plane that turns by 34°", "largest distance from it", "mm", "rigid", 0,
          0.03, measured_distance_from_plane},
     };
+    const std::vector<EffectCase> more = fibre_cases();
+    cases.insert(cases.end(), more.begin(), more.end());
+    return cases;
 }
 
 }  // namespace tissuewarp::verification
