@@ -191,6 +191,7 @@ ProgramSource surface_force_program(const SurfaceForces& forces) {
     add_effect(source, "surface.pressure", "HAS_PRESSURE", forces.pressure);
     add_effect(source, "surface.membrane", "HAS_MEMBRANE", forces.membrane);
     add_effect(source, "surface.sliding", "HAS_SLIDING", forces.sliding);
+    add_effect(source, "surface.parting", "HAS_PARTING", forces.parting);
     return source;
 }
 
@@ -379,8 +380,8 @@ void add_node_passes(std::vector<ProgramSource>& all) {
         for (const MaskConstrained mask : {MaskConstrained::No, MaskConstrained::Yes})
             all.push_back(node_residual_program(effects, mask));
     using S = SurfaceForces;
-    for (const SurfaceForces& forces : combinations<S, 3>({&S::pressure, &S::membrane, &S::sliding}))
-        if (forces.pressure || forces.membrane || forces.sliding) all.push_back(surface_force_program(forces));
+    for (const SurfaceForces& forces : combinations<S, 4>({&S::pressure, &S::membrane, &S::sliding, &S::parting}))
+        if (forces.pressure || forces.membrane || forces.sliding || forces.parting) all.push_back(surface_force_program(forces));
 }
 
 /// Laws and effects do not meet in the code of a patch: every law, elastic and viscous, with no effect and with all of

@@ -56,6 +56,7 @@ struct SurfaceForces {
     bool pressure = false;
     bool membrane = false;
     bool sliding = false;
+    bool parting = false;
 };
 
 /// The most that a pass over elements or nodes declares; those over patches are counted in tled/detail/gpu_patches.cpp.

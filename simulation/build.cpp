@@ -49,15 +49,27 @@ tled::Model model_of(const Scene& scene, const meshing::TetMesh& mesh) {
     return model;
 }
 
-std::vector<tled::SlidingPair> open_interfaces(const Scene& scene, TissueMesh& tissue) {
-    std::vector<tled::SlidingPair> pairs;
+/// Pairs that hold together, and that may part.
+struct Interfaces {
+    std::vector<tled::SlidingPair> held, free;
+};
+
+InterfaceSides sides_of(const Sliding& sliding, const Scene& scene, const TissueMesh& tissue) {
+    if (!sliding.sets) return sides_of_labels(tissue, sliding.labels);
+    const RegionFinder finder(tissue, scene.sets);
+    return {finder.tets((*sliding.sets)[0]), finder.tets((*sliding.sets)[1]), simulation::sides_of(sliding)};
+}
+
+Interfaces open_interfaces(const Scene& scene, TissueMesh& tissue) {
+    Interfaces interfaces;
     for (const Sliding& sliding : scene.sliding) {
         std::vector<int> joined;
         if (!sliding.except.empty()) joined = RegionFinder(tissue, scene.sets).nodes(sliding.except);
-        const auto more = open_interface(tissue, sliding.labels, joined, sliding.per_area);
+        auto& pairs = sliding.opening == Sliding::Opening::Held ? interfaces.held : interfaces.free;
+        const auto more = open_interface(tissue, sides_of(sliding, scene, tissue), joined, sliding.per_area);
         pairs.insert(pairs.end(), more.begin(), more.end());
     }
-    return pairs;
+    return interfaces;
 }
 
 /// Only one may hold or move a component; fixing it twice is the same as once.
@@ -134,13 +146,14 @@ tled::RigidContact contact_of(const Scene& scene, const meshing::TetMesh& mesh, 
 }
 
 tled::Effects effects_of(const Scene& scene, const meshing::TetMesh& mesh, const RegionFinder& finder,
-                         std::vector<tled::SlidingPair> sliding, Observer& observer) {
+                         Interfaces interfaces, Observer& observer) {
     tled::Effects effects;
     for (const Pressure& pressure : scene.pressures)
         effects.pressures.push_back({finder.faces(pressure.set), pressure.pressure});
     for (const MembraneOn& membrane : scene.membranes)
         effects.membranes.push_back({finder.faces(membrane.set), membrane.shear_modulus, membrane.thickness});
-    effects.sliding = std::move(sliding);
+    effects.sliding = std::move(interfaces.held);
+    effects.parting = std::move(interfaces.free);
     if (scene.fluid) effects.fluid = tled::Fluid{scene.fluid->density, Vector3d::Zero(), scene.fluid->to};
     if (!scene.contacts.empty()) effects.contact = contact_of(scene, mesh, finder, observer);
     return effects;
@@ -228,11 +241,11 @@ BuiltScene build(const Scene& scene, const meshing::TetMesh& mesh, Observer& obs
     BuiltScene built;
     built.scene = scene;
     TissueMesh tissue = closed(mesh);
-    std::vector<tled::SlidingPair> sliding = open_interfaces(scene, tissue);
+    Interfaces interfaces = open_interfaces(scene, tissue);
     const RegionFinder finder(tissue, scene.sets);
     built.held = held_nodes(scene, finder);
     for (const Springs& springs : scene.springs) add_springs(springs, tissue.mesh, finder, built.springs);
-    built.effects = effects_of(scene, tissue.mesh, finder, std::move(sliding), observer);
+    built.effects = effects_of(scene, tissue.mesh, finder, std::move(interfaces), observer);
     built.probes = located(scene.probes, tissue.mesh);
     built.mesh = tissue.mesh;
     std::vector<bool> gone(static_cast<std::size_t>(tissue.mesh.tet_count()), false);

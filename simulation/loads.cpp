@@ -110,11 +110,13 @@ tled::Effects remaining_effects(const BuiltScene& built, const Stage& stage) {
     const auto place = [&](int node) { return stage.place[static_cast<std::size_t>(node)]; };
     for (tled::SurfacePressure& each : effects.pressures) each.faces = remaining_faces(each.faces, stage);
     for (tled::Membrane& each : effects.membranes) each.faces = remaining_faces(each.faces, stage);
-    std::erase_if(effects.sliding,
-                  [&](const tled::SlidingPair& pair) { return place(pair.first) < 0 || place(pair.second) < 0; });
-    for (tled::SlidingPair& pair : effects.sliding) {
-        pair.first = place(pair.first);
-        pair.second = place(pair.second);
+    for (std::vector<tled::SlidingPair>* pairs : {&effects.sliding, &effects.parting}) {
+        std::erase_if(*pairs,
+                      [&](const tled::SlidingPair& pair) { return place(pair.first) < 0 || place(pair.second) < 0; });
+        for (tled::SlidingPair& pair : *pairs) {
+            pair.first = place(pair.first);
+            pair.second = place(pair.second);
+        }
     }
     if (effects.contact) {
         std::erase_if(effects.contact->nodes, [&](int node) { return place(node) < 0; });

@@ -68,9 +68,13 @@ void add_effects(const BuiltScene& built, std::vector<PlannedEffect>& all) {
     };
     for (const tled::SurfacePressure& each : effects.pressures) faces("pressure", each.faces, pressure_of_face);
     for (const tled::Membrane& each : effects.membranes) faces("membrane", each.faces, membrane_of_face);
-    if (!effects.sliding.empty())
-        all.push_back({"sliding", count(static_cast<Eigen::Index>(effects.sliding.size()), "pairs of nodes"),
-                       times(static_cast<double>(effects.sliding.size()), sliding_of_pair)});
+    const auto pairs = [&](const char* name, const std::vector<tled::SlidingPair>& list) {
+        if (list.empty()) return;
+        all.push_back({name, count(static_cast<Eigen::Index>(list.size()), "pairs of nodes"),
+                       times(static_cast<double>(list.size()), sliding_of_pair)});
+    };
+    pairs("sliding", effects.sliding);
+    pairs("parting", effects.parting);
     if (!effects.contact) return;
     std::set<int> nodes(effects.contact->nodes.begin(), effects.contact->nodes.end());
     const auto bodies = effects.contact->obstacles.size();

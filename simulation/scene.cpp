@@ -55,6 +55,9 @@ std::vector<std::pair<std::string, std::string>> named_sets(const Scene& scene) 
         if (!each.set.empty()) names.emplace_back("a contact", each.set);
     for (const Sliding& each : scene.sliding)
         if (!each.except.empty()) names.emplace_back("a sliding interface", each.except);
+    for (const Sliding& each : scene.sliding)
+        if (each.sets)
+            for (const std::string& set : *each.sets) names.emplace_back("a sliding interface", set);
     return names;
 }
 
@@ -107,6 +110,10 @@ void require_neighbours(const Scene& scene) {
     }
     for (const Sliding& sliding : scene.sliding) {
         require_positive(sliding.per_area, "the stiffness (kPa/mm) of a sliding interface");
+        if (sliding.sets) {
+            require((*sliding.sets)[0] != (*sliding.sets)[1], "the set '" + (*sliding.sets)[0] + "' cannot slide on itself");
+            continue;
+        }
         for (const int label : sliding.labels)
             require(scene.tissues.contains(label), "label " + std::to_string(label) +
                                                        " slides and has no tissue; add [label." +
@@ -128,6 +135,11 @@ void require_valid(const Solve& solve, const Scene& scene) {
 }
 
 }  // namespace
+
+std::string sides_of(const Sliding& sliding) {
+    if (sliding.sets) return "the sets '" + (*sliding.sets)[0] + "' and '" + (*sliding.sets)[1] + "'";
+    return "labels " + std::to_string(sliding.labels[0]) + " and " + std::to_string(sliding.labels[1]);
+}
 
 void require_valid(const Scene& scene) {
     require(!scene.tissues.empty(), "the scene has no tissue; give each label a material");

@@ -131,12 +131,18 @@ struct Contact {
     Curve curve{};
 };
 
-/// Two labels that slide on one another. Nodes that a third label touches stay joined.
+/// Two labels that slide on one another, or two sets of tissue, which may be of one label (a fissure, a cut). Nodes that
+/// other tissue touches stay joined.
 struct Sliding {
+    enum class Opening { Held, Free };
     std::array<int, 2> labels{0, 0};
-    double per_area = 100.0;  ///< kPa/mm, against opening and overlap
+    double per_area = 100.0;  ///< kPa/mm, against overlap, and against opening where that is held
     std::string except;       ///< a set of nodes that stay joined
+    Opening opening = Opening::Held;
+    std::optional<std::array<std::string, 2>> sets{};  ///< in place of the labels
 };
+/// "labels 1 and 2", "the sets 'upper' and 'lower'".
+std::string sides_of(const Sliding& sliding);
 
 /// Tissue that is taken out at a time.
 struct Resection {

@@ -95,8 +95,21 @@ private:
         }
     }
 
+    /// Which of the pairs that may part press in a mode is not known beforehand: all are held together for it, which
+    /// is stiffest.
+    HighestMode stiffest_mode(const Matrix3Xd& displacement, int iterations, const Matrix3Xd* start = nullptr) {
+        const SurfaceEffects& surface = conditions_->effects.surface;
+        if (surface.parting.empty()) return highest_mode(engine_, mass_, displacement, iterations, start);
+        NodalConditions closed = *conditions_;
+        closed.effects.surface = with_pairs_decided(surface, std::vector<bool>(surface.parting.size(), true));
+        engine_.set_conditions(closed);
+        HighestMode mode = highest_mode(engine_, mass_, displacement, iterations, start);
+        engine_.set_conditions(*conditions_);
+        return mode;
+    }
+
     void choose_step(const Matrix3Xd& displacement) {
-        HighestMode mode = highest_mode(engine_, mass_, displacement, first_iterations);
+        HighestMode mode = stiffest_mode(displacement, first_iterations);
         mode_ = std::move(mode.shape);
         result_.critical_step = mode.eigenvalue > 0 ? 2 / std::sqrt(mode.eigenvalue) : end_time_ - start_time_;
         if (!std::isfinite(result_.critical_step))
@@ -198,7 +211,7 @@ private:
         Matrix3Xd start = mode_;
         for (Eigen::Index i = 0; i < start.size(); ++i)
             start.reshaped()[i] += 0.02 * std::sin(1.7 * static_cast<double>(i) + 0.3);
-        HighestMode mode = highest_mode(engine_, mass_, result_.state.displacement, later_iterations, &start);
+        HighestMode mode = stiffest_mode(result_.state.displacement, later_iterations, &start);
         engine_.return_to_kept_state();
         mode_ = std::move(mode.shape);
         if (!(mode.eigenvalue > 0)) return;

@@ -28,10 +28,11 @@ struct Membrane {
     double thickness = 0.0;      ///< mm, at rest
 };
 
-/// Two nodes of surfaces that slide on one another, at one place at rest: energy ½ k (n·(u_first − u_second))².
+/// Two nodes of surfaces that slide on one another, at one place at rest: energy ½ k g² of how far they overlap,
+/// g = n·(u_first − u_second). Pairs that hold together have it for g < 0 too, pairs that may part have none there.
 struct SlidingPair {
     int first = -1, second = -1;
-    Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< n, unit vector
+    Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< n, unit vector out of the surface of the first
     double stiffness = 0.0;                            ///< k, mN/mm
 };
 
@@ -102,11 +103,12 @@ struct RigidContact {
 struct Effects {
     std::vector<SurfacePressure> pressures;
     std::vector<Membrane> membranes;
-    std::vector<SlidingPair> sliding;
+    std::vector<SlidingPair> sliding;  ///< that hold together
+    std::vector<SlidingPair> parting;  ///< that press on one another or are apart
     std::optional<Fluid> fluid;
     std::optional<RigidContact> contact;
     [[nodiscard]] bool none() const {
-        return pressures.empty() && membranes.empty() && sliding.empty() && !fluid && !contact;
+        return pressures.empty() && membranes.empty() && sliding.empty() && parting.empty() && !fluid && !contact;
     }
 };
 

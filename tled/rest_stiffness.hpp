@@ -11,7 +11,7 @@
 
 namespace tissuewarp::tled {
 
-/// K₀ + springs, membranes and sliding pairs of the rest configuration with constrained degrees of freedom removed.
+/// K₀ + springs, membranes and pairs (which touch at rest) of the rest configuration, constrained degrees of freedom removed.
 /// Moving targets do not change it; pressures, fluid and contact are not in it. Free rigid modes are excluded by the
 /// springs or prescribed displacements; without them construction throws InvalidInput ("nothing holds the tissue").
 /// What needs the factor makes it at first, once, and throws InvalidInput where the stiffness is not positive definite

@@ -228,6 +228,26 @@ TEST_F(SceneFiles, TakeFibresOfOneKind) {
     EXPECT_THROW((void)read(mesh + "fibre_array = \"fiber\"\n"), InvalidInput);
 }
 
+TEST_F(SceneFiles, OpenInterfacesBetweenLabelsOrSets) {
+    using simulation::Sliding;
+    const std::string sets = cube + "[set.upper]\nhalf_space = { point_mm = [0, 0, 15], normal = [0, 0, -1] }\n";
+    const Sliding free =
+        read(sets + "[[sliding]]\nsets = [\"base\", \"upper\"]\nopening = \"free\"\n").sliding.at(0);
+    EXPECT_EQ((*free.sets)[1], "upper");
+    EXPECT_EQ(free.opening, Sliding::Opening::Free);
+    const Sliding held = read(sets + "[[sliding]]\nsets = [\"base\", \"upper\"]\n").sliding.at(0);
+    EXPECT_EQ(held.opening, Sliding::Opening::Held);
+    const auto slides = [&](const std::string& keys) { return refusal(sets + "[[sliding]]\n" + keys); };
+    EXPECT_THAT(slides("sets = [\"base\", \"uper\"]\n"),
+                testing::AllOf(HasSubstr("line 13"), HasSubstr("did you mean 'upper'")));
+    EXPECT_THAT(slides("sets = [\"base\"]\n"), HasSubstr("two 'sets'"));
+    EXPECT_THAT(slides("sets = [\"base\", \"base\"]\n"), HasSubstr("on itself"));
+    EXPECT_THAT(slides("sets = [\"base\", \"upper\"]\nlabels = [1, 2]\n"), HasSubstr("two 'labels', [a, b], or"));
+    EXPECT_THAT(slides("opening = \"free\"\n"), HasSubstr("two 'labels', [a, b], or"));
+    EXPECT_THAT(slides("sets = [\"base\", \"upper\"]\nopening = \"fre\"\n"), HasSubstr("did you mean 'free'"));
+    EXPECT_THAT(slides("sets = [\"base\", \"upper\"]\nopenning = \"free\"\n"), HasSubstr("'opening'"));
+}
+
 TEST_F(SceneFiles, NameTheLineAndTheNearestKey) {
     EXPECT_THAT(refusal(cube + "[solve]\nframse = 3\n"), testing::AllOf(HasSubstr("line 11"), HasSubstr("'frames'")));
     EXPECT_THAT(refusal(cube + "[slove]\n"), testing::AllOf(HasSubstr("line 10"), HasSubstr("'solve'")));

@@ -36,14 +36,23 @@ const std::array<EngineUnderTest, 5> engines{{
 }};
 
 /// Turning is of bodies in contact.
-enum Effect : unsigned { Pressures = 1, Membranes = 2, Sliding = 4, Fluids = 8, Contacts = 16, Turning = 32 };
-constexpr unsigned every_effect = 63;
+enum Effect : unsigned {
+    Pressures = 1,
+    Membranes = 2,
+    Sliding = 4,
+    Fluids = 8,
+    Contacts = 16,
+    Turning = 32,
+    Parting = 64
+};
+constexpr unsigned every_effect = 127;
 
 std::string name_of_effects(unsigned effects) {
     std::string name;
     for (const auto& [effect, word] :
          {std::pair{Pressures, "Pressure"}, std::pair{Membranes, "Membrane"}, std::pair{Sliding, "Sliding"},
-          std::pair{Fluids, "Fluid"}, std::pair{Contacts, "Contact"}, std::pair{Turning, "Turning"}})
+          std::pair{Fluids, "Fluid"}, std::pair{Contacts, "Contact"}, std::pair{Turning, "Turning"},
+          std::pair{Parting, "Parting"}})
         if (effects & effect) name += word;
     return name.empty() ? "None" : name;
 }
@@ -133,6 +142,12 @@ struct Scene {
         return {Vector3d(60, 5, -40) - spin.cross(point), spin};
     }
 
+    /// Some press on one another where the tests start, some are apart.
+    static std::vector<SlidingPair> pairs_that_may_part(const Vector3d& n) {
+        return {{31, 93, n, 6.0},  {93, 31, n, 5.0},  {92, 66, Vector3d::UnitZ(), 5.0}, {66, 92, Vector3d::UnitZ(), 3.0},
+                {58, 66, n, 6.0},  {66, 58, n, 5.0},  {61, 92, Vector3d::UnitX(), 5.0}, {92, 61, Vector3d::UnitX(), 2.0}};
+    }
+
     [[nodiscard]] Conditions conditions(unsigned effects) const {
         Conditions conditions = plain;
         const Matrix3Xi faces = boundary_faces(), half = faces.leftCols(faces.cols() / 2);
@@ -141,6 +156,7 @@ struct Scene {
         const Vector3d n = Vector3d(1, -2, 0.5).normalized();
         if (effects & Sliding)
             conditions.effects.sliding = {{60, 62, n, 6.0}, {62, 87, Vector3d::UnitZ(), 5.0}, {90, 60, n, 4.0}};
+        if (effects & Parting) conditions.effects.parting = pairs_that_may_part(n);
         if (effects & Fluids)
             conditions.effects.fluid =
                 Fluid{1e-6,
@@ -311,6 +327,7 @@ TEST_P(EffectsInEngines, NothingIsLeftOfEffectsThatHaveChanged) {
     }
     for (Membrane& each : before.effects.membranes) each.thickness *= 3;
     for (SlidingPair& each : before.effects.sliding) std::swap(each.first, each.second);
+    for (SlidingPair& each : before.effects.parting) std::swap(each.first, each.second);
     if (before.effects.fluid) before.effects.fluid->level += 5;
     if (before.effects.contact)
         for (Obstacle& each : before.effects.contact->obstacles) {
@@ -361,9 +378,10 @@ TEST_P(EffectsInEngines, StepPassesNameWhatTheSceneHasAndNothingElse) {
     ASSERT_GE(passes.size(), 1u);
     for (const auto& [effect, word] :
          {std::pair{Pressures, "pressure"}, std::pair{Membranes, "membrane"}, std::pair{Sliding, "sliding"},
-          std::pair{Fluids, "fluid"}, std::pair{Contacts, "contact"}, std::pair{Turning, "turning"}}) {
+          std::pair{Fluids, "fluid"}, std::pair{Contacts, "contact"}, std::pair{Turning, "turning"},
+          std::pair{Parting, "parting"}}) {
         const bool gpu = engine->processor() == Processor::Gpu,
-                   on_surface = (effect & (Pressures | Membranes | Sliding)) != 0;
+                   on_surface = (effect & (Pressures | Membranes | Sliding | Parting)) != 0;
         const std::string part = !gpu ? word : std::string(on_surface ? "surface." : "node.") + word;
         if (part == "pressure" && std::get<1>(GetParam()) != Cells::T4) continue;  // averaged pressure is another thing
         EXPECT_EQ(names(passes, part), (effects & effect) != 0) << part;
@@ -373,7 +391,7 @@ TEST_P(EffectsInEngines, StepPassesNameWhatTheSceneHasAndNothingElse) {
         for (const StepBuffer& buffer : pass.buffers) EXPECT_GT(buffer.bytes, 0u) << buffer.name;
     }
     engine->set_conditions(scene.nodal(0));
-    for (const char* word : {"membrane", "sliding", "fluid", "contact", "turning", "surface"})
+    for (const char* word : {"membrane", "sliding", "parting", "fluid", "contact", "turning", "surface"})
         EXPECT_FALSE(names(engine->step_passes(), word)) << word;
 }
 
@@ -381,7 +399,7 @@ TEST(GpuEffects, SurfaceEffectsTakeTwoPassesWhileTheyLast) {
     const Scene scene(Cells::T4);
     const auto engine = make_engine(Kind::GpuPatches, scene.rest);
     EXPECT_THAT(engine->description(), HasSubstr("patches"));
-    for (const unsigned effect : {Pressures, Membranes, Sliding}) {
+    for (const unsigned effect : {Pressures, Membranes, Sliding, Parting}) {
         engine->set_conditions(scene.nodal(effect));
         EXPECT_THAT(engine->description(), HasSubstr("two passes")) << name_of_effects(effect);
         engine->set_conditions(scene.nodal(Fluids | Contacts));

@@ -80,6 +80,40 @@ TEST(EffectForces, SlidingPairsPullAlongTheirNormalOnly) {
     expect_gradient(effects);
 }
 
+TEST(EffectForces, PairsThatMayPartPressAndDoNotPull) {
+    Effects effects;
+    const Vector3d n = Vector3d(1, -2, 0.5).normalized();
+    effects.parting = {{0, 17, n, 3.0}, {17, 0, n, 4.0}, {40, 62, Vector3d::UnitZ(), 5.0}, {62, 40, -n, 2.0}};
+    expect_gradient(effects);
+    const Organ organ;
+    Matrix3Xd u = Matrix3Xd::Zero(3, organ.rest.node_count);
+    effects.parting = {{0, 17, n, 3.0}};
+    const SurfaceEffects surface = nodal_effects(effects, organ.rest).surface;
+    u.col(0) = 0.2 * n;
+    const Matrix3Xd pressed = surface_force(surface, organ.rest.position, u);
+    EXPECT_LT((pressed.col(0) + 0.6 * n).norm(), 1e-12);
+    EXPECT_LT((pressed.col(17) - 0.6 * n).norm(), 1e-12);
+    u.col(0) *= -1;
+    EXPECT_TRUE(surface_force(surface, organ.rest.position, u).isZero(0.0));
+    effects.parting = {{0, 17, {1, 1, 0}, 3.0}};
+    EXPECT_THROW(nodal_effects(effects, organ.rest), InvalidInput);
+}
+
+TEST(EffectForces, DecidedPairsHoldTogetherOrAreGone) {
+    const Organ organ;
+    Effects effects;
+    effects.sliding = {{3, 17, Vector3d::UnitX(), 2.0}};
+    effects.parting = {{0, 17, Vector3d::UnitX(), 3.0}, {40, 62, Vector3d::UnitZ(), 5.0}};
+    const SurfaceEffects decided = with_pairs_decided(nodal_effects(effects, organ.rest).surface, {false, true});
+    effects.sliding.push_back(effects.parting.back());
+    effects.parting.clear();
+    const SurfaceEffects expected = nodal_effects(effects, organ.rest).surface;
+    EXPECT_EQ(decided.node, expected.node);
+    EXPECT_TRUE(decided.parting.empty());
+    EXPECT_EQ(surface_force(decided, organ.rest.position, organ.u),
+              surface_force(expected, organ.rest.position, organ.u));
+}
+
 TEST(EffectForces, FluidLiftIsTheGradientOfItsEnergy) {
     Effects effects;
     effects.fluid = Fluid{1e-6, {1000, 2000, -9000}, 4.0};

@@ -31,5 +31,7 @@ std::vector<EffectCase> contact_cases();
 std::vector<EffectCase> scene_cases();
 /// Those of fibres that vary in space, which are among them.
 std::vector<EffectCase> fibre_cases();
+/// Those of surfaces that may part, likewise.
+std::vector<EffectCase> parting_cases();
 
 }  // namespace tissuewarp::verification

@@ -187,8 +187,8 @@ std::vector<EffectCase> scene_cases() {
         {"turning body", "hinged block on a plane that turns by 34°", "largest distance from it", "mm", "rigid", 0,
          0.03, measured_distance_from_plane},
     };
-    const std::vector<EffectCase> more = fibre_cases();
-    cases.insert(cases.end(), more.begin(), more.end());
+    for (const std::vector<EffectCase>& more : {fibre_cases(), parting_cases()})
+        cases.insert(cases.end(), more.begin(), more.end());
     return cases;
 }
 

@@ -129,6 +129,13 @@ GpuSurface gpu_surface(const SurfaceEffects& effects, const Matrix3Xd& position)
         put(words, pair.stiffness);
         put(words, pair.normal);
     });
+    surface.parting_lists = append_lists(words, effects.parting_incidence, [&](int entry) {
+        const SlidingPair& pair = effects.parting[static_cast<std::size_t>(entry / 2)];
+        const bool first = entry % 2 == 0;
+        put_node(words, first ? pair.second : pair.first);
+        put(words, pair.stiffness);
+        put(words, first ? pair.normal : Vector3d(-pair.normal));
+    });
     return surface;
 }
 
