@@ -46,8 +46,9 @@ void read_fibre_arrays(const std::optional<std::string>& mesh, const std::filesy
                        const NameUses& uses, Scene& scene) {
     for (const auto& [label, array, place] : uses.fibre_arrays) {
         if (!mesh)
-            throw InvalidInput(place + ": 'fibre_array' is a cell array of the geometry's mesh file, and the scene has "
-                                       "none; give 'mesh' in [geometry], or 'fibre' or 'fibre_file'");
+            throw InvalidInput(place +
+                               ": 'fibre_array' is a cell array of the geometry's mesh file, and the scene has "
+                               "none; give 'mesh' in [geometry], or 'fibre' or 'fibre_file'");
         const Eigen::MatrixXd values = meshing::read_vtu_cell_array(folder / *mesh, array);
         if (values.rows() != 3)
             throw InvalidInput(place + ": the cell array '" + array + "' has " + std::to_string(values.rows()) +

@@ -53,7 +53,8 @@ void read_fibres(TomlReader& reader, const std::filesystem::path& folder, int la
     if (!file) return;
     const imaging::Volume volume = imaging::read_volume(folder / *file);
     if (volume.channels() != 3)
-        reader.refuse("fibre_file", "'" + *file + "' has one number a voxel; fibres are vectors of three components, LPS");
+        reader.refuse("fibre_file",
+                      "'" + *file + "' has one number a voxel; fibres are vectors of three components, LPS");
     tissue.fibres = simulation::FibreVolume{volume.as(CV_32F)};
 }
 

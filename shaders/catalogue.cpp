@@ -371,8 +371,8 @@ std::vector<NodeEffects> with_contact(const std::array<bool NodeEffects::*, coun
 
 void add_node_passes(std::vector<ProgramSource>& all) {
     using E = NodeEffects;
-    for (const NodeEffects& effects : with_contact<6>(
-             {&E::springs, &E::external_force, &E::surface_force, &E::fluid, &E::contact, &E::turning}))
+    for (const NodeEffects& effects :
+         with_contact<6>({&E::springs, &E::external_force, &E::surface_force, &E::fluid, &E::contact, &E::turning}))
         for (const StoreResidual store : {StoreResidual::No, StoreResidual::Yes})
             all.push_back(node_step_program(effects, store));
     for (const NodeEffects& effects :
@@ -381,7 +381,8 @@ void add_node_passes(std::vector<ProgramSource>& all) {
             all.push_back(node_residual_program(effects, mask));
     using S = SurfaceForces;
     for (const SurfaceForces& forces : combinations<S, 4>({&S::pressure, &S::membrane, &S::sliding, &S::parting}))
-        if (forces.pressure || forces.membrane || forces.sliding || forces.parting) all.push_back(surface_force_program(forces));
+        if (forces.pressure || forces.membrane || forces.sliding || forces.parting)
+            all.push_back(surface_force_program(forces));
 }
 
 /// Laws and effects do not meet in the code of a patch: every law, elastic and viscous, with no effect and with all of

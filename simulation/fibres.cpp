@@ -107,9 +107,7 @@ Matrix3Xd fibres_of(const FibresOfTetrahedra& fibres, const meshing::TetMesh& me
         throw InvalidInput("the fibres of label " + std::to_string(label) + " are " +
                            std::to_string(fibres.directions.cols()) + " directions for " +
                            std::to_string(mesh.tet_count()) + " tetrahedra; give one for each of the mesh's own");
-    return of_label(mesh, label, [&](int e) {
-        return unit(fibres.directions.col(e), centroid(mesh, e), label);
-    });
+    return of_label(mesh, label, [&](int e) { return unit(fibres.directions.col(e), centroid(mesh, e), label); });
 }
 
 }  // namespace tissuewarp::simulation

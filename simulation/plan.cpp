@@ -80,11 +80,12 @@ void add_effects(const BuiltScene& built, std::vector<PlannedEffect>& all) {
     const auto bodies = effects.contact->obstacles.size();
     const auto turning = std::count_if(built.scene.contacts.begin(), built.scene.contacts.end(),
                                        [](const Contact& each) { return !each.motion.turn.isZero(0.0); });
-    all.push_back({"contact",
-                   count(static_cast<Eigen::Index>(nodes.size()), "nodes with ") +
-                       count(static_cast<Eigen::Index>(bodies), bodies == 1 ? "body" : "bodies") +
-                       (turning > 0 ? ", of which " + std::to_string(turning) + (turning == 1 ? " turns" : " turn") : ""),
-                   times(static_cast<double>(nodes.size() * bodies), contact_of_node)});
+    all.push_back(
+        {"contact",
+         count(static_cast<Eigen::Index>(nodes.size()), "nodes with ") +
+             count(static_cast<Eigen::Index>(bodies), bodies == 1 ? "body" : "bodies") +
+             (turning > 0 ? ", of which " + std::to_string(turning) + (turning == 1 ? " turns" : " turn") : ""),
+         times(static_cast<double>(nodes.size() * bodies), contact_of_node)});
 }
 
 double memory_of(const BuiltScene& built) {

@@ -119,11 +119,11 @@ private:
         const bool unilateral = conditions.effects.contact || !conditions.effects.surface.parting.empty();
         try {
             const tled::EquilibriumResult found =
-                unilateral ? tled::equilibrium_in_contact(engine, stage.rest, conditions,
-                                                                          {.equilibrium = options}, start, part)
-                                                 .equilibrium
-                                           : tled::equilibrium_along_load(engine, stiffness, conditions,
-                                                                          {.equilibrium = options}, start, part);
+                unilateral ? tled::equilibrium_in_contact(engine, stage.rest, conditions, {.equilibrium = options},
+                                                          start, part)
+                                 .equilibrium
+                           : tled::equilibrium_along_load(engine, stiffness, conditions, {.equilibrium = options},
+                                                          start, part);
             state_.displacement = found.displacement;
             summary_.steps += found.force_evaluations;
             summary_.estimated_error_mm = std::max(summary_.estimated_error_mm, found.estimated_error_mm);

@@ -111,7 +111,8 @@ void require_neighbours(const Scene& scene) {
     for (const Sliding& sliding : scene.sliding) {
         require_positive(sliding.per_area, "the stiffness (kPa/mm) of a sliding interface");
         if (sliding.sets) {
-            require((*sliding.sets)[0] != (*sliding.sets)[1], "the set '" + (*sliding.sets)[0] + "' cannot slide on itself");
+            require((*sliding.sets)[0] != (*sliding.sets)[1],
+                    "the set '" + (*sliding.sets)[0] + "' cannot slide on itself");
             continue;
         }
         for (const int label : sliding.labels)

@@ -131,8 +131,8 @@ struct Contact {
     Curve curve{};
 };
 
-/// Two labels that slide on one another, or two sets of tissue, which may be of one label (a fissure, a cut). Nodes that
-/// other tissue touches stay joined.
+/// Two labels that slide on one another, or two sets of tissue, which may be of one label (a fissure, a cut). Nodes
+/// that other tissue touches stay joined.
 struct Sliding {
     enum class Opening { Held, Free };
     std::array<int, 2> labels{0, 0};

@@ -56,8 +56,9 @@ meshing::TetMesh labelled_by_side(const TissueMesh& tissue, const InterfaceSides
     for (const int e : sides.second) mesh.labels[e] = on_second;
     for (const int e : sides.first) {
         if (mesh.labels[e] == on_second)
-            throw InvalidInput(sides.name + " share tetrahedra, and what slides lies on one side; let them differ, by "
-                                            "'without'");
+            throw InvalidInput(sides.name +
+                               " share tetrahedra, and what slides lies on one side; let them differ, by "
+                               "'without'");
         mesh.labels[e] = on_first;
     }
     return mesh;

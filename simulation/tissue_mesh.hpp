@@ -19,9 +19,9 @@ struct TissueFace {
 };
 
 struct TissueMesh {
-    meshing::TetMesh mesh;           ///< nodes of the closed mesh first, then their copies
-    Eigen::Matrix4Xi closed_tets;    ///< of the closed mesh
-    std::vector<TissueFace> faces;   ///< interface_faces() of the closed mesh
+    meshing::TetMesh mesh;          ///< nodes of the closed mesh first, then their copies
+    Eigen::Matrix4Xi closed_tets;   ///< of the closed mesh
+    std::vector<TissueFace> faces;  ///< interface_faces() of the closed mesh
 
     /// The node that a tetrahedron has in the place of one of its nodes in the closed mesh.
     [[nodiscard]] int node_of(int node, int tet) const;

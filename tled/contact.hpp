@@ -21,12 +21,12 @@ struct ContactResult {
     Eigen::Matrix3Xd reaction;            ///< of the obstacles on the nodes, mN, 3 × N
 };
 
-/// Equilibrium under `conditions` and the unilateral, frictionless contact that they hold, with bodies and of pairs that
-/// may part; the engine is left without it. Each round solves the equilibrium with a spring along the surface's normal at every touching node, pushes the
-/// spring's end on by what the node still lies inside (the augmented Lagrangian of Simo and Laursen 1992: the springs
-/// end up carrying the contact force at no penetration, whatever their stiffness), lets go of nodes that are pulled and
-/// takes those that have entered. Pairs that may part are held together or absent in a round: those that are pulled are
-/// let go for the next, those that overlap are held.
+/// Equilibrium under `conditions` and the unilateral, frictionless contact that they hold, with bodies and of pairs
+/// that may part; the engine is left without it. Each round solves the equilibrium with a spring along the surface's
+/// normal at every touching node, pushes the spring's end on by what the node still lies inside (the augmented
+/// Lagrangian of Simo and Laursen 1992: the springs end up carrying the contact force at no penetration, whatever their
+/// stiffness), lets go of nodes that are pulled and takes those that have entered. Pairs that may part are held
+/// together or absent in a round: those that are pulled are let go for the next, those that overlap are held.
 ///
 /// Throws InvalidInput without either or with friction, which depends on the way there: take dynamics; SolverFailure
 /// when the rounds do not settle, or from an equilibrium.

@@ -157,8 +157,7 @@ public:
                     const std::size_t at = begin * record;
                     detail::advance_nodes(momentum, gain, &inverse_mass_[at], &force_load_[at], &force_[at], &free_[at],
                                           &increment_[at], u + at, end - begin);
-                    if constexpr (contact)
-                        contact_->settle(turning, begin, end, free_.data(), increment_.data(), u);
+                    if constexpr (contact) contact_->settle(turning, begin, end, free_.data(), increment_.data(), u);
                 });
         });
     }
@@ -341,8 +340,8 @@ private:
         });
     }
 
-    /// body(surface, fluid, contact, turning), each std::true_type where the scene has it and std::false_type otherwise: the
-    /// step of a scene is compiled for the effects that it has.
+    /// body(surface, fluid, contact, turning), each std::true_type where the scene has it and std::false_type
+    /// otherwise: the step of a scene is compiled for the effects that it has.
     template <class Body>
     void with_effects(const Body& body) {
         const auto choose = [](bool present, const auto& next) {
@@ -355,8 +354,7 @@ private:
             choose(fluid_.has_value(), [&](auto fluid) {
                 choose(contact_.has_value(), [&](auto contact) {
                     if constexpr (contact)
-                        choose(contact_->turning(),
-                               [&](auto turning) { body(surface, fluid, contact, turning); });
+                        choose(contact_->turning(), [&](auto turning) { body(surface, fluid, contact, turning); });
                     else
                         body(surface, fluid, contact, std::false_type{});
                 });

@@ -68,8 +68,8 @@ private:
 
 /// Where a rigid body is: its point that was sampled at X is at rotation · X + shift.
 struct RigidPlacement {
-    Eigen::Vector3d shift = Eigen::Vector3d::Zero();           ///< mm
-    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();    ///< proper orthogonal
+    Eigen::Vector3d shift = Eigen::Vector3d::Zero();         ///< mm
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< proper orthogonal
     bool operator==(const RigidPlacement&) const = default;
 };
 

@@ -179,7 +179,8 @@ TEST_F(SceneFiles, TurnBodiesByDegreesAboutAnAxisThroughAPoint) {
     const simulation::RigidMotion still = read(ball).contacts.at(0).motion;
     EXPECT_TRUE(still.turn.isZero(0.0) && still.displacement.isZero(0.0));
     const simulation::RigidMotion motion =
-        read(ball + "displacement_mm = [0, 0, -3]\nrotation = { point_mm = [1, 2, 3], axis = [0, -2, 0], degrees = 90 }\n")
+        read(ball +
+             "displacement_mm = [0, 0, -3]\nrotation = { point_mm = [1, 2, 3], axis = [0, -2, 0], degrees = 90 }\n")
             .contacts.at(0)
             .motion;
     EXPECT_EQ(motion.displacement, Eigen::Vector3d(0, 0, -3));
@@ -198,8 +199,9 @@ TEST_F(SceneFiles, TurnBodiesByDegreesAboutAnAxisThroughAPoint) {
 }
 
 TEST_F(SceneFiles, TakeFibresOfOneKind) {
-    const std::string law = "[label.1]\nlaw = \"transversely-isotropic\"\nshear_modulus_kpa = 1\n"
-                            "bulk_modulus_kpa = 40\nfibre_modulus_kpa = 5\n";
+    const std::string law =
+        "[label.1]\nlaw = \"transversely-isotropic\"\nshear_modulus_kpa = 1\n"
+        "bulk_modulus_kpa = 40\nfibre_modulus_kpa = 5\n";
     const std::string box = "[geometry]\nbox = { size_mm = [10, 10, 10], cells = [1, 1, 1] }\n" + law;
     const std::string mesh = "[geometry]\nmesh = \"bar.vtu\"\n" + law;
     const meshing::TetMesh bar = meshing::box_mesh({10, 10, 10}, {1, 1, 1});
@@ -210,7 +212,8 @@ TEST_F(SceneFiles, TakeFibresOfOneKind) {
     imaging::write_volume(imaging::Volume(grid, CV_32FC3), folder_ / "fibres.nii.gz");
     imaging::write_volume(imaging::Volume(grid, CV_32FC1), folder_ / "numbers.nii.gz");
 
-    const auto& direction = std::get<tled::TransverselyIsotropic>(read(box + "fibre = [0, 2, 0]\n").tissues.at(1).material);
+    const auto& direction =
+        std::get<tled::TransverselyIsotropic>(read(box + "fibre = [0, 2, 0]\n").tissues.at(1).material);
     EXPECT_EQ(direction.fibre, Eigen::Vector3d(0, 1, 0));
     const auto volume = read(box + "fibre_file = \"fibres.nii.gz\"\n").tissues.at(1).fibres;
     EXPECT_EQ(std::get<simulation::FibreVolume>(volume).directions.geometry.size, grid.size);
@@ -231,8 +234,7 @@ TEST_F(SceneFiles, TakeFibresOfOneKind) {
 TEST_F(SceneFiles, OpenInterfacesBetweenLabelsOrSets) {
     using simulation::Sliding;
     const std::string sets = cube + "[set.upper]\nhalf_space = { point_mm = [0, 0, 15], normal = [0, 0, -1] }\n";
-    const Sliding free =
-        read(sets + "[[sliding]]\nsets = [\"base\", \"upper\"]\nopening = \"free\"\n").sliding.at(0);
+    const Sliding free = read(sets + "[[sliding]]\nsets = [\"base\", \"upper\"]\nopening = \"free\"\n").sliding.at(0);
     EXPECT_EQ((*free.sets)[1], "upper");
     EXPECT_EQ(free.opening, Sliding::Opening::Free);
     const Sliding held = read(sets + "[[sliding]]\nsets = [\"base\", \"upper\"]\n").sliding.at(0);

@@ -138,7 +138,8 @@ TEST(SlidingInterface, StaysJoinedWhereAThirdLabelTouchesAndWhereToldSo) {
         if (mesh.nodes(0, mesh.tets.col(e)).mean() > 20) mesh.labels[e] = 3;  // a wall across both layers
     TissueMesh tissue = closed(mesh);
     TissueMesh told = tissue;
-    EXPECT_EQ(open_interface(tissue, sides_of_labels(tissue, {1, 2}), {}, 1.0).size(), 8u) << "4 of 12 nodes lie on the wall";
+    EXPECT_EQ(open_interface(tissue, sides_of_labels(tissue, {1, 2}), {}, 1.0).size(), 8u)
+        << "4 of 12 nodes lie on the wall";
     EXPECT_EQ(meshing::quality(tissue.mesh).components, 1) << "the wall joins them";
     Regions regions;
     regions["front"].side = Side{1, false, 0.0};

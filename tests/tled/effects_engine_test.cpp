@@ -144,8 +144,8 @@ struct Scene {
 
     /// Some press on one another where the tests start, some are apart.
     static std::vector<SlidingPair> pairs_that_may_part(const Vector3d& n) {
-        return {{31, 93, n, 6.0},  {93, 31, n, 5.0},  {92, 66, Vector3d::UnitZ(), 5.0}, {66, 92, Vector3d::UnitZ(), 3.0},
-                {58, 66, n, 6.0},  {66, 58, n, 5.0},  {61, 92, Vector3d::UnitX(), 5.0}, {92, 61, Vector3d::UnitX(), 2.0}};
+        return {{31, 93, n, 6.0}, {93, 31, n, 5.0}, {92, 66, Vector3d::UnitZ(), 5.0}, {66, 92, Vector3d::UnitZ(), 3.0},
+                {58, 66, n, 6.0}, {66, 58, n, 5.0}, {61, 92, Vector3d::UnitX(), 5.0}, {92, 61, Vector3d::UnitX(), 2.0}};
     }
 
     [[nodiscard]] Conditions conditions(unsigned effects) const {

@@ -94,13 +94,14 @@ double measured_elongation(const MakeEngine& make) {
     return sum / count;
 }
 
-// A quarter of a tube, A ≤ R ≤ B, of nearly incompressible material with fibres around it, inflated from inside in plane
-// strain. The incompressible tube has b² − a² = B² − A², λ = r/R around and 1/λ along the radius, energy
-// W(λ) = μ/2 (λ² + λ⁻² − 2) + η/2 (λ² − 1)², and p = ∫ λ W'(λ) dr/r over the wall.
+// A quarter of a tube, A ≤ R ≤ B, of nearly incompressible material with fibres around it, inflated from inside in
+// plane strain. The incompressible tube has b² − a² = B² − A², λ = r/R around and 1/λ along the radius, energy W(λ) =
+// μ/2 (λ² + λ⁻² − 2) + η/2 (λ² − 1)², and p = ∫ λ W'(λ) dr/r over the wall.
 constexpr double tube_inner = 10.0, tube_outer = 16.0, tube_height = 1.5, tube_stretch = 1.25;
 const tled::TransverselyIsotropic tube_law{1.0, 1000.0, 0.8, Vector3d::UnitZ()};
 double tube_pressure() {
-    const double a = tube_stretch * tube_inner, b = std::sqrt(a * a + tube_outer * tube_outer - tube_inner * tube_inner);
+    const double a = tube_stretch * tube_inner,
+                 b = std::sqrt(a * a + tube_outer * tube_outer - tube_inner * tube_inner);
     return integral(a, b, [&](double r) {
         const double stretch = r / std::sqrt(r * r - a * a + tube_inner * tube_inner);
         const double slope = tube_law.shear_modulus * (stretch - std::pow(stretch, -3)) +

@@ -99,8 +99,8 @@ double measured_distance_from_apart(const MakeEngine& make) {
     return largest;
 }
 
-// A block that rests on a slope, held by a wall at its lower side: the slope bears a force along its normal alone, so that
-// the wall bears the weight times tan α, whatever the tissue does.
+// A block that rests on a slope, held by a wall at its lower side: the slope bears a force along its normal alone, so
+// that the wall bears the weight times tan α, whatever the tissue does.
 constexpr double slope = 0.5, slope_side = 20.0;
 BuiltScene block_on_slope() {
     meshing::TetMesh mesh = meshing::box_mesh({slope_side, slope_side, slope_side}, {4, 4, 4});
@@ -135,8 +135,8 @@ double measured_wall_over_weight(const MakeEngine& make) {
             for (const int a : built.mesh.tets.col(e)) upper[a] = 1;
     tled::Effects pairs;
     pairs.parting = built.effects.parting;
-    const Matrix3Xd reaction = tled::internal_force(rest, u) -
-                               tled::surface_force(tled::nodal_effects(pairs, rest).surface, rest.position, u);
+    const Matrix3Xd reaction =
+        tled::internal_force(rest, u) - tled::surface_force(tled::nodal_effects(pairs, rest).surface, rest.position, u);
     double wall = 0;
     for (int a = 0; a < rest.node_count; ++a)
         if (upper[a] == 1 && rest.position(0, a) < 1e-9) wall += reaction(0, a);
@@ -163,9 +163,9 @@ double measured_velocity_of_other(const MakeEngine& make) {
     const auto engine = make(stage.rest);
     const Matrix3Xd mass = stage.rest.lumped_mass.transpose().replicate(3, 1);
     const double travel = length / std::sqrt(tled::p_wave_modulus(tled::neo_hookean_iso(modulus, poisson)) / density);
-    const Matrix3Xd velocity = tled::dynamics(*engine, stage.rest, mass, tled::nodal_conditions(conditions, stage.rest),
-                                              state, 3 * travel)
-                                   .state.velocity;
+    const Matrix3Xd velocity =
+        tled::dynamics(*engine, stage.rest, mass, tled::nodal_conditions(conditions, stage.rest), state, 3 * travel)
+            .state.velocity;
     const Eigen::VectorXd mass_below = stage.rest.lumped_mass.cwiseProduct(Eigen::VectorXd(1 - upper.array()));
     return velocity.row(2).dot(mass_below) / mass_below.sum();
 }

@@ -108,8 +108,7 @@ private:
             if (!(depth > 0)) continue;
             const Eigen::Vector3d slip =
                 motion.v - increment_of(turning, obstacles_[o], position_.col(point.entry) + motion.u);
-            const Eigen::Vector3d correction =
-                contact_correction(tangent.normal, depth, obstacles_[o].friction, slip);
+            const Eigen::Vector3d correction = contact_correction(tangent.normal, depth, obstacles_[o].friction, slip);
             motion.u += correction;
             motion.v += correction;
         }
