@@ -41,13 +41,9 @@ tled::Material polynomial(TomlReader& tissue, const std::string& law) {
 void read_fibres(TomlReader& reader, const std::filesystem::path& folder, int label, simulation::Tissue& tissue,
                  NameUses& uses) {
     auto* law = std::get_if<tled::TransverselyIsotropic>(&tissue.material);
-    if (!law || reader.has("preset")) return;
+    if (!law) return;
     const auto direction = reader.direction("fibre");
     const auto file = reader.text("fibre_file"), array = reader.text("fibre_array");
-    if (int(direction.has_value()) + int(file.has_value()) + int(array.has_value()) != 1)
-        throw InvalidInput(reader.place() +
-                           ": a transversely-isotropic tissue takes one of 'fibre', [x, y, z], 'fibre_file', a volume "
-                           "of vectors, and 'fibre_array', a cell array of the mesh");
     if (direction) law->fibre = *direction;
     if (array) uses.fibre_arrays.push_back({label, *array, reader.place("fibre_array")});
     if (!file) return;
@@ -56,6 +52,15 @@ void read_fibres(TomlReader& reader, const std::filesystem::path& folder, int la
         reader.refuse("fibre_file",
                       "'" + *file + "' has one number a voxel; fibres are vectors of three components, LPS");
     tissue.fibres = simulation::FibreVolume{volume.as(CV_32F)};
+}
+
+/// After finish(), which names a misspelt one.
+void require_fibres(const TomlReader& reader, const tled::Material& material) {
+    if (!std::holds_alternative<tled::TransverselyIsotropic>(material)) return;
+    if (int(reader.has("fibre")) + int(reader.has("fibre_file")) + int(reader.has("fibre_array")) != 1)
+        throw InvalidInput(reader.place() +
+                           ": a transversely-isotropic tissue takes one of 'fibre', [x, y, z], 'fibre_file', a volume "
+                           "of vectors, and 'fibre_array', a cell array of the mesh");
 }
 
 tled::Material transversely_isotropic(TomlReader& tissue) {
@@ -123,6 +128,7 @@ void read_tissues(TomlReader& file, const std::filesystem::path& folder, simulat
             throw InvalidInput(reader.place() + ": '" + name + "' is no label; write [label.1], [label.2], ...");
         scene.tissues[label] = tissue_of(reader, folder, label, uses);
         reader.finish();
+        require_fibres(reader, scene.tissues[label].material);
         uses.volume_labels.push_back({label, reader.place(), "has a tissue"});
     }
     if (scene.tissues.empty())

@@ -226,7 +226,8 @@ TEST_F(SceneFiles, TakeFibresOfOneKind) {
                 testing::AllOf(HasSubstr("line 8"), HasSubstr("three components")));
     EXPECT_THAT(refusal(box + "fibre_array = \"fibre\"\n"), testing::AllOf(HasSubstr("line 8"), HasSubstr("'mesh'")));
     EXPECT_THAT(refusal(mesh + "fibre_array = \"J\"\n"), testing::AllOf(HasSubstr("line 8"), HasSubstr("three")));
-    EXPECT_THAT(refusal(box + "fiber = [0, 2, 0]\n"), HasSubstr("'fibre"));
+    EXPECT_THAT(refusal(box + "fiber = [0, 2, 0]\n"), testing::AllOf(HasSubstr("line 8"), HasSubstr("'fibre'")));
+    EXPECT_THAT(refusal(box + "fibre_arry = \"a\"\n"), HasSubstr("did you mean 'fibre_array'"));
     EXPECT_THAT(refusal(cube.substr(0, cube.find("[set")) + "fibre = [0, 2, 0]\n"), HasSubstr("'fibre'"));
     EXPECT_THROW((void)read(mesh + "fibre_array = \"fiber\"\n"), InvalidInput);
 }
