@@ -1,6 +1,7 @@
 #include "tled/contact.hpp"
 
 #include "core/errors.hpp"
+#include "tled/load_path.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -63,7 +64,7 @@ public:
         Matrix3Xd u = start ? *start : Matrix3Xd::Zero(3, rest_.node_count);
         begin(u);
         for (result_.rounds = 1;; ++result_.rounds) {
-            solve(u);
+            solve(u, result_.rounds == 1 ? start : &u);
             const bool changed = follow(u);
             if (!changed && settled(u)) break;
             if (result_.rounds == options_.most_rounds) fail(u);
@@ -81,11 +82,13 @@ private:
         return {d.value / steepness, d.gradient / steepness};
     }
 
-    void solve(Matrix3Xd& u) {
+    /// From `start`, or from rest; by way of smaller loads where all is too much at once.
+    void solve(Matrix3Xd& u, const Matrix3Xd* start) {
         const NodalConditions conditions = with_springs(u);
         const RestStiffness stiffness(rest_, conditions, *without_springs_);
         const EquilibriumResult& before = result_.equilibrium;
-        EquilibriumResult found = equilibrium(engine_, stiffness, conditions, options_.equilibrium, &u, observer_);
+        EquilibriumResult found = equilibrium_along_load(engine_, stiffness, conditions,
+                                                         {.equilibrium = options_.equilibrium}, start, observer_);
         found.force_evaluations += before.force_evaluations;
         found.lifted_residuals += before.lifted_residuals;
         u = found.displacement;
