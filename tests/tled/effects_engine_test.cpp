@@ -82,6 +82,7 @@ DistanceGrid sampled(const Vector3d& centre, const std::function<double(const Ve
 /// A jittered cube of 30 mm a metre from the origin, where float32 positions would lose the last 0.06 µm.
 struct Scene {
     Vector3d corner{1000, -700, 400};
+    static inline const Vector3d wall_velocity{60, 5, -40};  // mm/s
     Model model;
     Matrix3Xd local;  ///< positions from the corner
     Conditions plain;
@@ -116,30 +117,33 @@ struct Scene {
     }
 
     /// A slightly oblique wall with friction that the tissue bulges into, and a ball without that was moved to its
-    /// place; or both as bodies that have turned, the wall about an axis through the tissue and on the way on.
-    [[nodiscard]] RigidContact contact(bool turning) const {
+    /// place. They were sampled where these placements have taken them from.
+    [[nodiscard]] RigidContact contact(const RigidPlacement& of_wall, RigidPlacement of_ball,
+                                       const RigidVelocity& velocity_of_wall) const {
         RigidContact contact;
         for (int node = 0; node < rest.node_count; ++node) contact.nodes.push_back(node);
         const Vector3d n = Vector3d(0.05, -1, 0.02).normalized(), ball = corner + Vector3d(45, 17, 16);
-        contact.obstacles.push_back(touching([&](const Vector3d& x) { return n.dot(x); }, turned(turning, 0.7), 0.3));
-        contact.obstacles.back().velocity.of_origin = {60, 5, -40};
-        if (turning) contact.obstacles.back().velocity = spinning_about(corner + Vector3d(15, 0, 15), {2, -9, 4});
-        RigidPlacement moved = turned(turning, -1.1);
-        moved.shift += Vector3d(4, -1, 2);
-        contact.obstacles.push_back(touching([&](const Vector3d& x) { return (x - ball).norm(); }, moved, 0.0));
+        contact.obstacles.push_back(touching([&](const Vector3d& x) { return n.dot(x); }, of_wall, 0.3));
+        contact.obstacles.back().velocity = velocity_of_wall;
+        of_ball.shift += Vector3d(4, -1, 2);
+        contact.obstacles.push_back(touching([&](const Vector3d& x) { return (x - ball).norm(); }, of_ball, 0.0));
         return contact;
     }
 
+    /// The same as bodies that have turned, the wall about an axis through the tissue and on the way on.
+    [[nodiscard]] RigidContact turning_contact() const {
+        return contact(turned(0.7), turned(-1.1), spinning_about(corner + Vector3d(15, 0, 15), {2, -9, 4}));
+    }
+
     /// By an angle about an oblique axis through the cube.
-    [[nodiscard]] RigidPlacement turned(bool turning, double angle) const {
-        if (!turning) return {};
+    [[nodiscard]] RigidPlacement turned(double angle) const {
         const Eigen::Matrix3d R = Eigen::AngleAxisd(angle, Vector3d(1, 2, -2) / 3).toRotationMatrix();
         const Vector3d point = corner + Vector3d(10, 20, 5);
         return {point - R * point, R};
     }
 
     static RigidVelocity spinning_about(const Vector3d& point, const Vector3d& spin) {
-        return {Vector3d(60, 5, -40) - spin.cross(point), spin};
+        return {wall_velocity - spin.cross(point), spin};
     }
 
     /// Some press on one another where the tests start, some are apart.
@@ -162,7 +166,8 @@ struct Scene {
                 Fluid{1e-6,
                       {1000, 2000, -9500},
                       Vector3d(-1000, -2000, 9500).normalized().dot(corner + Vector3d(15, 15, 17))};
-        if (effects & Contacts) conditions.effects.contact = contact((effects & Turning) != 0);
+        if (effects & Contacts) conditions.effects.contact = contact({}, {}, {wall_velocity});
+        if (effects & Turning) conditions.effects.contact = turning_contact();
         return conditions;
     }
 
