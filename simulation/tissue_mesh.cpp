@@ -32,14 +32,20 @@ Corners sorted(Corners nodes) {
 std::vector<TissueFace> between_tets(const meshing::TetMesh& mesh, const std::vector<InterfaceFace>& faces) {
     std::map<Corners, std::size_t> place;
     std::vector<TissueFace> found;
+    std::vector<bool> on_faces(static_cast<std::size_t>(mesh.node_count()), false);  // few nodes are
     for (const InterfaceFace& face : faces) {
+        for (const int node : face.nodes) on_faces[static_cast<std::size_t>(node)] = true;
         place[sorted(face.nodes)] = found.size();
         found.push_back({face});
     }
     for (int e = 0; e < mesh.tet_count(); ++e)
         for (int apex = 0; apex < 4; ++apex) {
             const auto node = [&](int k) { return mesh.tets((apex + k) % 4, e); };
-            const auto face = place.find(sorted({node(1), node(2), node(3)}));
+            const Corners corners{node(1), node(2), node(3)};
+            if (!std::all_of(corners.begin(), corners.end(),
+                             [&](int corner) { return on_faces[static_cast<std::size_t>(corner)]; }))
+                continue;
+            const auto face = place.find(sorted(corners));
             if (face == place.end()) continue;
             TissueFace& each = found[face->second];
             (mesh.labels[e] == each.face.inner ? each.inner_tet : each.outer_tet) = e;
