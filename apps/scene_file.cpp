@@ -82,7 +82,7 @@ Scene read_scene(const std::filesystem::path& path) {
     Scene scene;
     NameUses uses;
     scene.title = file.text("title").value_or(path.stem().string());
-    read_tissues(file, scene, uses);
+    read_tissues(file, folder, scene, uses);
     read_sets(file, scene, uses);
     read_loads(file, scene, uses);
     read_neighbours(file, folder, scene, uses);
@@ -97,7 +97,7 @@ Scene read_scene(const std::filesystem::path& path) {
     } catch (const InvalidInput& error) {
         throw InvalidInput("'" + path.string() + "': " + error.what());
     }
-    read_geometry(file, folder, scene);
+    read_geometry(file, folder, scene, uses);
     require_labels(scene, uses);
     return scene;
 }

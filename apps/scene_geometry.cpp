@@ -42,9 +42,24 @@ Shape shape_of(TomlReader& reader) {
     return shape;
 }
 
+void read_fibre_arrays(const std::optional<std::string>& mesh, const std::filesystem::path& folder,
+                       const NameUses& uses, Scene& scene) {
+    for (const auto& [label, array, place] : uses.fibre_arrays) {
+        if (!mesh)
+            throw InvalidInput(place +
+                               ": 'fibre_array' is a cell array of the geometry's mesh file, and the scene has "
+                               "none; give 'mesh' in [geometry], or 'fibre' or 'fibre_file'");
+        const Eigen::MatrixXd values = meshing::read_vtu_cell_array(folder / *mesh, array);
+        if (values.rows() != 3)
+            throw InvalidInput(place + ": the cell array '" + array + "' has " + std::to_string(values.rows()) +
+                               " components; fibres have three, LPS");
+        scene.tissues[label].fibres = FibresOfTetrahedra{values};
+    }
+}
+
 }  // namespace
 
-void read_geometry(TomlReader& file, const std::filesystem::path& folder, Scene& scene) {
+void read_geometry(TomlReader& file, const std::filesystem::path& folder, Scene& scene, const NameUses& uses) {
     auto geometry = file.table("geometry");
     if (!geometry) throw InvalidInput(file.place() + ": the scene lacks [geometry]");
     const auto labels = geometry->text("labels"), mesh = geometry->text("mesh");
@@ -68,6 +83,7 @@ void read_geometry(TomlReader& file, const std::filesystem::path& folder, Scene&
         painted.label_edge_length = label_edge_length;
         scene.geometry = painted;
     }
+    read_fibre_arrays(mesh, folder, uses, scene);
 }
 
 void read_solve(TomlReader& file, Scene& scene) {

@@ -3,6 +3,8 @@
 #include "apps/scene_parts.hpp"
 #include "meshing/mesh_io.hpp"
 
+#include <numbers>
+
 namespace tissuewarp::apps {
 
 using namespace simulation;
@@ -29,6 +31,38 @@ Body body_of(TomlReader& reader, const std::filesystem::path& folder, NameUses& 
     return bodies.front();
 }
 
+void read_sides(TomlReader& reader, Sliding& sliding, NameUses& uses) {
+    const std::vector<int> labels = reader.wholes("labels", 1, 1000000);
+    const std::vector<std::string> sets = reader.texts("sets");
+    if (labels.empty() == sets.empty())
+        throw InvalidInput(reader.place() +
+                           ": a sliding interface lies between two 'labels', [a, b], or two 'sets' of tissue");
+    if (!sets.empty()) {
+        if (sets.size() != 2) reader.refuse("sets", "a sliding interface lies between two 'sets', [\"a\", \"b\"]");
+        sliding.sets = {sets[0], sets[1]};
+        for (const std::string& set : sets) uses.sets.push_back({set, reader.place("sets")});
+        return;
+    }
+    if (labels.size() != 2) reader.refuse("labels", "a sliding interface lies between two 'labels', [a, b]");
+    sliding.labels = {labels[0], labels[1]};
+    for (const int label : labels) uses.tissue_labels.push_back({label, reader.place("labels"), "slides"});
+}
+
+RigidMotion rigid_motion(TomlReader& reader) {
+    RigidMotion motion;
+    motion.displacement = reader.vector("displacement_mm", any_length).value_or(Eigen::Vector3d::Zero());
+    auto rotation = reader.table("rotation");
+    if (!rotation) return motion;
+    motion.point = rotation->required_vector("point_mm", any_length);
+    const auto axis = rotation->direction("axis");
+    if (!axis) throw InvalidInput(rotation->place() + ": a rotation needs an 'axis', [x, y, z]");
+    constexpr double most_degrees = 36000;
+    const double degrees = rotation->required_number("degrees", {-most_degrees, most_degrees, "degrees"});
+    motion.turn = degrees * std::numbers::pi / 180 * *axis;
+    rotation->finish();
+    return motion;
+}
+
 }  // namespace
 
 void read_neighbours(TomlReader& file, const std::filesystem::path& folder, Scene& scene, NameUses& uses) {
@@ -38,7 +72,7 @@ void read_neighbours(TomlReader& file, const std::filesystem::path& folder, Scen
         if (!contact.set.empty()) uses.sets.push_back({contact.set, reader.place("set")});
         contact.gap = reader.number("gap_mm", {0.0, 1000.0, "mm"}).value_or(0.0);
         contact.friction = reader.number("friction", {0.0, 10.0}).value_or(0.0);
-        contact.motion = reader.vector("displacement_mm", any_length).value_or(Eigen::Vector3d::Zero());
+        contact.motion = rigid_motion(reader);
         contact.curve = reader.curve();
         contact.body = body_of(reader, folder, uses);
         reader.finish();
@@ -46,10 +80,9 @@ void read_neighbours(TomlReader& file, const std::filesystem::path& folder, Scen
     }
     for (TomlReader& reader : file.tables("sliding")) {
         Sliding sliding;
-        const std::vector<int> labels = reader.wholes("labels", 1, 1000000);
-        if (labels.size() != 2) reader.refuse("labels", "a sliding interface lies between two 'labels', [a, b]");
-        sliding.labels = {labels[0], labels[1]};
-        for (const int label : labels) uses.tissue_labels.push_back({label, reader.place("labels"), "slides"});
+        read_sides(reader, sliding, uses);
+        const std::string opening = reader.one_of("opening", {"held", "free"}, "held");
+        sliding.opening = opening == "free" ? Sliding::Opening::Free : Sliding::Opening::Held;
         sliding.per_area = reader.number("stiffness_kpa_per_mm", {1e-6, 1e6, "kPa/mm"}).value_or(sliding.per_area);
         sliding.except = reader.text("except").value_or("");
         if (!sliding.except.empty()) uses.sets.push_back({sliding.except, reader.place("except")});

@@ -22,14 +22,22 @@ struct NameUses {
     std::vector<Label> tissue_labels;  ///< that a tissue must have
     std::vector<Label> volume_labels;  ///< that the label volume must hold
     std::vector<Set> sets;
+    /// Labels whose fibres are a cell array of the mesh.
+    struct FibreArray {
+        int label = 0;
+        std::string array, place;
+    };
+    std::vector<FibreArray> fibre_arrays;
 };
 
 constexpr double largest_length = 1e4;  // mm
 inline const Range any_length{-largest_length, largest_length, "mm"};
 inline const Range positive_length{1e-6, largest_length, "mm"};
 
-void read_tissues(TomlReader& file, simulation::Scene& scene, NameUses& uses);
-void read_geometry(TomlReader& file, const std::filesystem::path& folder, simulation::Scene& scene);
+void read_tissues(TomlReader& file, const std::filesystem::path& folder, simulation::Scene& scene, NameUses& uses);
+/// The fibres that `uses` names too.
+void read_geometry(TomlReader& file, const std::filesystem::path& folder, simulation::Scene& scene,
+                   const NameUses& uses);
 void read_sets(TomlReader& file, simulation::Scene& scene, NameUses& uses);
 void read_loads(TomlReader& file, simulation::Scene& scene, NameUses& uses);
 void read_neighbours(TomlReader& file, const std::filesystem::path& folder, simulation::Scene& scene, NameUses& uses);

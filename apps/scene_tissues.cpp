@@ -2,6 +2,7 @@
 
 #include "apps/parameters.hpp"
 #include "apps/scene_parts.hpp"
+#include "imaging/image_io.hpp"
 #include "simulation/presets.hpp"
 
 #include <charconv>
@@ -36,12 +37,37 @@ tled::Material polynomial(TomlReader& tissue, const std::string& law) {
     return tled::yeoh(c("c10_kpa"), c("c20_kpa"), c("c30_kpa"), bulk);
 }
 
+/// `fibre` in the material, or one of the fields.
+void read_fibres(TomlReader& reader, const std::filesystem::path& folder, int label, simulation::Tissue& tissue,
+                 NameUses& uses) {
+    auto* law = std::get_if<tled::TransverselyIsotropic>(&tissue.material);
+    if (!law) return;
+    const auto direction = reader.direction("fibre");
+    const auto file = reader.text("fibre_file"), array = reader.text("fibre_array");
+    if (direction) law->fibre = *direction;
+    if (array) uses.fibre_arrays.push_back({label, *array, reader.place("fibre_array")});
+    if (!file) return;
+    const imaging::Volume volume = imaging::read_volume(folder / *file);
+    if (volume.channels() != 3)
+        reader.refuse("fibre_file",
+                      "'" + *file + "' has one number a voxel; fibres are vectors of three components, LPS");
+    tissue.fibres = simulation::FibreVolume{volume.as(CV_32F)};
+}
+
+/// After finish(), which names a misspelt one.
+void require_fibres(const TomlReader& reader, const tled::Material& material) {
+    if (!std::holds_alternative<tled::TransverselyIsotropic>(material)) return;
+    if (int(reader.has("fibre")) + int(reader.has("fibre_file")) + int(reader.has("fibre_array")) != 1)
+        throw InvalidInput(reader.place() +
+                           ": a transversely-isotropic tissue takes one of 'fibre', [x, y, z], 'fibre_file', a volume "
+                           "of vectors, and 'fibre_array', a cell array of the mesh");
+}
+
 tled::Material transversely_isotropic(TomlReader& tissue) {
     tled::TransverselyIsotropic law;
     law.shear_modulus = tissue.required_number("shear_modulus_kpa", modulus);
     law.bulk_modulus = tissue.required_number("bulk_modulus_kpa", modulus);
     law.fibre_modulus = tissue.required_number("fibre_modulus_kpa", modulus);
-    if (const auto fibre = tissue.direction("fibre")) law.fibre = *fibre;
     return law;
 }
 
@@ -67,7 +93,7 @@ tled::Material material_of(TomlReader& tissue) {
     return tled::neo_hookean_lnj(youngs_modulus, poissons_ratio);
 }
 
-simulation::Tissue tissue_of(TomlReader& reader) {
+simulation::Tissue tissue_of(TomlReader& reader, const std::filesystem::path& folder, int label, NameUses& uses) {
     simulation::Tissue tissue;
     tissue.name = reader.text("name").value_or("");
     tissue.growth = reader.number("growth", {0.2, 5.0}).value_or(1.0);
@@ -80,6 +106,7 @@ simulation::Tissue tissue_of(TomlReader& reader) {
         (void)reader.text("preset");  // a name that misspelt keys may mean
         tissue.material = material_of(reader);
     }
+    read_fibres(reader, folder, label, tissue, uses);
     if (reader.has("prony")) tissue.viscosity.terms.clear();
     for (const Eigen::Vector2d& term : reader.pairs("prony")) tissue.viscosity.terms.push_back({term[0], term[1]});
     try {
@@ -93,14 +120,15 @@ simulation::Tissue tissue_of(TomlReader& reader) {
 
 }  // namespace
 
-void read_tissues(TomlReader& file, simulation::Scene& scene, NameUses& uses) {
+void read_tissues(TomlReader& file, const std::filesystem::path& folder, simulation::Scene& scene, NameUses& uses) {
     for (auto& [name, reader] : file.named_tables("label")) {
         int label = 0;
         const auto [end, failure] = std::from_chars(name.data(), name.data() + name.size(), label);
         if (failure != std::errc() || end != name.data() + name.size() || label <= 0)
             throw InvalidInput(reader.place() + ": '" + name + "' is no label; write [label.1], [label.2], ...");
-        scene.tissues[label] = tissue_of(reader);
+        scene.tissues[label] = tissue_of(reader, folder, label, uses);
         reader.finish();
+        require_fibres(reader, scene.tissues[label].material);
         uses.volume_labels.push_back({label, reader.place(), "has a tissue"});
     }
     if (scene.tissues.empty())

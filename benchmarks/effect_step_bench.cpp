@@ -16,6 +16,8 @@
 #include "tled/reference.hpp"
 #include "tled/step_shape_cache.hpp"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -66,7 +68,7 @@ tled::Obstacle obstacle(const std::function<double(const Vector3d&)>& distance, 
         for (int j = 0; j < grid.size[1]; ++j)
             for (int i = 0; i < grid.size[0]; ++i)
                 grid.distance.push_back(static_cast<float>(distance(grid.origin + grid.steps * Vector3d(i, j, k))));
-    return {std::move(grid), Vector3d::Zero(), friction};
+    return {std::move(grid), {}, friction};
 }
 
 /// Beside the face x = edge: a wall, or a ball half as wide as the cube.
@@ -76,6 +78,13 @@ tled::Obstacle wall(double friction) {
 tled::Obstacle ball() {
     const Vector3d centre(edge + 25.01, edge / 2, edge / 2);
     return obstacle([&](const Vector3d& x) { return (x - centre).norm() - 25; }, 0.0);
+}
+
+/// Once round in 6 s about the normal of the face.
+tled::Obstacle turning_about_its_middle(tled::Obstacle wall) {
+    wall.velocity.spin = {1, 0, 0};
+    wall.velocity.of_origin = -wall.velocity.spin.cross(Vector3d(edge, edge / 2, edge / 2));
+    return wall;
 }
 
 /// Neighbours on the face x = edge in pairs: what they cost does not depend on where they lie.
@@ -97,19 +106,22 @@ struct Case {
 std::vector<Case> cases(const meshing::TetMesh& mesh) {
     const Matrix3Xi faces = boundary_faces(mesh);
     const std::vector<int> boundary = nodes_of(faces);
-    tled::Effects pressure, membrane, sliding, fluid, touching_wall, rough_wall, touching_ball;
+    tled::Effects pressure, membrane, sliding, parting, fluid, touching_wall, rough_wall, turning_wall, touching_ball;
     pressure.pressures = {{faces, 0.05}};
     membrane.membranes = {{faces, 5.0, 0.5}};
     sliding.sliding = pairs_on_a_face(mesh, boundary);
+    parting.parting = sliding.sliding;
     // A tenth of water's density, because nothing weighs the cube down.
     fluid.fluid = tled::Fluid{1e-7, {0, 0, -9810}, edge / 2};
     touching_wall.contact = tled::RigidContact{boundary, {wall(0.0)}};
     rough_wall.contact = tled::RigidContact{boundary, {wall(0.3)}};
+    turning_wall.contact = tled::RigidContact{boundary, {turning_about_its_middle(wall(0.3))}};
     touching_ball.contact = tled::RigidContact{boundary, {ball()}};
     const auto both = [](tled::Effects one, const tled::Effects& other) {
         if (!other.pressures.empty()) one.pressures = other.pressures;
         if (!other.membranes.empty()) one.membranes = other.membranes;
         if (!other.sliding.empty()) one.sliding = other.sliding;
+        if (!other.parting.empty()) one.parting = other.parting;
         if (other.fluid) one.fluid = other.fluid;
         if (other.contact) one.contact = other.contact;
         return one;
@@ -118,15 +130,17 @@ std::vector<Case> cases(const meshing::TetMesh& mesh) {
             {"fluid", fluid},
             {"contact, wall", touching_wall},
             {"contact, wall with friction", rough_wall},
+            {"contact, wall with friction that turns", turning_wall},
             {"contact, ball", touching_ball},
             {"pressure", pressure},
             {"membrane", membrane},
             {"sliding pairs", sliding},
+            {"pairs that may part", parting},
             {"fluid, contact", both(fluid, touching_wall)},
             {"pressure, contact", both(pressure, touching_wall)},
             {"membrane, contact", both(membrane, touching_wall)},
             {"pressure, membrane", both(pressure, membrane)},
-            {"all", both(both(both(fluid, rough_wall), both(pressure, membrane)), sliding)}};
+            {"all", both(both(both(fluid, turning_wall), both(pressure, membrane)), both(sliding, parting))}};
 }
 
 /// Nodes on an obstacle's surface, which the table shows so that no contact is timed that does not take place.
@@ -194,7 +208,7 @@ void report(tled::Engine& engine, const std::string& name, const Scene& scene, c
             plain.push_back(timed_steps(engine, scene.conditions, start, steps, step));
             ratio.push_back(timed_steps(engine, with, start, steps, step) / plain.back());
         }
-        std::printf("| %-28s | %-24s | %9d | %9.2f | %6.3f | %5d | %6.3f |\n", each.name.c_str(), name.c_str(),
+        std::printf("| %-38s | %-24s | %9d | %9.2f | %6.3f | %5d | %6.3f |\n", each.name.c_str(), name.c_str(),
                     rest.element_count(), median(plain) * 1e6, median(ratio), touching(with, start.displacement),
                     tled::jacobians(rest, engine.displacement()).minCoeff());
         std::fflush(stdout);

@@ -30,6 +30,10 @@ TetMesh read_vtu(const std::filesystem::path& path);
 /// The same for a mesh of tetrahedra, hexahedra (VTK types 10 and 12) or both.
 MixedMesh read_mixed_vtu(const std::filesystem::path& path);
 
+/// A cell array of a .vtu, components × cells in the order of the file. Throws IoError or, naming those that there are,
+/// InvalidInput.
+Eigen::MatrixXd read_vtu_cell_array(const std::filesystem::path& path, const std::string& name);
+
 /// Surface with optional unit normals per node (3 × N or empty).
 struct Surface {
     SurfaceMesh mesh;

@@ -183,6 +183,7 @@ struct Content {
     bool piece = false;
     std::size_t points = 0, cells = 0;
     std::map<std::string, std::vector<double>> arrays;
+    std::vector<std::string> names;  ///< of all arrays of the file
 };
 
 void require_readable(const Tag& root, const FileReader& file) {
@@ -208,7 +209,8 @@ std::size_t piece_count(const Tag& tag, const char* key, const FileReader& file)
     return file.checked_count(file.to_integer(found->second), key, 1);
 }
 
-Content read_content(FileReader& file) {
+/// `more` names an array, by section and name, that is read besides those of the mesh.
+Content read_content(FileReader& file, const std::string& more = {}) {
     Layout layout;
     Content content;
     std::vector<std::pair<std::string, Tag>> arrays;
@@ -238,10 +240,12 @@ Content read_content(FileReader& file) {
         }
     }
     if (!root || !content.piece) file.fail("is no VTK XML unstructured grid");
-    for (const auto& [key, tag] : arrays)
+    for (const auto& [key, tag] : arrays) {
+        content.names.push_back(key);
         if (key == "Points/" || key == "Cells/connectivity" || key == "Cells/types" || key == "Cells/offsets" ||
-            key == "CellData/label")
+            key == "CellData/label" || key == more)
             content.arrays[key] = read_array(tag, layout, file);
+    }
     return content;
 }
 
@@ -328,6 +332,25 @@ MixedMesh read_cells(const std::filesystem::path& path, Accepted accepted) {
 
 TetMesh read_vtu(const std::filesystem::path& path) {
     return read_cells(path, Accepted::Tetrahedra).mesh;
+}
+
+Eigen::MatrixXd read_vtu_cell_array(const std::filesystem::path& path, const std::string& name) {
+    const std::string section = "CellData/", key = section + name;
+    FileReader file(path);
+    const Content content = read_content(file, key);
+    const auto found = content.arrays.find(key);
+    if (found == content.arrays.end()) {
+        std::string names;
+        for (const std::string& other : content.names)
+            if (other.starts_with(section)) names += (names.empty() ? "'" : ", '") + other.substr(section.size()) + "'";
+        file.refuse("has no cell array '" + name + "'" + (names.empty() ? "" : "; it has " + names));
+    }
+    const std::vector<double>& values = found->second;
+    if (content.cells == 0 || values.empty() || values.size() % content.cells != 0)
+        file.refuse("has " + std::to_string(values.size()) + " values in the cell array '" + name + "' of " +
+                    std::to_string(content.cells) + " cells");
+    const auto cells = static_cast<Eigen::Index>(content.cells);
+    return Eigen::Map<const Eigen::MatrixXd>(values.data(), static_cast<Eigen::Index>(values.size()) / cells, cells);
 }
 
 MixedMesh read_mixed_vtu(const std::filesystem::path& path) {

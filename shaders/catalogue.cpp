@@ -70,7 +70,9 @@ void add_nodal_forces(ProgramSource& source, const NodeEffects& effects) {
 /// `settles` is the chunk whose settle() the program calls.
 void add_contact(ProgramSource& source, const NodeEffects& effects, const char* settles) {
     add_effect(source, "node.contact", "HAS_CONTACT", effects.contact);
-    if (effects.contact) source.chunks.emplace_back(settles);
+    if (!effects.contact) return;
+    add_effect(source, "node.turning", "HAS_TURNING", effects.turning);
+    source.chunks.emplace_back(settles);
 }
 
 ProgramSource node_program(std::string kernel, const NodeEffects& effects) {
@@ -189,6 +191,7 @@ ProgramSource surface_force_program(const SurfaceForces& forces) {
     add_effect(source, "surface.pressure", "HAS_PRESSURE", forces.pressure);
     add_effect(source, "surface.membrane", "HAS_MEMBRANE", forces.membrane);
     add_effect(source, "surface.sliding", "HAS_SLIDING", forces.sliding);
+    add_effect(source, "surface.parting", "HAS_PARTING", forces.parting);
     return source;
 }
 
@@ -358,10 +361,18 @@ std::vector<Effects> combinations(const std::array<bool Effects::*, count>& flag
     return all;
 }
 
+/// The same, but of effects of which turning is one, which there is with contact only.
+template <std::size_t count>
+std::vector<NodeEffects> with_contact(const std::array<bool NodeEffects::*, count>& flags) {
+    std::vector<NodeEffects> all = combinations<NodeEffects, count>(flags);
+    std::erase_if(all, [](const NodeEffects& effects) { return effects.turning && !effects.contact; });
+    return all;
+}
+
 void add_node_passes(std::vector<ProgramSource>& all) {
     using E = NodeEffects;
     for (const NodeEffects& effects :
-         combinations<E, 5>({&E::springs, &E::external_force, &E::surface_force, &E::fluid, &E::contact}))
+         with_contact<6>({&E::springs, &E::external_force, &E::surface_force, &E::fluid, &E::contact, &E::turning}))
         for (const StoreResidual store : {StoreResidual::No, StoreResidual::Yes})
             all.push_back(node_step_program(effects, store));
     for (const NodeEffects& effects :
@@ -369,8 +380,9 @@ void add_node_passes(std::vector<ProgramSource>& all) {
         for (const MaskConstrained mask : {MaskConstrained::No, MaskConstrained::Yes})
             all.push_back(node_residual_program(effects, mask));
     using S = SurfaceForces;
-    for (const SurfaceForces& forces : combinations<S, 3>({&S::pressure, &S::membrane, &S::sliding}))
-        if (forces.pressure || forces.membrane || forces.sliding) all.push_back(surface_force_program(forces));
+    for (const SurfaceForces& forces : combinations<S, 4>({&S::pressure, &S::membrane, &S::sliding, &S::parting}))
+        if (forces.pressure || forces.membrane || forces.sliding || forces.parting)
+            all.push_back(surface_force_program(forces));
 }
 
 /// Laws and effects do not meet in the code of a patch: every law, elastic and viscous, with no effect and with all of
@@ -379,7 +391,7 @@ void add_node_passes(std::vector<ProgramSource>& all) {
 void add_patch_steps(std::vector<ProgramSource>& all) {
     using E = NodeEffects;
     const std::vector<NodeEffects> effects =
-        combinations<E, 4>({&E::springs, &E::external_force, &E::fluid, &E::contact});
+        with_contact<5>({&E::springs, &E::external_force, &E::fluid, &E::contact, &E::turning});
     for (const NodeEffects& each : effects) all.push_back(patch_step_program({}, each, {}, {.advances = true}));
     for (const PatchStages& stages : every_patch_stages) {
         for (int law = 0; law < law_count; ++law)

@@ -48,6 +48,7 @@ struct NodeEffects {
     bool surface_force = false;  ///< what surface_force_program leaves
     bool fluid = false;
     bool contact = false;
+    bool turning = false;  ///< of bodies in contact
 };
 
 /// Effects whose force on a node depends on where others are: chunks surface.*.glsl.
@@ -55,6 +56,7 @@ struct SurfaceForces {
     bool pressure = false;
     bool membrane = false;
     bool sliding = false;
+    bool parting = false;
 };
 
 /// The most that a pass over elements or nodes declares; those over patches are counted in tled/detail/gpu_patches.cpp.

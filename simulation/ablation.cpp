@@ -123,9 +123,8 @@ std::vector<Removable> removable(const Scene& scene) {
     add_each(all, scene, &Scene::contacts, [](const Contact& contact, std::size_t i) {
         return "contact " + std::to_string(i + 1) + (contact.set.empty() ? "" : " of '" + contact.set + "'");
     });
-    add_each(all, scene, &Scene::sliding, [](const Sliding& sliding, std::size_t) {
-        return "sliding of labels " + std::to_string(sliding.labels[0]) + " and " + std::to_string(sliding.labels[1]);
-    });
+    add_each(all, scene, &Scene::sliding,
+             [](const Sliding& sliding, std::size_t) { return "sliding of " + sides_of(sliding); });
     add_each(all, scene, &Scene::resections, on("resection of"));
     return all;
 }

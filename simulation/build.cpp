@@ -19,6 +19,23 @@ using Eigen::Matrix3d;
 using Eigen::Matrix3Xi;
 using Eigen::Vector3d;
 
+/// Of each tetrahedron, 3 × M; empty where no tissue has fibres that vary.
+Eigen::Matrix3Xd fibre_directions(const Scene& scene, const meshing::TetMesh& mesh) {
+    const auto vary = [](const auto& tissue) { return tissue.second.fibres.index() != 0; };
+    if (std::none_of(scene.tissues.begin(), scene.tissues.end(), vary)) return {};
+    Eigen::Matrix3Xd fibres = Vector3d::UnitZ().replicate(1, mesh.tet_count());  // where no law asks for one
+    for (const auto& [label, tissue] : scene.tissues) {
+        const auto* law = std::get_if<tled::TransverselyIsotropic>(&tissue.material);
+        if (!law) continue;
+        Eigen::Matrix3Xd own = law->fibre.replicate(1, mesh.tet_count());
+        if (const auto* volume = std::get_if<FibreVolume>(&tissue.fibres)) own = fibres_of(*volume, mesh, label);
+        if (const auto* given = std::get_if<FibresOfTetrahedra>(&tissue.fibres)) own = fibres_of(*given, mesh, label);
+        for (int e = 0; e < mesh.tet_count(); ++e)
+            if (mesh.labels[e] == label) fibres.col(e) = own.col(e);
+    }
+    return fibres;
+}
+
 tled::Model model_of(const Scene& scene, const meshing::TetMesh& mesh) {
     tled::Model model;
     model.mesh = mesh;
@@ -27,19 +44,32 @@ tled::Model model_of(const Scene& scene, const meshing::TetMesh& mesh) {
         if (!tissue.viscosity.terms.empty()) model.viscosity[label] = tissue.viscosity;
     }
     model.density = scene.density;
+    model.fibre = fibre_directions(scene, mesh);
     model.element = scene.solve.element.value_or(tled::suggested_element(model.materials));
     return model;
 }
 
-std::vector<tled::SlidingPair> open_interfaces(const Scene& scene, TissueMesh& tissue) {
-    std::vector<tled::SlidingPair> pairs;
+/// Pairs that hold together, and that may part.
+struct Interfaces {
+    std::vector<tled::SlidingPair> held, free;
+};
+
+InterfaceSides sides_of(const Sliding& sliding, const Scene& scene, const TissueMesh& tissue) {
+    if (!sliding.sets) return sides_of_labels(tissue, sliding.labels);
+    const RegionFinder finder(tissue, scene.sets);
+    return {finder.tets((*sliding.sets)[0]), finder.tets((*sliding.sets)[1]), simulation::sides_of(sliding)};
+}
+
+Interfaces open_interfaces(const Scene& scene, TissueMesh& tissue) {
+    Interfaces interfaces;
     for (const Sliding& sliding : scene.sliding) {
         std::vector<int> joined;
         if (!sliding.except.empty()) joined = RegionFinder(tissue, scene.sets).nodes(sliding.except);
-        const auto more = open_interface(tissue, sliding.labels, joined, sliding.per_area);
+        auto& pairs = sliding.opening == Sliding::Opening::Held ? interfaces.held : interfaces.free;
+        const auto more = open_interface(tissue, sides_of(sliding, scene, tissue), joined, sliding.per_area);
         pairs.insert(pairs.end(), more.begin(), more.end());
     }
-    return pairs;
+    return interfaces;
 }
 
 /// Only one may hold or move a component; fixing it twice is the same as once.
@@ -116,13 +146,14 @@ tled::RigidContact contact_of(const Scene& scene, const meshing::TetMesh& mesh, 
 }
 
 tled::Effects effects_of(const Scene& scene, const meshing::TetMesh& mesh, const RegionFinder& finder,
-                         std::vector<tled::SlidingPair> sliding, Observer& observer) {
+                         Interfaces interfaces, Observer& observer) {
     tled::Effects effects;
     for (const Pressure& pressure : scene.pressures)
         effects.pressures.push_back({finder.faces(pressure.set), pressure.pressure});
     for (const MembraneOn& membrane : scene.membranes)
         effects.membranes.push_back({finder.faces(membrane.set), membrane.shear_modulus, membrane.thickness});
-    effects.sliding = std::move(sliding);
+    effects.sliding = std::move(interfaces.held);
+    effects.parting = std::move(interfaces.free);
     if (scene.fluid) effects.fluid = tled::Fluid{scene.fluid->density, Vector3d::Zero(), scene.fluid->to};
     if (!scene.contacts.empty()) effects.contact = contact_of(scene, mesh, finder, observer);
     return effects;
@@ -175,6 +206,7 @@ Stage remaining(const tled::Model& model, const Scene& scene, const std::vector<
     left.nodes = Eigen::Matrix3Xd(mesh.nodes(Eigen::all, stage.node));
     left.tets = Eigen::Matrix4Xi(mesh.tets(Eigen::all, stage.tet));
     left.labels = Eigen::VectorXi(mesh.labels(stage.tet));
+    if (model.fibre.size() > 0) stage.model.fibre = Eigen::Matrix3Xd(model.fibre(Eigen::all, stage.tet));
     for (int& node : left.tets.reshaped()) node = stage.place[static_cast<std::size_t>(node)];
     grow(stage, scene);
     if (scene.solve.kind == Solve::Kind::Equilibrium) stage.model = tled::relaxed(stage.model);
@@ -209,11 +241,11 @@ BuiltScene build(const Scene& scene, const meshing::TetMesh& mesh, Observer& obs
     BuiltScene built;
     built.scene = scene;
     TissueMesh tissue = closed(mesh);
-    std::vector<tled::SlidingPair> sliding = open_interfaces(scene, tissue);
+    Interfaces interfaces = open_interfaces(scene, tissue);
     const RegionFinder finder(tissue, scene.sets);
     built.held = held_nodes(scene, finder);
     for (const Springs& springs : scene.springs) add_springs(springs, tissue.mesh, finder, built.springs);
-    built.effects = effects_of(scene, tissue.mesh, finder, std::move(sliding), observer);
+    built.effects = effects_of(scene, tissue.mesh, finder, std::move(interfaces), observer);
     built.probes = located(scene.probes, tissue.mesh);
     built.mesh = tissue.mesh;
     std::vector<bool> gone(static_cast<std::size_t>(tissue.mesh.tet_count()), false);

@@ -40,7 +40,7 @@ struct BuiltScene {
     std::vector<Stage> stages;   ///< one at least, in the order of time
     std::vector<HeldNode> held;  ///< by node
     std::vector<tled::Spring> springs;
-    tled::Effects effects;  ///< pressures and levels where their curves are 1, obstacles where they are at rest
+    tled::Effects effects;  ///< pressures and levels where their curves are 1, obstacles where they are at time 0
     std::vector<meshing::Location> probes;  ///< of Scene::probes, in that mesh
     std::optional<LeftOut> left_out;        ///< by Scene::leave_out
 };

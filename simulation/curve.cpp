@@ -38,6 +38,14 @@ double slope_before(const Curve& curve, double time, double duration) {
     return 0.0;
 }
 
+CurveRange range_of(const Curve& curve) {
+    if (curve.points.empty()) return {};
+    const auto [least, largest] =
+        std::minmax_element(curve.points.begin(), curve.points.end(),
+                            [](const CurvePoint& a, const CurvePoint& b) { return a.value < b.value; });
+    return {least->value, largest->value};
+}
+
 double steepest(const Curve& curve, double duration) {
     if (curve.points.empty()) return 1 / duration;
     double slope = 0;

@@ -25,6 +25,12 @@ double value_at(const Curve& curve, double time, double duration);
 /// Change of value per second just before `time`.
 double slope_before(const Curve& curve, double time, double duration);
 
+/// Least and largest value.
+struct CurveRange {
+    double least = 0.0, largest = 1.0;
+};
+CurveRange range_of(const Curve& curve);
+
 /// Largest |change of value| per second within [0, duration].
 double steepest(const Curve& curve, double duration);
 

@@ -65,10 +65,8 @@ std::set<int> needed_nodes(const BuiltScene& built, const std::vector<double>& t
     };
     for (const tled::SurfacePressure& each : effects.pressures) add(each.faces);
     for (const tled::Membrane& each : effects.membranes) add(each.faces);
-    for (const tled::SlidingPair& pair : effects.sliding) {
-        nodes.insert(pair.first);
-        nodes.insert(pair.second);
-    }
+    for (const std::vector<tled::SlidingPair>* pairs : {&effects.sliding, &effects.parting})
+        for (const tled::SlidingPair& pair : *pairs) nodes.insert({pair.first, pair.second});
     for (const meshing::Location& probe : built.probes)
         for (const int node : built.mesh.tets.col(probe.tet)) nodes.insert(node);
     return nodes;

@@ -1,5 +1,7 @@
 #include "simulation/loads.hpp"
 
+#include "simulation/obstacles.hpp"
+
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -108,11 +110,13 @@ tled::Effects remaining_effects(const BuiltScene& built, const Stage& stage) {
     const auto place = [&](int node) { return stage.place[static_cast<std::size_t>(node)]; };
     for (tled::SurfacePressure& each : effects.pressures) each.faces = remaining_faces(each.faces, stage);
     for (tled::Membrane& each : effects.membranes) each.faces = remaining_faces(each.faces, stage);
-    std::erase_if(effects.sliding,
-                  [&](const tled::SlidingPair& pair) { return place(pair.first) < 0 || place(pair.second) < 0; });
-    for (tled::SlidingPair& pair : effects.sliding) {
-        pair.first = place(pair.first);
-        pair.second = place(pair.second);
+    for (std::vector<tled::SlidingPair>* pairs : {&effects.sliding, &effects.parting}) {
+        std::erase_if(*pairs,
+                      [&](const tled::SlidingPair& pair) { return place(pair.first) < 0 || place(pair.second) < 0; });
+        for (tled::SlidingPair& pair : *pairs) {
+            pair.first = place(pair.first);
+            pair.second = place(pair.second);
+        }
     }
     if (effects.contact) {
         std::erase_if(effects.contact->nodes, [&](int node) { return place(node) < 0; });
@@ -132,8 +136,10 @@ double pressure_at(const BuiltScene& built, const Stage& stage, std::size_t inde
 void move_bodies(const BuiltScene& built, double time, std::vector<tled::Obstacle>& obstacles) {
     for (std::size_t c = 0; c < obstacles.size(); ++c) {
         const Contact& contact = built.scene.contacts[c];
-        obstacles[c].shift = part(contact.curve, built, time) * contact.motion;
-        obstacles[c].velocity = slope_before(contact.curve, time, built.scene.solve.duration) * contact.motion;
+        const double now = part(contact.curve, built, time);
+        const double rate = slope_before(contact.curve, time, built.scene.solve.duration);
+        obstacles[c].placement = placement_at(contact.motion, now);
+        obstacles[c].velocity = velocity_at(contact.motion, now, rate);
     }
 }
 
@@ -234,8 +240,11 @@ double hold_interval(const BuiltScene& built, const Stage& stage) {
     };
     for (const Motion& motion : scene.motions)
         limit(small * shortest, motion.displacement.norm() * steepest(motion.curve, duration));
-    for (const Contact& contact : scene.contacts)
-        limit(small * shortest, contact.motion.norm() * steepest(contact.curve, duration));
+    for (std::size_t c = 0; c < scene.contacts.size(); ++c) {
+        const RigidMotion& motion = scene.contacts[c].motion;
+        const double reach = surface_reach(*built.effects.contact->obstacles[c].surface, motion);
+        limit(small * shortest, longest_way(motion, reach) * steepest(scene.contacts[c].curve, duration));
+    }
     if (!stage.growth.empty()) limit(small, 1 / duration);
     for (const Pressure& pressure : scene.pressures) limit(small, steepest(pressure.curve, duration));
     if (scene.gravity && scene.gravity->from != scene.gravity->to)

@@ -33,8 +33,9 @@ private:
     Eigen::Vector3d gravity_;      ///< mm/s², of the conditions
 };
 
-/// For how long (s) loads may be held so that no motion in one go exceeds a hundredth of the shortest edge and no load
-/// changes by more than a hundredth; the scene's duration where nothing moves.
+/// For how long (s) loads may be held so that no motion in one go, of a node or of any point of a body's surface,
+/// exceeds a hundredth of the shortest edge and no load changes by more than a hundredth; the scene's duration where
+/// nothing moves.
 double hold_interval(const BuiltScene& built, const Stage& stage);
 
 }  // namespace tissuewarp::simulation

@@ -12,6 +12,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <numbers>
 #include <string>
 
 namespace tissuewarp::simulation {
@@ -30,13 +31,48 @@ struct Extent {
     [[nodiscard]] Vector3d size() const { return upper - lower; }
 };
 
+Vector3d corner_of(const Extent& extent, int corner) {
+    Vector3d point = extent.lower;
+    for (int axis = 0; axis < 3; ++axis)
+        if (corner >> axis & 1) point[axis] = extent.upper[axis];
+    return point;
+}
+
+Extent widened(const Extent& extent, double margin) {
+    return {extent.lower.array() - margin, extent.upper.array() + margin};
+}
+
+/// What an extent covers as seen from a body that turns through the parts of its motion.
+Extent seen_from_turning(const Extent& extent, const RigidMotion& motion, const CurveRange& parts) {
+    const double angle = motion.turn.norm();
+    if (!(angle > 0)) return extent;
+    const double way = std::min(angle * (parts.largest - parts.least), 2 * std::numbers::pi);
+    const int arcs = std::max(1, static_cast<int>(std::ceil(way / 0.1)));
+    const RigidMotion turn{Vector3d::Zero(), motion.turn, motion.point};
+    Extent seen{Vector3d::Constant(std::numeric_limits<double>::infinity()),
+                Vector3d::Constant(-std::numeric_limits<double>::infinity())};
+    double furthest = 0;
+    for (int end = 0; end <= arcs; ++end) {
+        const auto [shift, rotation] = placement_at(turn, parts.least + way / angle * end / arcs);
+        for (int corner = 0; corner < 8; ++corner) {
+            const Vector3d point = rotation.transpose() * (corner_of(extent, corner) - shift);
+            furthest = std::max(furthest, distance_from_axis(motion, point));
+            seen.lower = seen.lower.cwiseMin(point);
+            seen.upper = seen.upper.cwiseMax(point);
+        }
+    }
+    // By as much an arc stands out over its chord.
+    return widened(seen, furthest * way * way / (8.0 * arcs * arcs));
+}
+
+/// As seen from the body.
 Extent where_tissue_may_be(const Contact& contact, const Matrix3Xd& tissue) {
-    Extent extent{tissue.rowwise().minCoeff(), tissue.rowwise().maxCoeff()};
+    const Extent extent{tissue.rowwise().minCoeff(), tissue.rowwise().maxCoeff()};
     const bool around = std::holds_alternative<OutsideOfLabels>(contact.body);
-    const double margin = (around ? inwards : reach * extent.size().norm()) + contact.gap + contact.motion.norm();
-    extent.lower.array() -= margin;
-    extent.upper.array() += margin;
-    return extent;
+    const CurveRange parts = range_of(contact.curve);
+    const double way = std::max(std::abs(parts.least), std::abs(parts.largest)) * contact.motion.displacement.norm();
+    const double margin = (around ? inwards : reach * extent.size().norm()) + contact.gap + way;
+    return seen_from_turning(widened(extent, margin), contact.motion, parts);
 }
 
 DistanceGrid sampled(const Extent& extent, double spacing, const std::function<double(const Vector3d&)>& distance) {
@@ -73,7 +109,12 @@ DistanceGrid grid_of(const Ball& body, const Extent& extent) {
 
 DistanceGrid grid_of(const meshing::SurfaceMesh& body, const Extent& extent) {
     const SurfaceDistance distance(body);
-    return sampled(extent, finest_spacing(extent), distance);
+    // A tool that turns passes through much space, of which it fills little.
+    const Extent body_alone{body.nodes.rowwise().minCoeff(), body.nodes.rowwise().maxCoeff()};
+    const Extent around = widened(body_alone, 0.1 * std::max(extent.size().norm(), body_alone.size().norm()));
+    const Extent both{extent.lower.cwiseMax(around.lower), extent.upper.cwiseMin(around.upper)};
+    const Extent& covered = both.size().minCoeff() > 0 ? both : extent;
+    return sampled(covered, finest_spacing(covered), distance);
 }
 
 /// Distances to voxels that are not 0, smoothed by a voxel so that steps of the label map are none of the surface.
@@ -93,10 +134,7 @@ imaging::Volume mask_around(const imaging::Volume& labels, const Extent& extent,
                             bool beyond) {
     Vector3d first = Vector3d::Constant(std::numeric_limits<double>::infinity()), last = -first;
     for (int corner = 0; corner < 8; ++corner) {
-        Vector3d point = extent.lower;
-        for (int axis = 0; axis < 3; ++axis)
-            if (corner >> axis & 1) point[axis] = extent.upper[axis];
-        const Vector3d index = labels.geometry.index(point);
+        const Vector3d index = labels.geometry.index(corner_of(extent, corner));
         first = first.cwiseMin(index);
         last = last.cwiseMax(index);
     }
@@ -146,10 +184,10 @@ void make_room(tled::Obstacle& obstacle, const Contact& contact, const Matrix3Xd
         deepest = std::max(deepest, -tled::distance_to(obstacle, tissue.col(n)).value - contact.gap);
     if (deepest > most)
         throw InvalidInput("a body that the tissue is in contact with overlaps it by " + std::to_string(deepest) +
-                           " mm at rest, more than " + std::to_string(most) +
+                           " mm at the beginning, more than " + std::to_string(most) +
                            " mm that the mesh explains; move it, or give gap_mm");
     if (deepest > 0)
-        observer.note("a body overlapped the tissue at rest by up to " + std::to_string(deepest) +
+        observer.note("a body overlapped the tissue at the beginning by up to " + std::to_string(deepest) +
                       " mm and was made smaller by as much");
     DistanceGrid smaller = *obstacle.surface;
     for (float& distance : smaller.distance) distance += static_cast<float>(deepest + contact.gap);
@@ -171,8 +209,24 @@ tled::Obstacle obstacle(const Contact& contact, const Matrix3Xd& tissue, double 
         },
         contact.body);
     result.friction = contact.friction;
+    result.placement = placement_at(contact.motion, value_at(contact.curve, 0.0, 1.0));  // whatever the duration
     make_room(result, contact, tissue, overlap, observer);
     return result;
+}
+
+double surface_reach(const DistanceGrid& grid, const RigidMotion& motion) {
+    if (motion.turn.isZero(0.0)) return 0.0;
+    // A cell that the surface goes through has no corner further from it than its own diagonal, and none of its points
+    // is further from the axis than its corners.
+    const double diagonal = grid.steps.colwise().norm().sum();
+    double reach = 0;
+    std::size_t at = 0;
+    for (int k = 0; k < grid.size[2]; ++k)
+        for (int j = 0; j < grid.size[1]; ++j)
+            for (int i = 0; i < grid.size[0]; ++i, ++at)
+                if (std::abs(double{grid.distance[at]}) <= diagonal)
+                    reach = std::max(reach, distance_from_axis(motion, grid.origin + grid.steps * Vector3d(i, j, k)));
+    return reach;
 }
 
 }  // namespace tissuewarp::simulation

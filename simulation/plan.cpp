@@ -3,6 +3,7 @@
 #include "tled/critical_step.hpp"
 #include "tled/step_work.hpp"
 
+#include <algorithm>
 #include <set>
 
 namespace tissuewarp::simulation {
@@ -67,16 +68,24 @@ void add_effects(const BuiltScene& built, std::vector<PlannedEffect>& all) {
     };
     for (const tled::SurfacePressure& each : effects.pressures) faces("pressure", each.faces, pressure_of_face);
     for (const tled::Membrane& each : effects.membranes) faces("membrane", each.faces, membrane_of_face);
-    if (!effects.sliding.empty())
-        all.push_back({"sliding", count(static_cast<Eigen::Index>(effects.sliding.size()), "pairs of nodes"),
-                       times(static_cast<double>(effects.sliding.size()), sliding_of_pair)});
+    const auto pairs = [&](const char* name, const std::vector<tled::SlidingPair>& list) {
+        if (list.empty()) return;
+        all.push_back({name, count(static_cast<Eigen::Index>(list.size()), "pairs of nodes"),
+                       times(static_cast<double>(list.size()), sliding_of_pair)});
+    };
+    pairs("sliding", effects.sliding);
+    pairs("parting", effects.parting);
     if (!effects.contact) return;
     std::set<int> nodes(effects.contact->nodes.begin(), effects.contact->nodes.end());
     const auto bodies = effects.contact->obstacles.size();
-    all.push_back({"contact",
-                   count(static_cast<Eigen::Index>(nodes.size()), "nodes with ") +
-                       count(static_cast<Eigen::Index>(bodies), bodies == 1 ? "body" : "bodies"),
-                   times(static_cast<double>(nodes.size() * bodies), contact_of_node)});
+    const auto turning = std::count_if(built.scene.contacts.begin(), built.scene.contacts.end(),
+                                       [](const Contact& each) { return !each.motion.turn.isZero(0.0); });
+    all.push_back(
+        {"contact",
+         count(static_cast<Eigen::Index>(nodes.size()), "nodes with ") +
+             count(static_cast<Eigen::Index>(bodies), bodies == 1 ? "body" : "bodies") +
+             (turning > 0 ? ", of which " + std::to_string(turning) + (turning == 1 ? " turns" : " turn") : ""),
+         times(static_cast<double>(nodes.size() * bodies), contact_of_node)});
 }
 
 double memory_of(const BuiltScene& built) {
@@ -96,6 +105,8 @@ double memory_of(const BuiltScene& built) {
 std::string law_of(int label, const Tissue& tissue) {
     std::string text = "label " + std::to_string(label) + (tissue.name.empty() ? "" : ", " + tissue.name) + ": " +
                        tled::law_name(tissue.material);
+    if (std::holds_alternative<FibreVolume>(tissue.fibres)) text += ", fibres from a volume";
+    if (std::holds_alternative<FibresOfTetrahedra>(tissue.fibres)) text += ", fibres of each tetrahedron";
     if (!tissue.viscosity.terms.empty())
         text += ", viscous with " + std::to_string(tissue.viscosity.terms.size()) + " terms";
     if (tissue.growth != 1.0) text += ", grown by " + std::to_string(tissue.growth);

@@ -39,8 +39,10 @@ Matrix3Xi matrix_of(const std::vector<std::array<int, 3>>& faces) {
 }
 
 /// The face seen by the tissue of a label: its nodes there, normal outward.
-std::array<int, 3> seen_from(const TissueMesh& tissue, const InterfaceFace& face, int label) {
-    const auto node = [&](std::size_t corner) { return tissue.node_of(face.nodes[corner], label); };
+std::array<int, 3> seen_from(const TissueMesh& tissue, const TissueFace& each, int label) {
+    const InterfaceFace& face = each.face;
+    const int tet = face.inner == label ? each.inner_tet : each.outer_tet;
+    const auto node = [&](std::size_t corner) { return tissue.node_of(face.nodes[corner], tet); };
     return face.inner == label ? std::array<int, 3>{node(0), node(1), node(2)}
                                : std::array<int, 3>{node(0), node(2), node(1)};
 }
@@ -86,13 +88,13 @@ std::vector<bool> RegionFinder::holds_node(const std::string& name, int depth) c
     }
     if (region.interface || region.surface_of) {
         std::vector<bool> of_surface(held.size(), false);
-        for (const InterfaceFace& face : tissue_.faces) {
-            if (!belongs(region, face)) continue;
-            for (const int node : face.nodes) {
-                of_surface[static_cast<std::size_t>(tissue_.node_of(node, side_of(region, face)))] = true;
-                if (region.interface)
-                    of_surface[static_cast<std::size_t>(tissue_.node_of(node, (*region.interface)[1]))] = true;
-            }
+        const auto mark = [&](const TissueFace& face, int label) {
+            for (const int node : seen_from(tissue_, face, label)) of_surface[static_cast<std::size_t>(node)] = true;
+        };
+        for (const TissueFace& each : tissue_.faces) {
+            if (!belongs(region, each.face)) continue;
+            mark(each, side_of(region, each.face));
+            if (region.interface) mark(each, (*region.interface)[1]);
         }
         keep_only(of_surface);
     }
@@ -119,9 +121,9 @@ Matrix3Xi RegionFinder::faces(const std::string& name) const {
     const Region& region = this->region(name);
     const std::vector<bool> held = holds_node(name, 0);
     std::vector<std::array<int, 3>> found;
-    for (const InterfaceFace& face : tissue_.faces) {
-        if (!belongs(region, face)) continue;
-        const std::array<int, 3> nodes = seen_from(tissue_, face, side_of(region, face));
+    for (const TissueFace& each : tissue_.faces) {
+        if (!belongs(region, each.face)) continue;
+        const std::array<int, 3> nodes = seen_from(tissue_, each, side_of(region, each.face));
         if (std::all_of(nodes.begin(), nodes.end(), [&](int node) { return held[static_cast<std::size_t>(node)]; }))
             found.push_back(nodes);
     }
@@ -131,8 +133,8 @@ Matrix3Xi RegionFinder::faces(const std::string& name) const {
 
 Matrix3Xi RegionFinder::outer_faces() const {
     std::vector<std::array<int, 3>> found;
-    for (const InterfaceFace& face : tissue_.faces)
-        if (face.outer == 0) found.push_back(seen_from(tissue_, face, face.inner));
+    for (const TissueFace& each : tissue_.faces)
+        if (each.face.outer == 0) found.push_back(seen_from(tissue_, each, each.face.inner));
     return matrix_of(found);
 }
 

@@ -116,13 +116,14 @@ private:
         // The first comes from rest, along its load where that is too much at once.
         const Matrix3Xd* start = shown_ == 1 ? nullptr : &state_.displacement;
         Part part(observer_, time / solve_.duration, time / solve_.duration);
+        const bool unilateral = conditions.effects.contact || !conditions.effects.surface.parting.empty();
         try {
             const tled::EquilibriumResult found =
-                conditions.effects.contact ? tled::equilibrium_in_contact(engine, stage.rest, conditions,
-                                                                          {.equilibrium = options}, start, part)
-                                                 .equilibrium
-                                           : tled::equilibrium_along_load(engine, stiffness, conditions,
-                                                                          {.equilibrium = options}, start, part);
+                unilateral ? tled::equilibrium_in_contact(engine, stage.rest, conditions, {.equilibrium = options},
+                                                          start, part)
+                                 .equilibrium
+                           : tled::equilibrium_along_load(engine, stiffness, conditions, {.equilibrium = options},
+                                                          start, part);
             state_.displacement = found.displacement;
             summary_.steps += found.force_evaluations;
             summary_.estimated_error_mm = std::max(summary_.estimated_error_mm, found.estimated_error_mm);

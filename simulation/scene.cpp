@@ -55,6 +55,9 @@ std::vector<std::pair<std::string, std::string>> named_sets(const Scene& scene) 
         if (!each.set.empty()) names.emplace_back("a contact", each.set);
     for (const Sliding& each : scene.sliding)
         if (!each.except.empty()) names.emplace_back("a sliding interface", each.except);
+    for (const Sliding& each : scene.sliding)
+        if (each.sets)
+            for (const std::string& set : *each.sets) names.emplace_back("a sliding interface", set);
     return names;
 }
 
@@ -91,7 +94,10 @@ void require_loads(const Scene& scene) {
 void require_neighbours(const Scene& scene) {
     for (const Contact& contact : scene.contacts) {
         require(contact.friction >= 0 && std::isfinite(contact.friction), "the friction of a contact is below 0");
-        require(std::isfinite(contact.gap) && contact.motion.allFinite(), "a contact has a number that is not finite");
+        const RigidMotion& motion = contact.motion;
+        require(std::isfinite(contact.gap) && motion.displacement.allFinite() && motion.turn.allFinite() &&
+                    motion.point.allFinite(),
+                "a contact has a number that is not finite");
         require_valid(contact.curve, "the curve of a contact");
         if (const auto* plane = std::get_if<HalfSpace>(&contact.body))
             require_unit(plane->normal, "the normal of a plane in contact");
@@ -104,6 +110,11 @@ void require_neighbours(const Scene& scene) {
     }
     for (const Sliding& sliding : scene.sliding) {
         require_positive(sliding.per_area, "the stiffness (kPa/mm) of a sliding interface");
+        if (sliding.sets) {
+            require((*sliding.sets)[0] != (*sliding.sets)[1],
+                    "the set '" + (*sliding.sets)[0] + "' cannot slide on itself");
+            continue;
+        }
         for (const int label : sliding.labels)
             require(scene.tissues.contains(label), "label " + std::to_string(label) +
                                                        " slides and has no tissue; add [label." +
@@ -126,6 +137,11 @@ void require_valid(const Solve& solve, const Scene& scene) {
 
 }  // namespace
 
+std::string sides_of(const Sliding& sliding) {
+    if (sliding.sets) return "the sets '" + (*sliding.sets)[0] + "' and '" + (*sliding.sets)[1] + "'";
+    return "labels " + std::to_string(sliding.labels[0]) + " and " + std::to_string(sliding.labels[1]);
+}
+
 void require_valid(const Scene& scene) {
     require(!scene.tissues.empty(), "the scene has no tissue; give each label a material");
     for (const auto& [label, tissue] : scene.tissues) {
@@ -135,6 +151,10 @@ void require_valid(const Scene& scene) {
         tled::require_valid(tissue.viscosity, name);
         require(tissue.growth > 0.2 && tissue.growth < 5,
                 "the growth of " + name + " is " + std::to_string(tissue.growth) + "; it lies between 0.2 and 5");
+        if (std::holds_alternative<std::monostate>(tissue.fibres)) continue;
+        require(std::holds_alternative<tled::TransverselyIsotropic>(tissue.material),
+                name + " has fibres and the law " + tled::law_name(tissue.material) +
+                    ", which knows none; take transversely-isotropic");
     }
     require_positive(scene.density, "the density (kg/mm³) of the tissue");
     for (const auto& [name, region] : scene.sets) require_valid(region, name, scene.sets);

@@ -5,7 +5,9 @@
 #include "imaging/volume.hpp"
 #include "meshing/tet_mesh.hpp"
 #include "simulation/curve.hpp"
+#include "simulation/fibres.hpp"
 #include "simulation/region.hpp"
+#include "simulation/rigid_motion.hpp"
 #include "tled/model.hpp"
 
 #include <map>
@@ -53,6 +55,7 @@ struct Tissue {
     /// g: unloaded, each length of the tissue becomes g times itself, over the length of the scene. On the way there
     /// the pressure of growth rises evenly and the moduli are those of the end (tled/growth.hpp, which names the laws).
     double growth = 1.0;
+    FibreField fibres{};  ///< of a transversely isotropic material, in place of its one direction
 };
 
 /// Displacement components that stay zero.
@@ -124,16 +127,22 @@ struct Contact {
     Body body;
     double gap = 0.0;  ///< mm, by which the body is smaller than stated
     double friction = 0.0;
-    Eigen::Vector3d motion = Eigen::Vector3d::Zero();  ///< mm, where the curve is 1
+    RigidMotion motion{};  ///< all of it where the curve is 1
     Curve curve{};
 };
 
-/// Two labels that slide on one another. Nodes that a third label touches stay joined.
+/// Two labels that slide on one another, or two sets of tissue, which may be of one label (a fissure, a cut). Nodes
+/// that other tissue touches stay joined.
 struct Sliding {
+    enum class Opening { Held, Free };
     std::array<int, 2> labels{0, 0};
-    double per_area = 100.0;  ///< kPa/mm, against opening and overlap
+    double per_area = 100.0;  ///< kPa/mm, against overlap, and against opening where that is held
     std::string except;       ///< a set of nodes that stay joined
+    Opening opening = Opening::Held;
+    std::optional<std::array<std::string, 2>> sets{};  ///< in place of the labels
 };
+/// "labels 1 and 2", "the sets 'upper' and 'lower'".
+std::string sides_of(const Sliding& sliding);
 
 /// Tissue that is taken out at a time.
 struct Resection {

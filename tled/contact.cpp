@@ -1,6 +1,7 @@
 #include "tled/contact.hpp"
 
 #include "core/errors.hpp"
+#include "tled/load_path.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -27,6 +28,12 @@ struct Touch {
     double push;  // mm beyond the surface to which the spring pulls
 };
 
+/// A pair that may part.
+struct Pair {
+    bool closed = true;
+    int openings = 0;
+};
+
 struct Gap {
     double distance;  // mm
     Vector3d normal;
@@ -36,10 +43,16 @@ class Rounds {
 public:
     Rounds(Engine& engine, const RestState& rest, const NodalConditions& conditions, const ContactOptions& options,
            Observer& observer)
-        : engine_(engine), rest_(rest), free_(conditions), options_(options), observer_(observer) {
-        contact_ = *conditions.effects.contact;
+        : engine_(engine),
+          rest_(rest),
+          free_(conditions),
+          stated_(conditions.effects.surface),
+          options_(options),
+          observer_(observer),
+          pairs_(stated_.parting.size()) {
+        if (conditions.effects.contact) contact_ = *conditions.effects.contact;
         free_.effects.contact.reset();
-        without_springs_.emplace(rest, free_);
+        decide_pairs();
         const Matrix3Xd diagonal = without_springs_->diagonal(free_);
         for (std::size_t i = 0; i < contact_.node.size(); ++i)
             candidates_.push_back({contact_.node[i], contact_.rest_position.col(static_cast<Eigen::Index>(i)),
@@ -49,9 +62,9 @@ public:
 
     ContactResult run(const Matrix3Xd* start) {
         Matrix3Xd u = start ? *start : Matrix3Xd::Zero(3, rest_.node_count);
-        follow(u);
+        begin(u);
         for (result_.rounds = 1;; ++result_.rounds) {
-            solve(u);
+            solve(u, result_.rounds == 1 ? start : &u);
             const bool changed = follow(u);
             if (!changed && settled(u)) break;
             if (result_.rounds == options_.most_rounds) fail(u);
@@ -69,11 +82,13 @@ private:
         return {d.value / steepness, d.gradient / steepness};
     }
 
-    void solve(Matrix3Xd& u) {
+    /// From `start`, or from rest; by way of smaller loads where all is too much at once.
+    void solve(Matrix3Xd& u, const Matrix3Xd* start) {
         const NodalConditions conditions = with_springs(u);
         const RestStiffness stiffness(rest_, conditions, *without_springs_);
         const EquilibriumResult& before = result_.equilibrium;
-        EquilibriumResult found = equilibrium(engine_, stiffness, conditions, options_.equilibrium, &u, observer_);
+        EquilibriumResult found = equilibrium_along_load(engine_, stiffness, conditions,
+                                                         {.equilibrium = options_.equilibrium}, start, observer_);
         found.force_evaluations += before.force_evaluations;
         found.lifted_residuals += before.lifted_residuals;
         u = found.displacement;
@@ -119,8 +134,45 @@ private:
         return result;
     }
 
-    /// Moves the ends of the springs on, lets go and takes hold; whether the set of touching nodes has changed.
+    void begin(const Matrix3Xd& u) {
+        follow_bodies(u);
+        for (std::size_t p = 0; p < pairs_.size(); ++p) pairs_[p].closed = overlap(stated_.parting[p], u) >= 0;
+        decide_pairs();
+    }
+
+    /// Whether anything has changed.
     bool follow(const Matrix3Xd& u) {
+        const bool bodies = follow_bodies(u), pairs = follow_pairs(u);
+        return bodies || pairs;
+    }
+
+    void decide_pairs() {
+        std::vector<bool> closed;
+        for (const Pair& pair : pairs_) closed.push_back(pair.closed);
+        free_.effects.surface = with_pairs_decided(stated_, closed);
+        without_springs_.emplace(rest_, free_);
+    }
+
+    /// Lets pairs go that are pulled and holds those that overlap; whether any has changed. Each time that a pair was
+    /// let go it may overlap a little more before it is held again: else one without force would open and close for
+    /// ever.
+    bool follow_pairs(const Matrix3Xd& u) {
+        bool changed = false;
+        for (std::size_t p = 0; p < pairs_.size(); ++p) {
+            Pair& pair = pairs_[p];
+            const double g = overlap(stated_.parting[p], u);
+            const bool closed = pair.closed ? g >= 0 : g > 0.1 * options_.penetration_mm * pair.openings;
+            if (closed == pair.closed) continue;
+            pair.closed = closed;
+            pair.openings += closed ? 0 : 1;
+            changed = true;
+        }
+        if (changed) decide_pairs();
+        return changed;
+    }
+
+    /// Moves the ends of the springs on, lets go and takes hold; whether the set of touching nodes has changed.
+    bool follow_bodies(const Matrix3Xd& u) {
         bool changed = false;
         for (std::size_t i = 0; i < candidates_.size(); ++i) {
             std::optional<Touch>& touch = touches_[i];
@@ -165,6 +217,8 @@ private:
     }
 
     void report(const Matrix3Xd& u) {
+        result_.pressing =
+            static_cast<int>(std::count_if(pairs_.begin(), pairs_.end(), [](const Pair& pair) { return pair.closed; }));
         result_.largest_penetration_mm = largest_penetration(u);
         result_.reaction = Matrix3Xd::Zero(3, rest_.node_count);
         for (std::size_t i = 0; i < candidates_.size(); ++i) {
@@ -179,26 +233,30 @@ private:
     [[noreturn]] void fail(const Matrix3Xd& u) const {
         throw SolverFailure("the contact does not settle: after " + std::to_string(result_.rounds) +
                             " rounds a node is " + std::to_string(largest_penetration(u)) +
-                            " mm inside an obstacle; apply the load in parts, refine the mesh at the contact, or take "
-                            "dynamics");
+                            " mm inside an obstacle, or pairs open and close; apply the load in parts, refine the mesh "
+                            "at the contact, or take dynamics");
     }
 
     Engine& engine_;
     const RestState& rest_;
-    NodalConditions free_;  // without contact
-    NodalContact contact_;
+    NodalConditions free_;  // without contact, with the pairs as this round has them
+    SurfaceEffects stated_;
+    NodalContact contact_;  // without nodes where there are no bodies
     const ContactOptions& options_;
     Observer& observer_;
     std::optional<RestStiffness> without_springs_;
     std::vector<Candidate> candidates_;
     std::vector<std::optional<Touch>> touches_;  // of each candidate
+    std::vector<Pair> pairs_;                    // of SurfaceEffects::parting
     ContactResult result_;
 };
 
 void require_usable(const NodalConditions& conditions, const ContactOptions& options) {
-    if (!conditions.effects.contact)
-        throw InvalidInput("equilibrium in contact needs conditions with contact: take equilibrium()");
-    for (const Obstacle& obstacle : conditions.effects.contact->obstacles)
+    const auto& contact = conditions.effects.contact;
+    if (!contact && conditions.effects.surface.parting.empty())
+        throw InvalidInput(
+            "equilibrium in contact needs conditions with contact or pairs that may part: take equilibrium()");
+    for (const Obstacle& obstacle : contact ? contact->obstacles : std::vector<Obstacle>{})
         if (obstacle.friction > 0)
             throw InvalidInput("an obstacle has a friction of " + std::to_string(obstacle.friction) +
                                ": where tissue comes to rest depends on its way then; take dynamics");

@@ -1,5 +1,5 @@
 #pragma once
-/// Static equilibrium of tissue that rests against rigid bodies.
+/// Static equilibrium of tissue that rests against rigid bodies, and of surfaces that may part.
 
 #include "tled/equilibrium.hpp"
 
@@ -17,16 +17,18 @@ struct ContactResult {
     int rounds = 0;
     int touching = 0;                     ///< nodes
     double largest_penetration_mm = 0.0;  ///< of any node that may touch
+    int pressing = 0;                     ///< pairs that may part and do not
     Eigen::Matrix3Xd reaction;            ///< of the obstacles on the nodes, mN, 3 × N
 };
 
-/// Equilibrium under `conditions` and the unilateral, frictionless contact that they hold; the engine is left without
-/// it. Each round solves the equilibrium with a spring along the surface's normal at every touching node, pushes the
-/// spring's end on by what the node still lies inside (the augmented Lagrangian of Simo and Laursen 1992: the springs
-/// end up carrying the contact force at no penetration, whatever their stiffness), lets go of nodes that are pulled and
-/// takes those that have entered.
+/// Equilibrium under `conditions` and the unilateral, frictionless contact that they hold, with bodies and of pairs
+/// that may part; the engine is left without it. Each round solves the equilibrium with a spring along the surface's
+/// normal at every touching node, pushes the spring's end on by what the node still lies inside (the augmented
+/// Lagrangian of Simo and Laursen 1992: the springs end up carrying the contact force at no penetration, whatever their
+/// stiffness), lets go of nodes that are pulled and takes those that have entered. Pairs that may part are held
+/// together or absent in a round: those that are pulled are let go for the next, those that overlap are held.
 ///
-/// Throws InvalidInput without contact or with friction, which depends on the way there: take dynamics; SolverFailure
+/// Throws InvalidInput without either or with friction, which depends on the way there: take dynamics; SolverFailure
 /// when the rounds do not settle, or from an equilibrium.
 ContactResult equilibrium_in_contact(Engine& engine, const RestState& rest, const NodalConditions& conditions,
                                      const ContactOptions& options = {}, const Eigen::Matrix3Xd* start = nullptr,

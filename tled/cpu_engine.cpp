@@ -151,13 +151,13 @@ public:
         set_time_step(coefficients.time_step);
         if (contact_) contact_->set_time_step(coefficients.time_step);
         T* u = displacement_.data();
-        with_effects([&](auto surface, auto fluid, auto contact) {
+        with_effects([&](auto surface, auto fluid, auto contact, auto turning) {
             for (int step = 0; step < steps; ++step)
                 sum_all_forces(surface, fluid, u, Advance::Yes, [&](std::size_t begin, std::size_t end) {
                     const std::size_t at = begin * record;
                     detail::advance_nodes(momentum, gain, &inverse_mass_[at], &force_load_[at], &force_[at], &free_[at],
                                           &increment_[at], u + at, end - begin);
-                    if constexpr (contact) contact_->settle(begin, end, free_.data(), increment_.data(), u);
+                    if constexpr (contact) contact_->settle(turning, begin, end, free_.data(), increment_.data(), u);
                 });
         });
     }
@@ -234,6 +234,7 @@ public:
         if (surface_) advance.parts.push_back("surface");
         if (fluid_) advance.parts.push_back("fluid");
         if (contact_) advance.parts.push_back("contact");
+        if (contact_ && contact_->turning()) advance.parts.push_back("turning");
         passes.push_back(advance);
         return passes;
     }
@@ -339,8 +340,8 @@ private:
         });
     }
 
-    /// body(surface, fluid, contact), each std::true_type where the scene has it and std::false_type otherwise: the
-    /// step of a scene is compiled for the effects that it has.
+    /// body(surface, fluid, contact, turning), each std::true_type where the scene has it and std::false_type
+    /// otherwise: the step of a scene is compiled for the effects that it has.
     template <class Body>
     void with_effects(const Body& body) {
         const auto choose = [](bool present, const auto& next) {
@@ -351,7 +352,12 @@ private:
         };
         choose(surface_.has_value(), [&](auto surface) {
             choose(fluid_.has_value(), [&](auto fluid) {
-                choose(contact_.has_value(), [&](auto contact) { body(surface, fluid, contact); });
+                choose(contact_.has_value(), [&](auto contact) {
+                    if constexpr (contact)
+                        choose(contact_->turning(), [&](auto turning) { body(surface, fluid, contact, turning); });
+                    else
+                        body(surface, fluid, contact, std::false_type{});
+                });
             });
         });
     }
@@ -443,7 +449,7 @@ private:
 
     /// f_ext + f_spring − f_int, masked by the constraints.
     [[nodiscard]] Eigen::Matrix3Xd residual_at(T* u) {
-        with_effects([&](auto surface, auto fluid, auto) {
+        with_effects([&](auto surface, auto fluid, auto, auto) {
             sum_all_forces(surface, fluid, u, Advance::No, [&](std::size_t begin, std::size_t end) {
                 for (std::size_t at = begin * record; at < end * record; ++at)
                     force_[at] = free_[at] * (force_load_[at] - force_[at]);

@@ -34,7 +34,7 @@ std::string unsupported(const Model& model, const NodalConditions& conditions) {
     const NodalEffects& effects = conditions.effects;
     if (model.hexahedra.count() > 0) return "hexahedra have no estimate";
     if (!effects.surface.empty() || effects.fluid || effects.contact) {
-        return "pressures, membranes, sliding pairs, fluid and contact have no estimate";
+        return "pressures, membranes, pairs that slide or part, fluid and contact have no estimate";
     }
     return {};
 }

@@ -25,9 +25,10 @@ constexpr double loose_tolerance = 1.0;
 constexpr double fewest_held = 10;  // steps between two changes of the conditions
 
 /// Whether something may give energy back or do work that no potential tells: viscous tissue, a pressure on a surface
-/// with a moving rim, an obstacle that moves.
+/// with a moving rim, an obstacle that moves, a step over the kink of a spring to one side.
 bool energy_may_grow(const RestState& rest, const NodalEffects& effects) {
-    return !rest.viscosity.empty() || effects.contact || effects.surface.pressure.size() > 0;
+    return !rest.viscosity.empty() || effects.contact || effects.surface.pressure.size() > 0 ||
+           !effects.surface.parting.empty();
 }
 
 class Run {
@@ -95,10 +96,31 @@ private:
         }
     }
 
+    /// Which of the pairs that may part press in a mode is not known beforehand: all are held together for it, which
+    /// is stiffest.
+    HighestMode stiffest_mode(const Matrix3Xd& displacement, int iterations, const Matrix3Xd* start = nullptr) {
+        const SurfaceEffects& surface = conditions_->effects.surface;
+        if (surface.parting.empty()) return highest_mode(engine_, mass_, displacement, iterations, start);
+        NodalConditions closed = *conditions_;
+        closed.effects.surface = with_pairs_decided(surface, std::vector<bool>(surface.parting.size(), true));
+        engine_.set_conditions(closed);
+        HighestMode mode = highest_mode(engine_, mass_, displacement, iterations, start);
+        engine_.set_conditions(*conditions_);
+        return mode;
+    }
+
+    /// s, 2/ω; with pairs that may part half of it. A node comes to a spring to one side with the increment −v and
+    /// leaves it with (ω Δt)² v − v where it has gone deepest. A bar that bounces for 2.4 s gained 3 % of its energy at
+    /// 1/ω and 30 % at 1.4/ω, and flew away at 1.6/ω.
+    [[nodiscard]] double critical_step_of(const HighestMode& mode) const {
+        const bool to_one_side = !conditions_->effects.surface.parting.empty();
+        return (to_one_side ? 1 : 2) / std::sqrt(mode.eigenvalue);
+    }
+
     void choose_step(const Matrix3Xd& displacement) {
-        HighestMode mode = highest_mode(engine_, mass_, displacement, first_iterations);
+        HighestMode mode = stiffest_mode(displacement, first_iterations);
         mode_ = std::move(mode.shape);
-        result_.critical_step = mode.eigenvalue > 0 ? 2 / std::sqrt(mode.eigenvalue) : end_time_ - start_time_;
+        result_.critical_step = mode.eigenvalue > 0 ? critical_step_of(mode) : end_time_ - start_time_;
         if (!std::isfinite(result_.critical_step))
             throw SolverFailure("the start of the dynamics has forces that are not finite: no step is stable there");
         if (options_.step > result_.critical_step)
@@ -198,11 +220,11 @@ private:
         Matrix3Xd start = mode_;
         for (Eigen::Index i = 0; i < start.size(); ++i)
             start.reshaped()[i] += 0.02 * std::sin(1.7 * static_cast<double>(i) + 0.3);
-        HighestMode mode = highest_mode(engine_, mass_, result_.state.displacement, later_iterations, &start);
+        HighestMode mode = stiffest_mode(result_.state.displacement, later_iterations, &start);
         engine_.return_to_kept_state();
         mode_ = std::move(mode.shape);
         if (!(mode.eigenvalue > 0)) return;
-        const double critical = 2 / std::sqrt(mode.eigenvalue);
+        const double critical = critical_step_of(mode);
         result_.critical_step = std::min(result_.critical_step, critical);
         if (result_.step <= cutting_margin * critical) return;
         observer_.note("tissue stiffened: the time step is cut to " + std::to_string(1e6 * options_.safety * critical) +

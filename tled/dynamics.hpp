@@ -53,11 +53,11 @@ struct DynamicsResult {
 };
 
 /// Advances by `duration` (s) under constant conditions with the engine's mass `mass` (3 × N, kg; set here). Loads come
-/// at once. A step above the critical one is refused (InvalidInput). When energy grows, tissue inverts that must not,
-/// or a value is not finite, the run goes back to the last good state and takes half the step; after six cuts it throws
-/// SolverFailure with cause, time and place, and leaves the engine in the last good state. Viscous tissue may give back
-/// what it stored, and pressures and obstacles may do work that no potential tells, so only a doubling of energy counts
-/// as growth there.
+/// at once. A step above the critical one, which pairs that may part halve, is refused (InvalidInput). When energy
+/// grows, tissue inverts that must not, or a value is not finite, the run goes back to the last good state and takes
+/// half the step; after six cuts it throws SolverFailure with cause, time and place, and leaves the engine in the last
+/// good state. Viscous tissue may give back what it stored, pressures and obstacles may do work that no potential
+/// tells, and steps go over the kink of pairs that may part, so only a doubling of energy counts as growth there.
 DynamicsResult dynamics(Engine& engine, const RestState& rest, const Eigen::Matrix3Xd& mass,
                         const NodalConditions& conditions, const DynamicsState& start, double duration,
                         const DynamicsOptions& options = {}, Observer& observer = silent_observer());

@@ -51,13 +51,14 @@ void add_membranes(const SurfaceEffects& effects, const Matrix3Xd& x, Matrix3Xd&
     }
 }
 
-void add_sliding(const SurfaceEffects& effects, const Matrix3Xd& u, Matrix3Xd& force) {
-    for (const SlidingPair& pair : effects.sliding) {
-        const Vector3d gap = u.col(pair.first) - u.col(pair.second);
-        const Vector3d pull = pair.stiffness * pair.normal.dot(gap) * pair.normal;
-        force.col(pair.first) -= pull;
-        force.col(pair.second) += pull;
-    }
+void add_pair(const SlidingPair& pair, double g, Matrix3Xd& force) {
+    force.col(pair.first) -= pair.stiffness * g * pair.normal;
+    force.col(pair.second) += pair.stiffness * g * pair.normal;
+}
+
+void add_pairs(const SurfaceEffects& effects, const Matrix3Xd& u, Matrix3Xd& force) {
+    for (const SlidingPair& pair : effects.sliding) add_pair(pair, overlap(pair, u), force);
+    for (const SlidingPair& pair : effects.parting) add_pair(pair, std::max(overlap(pair, u), 0.0), force);
 }
 
 /// Six times the volume between faces and the origin.
@@ -84,12 +85,12 @@ double membrane_energy(const SurfaceEffects& effects, const Matrix3Xd& x) {
     return energy;
 }
 
-double sliding_energy(const SurfaceEffects& effects, const Matrix3Xd& u) {
+double energy_of_pairs(const SurfaceEffects& effects, const Matrix3Xd& u) {
+    const auto square = [](double g) { return g * g; };
     double energy = 0;
-    for (const SlidingPair& pair : effects.sliding) {
-        const double gap = pair.normal.dot(u.col(pair.first) - u.col(pair.second));
-        energy += 0.5 * pair.stiffness * gap * gap;
-    }
+    for (const SlidingPair& pair : effects.sliding) energy += 0.5 * pair.stiffness * square(overlap(pair, u));
+    for (const SlidingPair& pair : effects.parting)
+        energy += 0.5 * pair.stiffness * square(std::max(overlap(pair, u), 0.0));
     return energy;
 }
 
@@ -125,12 +126,16 @@ CubicWeights cubic_weights(double t) {
 
 }  // namespace
 
+double overlap(const SlidingPair& pair, const Matrix3Xd& u) {
+    return pair.normal.dot(u.col(pair.first) - u.col(pair.second));
+}
+
 Matrix3Xd surface_force(const SurfaceEffects& effects, const Matrix3Xd& position, const Matrix3Xd& u) {
     const Matrix3Xd x = position + u;
     Matrix3Xd force = Matrix3Xd::Zero(3, u.cols());
     add_pressures(effects, x, force);
     add_membranes(effects, x, force);
-    add_sliding(effects, u, force);
+    add_pairs(effects, u, force);
     return force;
 }
 
@@ -144,15 +149,17 @@ Matrix3Xd fluid_force(const NodalFluid& fluid, const Matrix3Xd& u) {
 double energy(const NodalEffects& effects, const Matrix3Xd& position, const Matrix3Xd& u) {
     const Matrix3Xd x = position + u;
     double sum = pressure_energy(effects.surface, position, x) + membrane_energy(effects.surface, x) +
-                 sliding_energy(effects.surface, u);
+                 energy_of_pairs(effects.surface, u);
     if (effects.fluid) sum += fluid_energy(*effects.fluid, u);
     return sum;
 }
 
 Distance distance_to(const Obstacle& obstacle, const Vector3d& position) {
     const DistanceGrid& grid = *obstacle.surface;
+    const Eigen::Matrix3d& rotation = obstacle.placement.rotation;
     const Eigen::Matrix3d to_grid = grid.steps.inverse();
-    const Vector3d at = to_grid * (position - obstacle.shift - grid.origin);
+    const Vector3d in_body = rotation.transpose() * (position - obstacle.placement.shift);
+    const Vector3d at = to_grid * (in_body - grid.origin);
     const Vector3d corner = at.array().floor();
     if (!((corner.array() >= 1).all() && (corner.array() <= grid.size.cast<double>().array() - 3).all()))
         return {std::numeric_limits<double>::infinity(), Vector3d::Zero()};
@@ -180,7 +187,7 @@ Distance distance_to(const Obstacle& obstacle, const Vector3d& position) {
         value += z.value[k] * of_layer;
         slope += Vector3d(z.value[k] * along_x, z.value[k] * along_y, z.slope[k] * of_layer);
     }
-    return {value, to_grid.transpose() * slope};
+    return {value, rotation * (to_grid.transpose() * slope)};
 }
 
 Vector3d contact_correction(const Vector3d& normal, double depth, double friction, const Vector3d& v) {
@@ -197,8 +204,9 @@ Motion in_contact(const std::vector<Obstacle>& obstacles, const Vector3d& X, con
         const Distance distance = distance_to(obstacle, X + motion.u);
         const double steepness = distance.gradient.norm();
         if (!(distance.value < 0) || !(steepness > 0)) continue;
+        const Vector3d of_body = obstacle.velocity.of_origin + obstacle.velocity.spin.cross(X + motion.u);
         const Vector3d correction = contact_correction(distance.gradient / steepness, -distance.value / steepness,
-                                                       obstacle.friction, motion.v - time_step * obstacle.velocity);
+                                                       obstacle.friction, motion.v - time_step * of_body);
         motion.u += correction;
         motion.v += correction;
     }

@@ -28,10 +28,11 @@ struct Membrane {
     double thickness = 0.0;      ///< mm, at rest
 };
 
-/// Two nodes of surfaces that slide on one another, at one place at rest: energy ½ k (n·(u_first − u_second))².
+/// Two nodes of surfaces that slide on one another, at one place at rest: energy ½ k g² of how far they overlap,
+/// g = n·(u_first − u_second). Pairs that hold together have it for g < 0 too, pairs that may part have none there.
 struct SlidingPair {
     int first = -1, second = -1;
-    Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< n, unit vector
+    Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< n, unit vector out of the surface of the first
     double stiffness = 0.0;                            ///< k, mN/mm
 };
 
@@ -65,14 +66,30 @@ private:
     std::shared_ptr<const DistanceGrid> grid_;
 };
 
+/// Where a rigid body is: its point that was sampled at X is at rotation · X + shift.
+struct RigidPlacement {
+    Eigen::Vector3d shift = Eigen::Vector3d::Zero();         ///< mm
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< proper orthogonal
+    bool operator==(const RigidPlacement&) const = default;
+};
+
+/// How a rigid body moves: its point at x has the velocity of_origin + spin × x.
+struct RigidVelocity {
+    Eigen::Vector3d of_origin = Eigen::Vector3d::Zero();  ///< mm/s, of the body's point at the origin of space
+    Eigen::Vector3d spin = Eigen::Vector3d::Zero();       ///< rad/s
+    bool operator==(const RigidVelocity&) const = default;
+};
+
 /// A rigid body that tissue cannot enter but can leave.
 struct Obstacle {
     SharedGrid surface;
-    Eigen::Vector3d shift = Eigen::Vector3d::Zero();     ///< translation of the body from where it was sampled, mm
-    double friction = 0.0;                               ///< Coulomb's coefficient
-    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< of the body, mm/s, for friction alone: what moves the body
-                                                         ///< is its shift from one set of conditions to the next
+    RigidPlacement placement{};
+    double friction = 0.0;     ///< Coulomb's coefficient
+    RigidVelocity velocity{};  ///< for friction alone: what moves the body is its placement from one set of conditions
+                               ///< to the next
 };
+/// Whether the velocity of any depends on the place.
+bool turns(const std::vector<Obstacle>& obstacles);
 
 /// Nodes of the tissue's surface that may touch the obstacles. In dynamics a node that enters one is put back onto its
 /// surface within the step and loses the velocity towards it, and up to `friction` times as much of that along it,
@@ -86,11 +103,12 @@ struct RigidContact {
 struct Effects {
     std::vector<SurfacePressure> pressures;
     std::vector<Membrane> membranes;
-    std::vector<SlidingPair> sliding;
+    std::vector<SlidingPair> sliding;  ///< that hold together
+    std::vector<SlidingPair> parting;  ///< that press on one another or are apart
     std::optional<Fluid> fluid;
     std::optional<RigidContact> contact;
     [[nodiscard]] bool none() const {
-        return pressures.empty() && membranes.empty() && sliding.empty() && !fluid && !contact;
+        return pressures.empty() && membranes.empty() && sliding.empty() && parting.empty() && !fluid && !contact;
     }
 };
 

@@ -22,6 +22,8 @@ void require_usable(const NodalConditions& conditions, const EquilibriumOptions&
     if (start != nullptr && (start->cols() != conditions.constrained.cols() || !start->allFinite()))
         throw InvalidInput("equilibrium: the start has " + std::to_string(start->cols()) + " columns for " +
                            std::to_string(conditions.constrained.cols()) + " nodes, or values that are not finite");
+    if (!conditions.effects.surface.parting.empty())
+        throw InvalidInput("equilibrium: some pairs may part, which it does not decide; take equilibrium_in_contact()");
     if (options.rest != nullptr) detail::require_held(*options.rest, conditions);
 }
 

@@ -85,7 +85,7 @@ void gather_membranes(const std::vector<Membrane>& membranes, const RestState& r
     }
 }
 
-void gather_sliding(const std::vector<SlidingPair>& pairs, const RestState& rest, SurfaceEffects& effects) {
+void require_pairs(const std::vector<SlidingPair>& pairs, const RestState& rest) {
     for (const SlidingPair& pair : pairs) {
         require_node(pair.first, rest, "a sliding pair");
         require_node(pair.second, rest, "a sliding pair");
@@ -96,7 +96,6 @@ void gather_sliding(const std::vector<SlidingPair>& pairs, const RestState& rest
             throw InvalidInput("the normal of the sliding pair at node " + std::to_string(pair.first) +
                                " is not a unit vector");
     }
-    effects.sliding = pairs;
 }
 
 /// Entries of every node of `node`, from `corners` nodes of each item.
@@ -122,7 +121,8 @@ void list_by_node(SurfaceEffects& effects) {
     std::vector<int>& node = effects.node;
     for (const Matrix3Xi* faces : {&effects.pressure_faces, &effects.membrane_faces})
         node.insert(node.end(), faces->reshaped().begin(), faces->reshaped().end());
-    for (const SlidingPair& pair : effects.sliding) node.insert(node.end(), {pair.first, pair.second});
+    for (const std::vector<SlidingPair>* pairs : {&effects.sliding, &effects.parting})
+        for (const SlidingPair& pair : *pairs) node.insert(node.end(), {pair.first, pair.second});
     std::sort(node.begin(), node.end());
     node.erase(std::unique(node.begin(), node.end()), node.end());
     const auto of_faces = [&](const Matrix3Xi& faces) {
@@ -130,11 +130,14 @@ void list_by_node(SurfaceEffects& effects) {
     };
     effects.pressure_incidence = of_faces(effects.pressure_faces);
     effects.membrane_incidence = of_faces(effects.membrane_faces);
-    effects.sliding_incidence =
-        incidence_of(node, static_cast<int>(effects.sliding.size()), 2, [&](int pair, int second) {
-            const SlidingPair& each = effects.sliding[static_cast<std::size_t>(pair)];
+    const auto of_pairs = [&](const std::vector<SlidingPair>& pairs) {
+        return incidence_of(node, static_cast<int>(pairs.size()), 2, [&](int pair, int second) {
+            const SlidingPair& each = pairs[static_cast<std::size_t>(pair)];
             return second == 0 ? each.first : each.second;
         });
+    };
+    effects.sliding_incidence = of_pairs(effects.sliding);
+    effects.parting_incidence = of_pairs(effects.parting);
 }
 
 /// Shares of the elements' volumes, mm³.
@@ -174,8 +177,12 @@ void require_valid(const Obstacle& obstacle) {
                            " values for " + std::to_string(grid.size.cast<long>().prod()) + " samples");
     if (!grid.origin.allFinite() || !grid.steps.allFinite() || !(std::abs(grid.steps.determinant()) > 0))
         throw InvalidInput("the distance grid of an obstacle has steps that do not span space");
-    if (!obstacle.shift.allFinite()) throw InvalidInput("the shift of an obstacle is not finite");
-    if (!obstacle.velocity.allFinite()) throw InvalidInput("the velocity of an obstacle is not finite");
+    if (!obstacle.placement.shift.allFinite()) throw InvalidInput("the shift of an obstacle is not finite");
+    const Eigen::Matrix3d& rotation = obstacle.placement.rotation;
+    if (!((rotation.transpose() * rotation).isIdentity(1e-6) && rotation.determinant() > 0))
+        throw InvalidInput("the rotation of an obstacle is no proper orthogonal matrix");
+    if (!obstacle.velocity.of_origin.allFinite() || !obstacle.velocity.spin.allFinite())
+        throw InvalidInput("the velocity of an obstacle is not finite");
     if (!std::all_of(grid.distance.begin(), grid.distance.end(), [](float d) { return std::isfinite(d); }))
         throw InvalidInput("the distance grid of an obstacle has a value that is not finite");
     if (!(obstacle.friction >= 0) || !std::isfinite(obstacle.friction))
@@ -202,15 +209,32 @@ NodalContact nodal_contact(const RigidContact& contact, const RestState& rest) {
 
 }  // namespace
 
+bool turns(const std::vector<Obstacle>& obstacles) {
+    return std::any_of(obstacles.begin(), obstacles.end(),
+                       [](const Obstacle& each) { return !each.velocity.spin.isZero(0.0); });
+}
+
 NodalEffects nodal_effects(const Effects& effects, const RestState& rest) {
     NodalEffects nodal;
     gather_pressures(effects.pressures, rest, nodal.surface);
     gather_membranes(effects.membranes, rest, nodal.surface);
-    gather_sliding(effects.sliding, rest, nodal.surface);
+    for (const std::vector<SlidingPair>* pairs : {&effects.sliding, &effects.parting}) require_pairs(*pairs, rest);
+    nodal.surface.sliding = effects.sliding;
+    nodal.surface.parting = effects.parting;
     list_by_node(nodal.surface);
     if (effects.fluid) nodal.fluid = nodal_fluid(*effects.fluid, rest);
     if (effects.contact && !effects.contact->nodes.empty()) nodal.contact = nodal_contact(*effects.contact, rest);
     return nodal;
+}
+
+SurfaceEffects with_pairs_decided(const SurfaceEffects& effects, const std::vector<bool>& closed) {
+    SurfaceEffects decided = effects;
+    decided.parting.clear();
+    for (std::size_t p = 0; p < effects.parting.size(); ++p)
+        if (closed[p]) decided.sliding.push_back(effects.parting[p]);
+    decided.node.clear();
+    list_by_node(decided);
+    return decided;
 }
 
 }  // namespace tissuewarp::tled

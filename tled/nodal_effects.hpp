@@ -29,6 +29,9 @@ struct SurfaceEffects {
     std::vector<SlidingPair> sliding;
     Incidence sliding_incidence;  ///< entries 2·pair + (0: first, 1: second)
 
+    std::vector<SlidingPair> parting;
+    Incidence parting_incidence;  ///< likewise
+
     [[nodiscard]] bool empty() const { return node.empty(); }
 };
 
@@ -52,7 +55,7 @@ struct NodalContact {
     std::vector<int> node;           ///< ascending
     Eigen::Matrix3Xd rest_position;  ///< 3 × as many, mm
     std::vector<Obstacle> obstacles;
-    std::vector<GridReach> reach;  ///< of the obstacles, wherever they are shifted to
+    std::vector<GridReach> reach;  ///< of the obstacles, wherever they are
 };
 
 struct NodalEffects {
@@ -64,7 +67,13 @@ struct NodalEffects {
 /// Throws InvalidInput on nodes out of range, faces without area, numbers that are not finite or have no meaning.
 NodalEffects nodal_effects(const Effects& effects, const RestState& rest);
 
-/// Force of pressures, membranes and sliding pairs on every node at displacement `u` (3 × N, mm), mN, 3 × N.
+/// g of a pair, mm: how far it overlaps, negative where it is apart.
+double overlap(const SlidingPair& pair, const Eigen::Matrix3Xd& u);
+
+/// The same effects with every pair that may part decided: those of `closed` hold together, the others are absent.
+SurfaceEffects with_pairs_decided(const SurfaceEffects& effects, const std::vector<bool>& closed);
+
+/// Force of pressures, membranes and pairs on every node at displacement `u` (3 × N, mm), mN, 3 × N.
 Eigen::Matrix3Xd surface_force(const SurfaceEffects& effects, const Eigen::Matrix3Xd& position,
                                const Eigen::Matrix3Xd& u);
 /// Lift on every node, mN, 3 × N.

@@ -75,11 +75,12 @@ Effects effects_on(const Part& part, const Effects& whole) {
     int outside = 0;
     for (SurfacePressure& each : effects.pressures) each.faces = renumbered(part, each.faces, outside);
     for (Membrane& each : effects.membranes) each.faces = renumbered(part, each.faces, outside);
-    for (SlidingPair& pair : effects.sliding) {
-        pair.first = renumbered(part, pair.first);
-        pair.second = renumbered(part, pair.second);
-        outside += pair.first < 0 || pair.second < 0;
-    }
+    for (std::vector<SlidingPair>* pairs : {&effects.sliding, &effects.parting})
+        for (SlidingPair& pair : *pairs) {
+            pair.first = renumbered(part, pair.first);
+            pair.second = renumbered(part, pair.second);
+            outside += pair.first < 0 || pair.second < 0;
+        }
     if (outside > 0)
         throw InvalidInput("the region leaves out " + std::to_string(outside) +
                            " faces or pairs on which a pressure, a membrane or sliding acts: keep the tissue there");

@@ -11,11 +11,11 @@
 
 namespace tissuewarp::tled {
 
-/// K₀ + springs, membranes and sliding pairs of the rest configuration with constrained degrees of freedom removed.
-/// Moving targets do not change it; pressures, fluid and contact are not in it. Free rigid modes are excluded by the
-/// springs or prescribed displacements; without them construction throws InvalidInput ("nothing holds the tissue").
-/// What needs the factor makes it at first, once, and throws InvalidInput where the stiffness is not positive definite
-/// or SolverFailure without memory for it; multiplications, diagonal and approximations do without.
+/// K₀ + springs, membranes and pairs (which touch at rest) of the rest configuration, constrained degrees of freedom
+/// removed. Moving targets do not change it; pressures, fluid and contact are not in it. Free rigid modes are excluded
+/// by the springs or prescribed displacements; without them construction throws InvalidInput ("nothing holds the
+/// tissue"). What needs the factor makes it at first, once, and throws InvalidInput where the stiffness is not positive
+/// definite or SolverFailure without memory for it; multiplications, diagonal and approximations do without.
 class RestStiffness {
 public:
     RestStiffness(const RestState& rest, const NodalConditions& conditions);

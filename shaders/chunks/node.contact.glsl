@@ -9,9 +9,10 @@ layout(location = 15) uniform float time_step;  // s
 /// touches nothing; rest positions, mm, from a point near all of them; samples.
 layout(std430, binding = BINDING_CONTACT) readonly buffer Contact { uint contact[]; };
 
-const uint obstacle_words = 23u;  // rows of the map from mm to steps of the samples, 1/mm; place of sample (0, 0, 0), mm from
+const uint obstacle_words = 26u;  // rows of the map from mm to steps of the samples, 1/mm; place of sample (0, 0, 0), mm from
                                   // the same point; size; the first sample; reach of the interpolation, mm; friction; the
-                                  // inverse of the largest steepness; reach of a tangent, mm; velocity, mm/s
+                                  // inverse of the largest steepness; reach of a tangent, mm; velocity at the common
+                                  // point, mm/s; spin, rad/s
 
 float contact_number(uint at) { return uintBitsToFloat(contact[at]); }
 vec3 contact_vector(uint at) { return vec3(contact_number(at), contact_number(at + 1u), contact_number(at + 2u)); }
@@ -21,7 +22,7 @@ uint place_of_obstacle(uint o) { return 1u + obstacle_words * o; }
 /// 0 where node a touches nothing.
 uint place_in_contact(uint a) { return contact[place_of_obstacle(obstacle_count()) + a]; }
 float friction_of(uint obstacle) { return contact_number(obstacle + 17u); }
-/// How far the obstacle itself goes in a step, mm.
+/// How far the obstacle itself goes in a step at the common point, and everywhere where it does not turn, mm.
 vec3 increment_of(uint obstacle) { return time_step * contact_vector(obstacle + 20u); }
 
 /// Weights of the four samples about a point a fraction t past the second, and their derivatives (Keys 1981, eq. 15 with

@@ -1,7 +1,8 @@
-// Needs: node.contact, patch, patch.state, patch.node.
+// Needs: node.contact, patch, patch.state, patch.node; node.turning where its flag is 1.
 // Gives: early_tangent, settle: after a step has brought slot s to u by v, contact with all obstacles in
 // turn. It looks at samples only where the slot has left the reach of the tangent that it keeps.
 //! define STAYS
+//! define HAS_TURNING
 
 layout(location = 14) uniform uint obstacles;
 
@@ -69,8 +70,11 @@ void settle(uint s, bvec3 constrained, KeptTangent tangent, inout vec3 u, inout 
         float depth = -(tangent.height + dot(tangent.normal, way));
         if (!(depth > 0.0)) continue;
         uint obstacle = place_of_obstacle(o);
-        vec3 correction =
-            contact_correction(tangent.normal, depth, friction_of(obstacle), settled_v - increment_of(obstacle));
+        vec3 slip = settled_v - increment_of(obstacle);
+#if HAS_TURNING
+        slip -= turn_of(obstacle, contact_vector(place_in_contact(node_of_slot[s])) + settled_u);
+#endif
+        vec3 correction = contact_correction(tangent.normal, depth, friction_of(obstacle), slip);
         settled_u += correction;
         settled_v += correction;
     }

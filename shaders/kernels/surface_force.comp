@@ -4,6 +4,7 @@
 //! define HAS_PRESSURE
 //! define HAS_MEMBRANE
 //! define HAS_SLIDING
+//! define HAS_PARTING
 
 layout(std430, binding = BINDING_SURFACE_FORCE) writeonly buffer SurfaceForce { vec4 surface_force_of_node[]; };
 
@@ -21,6 +22,9 @@ void main() {
 #endif
 #if HAS_SLIDING
     force += sliding_force(s, u);
+#endif
+#if HAS_PARTING
+    force += parting_force(s, u);
 #endif
     surface_force_of_node[a] = vec4(force, 0.0);
 }

@@ -3,9 +3,13 @@
 #include "apps/scene_file.hpp"
 
 #include "core/errors.hpp"
+#include "imaging/image_io.hpp"
+#include "meshing/mesh_io.hpp"
+#include "meshing/primitives.hpp"
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
@@ -168,6 +172,83 @@ TEST_F(SceneFiles, KnowTheLawsAndTissues) {
     EXPECT_EQ(brain.viscosity.terms.size(), 2u);
     const auto viscous = read(head + "preset = \"brain-taylor-2007\"\nprony = [[0.3, 0.5]]\n").tissues.at(1);
     EXPECT_EQ(viscous.viscosity.terms.at(0).relative_modulus, 0.3);
+}
+
+TEST_F(SceneFiles, TurnBodiesByDegreesAboutAnAxisThroughAPoint) {
+    const std::string ball = cube + "[[contact]]\nball = { centre_mm = [5, 5, 40], radius_mm = 4 }\n";
+    const simulation::RigidMotion still = read(ball).contacts.at(0).motion;
+    EXPECT_TRUE(still.turn.isZero(0.0) && still.displacement.isZero(0.0));
+    const simulation::RigidMotion motion =
+        read(ball +
+             "displacement_mm = [0, 0, -3]\nrotation = { point_mm = [1, 2, 3], axis = [0, -2, 0], degrees = 90 }\n")
+            .contacts.at(0)
+            .motion;
+    EXPECT_EQ(motion.displacement, Eigen::Vector3d(0, 0, -3));
+    EXPECT_EQ(motion.point, Eigen::Vector3d(1, 2, 3));
+    EXPECT_LT((motion.turn - Eigen::Vector3d(0, -std::acos(-1.0) / 2, 0)).norm(), 1e-12);
+    const auto turned = [&](const std::string& keys) { return refusal(ball + "rotation = { " + keys + " }\n"); };
+    EXPECT_THAT(turned("point_mm = [1, 2, 3], axis = [0, 1, 0]"),
+                testing::AllOf(HasSubstr("line 12"), HasSubstr("lacks 'degrees'")));
+    EXPECT_THAT(turned("point_mm = [1, 2, 3], degrees = 5"), HasSubstr("axis"));
+    EXPECT_THAT(turned("axis = [0, 1, 0], degrees = 5"), HasSubstr("lacks 'point_mm'"));
+    EXPECT_THAT(turned("point_mm = [1, 2, 3], axis = [0, 0, 0], degrees = 5"), HasSubstr("[0, 0, 0]"));
+    EXPECT_THAT(turned("point_mm = [1, 2, 3], axis = [0, 1, 0], degrees = 5, radians = 1"), HasSubstr("'radians'"));
+    EXPECT_THAT(turned("point_mm = [1, 2, 3], axis = [0, 1, 0], degrees = 1e6"), HasSubstr("36000"));
+    EXPECT_THAT(turned("point_mm = [1, 2, 3], axis = [0, 1, 0], degree = 5"), HasSubstr("'degrees'"));
+    EXPECT_THAT(refusal(ball + "rotaton = { }\n"), HasSubstr("did you mean 'rotation'"));
+}
+
+TEST_F(SceneFiles, TakeFibresOfOneKind) {
+    const std::string law =
+        "[label.1]\nlaw = \"transversely-isotropic\"\nshear_modulus_kpa = 1\n"
+        "bulk_modulus_kpa = 40\nfibre_modulus_kpa = 5\n";
+    const std::string box = "[geometry]\nbox = { size_mm = [10, 10, 10], cells = [1, 1, 1] }\n" + law;
+    const std::string mesh = "[geometry]\nmesh = \"bar.vtu\"\n" + law;
+    const meshing::TetMesh bar = meshing::box_mesh({10, 10, 10}, {1, 1, 1});
+    const Eigen::MatrixXd along = Eigen::Vector3d(0, 3, 0).replicate(1, bar.tet_count());
+    meshing::write_vtu(bar, folder_ / "bar.vtu", {}, {{"fibre", along}, {"J", along.row(1)}});
+    imaging::Geometry grid;
+    grid.size = {4, 4, 4};
+    imaging::write_volume(imaging::Volume(grid, CV_32FC3), folder_ / "fibres.nii.gz");
+    imaging::write_volume(imaging::Volume(grid, CV_32FC1), folder_ / "numbers.nii.gz");
+
+    const auto& direction =
+        std::get<tled::TransverselyIsotropic>(read(box + "fibre = [0, 2, 0]\n").tissues.at(1).material);
+    EXPECT_EQ(direction.fibre, Eigen::Vector3d(0, 1, 0));
+    const auto volume = read(box + "fibre_file = \"fibres.nii.gz\"\n").tissues.at(1).fibres;
+    EXPECT_EQ(std::get<simulation::FibreVolume>(volume).directions.geometry.size, grid.size);
+    const auto array = read(mesh + "fibre_array = \"fibre\"\n").tissues.at(1).fibres;
+    EXPECT_EQ(std::get<simulation::FibresOfTetrahedra>(array).directions, along);
+
+    EXPECT_THAT(refusal(box), testing::AllOf(HasSubstr("line 3"), HasSubstr("'fibre_file'")));
+    EXPECT_THAT(refusal(box + "fibre = [0, 2, 0]\nfibre_file = \"fibres.nii.gz\"\n"), HasSubstr("takes one of"));
+    EXPECT_THAT(refusal(box + "fibre_file = \"numbers.nii.gz\"\n"),
+                testing::AllOf(HasSubstr("line 8"), HasSubstr("three components")));
+    EXPECT_THAT(refusal(box + "fibre_array = \"fibre\"\n"), testing::AllOf(HasSubstr("line 8"), HasSubstr("'mesh'")));
+    EXPECT_THAT(refusal(mesh + "fibre_array = \"J\"\n"), testing::AllOf(HasSubstr("line 8"), HasSubstr("three")));
+    EXPECT_THAT(refusal(box + "fiber = [0, 2, 0]\n"), testing::AllOf(HasSubstr("line 8"), HasSubstr("'fibre'")));
+    EXPECT_THAT(refusal(box + "fibre_arry = \"a\"\n"), HasSubstr("did you mean 'fibre_array'"));
+    EXPECT_THAT(refusal(cube.substr(0, cube.find("[set")) + "fibre = [0, 2, 0]\n"), HasSubstr("'fibre'"));
+    EXPECT_THROW((void)read(mesh + "fibre_array = \"fiber\"\n"), InvalidInput);
+}
+
+TEST_F(SceneFiles, OpenInterfacesBetweenLabelsOrSets) {
+    using simulation::Sliding;
+    const std::string sets = cube + "[set.upper]\nhalf_space = { point_mm = [0, 0, 15], normal = [0, 0, -1] }\n";
+    const Sliding free = read(sets + "[[sliding]]\nsets = [\"base\", \"upper\"]\nopening = \"free\"\n").sliding.at(0);
+    EXPECT_EQ((*free.sets)[1], "upper");
+    EXPECT_EQ(free.opening, Sliding::Opening::Free);
+    const Sliding held = read(sets + "[[sliding]]\nsets = [\"base\", \"upper\"]\n").sliding.at(0);
+    EXPECT_EQ(held.opening, Sliding::Opening::Held);
+    const auto slides = [&](const std::string& keys) { return refusal(sets + "[[sliding]]\n" + keys); };
+    EXPECT_THAT(slides("sets = [\"base\", \"uper\"]\n"),
+                testing::AllOf(HasSubstr("line 13"), HasSubstr("did you mean 'upper'")));
+    EXPECT_THAT(slides("sets = [\"base\"]\n"), HasSubstr("two 'sets'"));
+    EXPECT_THAT(slides("sets = [\"base\", \"base\"]\n"), HasSubstr("on itself"));
+    EXPECT_THAT(slides("sets = [\"base\", \"upper\"]\nlabels = [1, 2]\n"), HasSubstr("two 'labels', [a, b], or"));
+    EXPECT_THAT(slides("opening = \"free\"\n"), HasSubstr("two 'labels', [a, b], or"));
+    EXPECT_THAT(slides("sets = [\"base\", \"upper\"]\nopening = \"fre\"\n"), HasSubstr("did you mean 'free'"));
+    EXPECT_THAT(slides("sets = [\"base\", \"upper\"]\nopenning = \"free\"\n"), HasSubstr("'opening'"));
 }
 
 TEST_F(SceneFiles, NameTheLineAndTheNearestKey) {

@@ -50,6 +50,20 @@ TEST_F(Vtu, RoundTripIsExact) {
     expect_equal(read_vtu(file("box.vtu")), mesh);
 }
 
+TEST_F(Vtu, CellArraysAreReadByName) {
+    const TetMesh mesh = labelled_box();
+    const Eigen::MatrixXd fibre = Eigen::MatrixXd::Random(3, mesh.tet_count());
+    write_vtu(mesh, file("box.vtu"), {}, {{"fibre", fibre}, {"J", Eigen::MatrixXd::Ones(1, mesh.tet_count())}});
+    EXPECT_LT((read_vtu_cell_array(file("box.vtu"), "fibre") - fibre).norm(), 1e-5) << "float32 in the file";
+    EXPECT_EQ(read_vtu_cell_array(file("box.vtu"), "label").cast<int>(), mesh.labels.transpose());
+    try {
+        read_vtu_cell_array(file("box.vtu"), "fiber");
+        FAIL() << "accepted";
+    } catch (const InvalidInput& error) {
+        EXPECT_THAT(error.what(), ::testing::AllOf(::testing::HasSubstr("'fiber'"), ::testing::HasSubstr("'fibre'")));
+    }
+}
+
 TEST_F(Vtu, ReadsAsciiWithoutLabels) {
     const TetMesh mesh = read_vtu(file("tet.vtu", ascii_tet()));
     ASSERT_EQ(mesh.tet_count(), 1);

@@ -112,8 +112,8 @@ void expect_effect(bool present, const EffectChunk<Flags>& effect, const Program
     SCOPED_TRACE(source.kernel + (present ? " with " : " without ") + effect.file);
     EXPECT_EQ(std::count(composed.files.begin(), composed.files.end(), effect.file), present ? 1 : 0);
     EXPECT_THAT(composed.text, HasSubstr(std::string("#define ") + effect.name + (present ? " 1\n" : " 0\n")));
-    const bool has_block = present || effect.block == std::string("SurfaceEffects");  // which they share
-    EXPECT_EQ(composed.text.find(std::string("buffer ") + effect.block + " ") != std::string::npos, has_block);
+    const bool shared = effect.block == std::string("SurfaceEffects") || effect.name == std::string("HAS_TURNING");
+    EXPECT_EQ(composed.text.find(std::string("buffer ") + effect.block + " ") != std::string::npos, present || shared);
 }
 
 TEST(Composition, ChunksOfAbsentEffectsAreAbsent) {
@@ -127,6 +127,11 @@ TEST(Composition, ChunksOfAbsentEffectsAreAbsent) {
             if (in_patches)
                 expect_effect(present, effect, patch_step_program({Law::NeoHookeanIso}, effects, {}, whole_step));
         }
+    }
+    for (const bool present : {false, true}) {
+        const NodeEffects effects = present ? all_on_nodes : without(all_on_nodes, turning);
+        expect_effect(present, turning, node_step_program(effects, StoreResidual::Yes));
+        expect_effect(present, turning, patch_step_program({Law::NeoHookeanIso}, effects, {}, whole_step));
     }
     for (const EffectChunk<SurfaceForces>& effect : on_surfaces) {
         expect_effect(true, effect, surface_force_program(all_on_surfaces));

@@ -24,15 +24,20 @@ inline constexpr std::array<EffectChunk<NodeEffects>, 5> on_nodes{{
     {&NodeEffects::contact, "chunks/node.contact.glsl", "Contact", "HAS_CONTACT", "contact"},
 }};
 
+/// Of bodies in contact, whose block it reads.
+inline constexpr EffectChunk<NodeEffects> turning{&NodeEffects::turning, "chunks/node.turning.glsl", "Contact",
+                                                  "HAS_TURNING", "turn_of"};
+
 /// Their lists share a block.
-inline constexpr std::array<EffectChunk<SurfaceForces>, 3> on_surfaces{{
+inline constexpr std::array<EffectChunk<SurfaceForces>, 4> on_surfaces{{
     {&SurfaceForces::pressure, "chunks/surface.pressure.glsl", "SurfaceEffects", "HAS_PRESSURE", "pressure"},
     {&SurfaceForces::membrane, "chunks/surface.membrane.glsl", "SurfaceEffects", "HAS_MEMBRANE", "membrane"},
     {&SurfaceForces::sliding, "chunks/surface.sliding.glsl", "SurfaceEffects", "HAS_SLIDING", "sliding"},
+    {&SurfaceForces::parting, "chunks/surface.parting.glsl", "SurfaceEffects", "HAS_PARTING", "parting"},
 }};
 
-inline constexpr NodeEffects all_on_nodes{true, true, true, true, true};
-inline constexpr SurfaceForces all_on_surfaces{true, true, true};
+inline constexpr NodeEffects all_on_nodes{true, true, true, true, true, true};
+inline constexpr SurfaceForces all_on_surfaces{true, true, true, true};
 
 template <class Flags>
 Flags without(Flags all, const EffectChunk<Flags>& effect) {

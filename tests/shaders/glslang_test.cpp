@@ -82,6 +82,11 @@ TEST(Glslang, NothingOfAnAbsentEffectIsLeftBehindThePreprocessor) {
                         patch_step_program({Law::NeoHookeanIso}, effects, {}, whole_step));
         }
     }
+    for (const bool present : {false, true}) {
+        const NodeEffects effects = present ? all_on_nodes : without(all_on_nodes, turning);
+        expect_word(present, turning.word, node_step_program(effects, StoreResidual::No));
+        expect_word(present, turning.word, patch_step_program({Law::NeoHookeanIso}, effects, {}, whole_step));
+    }
     for (const EffectChunk<SurfaceForces>& effect : on_surfaces) {
         expect_word(true, effect.word, surface_force_program(all_on_surfaces));
         expect_word(false, effect.word, surface_force_program(without(all_on_surfaces, effect)));

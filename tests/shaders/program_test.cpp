@@ -160,6 +160,8 @@ TEST_F(ProgramTest, StorageBlocksOfAbsentEffectsAreNotBound) {
         EXPECT_EQ(step_with(without(all_on_nodes, effect)), less(full)) << effect.block;
         EXPECT_EQ(patches_with(without(all_on_nodes, effect)), less(full_patches)) << effect.block;
     }
+    EXPECT_EQ(step_with(without(all_on_nodes, turning)), full) << "turning has no block of its own";
+    EXPECT_EQ(patches_with(without(all_on_nodes, turning)), full_patches);
     for (const EffectChunk<SurfaceForces>& effect : on_surfaces)
         EXPECT_THAT(names(surface_force_program(without(all_on_surfaces, effect))),
                     ::testing::ElementsAre("Displacement", "SurfaceEffects", "SurfaceForce"));

@@ -49,6 +49,45 @@ TEST(Obstacles, OverlapIsRoomOrRefused) {
     EXPECT_NO_THROW(made(HalfSpace{{0, 0, 3}, Vector3d::UnitZ()}, 2.5));
 }
 
+// Tissue goes far in the frame of a body that turns; a grid for the body at rest would end before it.
+TEST(Obstacles, BodiesThatTurnAreSampledWhereverTissueMayBe) {
+    Contact contact;
+    const HalfSpace plane{{0, 0, -2}, {0, 0, 1}};
+    contact.body = plane;
+    contact.motion = {{0, 3, 1}, {0, -2.0, 0}, {-50, 0, -2}};
+    contact.curve = {{{0, 0}, {1, 1}, {2, -0.5}}};
+    tled::Obstacle body = obstacle(contact, tissue(), 1.0, nullptr, silent_observer());
+    for (const double part : {-0.5, 0.0, 0.4, 1.0}) {
+        body.placement = placement_at(contact.motion, part);
+        for (const Vector3d& x : {Vector3d(0, 0, 0), Vector3d(40, 0, 40), Vector3d(20, 40, 10)}) {
+            const Vector3d point = body.placement.rotation * plane.point + body.placement.shift;
+            EXPECT_NEAR(tled::distance_to(body, x).value, body.placement.rotation.col(2).dot(x - point), 1e-4);
+        }
+    }
+}
+
+TEST(Obstacles, OverlapIsLookedForWhereTheBodyIsAtTheBeginning) {
+    Contact contact;
+    contact.body = HalfSpace{{0, 0, -20}, {0, 0, 1}};
+    contact.motion.displacement = {0, 0, 23};
+    EXPECT_NO_THROW(obstacle(contact, tissue(), 1.0, nullptr, silent_observer()));
+    contact.curve = {{{0, 1}, {1, 0}}};
+    EXPECT_THROW(obstacle(contact, tissue(), 1.0, nullptr, silent_observer()), InvalidInput) << "3 mm inside";
+    contact.motion = {{0, 0, 0}, {0, 0.2, 0}, {-100, 0, -20}};  // tan 0.2 of 100 to 140 mm lowers the plane
+    EXPECT_NO_THROW(obstacle(contact, tissue(), 1.0, nullptr, silent_observer()));
+    contact.motion.turn *= -1;
+    EXPECT_THROW(obstacle(contact, tissue(), 1.0, nullptr, silent_observer()), InvalidInput) << "8.4 mm inside";
+}
+
+TEST(Obstacles, SurfaceReachesFromTheAxisAsFarAsTheBody) {
+    const tled::Obstacle round = made(Ball{{20, 20, 60}, 18});
+    const RigidMotion motion{{0, 0, 0}, {0, 0.3, 0}, {-40, 0, 60}};
+    const double exact = 60 + 18, reach = surface_reach(*round.surface, motion);
+    EXPECT_GE(reach, exact);
+    EXPECT_LT(reach, exact + 10) << "within some samples";
+    EXPECT_EQ(surface_reach(*round.surface, {}), 0);
+}
+
 TEST(Obstacles, LabelsAreBodiesAndHollows) {
     const imaging::Volume labels =
         painted({{1, Box{{0, 0, 0}, {40, 40, 40}}}, {5, Box{{-20, -20, -30}, {60, 60, -3}}}}, 1.0);

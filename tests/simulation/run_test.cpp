@@ -11,6 +11,7 @@
 #include <Eigen/Geometry>
 
 #include <cmath>
+#include <numbers>
 
 namespace tissuewarp::simulation {
 namespace {
@@ -322,6 +323,84 @@ TEST(Simulate, StopsWhenAsked) {
     EXPECT_THROW(simulate(
                      built, [](const Frame&) {}, observer),
                  Cancelled);
+}
+
+// An organ on another one, pushed down on one side and lifted on the other: rounds of pairs that are held or absent end
+// in the equilibrium of forces to one side. Pairs that were decided wrongly leave the force that they bear.
+TEST(Simulate, SurfacesThatMayPartComeToTheEquilibriumOfTheirOneSidedForces) {
+    Scene scene;
+    scene.title = "organs";
+    scene.geometry =
+        ShapeGeometry{{{2, Box{{-30, -25, 0}, {30, 25, 25}}}, {1, Ellipsoid{{0, 0, -2}, {28, 22, 18}}}}, 7.0};
+    for (const int label : {1, 2}) scene.tissues[label].material = tled::neo_hookean_lnj(3.0, 0.4);
+    scene.sets["bottom"].side = Side{2, false, 8.0};
+    scene.sets["left"].side = Side{0, false, 3.0};
+    scene.sets["lifted"].box = Box{{10, -25, 20}, {30, 25, 26}};
+    scene.fixed.push_back({"bottom", {true, true, true}});
+    scene.fixed.push_back({"left", {true, true, true}});
+    scene.motions.push_back({"lifted", {false, false, true}, {0, 0, 8}, {}});
+    scene.sets["pushed"].box = Box{{-24, -25, 20}, {-5, 25, 26}};
+    scene.motions.push_back({"pushed", {false, false, true}, {0, 0, -3}, {}});
+    scene.sliding.push_back({{1, 2}, 100.0, "", Sliding::Opening::Free});
+    scene.solve.device = Device::Cpu;
+    scene.solve.tolerance_mm = 1e-3;
+    const BuiltScene built = build(scene);
+    const Matrix3Xd u = run(built).displacement;
+    const Stage& stage = built.stages.front();
+    const tled::NodalConditions conditions =
+        tled::nodal_conditions(conditions_at(built, stage, scene.solve.duration), stage.rest);
+    ASSERT_FALSE(conditions.effects.surface.parting.empty());
+    const Matrix3Xd force =
+        tled::internal_force(stage.rest, u) - tled::surface_force(conditions.effects.surface, stage.rest.position, u);
+    const Matrix3Xd zero = Matrix3Xd::Zero(3, u.cols());
+    EXPECT_LT(conditions.constrained.select(zero, force).cwiseAbs().maxCoeff(), 2e-3 * force.cwiseAbs().maxCoeff());
+    int pressing = 0, apart = 0;
+    for (const tled::SlidingPair& pair : conditions.effects.surface.parting) {
+        const double g = tled::overlap(pair, u);
+        pressing += g > 0;
+        apart += g < -1;
+    }
+    EXPECT_GT(pressing, 10);
+    EXPECT_GT(apart, 20);
+}
+
+/// A cube with a ball just above it, which is to be turned or displaced into it.
+Scene under_a_ball() {
+    Scene scene = cube(6, 0.3);
+    test::stand_freely(scene);
+    Contact ball;
+    ball.body = Ball{{50, 50, 140}, 39};
+    scene.contacts.push_back(ball);
+    scene.solve.frames = 2;
+    return scene;
+}
+
+// A ball that turns about an axis is a ball that is displaced along the arc: what differs is the path of the code, and
+// the samples, which turn with it.
+TEST(Simulate, BallThatTurnsPressesAsOneThatIsDisplacedToTheSamePlace) {
+    Scene turned = under_a_ball(), displaced = turned;
+    RigidMotion& turn = turned.contacts.back().motion;
+    turn = {{0, 0, 0}, {0, 0.4, 0}, {20, 50, 140}};
+    const tled::RigidPlacement end = placement_at(turn, 1);
+    const Vector3d centre(50, 50, 140), way = end.rotation * centre + end.shift - centre;
+    ASSERT_LT(way.z(), -11);
+    displaced.contacts.back().motion.displacement = way;
+    const Result by_turn = run(build(turned)), by_way = run(build(displaced));
+    EXPECT_GT(by_way.displacement.colwise().norm().maxCoeff(), 8);
+    EXPECT_LT((by_turn.displacement - by_way.displacement).colwise().norm().maxCoeff(), 0.05);
+}
+
+TEST(Simulate, BodyThatTurnsAllTheWayRoundLeavesTheTissueAsItWas) {
+    Scene scene = under_a_ball();
+    scene.contacts.back().body = Ball{{50, 50, 190}, 38};  // 8 mm deep half way
+    scene.contacts.back().motion = {{0, 0, 0}, {0, 2 * std::numbers::pi, 0}, {50, 50, 160}};
+    scene.solve.frames = 4;
+    const BuiltScene built = build(scene);
+    std::vector<double> largest;
+    simulate(built, [&](const Frame& frame) { largest.push_back(frame.displacement.colwise().norm().maxCoeff()); });
+    ASSERT_EQ(largest.size(), 5u);
+    EXPECT_GT(largest[2], 5);
+    EXPECT_LT(largest[4], 2e-3);
 }
 
 }  // namespace

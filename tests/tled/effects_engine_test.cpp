@@ -5,6 +5,7 @@
 #include "tled/detail/interpolation_reach.hpp"
 
 #include <gmock/gmock.h>
+#include <Eigen/Geometry>
 
 #include <cmath>
 #include <functional>
@@ -34,14 +35,24 @@ const std::array<EngineUnderTest, 5> engines{{
     {"GpuPatchesManySteps", [](const RestState& rest) { return make_gpu_engine(rest, -1, many_steps_at_once); }},
 }};
 
-enum Effect : unsigned { Pressures = 1, Membranes = 2, Sliding = 4, Fluids = 8, Contacts = 16 };
-constexpr unsigned every_effect = 31;
+/// Turning is of bodies in contact.
+enum Effect : unsigned {
+    Pressures = 1,
+    Membranes = 2,
+    Sliding = 4,
+    Fluids = 8,
+    Contacts = 16,
+    Turning = 32,
+    Parting = 64
+};
+constexpr unsigned every_effect = 127;
 
 std::string name_of_effects(unsigned effects) {
     std::string name;
     for (const auto& [effect, word] :
          {std::pair{Pressures, "Pressure"}, std::pair{Membranes, "Membrane"}, std::pair{Sliding, "Sliding"},
-          std::pair{Fluids, "Fluid"}, std::pair{Contacts, "Contact"}})
+          std::pair{Fluids, "Fluid"}, std::pair{Contacts, "Contact"}, std::pair{Turning, "Turning"},
+          std::pair{Parting, "Parting"}})
         if (effects & effect) name += word;
     return name.empty() ? "None" : name;
 }
@@ -50,7 +61,8 @@ std::string name_of_effects(unsigned effects) {
 std::vector<unsigned> combinations() {
     std::vector<unsigned> all;
     for (unsigned effects = 1; effects <= every_effect; ++effects)
-        if (std::popcount(effects) <= 2 || effects == every_effect) all.push_back(effects);
+        if ((std::popcount(effects) <= 2 || effects == every_effect) && (!(effects & Turning) || effects & Contacts))
+            all.push_back(effects);
     return all;
 }
 
@@ -70,6 +82,7 @@ DistanceGrid sampled(const Vector3d& centre, const std::function<double(const Ve
 /// A jittered cube of 30 mm a metre from the origin, where float32 positions would lose the last 0.06 µm.
 struct Scene {
     Vector3d corner{1000, -700, 400};
+    static inline const Vector3d wall_velocity{60, 5, -40};  // mm/s
     Model model;
     Matrix3Xd local;  ///< positions from the corner
     Conditions plain;
@@ -92,26 +105,51 @@ struct Scene {
 
     /// A body by its distance up to a constant, grown until it is 0.02 mm from where the tissue starts: a node that
     /// starts inside would be thrown out at its depth a step.
-    [[nodiscard]] Obstacle touching(const std::function<double(const Vector3d&)>& distance, const Vector3d& shift,
-                                    double friction) const {
+    [[nodiscard]] Obstacle touching(const std::function<double(const Vector3d&)>& distance,
+                                    const RigidPlacement& placement, double friction) const {
         double least = std::numeric_limits<double>::infinity();
         const Matrix3Xd x = model.mesh.nodes + start();
         for (Eigen::Index a = 0; a < x.cols(); ++a) least = std::min(least, distance(x.col(a)));
-        const Vector3d middle = corner + Vector3d(15, 15, 15);
-        return {sampled(middle - shift, [&](const Vector3d& at) { return distance(at + shift) - least + 0.02; }), shift,
-                friction};
+        const auto& [shift, rotation] = placement;
+        const Vector3d middle = rotation.transpose() * (corner + Vector3d(15, 15, 15) - shift);
+        const auto from_body = [&](const Vector3d& at) { return distance(rotation * at + shift) - least + 0.02; };
+        return {sampled(middle, from_body), placement, friction};
     }
 
     /// A slightly oblique wall with friction that the tissue bulges into, and a ball without that was moved to its
-    /// place.
-    [[nodiscard]] RigidContact contact() const {
+    /// place. They were sampled where these placements have taken them from.
+    [[nodiscard]] RigidContact contact(const RigidPlacement& of_wall, RigidPlacement of_ball,
+                                       const RigidVelocity& velocity_of_wall) const {
         RigidContact contact;
         for (int node = 0; node < rest.node_count; ++node) contact.nodes.push_back(node);
         const Vector3d n = Vector3d(0.05, -1, 0.02).normalized(), ball = corner + Vector3d(45, 17, 16);
-        contact.obstacles.push_back(touching([&](const Vector3d& x) { return n.dot(x); }, Vector3d::Zero(), 0.3));
-        contact.obstacles.back().velocity = {60, 5, -40};
-        contact.obstacles.push_back(touching([&](const Vector3d& x) { return (x - ball).norm(); }, {4, -1, 2}, 0.0));
+        contact.obstacles.push_back(touching([&](const Vector3d& x) { return n.dot(x); }, of_wall, 0.3));
+        contact.obstacles.back().velocity = velocity_of_wall;
+        of_ball.shift += Vector3d(4, -1, 2);
+        contact.obstacles.push_back(touching([&](const Vector3d& x) { return (x - ball).norm(); }, of_ball, 0.0));
         return contact;
+    }
+
+    /// The same as bodies that have turned, the wall about an axis through the tissue and on the way on.
+    [[nodiscard]] RigidContact turning_contact() const {
+        return contact(turned(0.7), turned(-1.1), spinning_about(corner + Vector3d(15, 0, 15), {2, -9, 4}));
+    }
+
+    /// By an angle about an oblique axis through the cube.
+    [[nodiscard]] RigidPlacement turned(double angle) const {
+        const Eigen::Matrix3d R = Eigen::AngleAxisd(angle, Vector3d(1, 2, -2) / 3).toRotationMatrix();
+        const Vector3d point = corner + Vector3d(10, 20, 5);
+        return {point - R * point, R};
+    }
+
+    static RigidVelocity spinning_about(const Vector3d& point, const Vector3d& spin) {
+        return {wall_velocity - spin.cross(point), spin};
+    }
+
+    /// Some press on one another where the tests start, some are apart.
+    static std::vector<SlidingPair> pairs_that_may_part(const Vector3d& n) {
+        return {{31, 93, n, 6.0}, {93, 31, n, 5.0}, {92, 66, Vector3d::UnitZ(), 5.0}, {66, 92, Vector3d::UnitZ(), 3.0},
+                {58, 66, n, 6.0}, {66, 58, n, 5.0}, {61, 92, Vector3d::UnitX(), 5.0}, {92, 61, Vector3d::UnitX(), 2.0}};
     }
 
     [[nodiscard]] Conditions conditions(unsigned effects) const {
@@ -122,12 +160,14 @@ struct Scene {
         const Vector3d n = Vector3d(1, -2, 0.5).normalized();
         if (effects & Sliding)
             conditions.effects.sliding = {{60, 62, n, 6.0}, {62, 87, Vector3d::UnitZ(), 5.0}, {90, 60, n, 4.0}};
+        if (effects & Parting) conditions.effects.parting = pairs_that_may_part(n);
         if (effects & Fluids)
             conditions.effects.fluid =
                 Fluid{1e-6,
                       {1000, 2000, -9500},
                       Vector3d(-1000, -2000, 9500).normalized().dot(corner + Vector3d(15, 15, 17))};
-        if (effects & Contacts) conditions.effects.contact = contact();
+        if (effects & Contacts) conditions.effects.contact = contact({}, {}, {wall_velocity});
+        if (effects & Turning) conditions.effects.contact = turning_contact();
         return conditions;
     }
 
@@ -292,11 +332,14 @@ TEST_P(EffectsInEngines, NothingIsLeftOfEffectsThatHaveChanged) {
     }
     for (Membrane& each : before.effects.membranes) each.thickness *= 3;
     for (SlidingPair& each : before.effects.sliding) std::swap(each.first, each.second);
+    for (SlidingPair& each : before.effects.parting) std::swap(each.first, each.second);
     if (before.effects.fluid) before.effects.fluid->level += 5;
     if (before.effects.contact)
         for (Obstacle& each : before.effects.contact->obstacles) {
-            each.shift += Vector3d(0.5, 0.5, -0.5);
-            each.velocity *= -1;
+            each.placement.shift += Vector3d(0.5, 0.5, -0.5);
+            each.placement.rotation = Eigen::AngleAxisd(0.01, Vector3d::UnitX()) * each.placement.rotation;
+            each.velocity.of_origin *= -1;
+            each.velocity.spin *= -1;
         }
     const auto run = [&](Engine& each) {
         each.set_conditions(conditions);
@@ -340,9 +383,10 @@ TEST_P(EffectsInEngines, StepPassesNameWhatTheSceneHasAndNothingElse) {
     ASSERT_GE(passes.size(), 1u);
     for (const auto& [effect, word] :
          {std::pair{Pressures, "pressure"}, std::pair{Membranes, "membrane"}, std::pair{Sliding, "sliding"},
-          std::pair{Fluids, "fluid"}, std::pair{Contacts, "contact"}}) {
+          std::pair{Fluids, "fluid"}, std::pair{Contacts, "contact"}, std::pair{Turning, "turning"},
+          std::pair{Parting, "parting"}}) {
         const bool gpu = engine->processor() == Processor::Gpu,
-                   on_surface = (effect & (Pressures | Membranes | Sliding)) != 0;
+                   on_surface = (effect & (Pressures | Membranes | Sliding | Parting)) != 0;
         const std::string part = !gpu ? word : std::string(on_surface ? "surface." : "node.") + word;
         if (part == "pressure" && std::get<1>(GetParam()) != Cells::T4) continue;  // averaged pressure is another thing
         EXPECT_EQ(names(passes, part), (effects & effect) != 0) << part;
@@ -352,7 +396,7 @@ TEST_P(EffectsInEngines, StepPassesNameWhatTheSceneHasAndNothingElse) {
         for (const StepBuffer& buffer : pass.buffers) EXPECT_GT(buffer.bytes, 0u) << buffer.name;
     }
     engine->set_conditions(scene.nodal(0));
-    for (const char* word : {"membrane", "sliding", "fluid", "contact", "surface"})
+    for (const char* word : {"membrane", "sliding", "parting", "fluid", "contact", "turning", "surface"})
         EXPECT_FALSE(names(engine->step_passes(), word)) << word;
 }
 
@@ -360,7 +404,7 @@ TEST(GpuEffects, SurfaceEffectsTakeTwoPassesWhileTheyLast) {
     const Scene scene(Cells::T4);
     const auto engine = make_engine(Kind::GpuPatches, scene.rest);
     EXPECT_THAT(engine->description(), HasSubstr("patches"));
-    for (const unsigned effect : {Pressures, Membranes, Sliding}) {
+    for (const unsigned effect : {Pressures, Membranes, Sliding, Parting}) {
         engine->set_conditions(scene.nodal(effect));
         EXPECT_THAT(engine->description(), HasSubstr("two passes")) << name_of_effects(effect);
         engine->set_conditions(scene.nodal(Fluids | Contacts));

@@ -80,6 +80,40 @@ TEST(EffectForces, SlidingPairsPullAlongTheirNormalOnly) {
     expect_gradient(effects);
 }
 
+TEST(EffectForces, PairsThatMayPartPressAndDoNotPull) {
+    Effects effects;
+    const Vector3d n = Vector3d(1, -2, 0.5).normalized();
+    effects.parting = {{0, 17, n, 3.0}, {17, 0, n, 4.0}, {40, 62, Vector3d::UnitZ(), 5.0}, {62, 40, -n, 2.0}};
+    expect_gradient(effects);
+    const Organ organ;
+    Matrix3Xd u = Matrix3Xd::Zero(3, organ.rest.node_count);
+    effects.parting = {{0, 17, n, 3.0}};
+    const SurfaceEffects surface = nodal_effects(effects, organ.rest).surface;
+    u.col(0) = 0.2 * n;
+    const Matrix3Xd pressed = surface_force(surface, organ.rest.position, u);
+    EXPECT_LT((pressed.col(0) + 0.6 * n).norm(), 1e-12);
+    EXPECT_LT((pressed.col(17) - 0.6 * n).norm(), 1e-12);
+    u.col(0) *= -1;
+    EXPECT_TRUE(surface_force(surface, organ.rest.position, u).isZero(0.0));
+    effects.parting = {{0, 17, {1, 1, 0}, 3.0}};
+    EXPECT_THROW(nodal_effects(effects, organ.rest), InvalidInput);
+}
+
+TEST(EffectForces, DecidedPairsHoldTogetherOrAreGone) {
+    const Organ organ;
+    Effects effects;
+    effects.sliding = {{3, 17, Vector3d::UnitX(), 2.0}};
+    effects.parting = {{0, 17, Vector3d::UnitX(), 3.0}, {40, 62, Vector3d::UnitZ(), 5.0}};
+    const SurfaceEffects decided = with_pairs_decided(nodal_effects(effects, organ.rest).surface, {false, true});
+    effects.sliding.push_back(effects.parting.back());
+    effects.parting.clear();
+    const SurfaceEffects expected = nodal_effects(effects, organ.rest).surface;
+    EXPECT_EQ(decided.node, expected.node);
+    EXPECT_TRUE(decided.parting.empty());
+    EXPECT_EQ(surface_force(decided, organ.rest.position, organ.u),
+              surface_force(expected, organ.rest.position, organ.u));
+}
+
 TEST(EffectForces, FluidLiftIsTheGradientOfItsEnergy) {
     Effects effects;
     effects.fluid = Fluid{1e-6, {1000, 2000, -9000}, 4.0};
@@ -122,7 +156,7 @@ DistanceGrid sampled(const Vector3d& origin, double step, int samples,
 }
 
 TEST(EffectForces, DistanceToABallIsSmoothAndShifts) {
-    Obstacle ball{sampled({-12, -12, -12}, 1.0, 25, [](const Vector3d& x) { return x.norm() - 8; }), {3, -1, 2}, 0};
+    Obstacle ball{sampled({-12, -12, -12}, 1.0, 25, [](const Vector3d& x) { return x.norm() - 8; }), {{3, -1, 2}}, 0};
     const Vector3d x = Vector3d(3, -1, 2) + 7.4 * Vector3d(1, 2, -2) / 3;
     const Distance d = distance_to(ball, x);
     EXPECT_NEAR(d.value, -0.6, 1e-3);  // the ball is eight samples in radius
@@ -138,21 +172,46 @@ TEST(EffectForces, ContactStopsWhatComesInAndRubsAlongTheSurface) {
     const DistanceGrid half_space = sampled({-8, -8, -8}, 2.0, 9, [](const Vector3d& x) { return x.z(); });
     const Vector3d X(1, 1, 1);
     const Motion free{{0.3, 0, -1.2}, {0.05, 0, -0.5}};  // 0.2 mm inside
-    const Motion smooth = in_contact({{half_space, Vector3d::Zero(), 0.0}}, X, free, 1);
+    const Motion smooth = in_contact({{half_space, {}, 0.0}}, X, free, 1);
     EXPECT_LT((smooth.u - Vector3d(0.3, 0, -1.0)).norm(), 1e-6);
     EXPECT_LT((smooth.v - Vector3d(0.05, 0, -0.3)).norm(), 1e-6);
-    const Motion rubbed = in_contact({{half_space, Vector3d::Zero(), 0.1}}, X, free, 1);
+    const Motion rubbed = in_contact({{half_space, {}, 0.1}}, X, free, 1);
     EXPECT_NEAR(rubbed.v.x(), 0.05 - 0.1 * 0.2, 1e-6);
-    const Motion held = in_contact({{half_space, Vector3d::Zero(), 0.5}}, X, free, 1);
+    const Motion held = in_contact({{half_space, {}, 0.5}}, X, free, 1);
     EXPECT_NEAR(held.v.x(), 0, 1e-9);
-    const Motion leaving = in_contact({{half_space, Vector3d::Zero(), 0.5}}, X, {{0, 0, -0.9}, {0, 0, 0.1}}, 1);
+    const Motion leaving = in_contact({{half_space, {}, 0.5}}, X, {{0, 0, -0.9}, {0, 0, 0.1}}, 1);
     EXPECT_EQ(leaving.u.z(), -0.9);
     // A body that goes faster than the node, by 0.75 mm a step, drags it along, and not up.
-    const Motion dragged = in_contact({{half_space, Vector3d::Zero(), 0.1, {8, 0, 5}}}, X, free, 0.1);
+    const Motion dragged = in_contact({{half_space, {}, 0.1, {{8, 0, 5}}}}, X, free, 0.1);
     EXPECT_NEAR(dragged.v.x(), 0.05 + 0.1 * 0.2, 1e-6);
     EXPECT_NEAR(dragged.v.z(), -0.3, 1e-6);
-    const Motion carried = in_contact({{half_space, Vector3d::Zero(), 0.5, {1, 0.5, 0}}}, X, free, 0.1);
+    const Motion carried = in_contact({{half_space, {}, 0.5, {{1, 0.5, 0}}}}, X, free, 0.1);
     EXPECT_LT((carried.v - Vector3d(0.1, 0.05, -0.3)).norm(), 1e-6);
+}
+
+// A body that has turned is looked at in its own frame, and its normal turned back.
+TEST(EffectForces, DistanceToATurnedBodyIsThatInItsOwnFrame) {
+    Obstacle box{sampled({-12, -12, -12}, 1.0, 25,
+                         [](const Vector3d& x) { return std::max(std::abs(x[0]) - 3, std::abs(x[1]) - 8); })};
+    const Obstacle at_rest = box;
+    const Eigen::Matrix3d R = Eigen::AngleAxisd(2.3, Vector3d(2, -1, 2) / 3).toRotationMatrix();
+    box.placement = {{4, 5, -300}, R};
+    for (const Vector3d& X : {Vector3d(3.4, 1, 2), Vector3d(-2.7, -4, 0), Vector3d(0.3, 8.6, 1)}) {
+        const Vector3d x = R * X + box.placement.shift;
+        const Distance turned = distance_to(box, x), rest = distance_to(at_rest, X);
+        EXPECT_NEAR(turned.value, rest.value, 1e-9);
+        EXPECT_LT((turned.gradient - R * rest.gradient).norm(), 1e-9);
+    }
+}
+
+TEST(EffectForces, FrictionIsRelativeToTheBodyAtTheContactPoint) {
+    const DistanceGrid half_space = sampled({-8, -8, -8}, 2.0, 9, [](const Vector3d& x) { return x.z(); });
+    const Vector3d X(1, 1, 1);
+    const Motion free{{0.3, 0, -1.2}, {0.05, 0, -0.5}};  // at (1.3, 1, −0.2)
+    // About z through (1, 0, 0), so that the body has ω (−1, 0.3, 0) there, and along x with 2 mm/s.
+    const Vector3d spin(0, 0, 3), velocity = Vector3d(2, 0, 0) - spin.cross(Vector3d(1, 0, 0));
+    const Motion carried = in_contact({{half_space, {}, 5.0, {velocity, spin}}}, X, free, 0.01);
+    EXPECT_LT((carried.v - Vector3d(0.01 * (2 - 3), 0.01 * 3 * 0.3, -0.3)).norm(), 1e-6);
 }
 
 TEST(EffectForces, NonsenseIsRefusedByName) {
@@ -187,6 +246,9 @@ TEST(EffectForces, NonsenseIsRefusedByName) {
     effects.contact =
         RigidContact{{0}, {Obstacle{DistanceGrid{{}, Eigen::Matrix3d::Identity(), {3, 9, 9}, {}}, {}, 0}}};
     EXPECT_THAT(message_of(effects), HasSubstr("needs 4"));
+    const DistanceGrid far = sampled({-8, -8, -8}, 2.0, 9, [](const Vector3d&) { return 1.0; });
+    effects.contact = RigidContact{{0}, {{far, {{0, 0, 0}, 2 * Eigen::Matrix3d::Identity()}, 0}}};
+    EXPECT_THAT(message_of(effects), HasSubstr("proper orthogonal"));
 }
 
 TEST(EffectForces, ConditionsWithEffectsNeedTheRestState) {

@@ -29,5 +29,9 @@ std::vector<EffectCase> effect_cases();
 std::vector<EffectCase> contact_cases();
 /// What changes in time, by whole scenes; where simulation is built.
 std::vector<EffectCase> scene_cases();
+/// Those of fibres that vary in space, which are among them.
+std::vector<EffectCase> fibre_cases();
+/// Those of surfaces that may part, likewise.
+std::vector<EffectCase> parting_cases();
 
 }  // namespace tissuewarp::verification

@@ -43,7 +43,7 @@ TEST(Contact, RoundsOfSpringsFindTheActiveSetsSolution) {
     tled::RigidContact contact;
     for (int a = 0; a < rest.node_count; ++a)
         if (problem.may_touch(rest.position.col(a))) contact.nodes.push_back(a);
-    contact.obstacles.push_back({below_plane(problem.plane_height(problem.stages)), Eigen::Vector3d::Zero(), 0});
+    contact.obstacles.push_back({below_plane(problem.plane_height(problem.stages)), {}, 0});
     tled::Effects effects;
     effects.contact = contact;
     conditions.effects = tled::nodal_effects(effects, rest);
@@ -71,7 +71,7 @@ TEST(Contact, FrictionIsRefusedInAnEquilibrium) {
     const auto engine = tled::make_cpu_engine(rest);
     EXPECT_THROW(tled::equilibrium_in_contact(*engine, rest, conditions), InvalidInput);
     tled::Effects effects;
-    effects.contact = tled::RigidContact{{0}, {{below_plane(60), Eigen::Vector3d::Zero(), 0.1}}};
+    effects.contact = tled::RigidContact{{0}, {{below_plane(60), {}, 0.1}}};
     conditions.effects = tled::nodal_effects(effects, rest);
     EXPECT_THROW(tled::equilibrium_in_contact(*engine, rest, conditions), InvalidInput);
 }

@@ -31,7 +31,7 @@ tled::DistanceGrid half_space(double height, double reach) {
 tled::RigidContact contact_of_all(const Model& model, double friction, const tled::DistanceGrid& grid) {
     tled::RigidContact contact;
     for (int a = 0; a < model.mesh.node_count(); ++a) contact.nodes.push_back(a);
-    contact.obstacles.push_back({grid, Vector3d::Zero(), friction});
+    contact.obstacles.push_back({grid, {}, friction});
     return contact;
 }
 

@@ -17,7 +17,7 @@ CpuContact::CpuContact(const NodalContact& contact, const std::vector<std::uint3
 
 bool CpuContact::take(const NodalContact& contact) {
     const auto in_place = [](const Obstacle& now, const Obstacle& before) {
-        return now.surface == before.surface && now.shift == before.shift;
+        return now.surface == before.surface && now.placement == before.placement;
     };
     if (node_ != contact.node ||
         !std::equal(contact.obstacles.begin(), contact.obstacles.end(), obstacles_.begin(), obstacles_.end(), in_place))

@@ -5,6 +5,7 @@
 #include "tled/nodal_effects.hpp"
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
@@ -43,19 +44,22 @@ public:
     /// To be called where nodes have moved otherwise than by steps: what follows does not depend on what went before.
     void forget_looks();
 
+    /// Whether a body's velocity depends on the place: what settle() must know.
+    [[nodiscard]] bool turning() const { return turns(obstacles_); }
+
     /// s, of the steps that follow.
     void set_time_step(double time_step) { time_step_ = time_step; }
 
     /// Puts internal nodes [begin, end) that have entered an obstacle back, in components that are free. Arrays of
-    /// records, mm.
-    template <class T>
-    void settle(std::size_t begin, std::size_t end, const T* free, T* v, T* u) {
+    /// records, mm. `turning` is std::true_type or std::false_type, as turning() says.
+    template <class Turning, class T>
+    void settle(Turning turning, std::size_t begin, std::size_t end, const T* free, T* v, T* u) {
         const auto [first, last] = of_nodes(point_, begin, end);
         for (Point* point = first; point != last; ++point) {
             const std::size_t at = point->node * std::size_t{record};
             const Eigen::Vector3d here = vector_at(u + at);
             if ((here - point->from).squaredNorm() < point->free_squared) continue;
-            const Motion after = settled(*point, {here, vector_at(v + at)});
+            const Motion after = settled(turning, *point, {here, vector_at(v + at)});
             if (after.u == here) {
                 set_free(*point, here);
                 continue;
@@ -84,16 +88,27 @@ private:
         return tangent_[point.entry * obstacles_.size() + obstacle];
     }
 
+    /// How far an obstacle goes at a point in a step, mm.
+    template <class Turning>
+    [[nodiscard]] Eigen::Vector3d increment_of(Turning turning, const Obstacle& obstacle,
+                                               const Eigen::Vector3d& x) const {
+        Eigen::Vector3d velocity = obstacle.velocity.of_origin;
+        if constexpr (turning) velocity += obstacle.velocity.spin.cross(x);
+        return time_step_ * velocity;
+    }
+
     /// As in_contact() has it.
-    Motion settled(const Point& point, Motion motion) {
+    template <class Turning>
+    Motion settled(Turning turning, const Point& point, Motion motion) {
         for (std::size_t o = 0; o < obstacles_.size(); ++o) {
             Tangent& tangent = this->tangent(point, o);
             if (!((motion.u - tangent.from).squaredNorm() < tangent.reach_squared))
                 tangent = look(o, position_.col(point.entry), motion.u);
             const double depth = -tangent.height_at(motion.u);
             if (!(depth > 0)) continue;
-            const Eigen::Vector3d correction = contact_correction(tangent.normal, depth, obstacles_[o].friction,
-                                                                  motion.v - time_step_ * obstacles_[o].velocity);
+            const Eigen::Vector3d slip =
+                motion.v - increment_of(turning, obstacles_[o], position_.col(point.entry) + motion.u);
+            const Eigen::Vector3d correction = contact_correction(tangent.normal, depth, obstacles_[o].friction, slip);
             motion.u += correction;
             motion.v += correction;
         }

@@ -62,6 +62,7 @@ public:
         if (!pressure_edges_.empty()) names.push_back("pressure");
         if (!tension_.empty()) names.push_back("membrane");
         if (!effects_.sliding.empty()) names.push_back("sliding");
+        if (!effects_.parting.empty()) names.push_back("parting");
         return names;
     }
 
@@ -113,7 +114,14 @@ private:
         Vector force = Vector::Zero();
         for_entries(effects_.pressure_incidence, i, [&](int entry) { force += pressure_on(entry / 3, u); });
         for_entries(effects_.membrane_incidence, i, [&](int entry) { force += tension_on(entry / 3, entry % 3); });
-        for_entries(effects_.sliding_incidence, i, [&](int entry) { force += pull_on(entry / 2, entry % 2, u); });
+        for_entries(effects_.sliding_incidence, i, [&](int entry) {
+            const SlidingPair& pair = effects_.sliding[static_cast<std::size_t>(entry / 2)];
+            force += pull_on(pair, entry % 2, overlap_of(pair, u));
+        });
+        for_entries(effects_.parting_incidence, i, [&](int entry) {
+            const SlidingPair& pair = effects_.parting[static_cast<std::size_t>(entry / 2)];
+            force += pull_on(pair, entry % 2, std::max(overlap_of(pair, u), T(0)));
+        });
         return force;
     }
 
@@ -143,10 +151,13 @@ private:
         return -internal.col(corner - 1);
     }
 
-    [[nodiscard]] Vector pull_on(int p, int second, const T* u) const {
-        const SlidingPair& pair = effects_.sliding[static_cast<std::size_t>(p)];
-        const Vector n = pair.normal.cast<T>();
-        const Vector pull = T(pair.stiffness) * n.dot(at(u, pair.first) - at(u, pair.second)) * n;
+    [[nodiscard]] T overlap_of(const SlidingPair& pair, const T* u) const {
+        return pair.normal.cast<T>().dot(at(u, pair.first) - at(u, pair.second));
+    }
+
+    /// Of a pair that overlaps by g.
+    [[nodiscard]] static Vector pull_on(const SlidingPair& pair, int second, T g) {
+        const Vector pull = T(pair.stiffness) * g * pair.normal.cast<T>();
         return second == 0 ? Vector(-pull) : pull;
     }
 

@@ -63,12 +63,13 @@ void append_membrane(const SurfaceEffects& effects, const Eigen::Matrix3Xd& posi
 }  // namespace
 
 void add_effects(const SurfaceEffects& effects, const Eigen::Matrix3Xd& position, Stiffness& stiffness) {
-    if (effects.sliding.empty() && effects.membrane_faces.cols() == 0) return;
+    if (effects.sliding.empty() && effects.parting.empty() && effects.membrane_faces.cols() == 0) return;
     {
         RowAppender rows(stiffness.products);
-        for (const SlidingPair& pair : effects.sliding)
-            rows.append(pair.stiffness, std::array{pair.first, pair.second},
-                        std::array<Vector3d, 2>{pair.normal, -pair.normal});
+        for (const std::vector<SlidingPair>* pairs : {&effects.sliding, &effects.parting})
+            for (const SlidingPair& pair : *pairs)
+                rows.append(pair.stiffness, std::array{pair.first, pair.second},
+                            std::array<Vector3d, 2>{pair.normal, -pair.normal});
         for (Eigen::Index f = 0; f < effects.membrane_faces.cols(); ++f) append_membrane(effects, position, f, rows);
     }
     list_by_node(static_cast<int>(position.cols()), stiffness.products);

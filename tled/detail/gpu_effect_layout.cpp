@@ -72,18 +72,21 @@ Vector3d rest_map(const Corner& corner) {
 void put_obstacle(Words& words, const Obstacle& obstacle, const GridReach& reach, const Vector3d& common_point,
                   std::uint32_t first_sample) {
     const DistanceGrid& grid = *obstacle.surface;
-    const Eigen::Matrix3d to_grid = grid.steps.inverse();
+    const auto& [shift, rotation] = obstacle.placement;
+    const Eigen::Matrix3d to_grid = grid.steps.inverse() * rotation.transpose();
     for (int row = 0; row < 3; ++row) put(words, to_grid.row(row).transpose().eval());
-    put(words, (grid.origin + obstacle.shift - common_point).eval());
+    put(words, (rotation * grid.origin + shift - common_point).eval());
     for (const int size : grid.size) put_node(words, size);
     words.push_back(first_sample);
     put(words, reach.interpolation);
     put(words, obstacle.friction);
     put(words, 1 / reach.steepness);
     put(words, std::min(reach.tangent, 1e3));
-    put(words, obstacle.velocity);
+    const auto& [of_origin, spin] = obstacle.velocity;
+    put(words, (of_origin + spin.cross(common_point)).eval());
+    put(words, spin);
 }
-constexpr std::size_t obstacle_words = 23;
+constexpr std::size_t obstacle_words = 26;
 
 }  // namespace
 
@@ -125,6 +128,13 @@ GpuSurface gpu_surface(const SurfaceEffects& effects, const Matrix3Xd& position)
         put_node(words, entry % 2 == 0 ? pair.second : pair.first);
         put(words, pair.stiffness);
         put(words, pair.normal);
+    });
+    surface.parting_lists = append_lists(words, effects.parting_incidence, [&](int entry) {
+        const SlidingPair& pair = effects.parting[static_cast<std::size_t>(entry / 2)];
+        const bool first = entry % 2 == 0;
+        put_node(words, first ? pair.second : pair.first);
+        put(words, pair.stiffness);
+        put(words, first ? pair.normal : Vector3d(-pair.normal));
     });
     return surface;
 }

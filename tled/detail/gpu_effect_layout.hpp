@@ -16,7 +16,8 @@ std::vector<std::uint32_t> gpu_springs(const NodalConditions& conditions, int no
 
 struct GpuSurface {
     std::vector<std::uint32_t> words;
-    std::uint32_t pressure_lists = 0, membrane_lists = 0, sliding_lists = 0;  ///< places in words; 0: no such effect
+    std::uint32_t pressure_lists = 0, membrane_lists = 0, sliding_lists = 0,
+                  parting_lists = 0;  ///< places in words; 0: no such effect
 };
 /// `position` is at rest, 3 × N, mm.
 GpuSurface gpu_surface(const SurfaceEffects& effects, const Eigen::Matrix3Xd& position);

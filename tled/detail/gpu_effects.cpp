@@ -31,7 +31,8 @@ void GpuEffects::set(const NodalConditions& conditions, BlockBuffers& blocks) {
                  .external_force = external_force_.has_value(),
                  .surface_force = surface_.has_value(),
                  .fluid = fluid_.has_value(),
-                 .contact = contact_.has_value()};
+                 .contact = contact_.has_value(),
+                 .turning = contact_ && turns(conditions.effects.contact->obstacles)};
 }
 
 void GpuEffects::set_springs(const NodalConditions& conditions, BlockBuffers& blocks) {
@@ -63,12 +64,14 @@ void GpuEffects::set_surface(const SurfaceEffects& effects, BlockBuffers& blocks
     blocks.set("SurfaceForce", surface_->force);
     const shaders::SurfaceForces forces{.pressure = layout.pressure_lists > 0,
                                         .membrane = layout.membrane_lists > 0,
-                                        .sliding = layout.sliding_lists > 0};
+                                        .sliding = layout.sliding_lists > 0,
+                                        .parting = layout.parting_lists > 0};
     const shaders::Program& program = programs_.get(shaders::surface_force_program(forces));
     program.set(0, static_cast<std::uint32_t>(effects.node.size()));
     if (forces.pressure) program.set(1, layout.pressure_lists);
     if (forces.membrane) program.set(2, layout.membrane_lists);
     if (forces.sliding) program.set(3, layout.sliding_lists);
+    if (forces.parting) program.set(4, layout.parting_lists);
     surface_pass_ = Pass{&program, effects.node.size()};
 }
 

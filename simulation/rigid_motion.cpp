@@ -1,0 +1,33 @@
+#include "simulation/rigid_motion.hpp"
+
+#include <Eigen/Geometry>
+
+namespace tissuewarp::simulation {
+
+using Eigen::Vector3d;
+
+tled::RigidPlacement placement_at(const RigidMotion& motion, double part) {
+    tled::RigidPlacement placement;
+    placement.shift = part * motion.displacement;
+    const double angle = motion.turn.norm();
+    if (!(angle > 0)) return placement;
+    placement.rotation = Eigen::AngleAxisd(part * angle, motion.turn / angle).toRotationMatrix();
+    placement.shift += motion.point - placement.rotation * motion.point;
+    return placement;
+}
+
+tled::RigidVelocity velocity_at(const RigidMotion& motion, double part, double rate) {
+    const Vector3d spin = rate * motion.turn, point = motion.point + part * motion.displacement;
+    return {rate * motion.displacement - spin.cross(point), spin};
+}
+
+double longest_way(const RigidMotion& motion, double reach) {
+    return motion.displacement.norm() + reach * motion.turn.norm();
+}
+
+double distance_from_axis(const RigidMotion& motion, const Vector3d& X) {
+    const double angle = motion.turn.norm();
+    return angle > 0 ? (X - motion.point).cross(motion.turn / angle).norm() : 0.0;
+}
+
+}  // namespace tissuewarp::simulation
