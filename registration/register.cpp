@@ -236,8 +236,14 @@ private:
         detail::Stopwatch stopwatch;
         const detail::RoundPlan plan = plan_of(round);
         detail::Contribution data = evidence_.contribution(plan, state_);
-        result_.pulls = {data.conditions.springs, data.holds, evidence_.ground, evidence_.supports(plan, state_),
-                         state_.placement,        loads_,     evidence_.energy, placement_is_free(),
+        result_.pulls = {data.conditions.springs,
+                         data.holds,
+                         evidence_.ground,
+                         evidence_.supports(plan, state_),
+                         state_.placement,
+                         loads_,
+                         evidence_.energy,
+                         placement_is_free(),
                          load_size_};
         data.conditions.external_force = loads_;
         append(data.conditions.springs, result_.pulls.holds);
@@ -289,10 +295,7 @@ struct Updater::Impl {
 
     Impl(const PreparedModel& model, const UpdateOptions& given, std::unique_ptr<tled::Engine> engine,
          Observer& observer)
-        : prepared(model),
-          options(given),
-          solver(std::move(engine)),
-          load_finder(model, given.tissue.load_shapes) {
+        : prepared(model), options(given), solver(std::move(engine)), load_finder(model, given.tissue.load_shapes) {
         const bool described =
             model.image && model.image->blocks.options().similarity == Similarity::SelfSimilarityContext;
         if (described) dense = detail::make_image_engine(model, given, observer);

@@ -17,9 +17,9 @@ public:
     /// The model outlives this.
     LoadFinder(const PreparedModel& prepared, int shapes) : prepared_(prepared), count_(shapes) {}
 
-    /// The loads that data pulling like `pulls` tell. The prior's springs are the same in every call. Of a model of more
-    /// than 6000 nodes they are found on a coarser mesh of the organ, since they are smooth and a factor would take
-    /// long. Throws InvalidInput where the springs do not hold the tissue, Cancelled.
+    /// The loads that data pulling like `pulls` tell. The prior's springs are the same in every call. Of a model of
+    /// more than 6000 nodes they are found on a coarser mesh of the organ, since they are smooth and a factor would
+    /// take long. Throws InvalidInput where the springs do not hold the tissue, Cancelled.
     FoundLoads find(const LastPulls& pulls, Observer& observer);
 
 private:

@@ -3,11 +3,11 @@
 ///
 /// Loads f = B a are of smooth shapes B (unknown_loads), a of variance s²; beside what they do, tissue moves as strain
 /// energy lets it: u has the covariance ε K⁻¹ + s² K⁻¹ B Bᵀ K⁻¹, K the stiffness of tissue and prior. Data pull by
-/// springs K_d to where they show it, u₀ = (K + K_d)⁻¹ K_d t without loads. With u integrated out, a has the information
-/// M = Bᵀ (K⁻¹ − (K + K_d)⁻¹) B/ε and, of b = Bᵀ u₀/ε, the mean (M + s⁻²)⁻¹ b. s is the likeliest one: it maximises the
-/// evidence ½ bᵀ (M + s⁻²)⁻¹ b − ½ log det(1 + s² M) (MacKay, Neural Comput 4 (1992) 415). That unknown boundary loads
-/// reconstruct an organ from a part of its surface: Rucker et al., IEEE TMI 33 (2014) 147; Heiselman et al., IEEE TMI
-/// 39 (2020) 2223.
+/// springs K_d to where they show it, u₀ = (K + K_d)⁻¹ K_d t without loads. With u integrated out, a has the
+/// information M = Bᵀ (K⁻¹ − (K + K_d)⁻¹) B/ε and, of b = Bᵀ u₀/ε, the mean (M + s⁻²)⁻¹ b. s is the likeliest one: it
+/// maximises the evidence ½ bᵀ (M + s⁻²)⁻¹ b − ½ log det(1 + s² M) (MacKay, Neural Comput 4 (1992) 415). That unknown
+/// boundary loads reconstruct an organ from a part of its surface: Rucker et al., IEEE TMI 33 (2014) 147; Heiselman et
+/// al., IEEE TMI 39 (2020) 2223.
 
 #include "registration/detail/posterior.hpp"
 
@@ -46,9 +46,9 @@ public:
 
 private:
     const LoadShapes& shapes_;
-    Eigen::MatrixXd answers_;      // (K + K_d)⁻¹ B
-    Eigen::MatrixXd axes_;         // eigenvectors of M
-    Eigen::ArrayXd information_;   // its eigenvalues
+    Eigen::MatrixXd answers_;     // (K + K_d)⁻¹ B
+    Eigen::MatrixXd axes_;        // eigenvectors of M
+    Eigen::ArrayXd information_;  // its eigenvalues
 };
 
 }  // namespace tissuewarp::registration::detail

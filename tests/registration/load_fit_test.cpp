@@ -1,13 +1,13 @@
 /// Loads found by what data show of them.
-#include "registration/detail/load_finder.hpp"
 #include "registration/detail/ground.hpp"
+#include "registration/detail/load_finder.hpp"
 #include "registration/detail/rigid_part.hpp"
 #include "registration/detail/unknown_loads.hpp"
 #include "registration/field.hpp"
 #include "tests/support/label_shapes.hpp"
 
-#include <Eigen/Cholesky>
 #include <gtest/gtest.h>
+#include <Eigen/Cholesky>
 
 #include <cmath>
 
@@ -96,20 +96,19 @@ TEST(LoadFit, IsTheMeanUnderThePriorOfSmoothLoads) {
     const MatrixXd answers = without.inverse(units), loads = shapes.forces(prepared);
     const MatrixXd covariance =
         energy * answers + size * size * without.inverse(loads) * (loads.transpose() * answers);  // with the held nodes
-    const MatrixXd between = units.transpose() * covariance +
-                             energy / stiffness * MatrixXd::Identity(targets.size(), targets.size());
+    const MatrixXd between =
+        units.transpose() * covariance + energy / stiffness * MatrixXd::Identity(targets.size(), targets.size());
     const VectorXd expected = covariance * between.ldlt().solve(targets);
     EXPECT_LT((found - expected).norm(), 1e-6 * expected.norm());
     EXPECT_GT((shown - expected).norm(), 0.02 * expected.norm());  // loads matter here
 
     // And the likeliest size is that of the largest density of the targets, of those that are tried.
     const auto density = [&](double s) {
-        const MatrixXd c = units.transpose() * (energy * answers + s * s * without.inverse(loads) *
-                                                                       (loads.transpose() * answers)) +
-                           energy / stiffness * MatrixXd::Identity(targets.size(), targets.size());
+        const MatrixXd c =
+            units.transpose() * (energy * answers + s * s * without.inverse(loads) * (loads.transpose() * answers)) +
+            energy / stiffness * MatrixXd::Identity(targets.size(), targets.size());
         const Eigen::LLT<MatrixXd> root(c);
-        return -0.5 * targets.dot(root.solve(targets)) -
-               root.matrixLLT().diagonal().array().log().sum();
+        return -0.5 * targets.dot(root.solve(targets)) - root.matrixLLT().diagonal().array().log().sum();
     };
     const double likeliest = fit.likeliest_size(shown);
     EXPECT_GT(density(likeliest), density(likeliest * std::sqrt(2.0)));
@@ -141,7 +140,8 @@ TEST(UnknownLoads, MoveWhatNoPairShows) {
                        with = update(prepared, {.points = pairs}, with_shapes(48));
     EXPECT_EQ(without.pulls.load_size, 0);
     EXPECT_GT(with.pulls.load_size, 1);
-    const double before = error_on_the_right(prepared, without, truth), after = error_on_the_right(prepared, with, truth);
+    const double before = error_on_the_right(prepared, without, truth),
+                 after = error_on_the_right(prepared, with, truth);
     EXPECT_LT(after, 0.7 * before) << before << " mm without";
     EXPECT_GT(with.min_jacobian, 0.5);
 }
