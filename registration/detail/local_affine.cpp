@@ -37,7 +37,7 @@ public:
         const double scale = matrix.topLeftCorner<3, 3>().trace() / 3;
         matrix.diagonal().head<3>().array() += 1e-6 * scale + 1e-12;
         matrix.diagonal().tail<9>().array() += 0.02 * scale + 1e-12;
-        return matrix.ldlt().solve(right);
+        return matrix.llt().solve(right);
     }
 
     [[nodiscard]] double squared_residual(const Vector12d& affine, int n) const {
@@ -68,6 +68,7 @@ LocalMotion fit_local_affine(const ScatteredMotion& motion, const Eigen::Vector3
     const auto kept = static_cast<std::ptrdiff_t>(std::ceil((1 - trimmed_share) * double(neighbours.size())));
     std::vector<int> used = neighbours, before;
     std::vector<std::pair<double, int>> residuals;
+    residuals.reserve(neighbours.size());
     Vector12d affine = fit.solve(used);
     for (int step = 0; step < concentration_steps && kept > 0; ++step) {
         residuals.clear();
@@ -86,8 +87,8 @@ LocalMotion fit_local_affine(const ScatteredMotion& motion, const Eigen::Vector3
 }
 
 Eigen::Matrix3d neighbour_weight(const BlockMatch& match) {
-    const double largest =
-        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(match.information, Eigen::EigenvaluesOnly).eigenvalues()[2];
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
+    const double largest = axes.computeDirect(match.information, Eigen::EigenvaluesOnly).eigenvalues()[2];
     if (!(largest > 0)) return Eigen::Matrix3d::Zero();
     return match.confidence / largest * match.information;
 }

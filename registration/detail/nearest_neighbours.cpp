@@ -97,12 +97,12 @@ private:
 
 }  // namespace
 
-std::vector<std::vector<int>> nearest_neighbours(const Eigen::Matrix3Xd& points, const std::vector<int>& among,
-                                                 int count) {
+std::vector<std::vector<int>> nearest_neighbours(const Eigen::Matrix3Xd& points, const std::vector<int>& of,
+                                                 const std::vector<int>& among, int count) {
     const ColumnTree tree(points, among);
-    std::vector<std::vector<int>> result(static_cast<std::size_t>(points.cols()));
+    std::vector<std::vector<int>> result(of.size());
     tbb::parallel_for(std::size_t{0}, result.size(), [&](std::size_t n) {
-        result[n] = tree.nearest(static_cast<int>(n), static_cast<std::size_t>(std::max(count, 0)));
+        result[n] = tree.nearest(of[n], static_cast<std::size_t>(std::max(count, 0)));
     });
     return result;
 }
@@ -110,7 +110,7 @@ std::vector<std::vector<int>> nearest_neighbours(const Eigen::Matrix3Xd& points,
 std::vector<std::vector<int>> nearest_neighbours(const Eigen::Matrix3Xd& points, int count) {
     std::vector<int> all(static_cast<std::size_t>(points.cols()));
     std::iota(all.begin(), all.end(), 0);
-    return nearest_neighbours(points, all, count);
+    return nearest_neighbours(points, all, all, count);
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace tissuewarp::registration::detail {
 namespace {
@@ -179,7 +180,10 @@ TEST(NearestNeighbours, AreThoseOfAFullSearch) {
         for (const int count : {0, 1, 24, 600}) {
             std::vector<int> among;
             for (int n = 0; n < 500; n += step) among.push_back(n);
-            const auto found = nearest_neighbours(points, among, count);
+            std::vector<int> all_points(500);
+            std::iota(all_points.begin(), all_points.end(), 0);
+            const auto found = nearest_neighbours(points, all_points, among, count);
+            EXPECT_EQ(nearest_neighbours(points, {7, 3}, among, count), (std::vector{found[7], found[3]}));
             for (Eigen::Index p = 0; p < points.cols(); ++p) {
                 std::vector<std::pair<double, int>> all;
                 for (const int n : among)
