@@ -331,10 +331,14 @@ void require_usable(const detail::TemplateImages& moving, const Eigen::Matrix3Xd
 
 std::vector<int> in_both_images(const detail::TemplateImages& moving, const imaging::Geometry& fixed,
                                 const Eigen::Matrix3Xd& predicted) {
+    std::vector<char> in_both(static_cast<std::size_t>(predicted.cols()));
+    tbb::parallel_for(Eigen::Index{0}, predicted.cols(), [&](Eigen::Index n) {
+        in_both[static_cast<std::size_t>(n)] =
+            detail::in_image(moving.image, moving.points.col(n)) && detail::in_image(fixed, predicted.col(n));
+    });
     std::vector<int> result;
-    for (Eigen::Index n = 0; n < predicted.cols(); ++n)
-        if (detail::in_image(moving.image, moving.points.col(n)) && detail::in_image(fixed, predicted.col(n)))
-            result.push_back(static_cast<int>(n));
+    for (std::size_t n = 0; n < in_both.size(); ++n)
+        if (in_both[n]) result.push_back(static_cast<int>(n));
     if (result.empty())
         throw InvalidInput("block matching: none of " + std::to_string(predicted.cols()) +
                            " points is expected to lie in both images; align them first");

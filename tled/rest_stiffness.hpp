@@ -27,7 +27,7 @@ public:
     /// pattern are taken over, only the numbers are factorised again. Throws InvalidInput for other constraints.
     RestStiffness(const RestState& rest, const NodalConditions& conditions, const RestStiffness& other);
     /// The search for the slowest mode begins at `slowest_about` (3 × N), that of another one, needs no coarse lattice
-    /// and ends earlier: some tens of per cent above where the slowest mode is another one now.
+    /// and ends earlier: up to twice too high where the slowest mode is quite another one now.
     RestStiffness(const RestState& rest, const NodalConditions& conditions, const RestStiffness& other,
                   const Eigen::Matrix3Xd& slowest_about);
     ~RestStiffness();

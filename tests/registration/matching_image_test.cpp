@@ -1,5 +1,6 @@
 /// What block matching makes of an image, against plain definitions.
 #include "registration/detail/matching_image.hpp"
+#include "registration/detail/field_of_view.hpp"
 #include "registration/detail/local_affine.hpp"
 
 #include "tests/registration/textured_phantom.hpp"
@@ -169,6 +170,35 @@ TEST(SeenRegion, IsItsPlainDefinition) {
     });
     EXPECT_GT(unseen, 100);
     EXPECT_LT(unseen, 17 * 13 * 11 - 100);
+}
+
+// A convex chain that turns the wrong way leaves out what spans the hull.
+TEST(FieldOfView, HoldsAllThatIsShownAndEndsThereAlongTheAxes) {
+    cv::RNG random(9);
+    imaging::Geometry grid;
+    grid.size = {23, 19, 7};
+    grid.spacing = {1, 1.5, 2};
+    Volume seen(grid, CV_8UC1);
+    for (int n = 0; n < 60; ++n)
+        seen.data<std::uint8_t>()[seen.offset(random.uniform(3, 20), random.uniform(2, 17), random.uniform(1, 6))] = 1;
+    const FieldOfView view(seen);
+    Eigen::Vector3d lower = Eigen::Vector3d::Constant(1e9), upper = -lower;
+    for (int k = 0; k < 7; ++k)
+        for (int j = 0; j < 19; ++j)
+            for (int i = 0; i < 23; ++i) {
+                if (!seen.data<std::uint8_t>()[seen.offset(i, j, k)]) continue;
+                const Eigen::Vector3d point = grid.point(Eigen::Vector3d(i, j, k));
+                EXPECT_LE(view.distance(point), 1e-9);
+                lower = lower.cwiseMin(point);
+                upper = upper.cwiseMax(point);
+            }
+    for (int axis = 0; axis < 3; ++axis) {
+        Eigen::Vector3d beyond = 0.5 * (lower + upper);
+        beyond[axis] = upper[axis] + 100;
+        EXPECT_NEAR(view.distance(beyond), 100, 1e-9);
+        beyond[axis] = lower[axis] - 100;
+        EXPECT_NEAR(view.distance(beyond), 100, 1e-9);
+    }
 }
 
 // A tree that prunes too early, or breaks ties by its own order.

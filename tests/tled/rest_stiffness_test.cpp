@@ -207,7 +207,7 @@ TEST_P(RestStiffnessTest, TheSlowestModeOfOtherSpringsIsWhereASearchMayBegin) {
         const RestStiffness next(rest, held(springs), first, first.approximate_slowest_mode());
         const double about = next.approximate_lowest_eigenvalue(), exact = next.lowest_eigenvalue();
         EXPECT_GE(about, (1 - 1e-4) * exact) << springs;
-        EXPECT_LE(about, 1.5 * exact) << springs;
+        EXPECT_LE(about, 2 * exact) << springs;
     }
 }
 
