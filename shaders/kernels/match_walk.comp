@@ -19,17 +19,18 @@ shared uint difference[CUBE], voxels[CUBE];
 shared float cost[CUBE];
 shared uint lane_difference[CUBE][3u * LANES + 1u], lane_voxels[CUBE][3u * LANES + 1u];
 
-/// Sum and count of a place over one word of the block's rows, of three a voxel; the first of them counts the voxel.
-uvec2 compare_word(ivec3 shown, ivec3 looked, int word) {
+/// Sum and count of a place over one word of every third of the block's rows, of three a voxel; the first of them counts
+/// the voxel.
+uvec2 compare_word(ivec3 shown, ivec3 looked, int word, int first_row) {
     Overlap overlap = overlap_of(shown, looked);
     int x = word / 3 - block_radius, part = word % 3;
     uvec2 sum = uvec2(0u);
     if (x < overlap.first.x || x > overlap.last.x) return sum;
     uint counts = part == 0 ? 1u : 0u;
     for (int k = overlap.first.z; k <= overlap.last.z; ++k) {
-        int a = shown_offset(shown + ivec3(x, overlap.first.y, k));
-        int b = looked_offset(looked + ivec3(x, overlap.first.y, k));
-        for (int j = overlap.first.y; j <= overlap.last.y; ++j, a += shown_size.x, b += looked_size.x) {
+        int first = overlap.first.y + first_row;
+        int a = shown_offset(shown + ivec3(x, first, k)), b = looked_offset(looked + ivec3(x, first, k));
+        for (int j = first; j <= overlap.last.y; j += 3, a += 3 * shown_size.x, b += 3 * looked_size.x) {
             uint both = min(shown_seen[a] & looked_seen[b], 1u);  // without a branch, loads need not wait for each other
             sum += both * uvec2(squared_difference(shown_word[3 * a + part], looked_word[3 * b + part]), counts);
         }
@@ -37,8 +38,8 @@ uvec2 compare_word(ivec3 shown, ivec3 looked, int word) {
     return sum;
 }
 
-/// Fills in `cost` of the first `count` places, which lie anywhere: LANES invocations side by side read a row's words,
-/// which lie side by side.
+/// Fills in `cost` of the first `count` places, which lie anywhere: LANES invocations side by side, for a third of the
+/// block's rows, read a row's words, which lie side by side.
 void compare(ivec3 shown, uint count) {
     uint local = gl_LocalInvocationID.x;
     if (local < CUBE) {
@@ -47,9 +48,10 @@ void compare(ivec3 shown, uint count) {
     }
     barrier();
     uint words = uint(3 * (2 * block_radius + 1));
-    for (uint which = local / LANES; which < count; which += WORKGROUP_SIZE / LANES)
+    for (uint part = local / LANES; part < 3u * count; part += WORKGROUP_SIZE / LANES)
         for (uint word = local % LANES; word < words; word += LANES) {
-            uvec2 sum = compare_word(shown, place[which], int(word));
+            uint which = part / 3u;
+            uvec2 sum = compare_word(shown, place[which], int(word), int(part % 3u));
             atomicAdd(difference[which], sum.x);
             atomicAdd(voxels[which], sum.y);
         }
