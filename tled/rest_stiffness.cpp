@@ -289,7 +289,7 @@ const detail::Mode& RestStiffness::Impl::slowest() const {
     const auto product = [this](const Matrix3Xd& x) {
         return Matrix3Xd(conditions.constrained.select(0.0, multiply(x, conditions)));
     };
-    constexpr detail::Patience of_given{2, 0.1};  // relaxation, which asks for it, makes up for more in fewer products
+    constexpr detail::Patience of_given{2, 0.05};  // relaxation, which asks for it, makes up for more in fewer products
     std::call_once(approximation_known, [&] {
         const Matrix3Xd D = diagonal(conditions);
         const bool given = slowest_about.size() > 0 && !slowest_about.isZero(0);
