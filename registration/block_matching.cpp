@@ -100,7 +100,8 @@ Eigen::Matrix3d information(const Minimum& minimum, const imaging::Geometry& gri
     const double independent = independent_share * std::pow(2 * radius + 1, 3), h = grid.spacing[0];
     const double chance = 1.5 * std::sqrt(2 * independent);
     const Eigen::Matrix3d raw = independent / (2 * std::max(minimum.cost, 1e-6)) * minimum.fit.hessian;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(raw);
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
+    axes.computeDirect(raw);
     const double leakage = 0.05 * axes.eigenvalues()[2];
     const Eigen::Array3d strength = (axes.eigenvalues().array() - chance - leakage).max(0.0);
     const Eigen::Vector3d bounded = strength / (1 + strength * least_deviation * least_deviation) / (h * h);
@@ -160,9 +161,11 @@ public:
             Level level = prepare(n, order_);
             std::vector<BlockMatch> matches(order_.size());
             match(level, level.searched, matches);
-            if (n + 1 < levels) predict(matches, level.searched);
-            if (const double candidate = mean_certainty(matches, level.searched); candidate >= certainty) {
-                certainty = candidate;
+            const double found = mean_certainty(matches, level.searched);
+            const Level& best_now = found >= certainty ? level : *best_level;
+            if (n + 1 < levels) predict(matches, level.searched, n + 1 < whole ? order_ : sought_later(best_now));
+            if (found >= certainty) {
+                certainty = found;
                 best = std::move(matches);
                 best_level.emplace(std::move(level));
             }
@@ -183,15 +186,32 @@ private:
     const ConsistencyOptions story_{};  // what neighbours must agree on, between levels as afterwards
     std::vector<std::size_t> order_;
 
-    /// Points between the described tissue and the border of what the moving image shows: the finest grid's matches
-    /// take the place of coarser ones where that grid serves them better.
-    void search_undescribed(std::vector<BlockMatch>& best) const {
+    /// Points between the described tissue and the border of what the moving image shows.
+    [[nodiscard]] std::vector<std::size_t> undescribed() const {
         const MatchingImage& finest = moving_.levels.back();
-        std::vector<std::size_t> points;
-        std::copy_if(order_.begin(), order_.end(), std::back_inserter(points), [&](std::size_t n) {
+        std::vector<char> described(order_.size());
+        tbb::parallel_for(std::size_t{0}, described.size(), [&](std::size_t n) {
             const Voxel centre = nearest_voxel(finest.grid, points_.col(static_cast<Eigen::Index>(n)));
-            return !finest.seen[static_cast<std::size_t>(finest.offset(centre))];
+            described[n] = finest.seen[static_cast<std::size_t>(finest.offset(centre))] != 0;
         });
+        std::vector<std::size_t> points;
+        std::copy_if(order_.begin(), order_.end(), std::back_inserter(points),
+                     [&](std::size_t n) { return !described[n]; });
+        return points;
+    }
+
+    /// Points that are looked for after the last level that looks for all.
+    [[nodiscard]] std::vector<std::size_t> sought_later(const Level& best) const {
+        std::vector<std::size_t> points = undescribed();
+        points.insert(points.end(), best.left_out.begin(), best.left_out.end());
+        std::sort(points.begin(), points.end());
+        points.erase(std::unique(points.begin(), points.end()), points.end());
+        return points;
+    }
+
+    /// The finest grid's matches take the place of coarser ones where that grid serves the points better.
+    void search_undescribed(std::vector<BlockMatch>& best) const {
+        const std::vector<std::size_t> points = undescribed();
         if (points.empty()) return;
         const Level level = prepare(moving_.options.levels - 1, points);
         std::vector<BlockMatch> matches(best.size());
@@ -228,8 +248,10 @@ private:
 
     /// Fills in the entries of some points; `point` stays −1 where the block was not found.
     void match(const Level& level, const std::vector<std::size_t>& points, std::vector<BlockMatch>& matches) const {
-        std::vector<SoughtBlock> blocks;
-        for (const std::size_t n : points) blocks.push_back(sought(level, static_cast<Eigen::Index>(n)));
+        std::vector<SoughtBlock> blocks(points.size());
+        tbb::parallel_for(std::size_t{0}, points.size(), [&](std::size_t place) {
+            blocks[place] = sought(level, static_cast<Eigen::Index>(points[place]));
+        });
         level.fixed->look(blocks, level.reach, options_.least_share, [&](std::size_t place, const BlockSight& sight) {
             const auto found = match_of(level, blocks[place].moving, sight);
             if (!found) return;
@@ -263,18 +285,20 @@ private:
         return result;
     }
 
-    /// The next level starts from what the searched neighbours of each point agree on.
-    void predict(const std::vector<BlockMatch>& matches, const std::vector<std::size_t>& searched) {
+    /// What is looked for next starts from what the searched neighbours of each of `points` agree on.
+    void predict(const std::vector<BlockMatch>& matches, const std::vector<std::size_t>& searched,
+                 const std::vector<std::size_t>& points) {
         const auto neighbours =
-            detail::nearest_neighbours(points_, std::vector<int>(searched.begin(), searched.end()), story_.neighbours);
+            detail::nearest_neighbours(points_, std::vector<int>(points.begin(), points.end()),
+                                       std::vector<int>(searched.begin(), searched.end()), story_.neighbours);
         detail::ScatteredMotion motion{points_, predicted_ - points_, std::vector<Eigen::Matrix3d>(matches.size())};
         tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t n) {
             const auto column = static_cast<Eigen::Index>(n);
             if (matches[n].point >= 0) motion.displacements.col(column) = matches[n].fixed - matches[n].moving;
             motion.weights[n] = detail::neighbour_weight(matches[n]);
         });
-        tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t n) {
-            const auto column = static_cast<Eigen::Index>(n);
+        tbb::parallel_for(std::size_t{0}, points.size(), [&](std::size_t n) {
+            const auto column = static_cast<Eigen::Index>(points[n]);
             const bool vouched = std::any_of(neighbours[n].begin(), neighbours[n].end(), [&](int other) {
                 return motion.weights[static_cast<std::size_t>(other)].trace() > 0.1;
             });
@@ -307,10 +331,14 @@ void require_usable(const detail::TemplateImages& moving, const Eigen::Matrix3Xd
 
 std::vector<int> in_both_images(const detail::TemplateImages& moving, const imaging::Geometry& fixed,
                                 const Eigen::Matrix3Xd& predicted) {
+    std::vector<char> in_both(static_cast<std::size_t>(predicted.cols()));
+    tbb::parallel_for(Eigen::Index{0}, predicted.cols(), [&](Eigen::Index n) {
+        in_both[static_cast<std::size_t>(n)] =
+            detail::in_image(moving.image, moving.points.col(n)) && detail::in_image(fixed, predicted.col(n));
+    });
     std::vector<int> result;
-    for (Eigen::Index n = 0; n < predicted.cols(); ++n)
-        if (detail::in_image(moving.image, moving.points.col(n)) && detail::in_image(fixed, predicted.col(n)))
-            result.push_back(static_cast<int>(n));
+    for (std::size_t n = 0; n < in_both.size(); ++n)
+        if (in_both[n]) result.push_back(static_cast<int>(n));
     if (result.empty())
         throw InvalidInput("block matching: none of " + std::to_string(predicted.cols()) +
                            " points is expected to lie in both images; align them first");

@@ -101,6 +101,7 @@ std::vector<std::size_t> candidates(const CostLattice& first) {
         return std::abs(a[0] - b[0]) <= 1 && std::abs(a[1] - b[1]) <= 1 && std::abs(a[2] - b[2]) <= 1;
     };
     std::vector<std::pair<double, std::size_t>> ranked;
+    ranked.reserve(first.costs.size());
     for (std::size_t n = 0; n < first.costs.size(); ++n)
         if (std::isfinite(first.costs[n])) ranked.emplace_back(first.costs[n], n);
     const std::size_t count = std::min(ranked.size(), 1 + first.costs.size() / one_of);

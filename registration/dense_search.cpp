@@ -42,18 +42,20 @@ DenseMatches DenseSearch::matches(const State& state, int coarsening, const Loca
     const meshing::TetMesh& mesh = prepared_.model.mesh;
     const int finest = prepared_.image->blocks.options().levels - 1;
     const DenseForces dense = engine_.forces(state, static_cast<std::size_t>(std::max(0, finest - coarsening)));
-    std::vector<std::optional<meshing::Location>> places(dense.forces.size());
-    std::vector<BlockMatch> matches(places.size());
-    tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t n) {
-        places[n] = locate_near(locator, dense.forces[n].place);
-        if (places[n]) matches[n] = as_match(dense.forces[n], mesh, state, *places[n]);
-    });
     DenseMatches result{{}, dense.agreement};
-    result.found.reserve(places.size() + known.matches.size());
-    for (std::size_t n = 0; n < places.size(); ++n)
-        if (places[n]) result.found.add(matches[n], *places[n]);
+    LocatedMatches& found = result.found;
+    found.reserve(dense.forces.size() + known.matches.size());
+    found.matches.resize(dense.forces.size());
+    found.places.resize(dense.forces.size());
+    tbb::parallel_for(std::size_t{0}, dense.forces.size(), [&](std::size_t n) {
+        const auto place = locate_near(locator, dense.forces[n].place);
+        if (!place) return;
+        found.places[n] = *place;
+        found.matches[n] = as_match(dense.forces[n], mesh, state, *place);
+    });
+    found.drop_unlocated();
     for (std::size_t n = 0; n < known.matches.size(); ++n)
-        if (!dense.say_something_at(known.matches[n].moving)) result.found.add(known.matches[n], known.places[n]);
+        if (!dense.say_something_at(known.matches[n].moving)) found.add(known.matches[n], known.places[n]);
     return result;
 }
 

@@ -26,10 +26,10 @@ void require_usable(const PreparedModel& prepared, const Intraoperative& seen) {
 }
 
 EvidenceSet::EvidenceSet(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options,
-                         ImageEngine* dense)
+                         std::optional<ImageTools>& image_tools)
     : energy(strain_energy_unit(prepared, options.tissue)) {
     const TissuePrior& tissue = options.tissue;
-    if (seen.image) image.emplace(prepared, *seen.image, options.image, dense, energy);
+    if (seen.image) image.emplace(prepared, *seen.image, options.image, *image_tools, energy);
     if (seen.surface) surface.emplace(prepared, *seen.surface, options.surface, energy);
     if (seen.points) points.emplace(prepared, *seen.points, options.points, energy);
     if (seen.curves) curves.emplace(prepared, *seen.curves, options.curves, energy);
@@ -60,7 +60,7 @@ std::vector<tled::Spring> EvidenceSet::supports(const RoundPlan& plan, const Sta
     return springs;
 }
 
-void EvidenceSet::judge(const State& state, UpdateResult& result) const {
+void EvidenceSet::judge(const State& state, UpdateResult& result) {
     if (image) result.image = image->fit(state);
     if (surface) result.surface = surface->fit(state);
     if (points) result.points = points->fit(state);

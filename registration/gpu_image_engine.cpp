@@ -92,7 +92,7 @@ public:
         const shaders::CurrentContext current = matching_.device().make_current();
         pull_back(level, state);
         matching_.describe(level.wide, memory_.descriptors, memory_.shown);
-        return forces_of(products(level), level.cells, level.moving.grid);
+        return forces_of(products(level), level.cells, level.moving.grid, windows_);
     }
 
 private:
@@ -100,6 +100,8 @@ private:
     std::vector<Level> levels_;
     Memory memory_;
     GpuBlockEngine blocks_;
+    std::vector<CellSums> sums_;  // of the cells of the level looked at last
+    WindowMemory windows_;
 
     /// Leaves values and what is seen on the wide grid.
     void pull_back(const Level& level, const State& state) {
@@ -125,7 +127,7 @@ private:
         matching_.run(MatchPass::Sample, level.wide_voxels(), {&fixed, &own, &samples});
     }
 
-    std::vector<CellSums> products(const Level& level) {
+    const std::vector<CellSums>& products(const Level& level) {
         const std::size_t count = level.cells.count();
         const GpuBlocks own{{"MatchDescriptors", &memory_.descriptors},
                             {"MatchShown", &memory_.shown},
@@ -136,13 +138,13 @@ private:
         program.set(0, static_cast<std::uint32_t>(count));
         matching_.run(MatchPass::Forces, count * static_cast<std::size_t>(program.workgroup_size()), {&own});
         const auto bytes = matching_.fetch(memory_.cells, count * sizeof(MatchCell));
-        std::vector<CellSums> sums(count);
+        sums_.resize(count);
         tbb::parallel_for(std::size_t{0}, count, [&](std::size_t n) {
             MatchCell cell;
             std::memcpy(&cell, bytes.data() + n * sizeof cell, sizeof cell);
-            sums[n] = sums_of(cell, level.cells.first_voxel(n));
+            sums_[n] = cell.voxels > 0 ? sums_of(cell, level.cells.first_voxel(n)) : CellSums{};
         });
-        return sums;
+        return sums_;
     }
 };
 

@@ -2,14 +2,16 @@
 
 #include "registration/detail/ground.hpp"
 #include "registration/detail/least_trimmed_motion.hpp"
-#include "registration/detail/point_tree.hpp"
+#include "registration/detail/near_points.hpp"
 
 #include <Eigen/Eigenvalues>
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 namespace tissuewarp::registration::detail {
 
@@ -25,21 +27,21 @@ double median_distance(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
 }  // namespace
 
 ImageEvidence::ImageEvidence(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
-                             ImageEngine* engine, double energy)
+                             ImageTools& tools, double energy)
     : prepared_(prepared),
-      fixed_(fixed),
+      fixed_(fixed, tools.memory),
       options_(options),
       view_(fixed_.seen),
-      locator_(prepared.model.mesh),
+      locator_(tools.locator),
       energy_(energy) {
-    if (!engine) {
+    if (!tools.engine) {
         own_blocks_ = make_cpu_block_engine(prepared.image->blocks.images(), fixed_);
         block_engine_ = own_blocks_.get();
         return;
     }
-    engine->set_fixed(fixed_);
-    block_engine_ = &engine->blocks();
-    dense_.emplace(prepared, *engine);
+    tools.engine->set_fixed(fixed_);
+    block_engine_ = &tools.engine->blocks();
+    dense_.emplace(prepared, *tools.engine);
 }
 
 int ImageEvidence::searches() const {
@@ -81,10 +83,11 @@ void ImageEvidence::use(LocatedMatches matches) {
     matches_ = std::move(matches);
     strongest_.resize(matches_.matches.size());
     tbb::parallel_for(std::size_t{0}, strongest_.size(), [&](std::size_t n) {
-        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(matches_.matches[n].information,
-                                                                  Eigen::EigenvaluesOnly);
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
+        axes.computeDirect(matches_.matches[n].information, Eigen::EigenvaluesOnly);
         strongest_[n] = axes.eigenvalues()[2];
     });
+    shares_ = NodalShares(prepared_.model.mesh, matches_.places);
 }
 
 LocatedMatches ImageEvidence::located(const std::vector<BlockMatch>& matches) const {
@@ -120,45 +123,66 @@ bool ImageEvidence::in_view(const Eigen::Vector3d& point) const {
     return view_.distance(point) < margin_mm;
 }
 
+std::vector<char> ImageEvidence::surface_in_view(const Eigen::Isometry3d& placement) const {
+    const std::vector<InterfaceNode>& interfaces = prepared_.interfaces.nodes();
+    std::vector<char> result(static_cast<std::size_t>(prepared_.model.mesh.node_count()));
+    tbb::parallel_for(std::size_t{0}, interfaces.size(), [&](std::size_t n) {
+        const int node = interfaces[n].node;
+        if (interfaces[n].outer != 0) return;
+        result[static_cast<std::size_t>(node)] =
+            in_view(placement * Eigen::Vector3d(prepared_.model.mesh.nodes.col(node)));
+    });
+    return result;
+}
+
 double ImageEvidence::view_share() const {
     double all = 0, seen = 0;
+    const std::vector<char> shown = surface_in_view(Eigen::Isometry3d::Identity());
     for (const InterfaceNode& node : prepared_.interfaces.nodes()) {
         if (node.outer != 0) continue;
         all += node.area;
-        if (in_view(prepared_.model.mesh.nodes.col(node.node))) seen += node.area;
+        if (shown[static_cast<std::size_t>(node.node)]) seen += node.area;
     }
     return all > 0 ? seen / all : 0;
 }
 
-ImageFit ImageEvidence::fit(const State& state) const {
+ImageFit ImageEvidence::fit(const State& state) {
     constexpr double near_mm = 15;
     const Eigen::Matrix3Xd& nodes = prepared_.model.mesh.nodes;
     ImageFit fit;
     fit.blocks = static_cast<int>(prepared_.image->blocks.points().cols());
     fit.matched = static_cast<int>(blocks_.matches.size());
     std::vector<Eigen::Vector3d> places;
+    places.reserve(matches_.matches.size());
     for (const BlockMatch& match : matches_.matches) places.push_back(match.moving);
-    const PointTree tree(std::move(places));
-    Eigen::Index shown = 0;
-    for (Eigen::Index node = 0; node < nodes.cols(); ++node) shown += tree.distance(nodes.col(node)) < near_mm;
+    const NearPoints matched(std::move(places), near_mm);
+    const auto shown = tbb::parallel_reduce(
+        tbb::blocked_range<Eigen::Index>(0, nodes.cols()), Eigen::Index{0},
+        [&](const tbb::blocked_range<Eigen::Index>& range, Eigen::Index count) {
+            for (Eigen::Index node = range.begin(); node < range.end(); ++node)
+                count += matched.any_about(nodes.col(node));
+            return count;
+        },
+        std::plus<>());
     fit.shown_share = double(shown) / double(nodes.cols());
     fit.residual_mm = mean_residual(pulled(state));
     fit.agreement = agreement_;
     return fit;
 }
 
-std::vector<ImageEvidence::PulledMatch> ImageEvidence::pulled(const State& state) const {
+const std::vector<ImageEvidence::PulledMatch>& ImageEvidence::pulled(const State& state) {
     const Eigen::Isometry3d back = state.placement.inverse();
-    std::vector<PulledMatch> result(matches_.matches.size());
-    tbb::parallel_for(std::size_t{0}, result.size(), [&](std::size_t n) {
+    pulled_.resize(matches_.matches.size());
+    tbb::parallel_for(std::size_t{0}, pulled_.size(), [&](std::size_t n) {
         const BlockMatch& match = matches_.matches[n];
         const meshing::Location& place = matches_.places[n];
         const Eigen::Matrix3d information = back.linear() * match.information * back.linear().transpose();
-        const Pull pull{place, back * match.fixed - match.moving, information};
-        const Eigen::Vector3d e = pull.target - displacement_at(prepared_.model.mesh, state.displacement, place);
-        result[n] = {pull, match.confidence, std::sqrt(e.dot(information * e) / strongest_[n])};
+        const Eigen::Vector3d target = back * match.fixed - match.moving,
+                              e = target - displacement_at(prepared_.model.mesh, state.displacement, place),
+                              force = information * e;
+        pulled_[n] = {{information, force}, match.confidence, std::sqrt(e.dot(force) / strongest_[n])};
     });
-    return result;
+    return pulled_;
 }
 
 double ImageEvidence::mean_residual(const std::vector<PulledMatch>& matches) {
@@ -171,18 +195,18 @@ double ImageEvidence::mean_residual(const std::vector<PulledMatch>& matches) {
 }
 
 Contribution ImageEvidence::contribution(const RoundPlan& plan, const State& state) {
-    const std::vector<PulledMatch> matches = pulled(state);
-    std::vector<Pull> pulls(matches.size());
+    const std::vector<PulledMatch>& matches = pulled(state);
+    forces_.resize(matches.size());
     tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t n) {
-        pulls[n] = matches[n].pull;
-        pulls[n].stiffness *= energy_ * matches[n].confidence * robust_weight(matches[n].residual_mm, plan.scale_mm);
+        const double weight = energy_ * matches[n].confidence * robust_weight(matches[n].residual_mm, plan.scale_mm);
+        forces_[n] = {weight * matches[n].pull.stiffness, weight * matches[n].pull.force};
     });
     Contribution result;
     result.candidates =
         std::max(static_cast<int>(prepared_.image->blocks.points().cols()), static_cast<int>(matches.size()));
     result.matched = static_cast<int>(matches.size());
     result.mean_residual_mm = mean_residual(matches);
-    result.conditions.springs = lumped_springs(prepared_.model.mesh, pulls, state.displacement);
+    result.conditions.springs = lumped_springs(shares_, forces_, state.displacement);
     for (const tled::Spring& spring : ground(state.placement)) result.conditions.springs.push_back(spring);
     return result;
 }
@@ -190,9 +214,9 @@ Contribution ImageEvidence::contribution(const RoundPlan& plan, const State& sta
 const std::vector<tled::Spring>& ImageEvidence::ground(const Eigen::Isometry3d& placement) {
     if (ground_.empty() || !ground_at_.isApprox(placement, 0)) {
         ground_at_ = placement;
+        const std::vector<char> shown = surface_in_view(placement);
         ground_ = ground_springs(prepared_, energy_, [&](const InterfaceNode& node) {
-            const bool seen = in_view(placement * Eigen::Vector3d(prepared_.model.mesh.nodes.col(node.node)));
-            return seen ? options_.expected_motion_mm : options_.unseen_motion_mm;
+            return shown[static_cast<std::size_t>(node.node)] ? options_.expected_motion_mm : options_.unseen_motion_mm;
         });
     }
     return ground_;

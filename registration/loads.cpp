@@ -7,6 +7,7 @@ Eigen::Matrix3Xd nodal_forces(const PreparedModel& prepared, const TissueLoads& 
         throw InvalidInput("the loads on the tissue are not finite; give numbers of kPa/mm and kPa");
     const meshing::TetMesh& mesh = prepared.model.mesh;
     Eigen::Matrix3Xd forces = loads.body_force * (prepared.rest.lumped_mass / prepared.model.density).transpose();
+    if (loads.pressure_kpa == 0) return forces;
     for (const meshing::InterfaceFace& face : meshing::interface_faces(mesh)) {
         if (face.outer != 0) continue;
         const Eigen::Vector3d a = mesh.nodes.col(face.nodes[0]), b = mesh.nodes.col(face.nodes[1]),

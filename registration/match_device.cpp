@@ -3,6 +3,10 @@
 #include "core/errors.hpp"
 #include "registration/detail/template_images.hpp"
 
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cstring>
 #include <vector>
 
 namespace tissuewarp::registration::detail {
@@ -56,9 +60,25 @@ void MatchDevice::set_fixed(const SeenImage& fixed) {
     reserve(blurred_, device_, voxels, "fixed image along one axis");
     reserve(fixed_seen_, device_, words, "what the fixed image shows");
     const shaders::CurrentContext current = device_.make_current();
-    fixed_voxels_->upload(std::span(fixed_.data<float>(), voxels));
-    fixed_seen_->write(0, std::as_bytes(std::span(fixed.seen.data<std::uint8_t>(), voxels)));
+    send(image_upload_, std::as_bytes(std::span(fixed_.data<float>(), voxels)), *fixed_voxels_);
+    send(seen_upload_, std::as_bytes(std::span(fixed.seen.data<std::uint8_t>(), voxels)), *fixed_seen_);
     for (auto& [spacing, smoothed] : smoothed_) smoothed.current = false;
+}
+
+/// In all threads: one alone takes longer than the way to the device.
+void MatchDevice::send(std::unique_ptr<shaders::Upload>& way, std::span<const std::byte> bytes,
+                       const shaders::StorageBuffer& target) {
+    if (!way || way->bytes() < bytes.size()) {
+        way.reset();
+        way = std::make_unique<shaders::Upload>(device_, bytes.size(), "the fixed image on its way up");
+    }
+    const std::span<std::byte> room = way->room();
+    constexpr std::size_t piece = std::size_t{1} << 18U;
+    tbb::parallel_for(std::size_t{0}, (bytes.size() + piece - 1) / piece, [&](std::size_t n) {
+        const auto some = bytes.subspan(n * piece, std::min(piece, bytes.size() - n * piece));
+        std::memcpy(room.data() + n * piece, some.data(), some.size());
+    });
+    way->send(target, bytes.size());
 }
 
 const Program& MatchDevice::program(MatchPass pass) {

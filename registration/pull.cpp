@@ -10,7 +10,8 @@ namespace {
 
 /// x of least norm with K x = f, for f in the range of K.
 Eigen::Vector3d least_norm_solution(const Eigen::Matrix3d& stiffness, const Eigen::Vector3d& force) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(stiffness);
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
+    axes.computeDirect(stiffness);
     const double least = 1e-9 * axes.eigenvalues()[2];
     Eigen::Vector3d along = axes.eigenvectors().transpose() * force;
     for (int axis = 0; axis < 3; ++axis)
@@ -36,31 +37,55 @@ Eigen::Vector3d displacement_at(const meshing::TetMesh& mesh, const Eigen::Matri
     return displacement(Eigen::all, mesh.tets.col(at.tet)) * at.barycentric;
 }
 
-std::vector<tled::Spring> lumped_springs(const meshing::TetMesh& mesh, const std::vector<Pull>& pulls,
-                                         const Eigen::Matrix3Xd& displacement) {
-    struct Sum {
-        Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero();
-        Eigen::Vector3d force = Eigen::Vector3d::Zero();
+NodalShares::NodalShares(const meshing::TetMesh& mesh, std::span<const meshing::Location> places) {
+    std::vector<std::size_t> count(static_cast<std::size_t>(mesh.node_count())), next(count.size());
+    const auto node_of = [&](const meshing::Location& at, int corner) {
+        return static_cast<std::size_t>(mesh.tets(corner, at.tet));
     };
-    std::vector<Sum> sums(static_cast<std::size_t>(mesh.node_count()));
-    for (const Pull& pull : pulls) {
-        const Eigen::Vector3d force = pull.stiffness * (pull.target - displacement_at(mesh, displacement, pull.at));
-        for (int corner = 0; corner < 4; ++corner) {
-            Sum& sum = sums[static_cast<std::size_t>(mesh.tets(corner, pull.at.tet))];
-            sum.stiffness += pull.at.barycentric[corner] * pull.stiffness;
-            sum.force += pull.at.barycentric[corner] * force;
-        }
+    for (const meshing::Location& at : places)
+        for (int corner = 0; corner < 4; ++corner) ++count[node_of(at, corner)];
+    first_.push_back(0);
+    for (std::size_t node = 0; node < count.size(); ++node) {
+        if (count[node] == 0) continue;
+        next[node] = first_.back();
+        nodes_.push_back(static_cast<int>(node));
+        first_.push_back(first_.back() + count[node]);
     }
-    std::vector<tled::Spring> springs;
-    for (int node = 0; node < mesh.node_count(); ++node)
-        if (sums[static_cast<std::size_t>(node)].stiffness.trace() > 0) springs.emplace_back().node = node;
+    shares_.resize(first_.back());
+    for (std::size_t n = 0; n < places.size(); ++n)
+        for (int corner = 0; corner < 4; ++corner)
+            shares_[next[node_of(places[n], corner)]++] = {static_cast<int>(n), places[n].barycentric[corner]};
+}
+
+std::vector<tled::Spring> lumped_springs(const NodalShares& shares, std::span<const PullForce> pulls,
+                                         const Eigen::Matrix3Xd& displacement) {
+    std::vector<tled::Spring> springs(shares.nodes().size());
     tbb::parallel_for(std::size_t{0}, springs.size(), [&](std::size_t n) {
         tled::Spring& spring = springs[n];
-        const auto& [stiffness, force] = sums[static_cast<std::size_t>(spring.node)];
-        spring.stiffness = stiffness;
-        spring.target = displacement.col(spring.node) + least_norm_solution(stiffness, force);
+        spring.node = shares.nodes()[n];
+        spring.stiffness.setZero();
+        Eigen::Vector3d force = Eigen::Vector3d::Zero();
+        for (const NodalShares::Share& share : shares.of(n)) {
+            const PullForce& pull = pulls[static_cast<std::size_t>(share.place)];
+            spring.stiffness += share.weight * pull.stiffness;
+            force += share.weight * pull.force;
+        }
+        spring.target = displacement.col(spring.node) + least_norm_solution(spring.stiffness, force);
     });
+    std::erase_if(springs, [](const tled::Spring& spring) { return !(spring.stiffness.trace() > 0); });
     return springs;
+}
+
+std::vector<tled::Spring> lumped_springs(const meshing::TetMesh& mesh, const std::vector<Pull>& pulls,
+                                         const Eigen::Matrix3Xd& displacement) {
+    std::vector<meshing::Location> places;
+    std::vector<PullForce> forces;
+    for (const Pull& pull : pulls) {
+        places.push_back(pull.at);
+        forces.push_back(
+            {pull.stiffness, pull.stiffness * (pull.target - displacement_at(mesh, displacement, pull.at))});
+    }
+    return lumped_springs(NodalShares(mesh, places), forces, displacement);
 }
 
 }  // namespace tissuewarp::registration::detail

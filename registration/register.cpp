@@ -102,6 +102,7 @@ private:
     /// Data other than labels pull with other springs than those that the model was prepared with: what relaxes
     /// slowest, and what a factor would be of, follow from them.
     std::optional<tled::RestStiffness> metric_;
+    bool metric_is_current_ = false;
     bool relaxation_failed_ = false;
     double matching_seconds_ = 0, solving_seconds_ = 0, finding_seconds_ = 0;
 
@@ -180,7 +181,7 @@ private:
         if (!searches_left() || round < round_of_search(evidence_.image->searches_done())) return;
         detail::Stopwatch stopwatch;
         evidence_.image->search(state_, observer_);
-        metric_.reset();
+        metric_is_current_ = false;
         matching_seconds_ += stopwatch.lap("").seconds;
     }
 
@@ -221,6 +222,14 @@ private:
         return {round, round == options_.rematches - 1, range, scale, step_mm_};
     }
 
+    /// The slowest mode is sought from that of the springs before, at first of those that the model was prepared with.
+    void renew_metric(const tled::NodalConditions& conditions) {
+        const tled::RestStiffness& before = metric_ ? *metric_ : prepared_.stiffness;
+        metric_ =
+            tled::RestStiffness(prepared_.rest, conditions, prepared_.stiffness, before.approximate_slowest_mode());
+        metric_is_current_ = true;
+    }
+
     /// Relaxation needs no factor; where it failed, L-BFGS with a factor of the data's own springs takes a handful of
     /// solves.
     void choose_method() {
@@ -258,7 +267,7 @@ private:
         record.mean_residual_mm = data.mean_residual_mm;
         matching_seconds_ += stopwatch.lap("").seconds;
 
-        if (needs_metric() && !metric_) metric_.emplace(prepared_.rest, conditions, prepared_.stiffness);
+        if (needs_metric() && !metric_is_current_) renew_metric(conditions);
         choose_method();
         const tled::EquilibriumResult solved =
             tled::equilibrium(engine_, metric_ ? *metric_ : prepared_.stiffness, conditions, equilibrium_,
@@ -271,7 +280,7 @@ private:
         record.estimated_error_mm = solved.estimated_error_mm;
         if (evidence_.contact && evidence_.contact->follow({state_.placement, solved.displacement}) &&
             most_passes > 1) {
-            metric_.reset();
+            metric_is_current_ = false;
             solving_seconds_ += stopwatch.lap("").seconds;
             Round again = match_and_solve(round, most_passes - 1);
             again.force_evaluations += record.force_evaluations;
@@ -290,6 +299,7 @@ struct Updater::Impl {
     const PreparedModel& prepared;
     UpdateOptions options;
     std::unique_ptr<tled::Engine> solver;
+<<<<<<< HEAD
     std::unique_ptr<detail::ImageEngine> dense;  // where the model has an image of descriptors
     detail::LoadFinder load_finder;
 
@@ -299,6 +309,18 @@ struct Updater::Impl {
         const bool described =
             model.image && model.image->blocks.options().similarity == Similarity::SelfSimilarityContext;
         if (described) dense = detail::make_image_engine(model, given, observer);
+=======
+    std::optional<detail::ImageTools> image_tools;  // where the model has an image
+
+    Impl(const PreparedModel& model, const UpdateOptions& given, std::unique_ptr<tled::Engine> engine,
+         Observer& observer)
+        : prepared(model), options(given), solver(std::move(engine)) {
+        if (!model.image) return;
+        const bool described = model.image->blocks.options().similarity == Similarity::SelfSimilarityContext;
+        image_tools.emplace(detail::ImageTools{described ? detail::make_image_engine(model, given, observer) : nullptr,
+                                               meshing::PointLocator(model.model.mesh),
+                                               {}});
+>>>>>>> gpu-update
     }
 
     UpdateResult update(const Intraoperative& given, Observer& observer);
@@ -310,7 +332,7 @@ UpdateResult Updater::Impl::update(const Intraoperative& given, Observer& observ
     detail::Pace pace(options.time_budget_s);
     detail::Stopwatch stopwatch;
     UpdateResult result;
-    detail::EvidenceSet evidence(prepared, seen, options, dense.get());
+    detail::EvidenceSet evidence(prepared, seen, options, image_tools);
     if (options.align) result.alignment = detail::align(prepared, seen, evidence, options, observer);
     result.times.push_back(stopwatch.lap("rigid alignment"));
     if (seen.labels) evidence.labels.emplace(prepared, *seen.labels, options);

@@ -38,6 +38,7 @@ public:
 
 private:
     friend class Readback;
+    friend class Upload;
     void require_range(std::size_t offset, std::size_t bytes) const;
 
     const Device* device_;

@@ -327,7 +327,10 @@ ProgramSource match_program(MatchPass pass, int descriptor_reach) {
     if (pass == MatchPass::Difference) source.defines["PARTIALS"] = number(match_partials);
     if (pass == MatchPass::Mean) source.defines["WORKGROUP_SIZE"] = std::to_string(match_partials);
     if (pass == MatchPass::Erode) source.defines["DESCRIPTOR_REACH"] = number(descriptor_reach);
-    if (pass == MatchPass::Walk) source.defines["MOST_STEPS"] = number(match_walk_steps);
+    if (pass == MatchPass::Walk) {
+        source.defines["MOST_STEPS"] = number(match_walk_steps);
+        source.defines["WORKGROUP_SIZE"] = "288";  // nine times the lanes of a row
+    }
     if (pass == MatchPass::Forces) {
         source.defines["CELL_SIDE"] = number(match_cell_side);
         source.defines["WORKGROUP_SIZE"] = std::to_string(match_cell_side * match_cell_side * match_cell_side);

@@ -4,7 +4,8 @@
 
 #include <Eigen/Cholesky>
 
-#include <algorithm>
+#include "tled/detail/parallel.hpp"
+
 #include <string>
 #include <vector>
 
@@ -18,29 +19,38 @@ void require_node(int node, int node_count, const char* what) {
                            std::to_string(node_count - 1));
 }
 
-void require_stiffness(const Spring& spring) {
+bool is_valid(const Spring& spring) {
     const Eigen::Matrix3d& k = spring.stiffness;
     const double size = k.norm();
     const Eigen::LLT<Eigen::Matrix3d> raised(k + 1e-9 * size * Eigen::Matrix3d::Identity());
-    const bool valid = k.allFinite() && spring.target.allFinite() && (k - k.transpose()).norm() <= 1e-9 * size &&
-                       (size == 0 || raised.info() == Eigen::Success);
-    if (!valid)
-        throw InvalidInput("the spring at node " + std::to_string(spring.node) +
-                           " needs a finite target and a symmetric positive semi-definite stiffness (mN/mm)");
+    return k.allFinite() && spring.target.allFinite() && (k - k.transpose()).norm() <= 1e-9 * size &&
+           (size == 0 || raised.info() == Eigen::Success);
+}
+
+void require_valid(const std::vector<Spring>& springs, int node_count) {
+    std::vector<char> valid(springs.size());
+    parallel_ranges(0, springs.size(), 256, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t n = begin; n < end; ++n) valid[n] = is_valid(springs[n]);
+    });
+    for (std::size_t n = 0; n < springs.size(); ++n) {
+        require_node(springs[n].node, node_count, "a spring");
+        if (!valid[n])
+            throw InvalidInput("the spring at node " + std::to_string(springs[n].node) +
+                               " needs a finite target and a symmetric positive semi-definite stiffness (mN/mm)");
+    }
 }
 
 void sum_springs(const std::vector<Spring>& springs, int node_count, NodalConditions& nodal) {
-    for (const Spring& spring : springs) {
-        require_node(spring.node, node_count, "a spring");
-        require_stiffness(spring);
-        nodal.spring_node.push_back(spring.node);
-    }
+    require_valid(springs, node_count);
+    constexpr Eigen::Index none = -1;
+    std::vector<Eigen::Index> column_of(static_cast<std::size_t>(node_count), none);
+    for (const Spring& spring : springs) column_of[static_cast<std::size_t>(spring.node)] = 0;
     std::vector<int>& nodes = nodal.spring_node;
-    std::sort(nodes.begin(), nodes.end());
-    nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
-    std::vector<Eigen::Index> column_of(static_cast<std::size_t>(node_count));
-    for (std::size_t n = 0; n < nodes.size(); ++n)
-        column_of[static_cast<std::size_t>(nodes[n])] = static_cast<Eigen::Index>(n);
+    for (int node = 0; node < node_count; ++node) {
+        if (column_of[static_cast<std::size_t>(node)] == none) continue;
+        column_of[static_cast<std::size_t>(node)] = static_cast<Eigen::Index>(nodes.size());
+        nodes.push_back(node);
+    }
     nodal.spring_stiffness = Eigen::Matrix<double, 6, Eigen::Dynamic>::Zero(6, static_cast<Eigen::Index>(nodes.size()));
     nodal.spring_force = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(nodes.size()));
     for (const Spring& spring : springs) {

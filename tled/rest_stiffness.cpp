@@ -42,8 +42,11 @@ struct Analysis {
 
 /// What stiffnesses of one tissue and other springs share, made by the first that needs it.
 struct Outline {
+    std::vector<std::vector<int>> pieces;  // connected ones
     std::once_flag made;
     std::unique_ptr<const detail::SmoothSpace> space;
+
+    explicit Outline(const RestState& rest) : pieces(detail::connected_pieces(rest)) {}
 };
 
 }  // namespace
@@ -54,7 +57,7 @@ struct RestStiffness::Impl {
         elastic;  // K₀ with membranes and sliding pairs, without springs, all degrees of freedom
     std::shared_ptr<const std::vector<Matrix3d>> elastic_diagonal;  // of every node
     std::shared_ptr<Analysis> analysis = std::make_shared<Analysis>();
-    std::shared_ptr<Outline> outline = std::make_shared<Outline>();
+    std::shared_ptr<Outline> outline;
     Matrix3Xd position;      // at rest, mm
     std::vector<int> index;  // degree of freedom 3·node + component → free number or −1
     int free_count = 0;
@@ -85,10 +88,14 @@ struct RestStiffness::Impl {
             if (index[d] >= 0) result.row(static_cast<Eigen::Index>(d)) = answer.row(index[d]);
         return result;
     }
+    [[nodiscard]] Matrix3Xd diagonal(const NodalConditions& present) const;
     [[nodiscard]] Matrix3Xd multiply(const Matrix3Xd& x, const NodalConditions& present) const {
         Matrix3Xd y = elastic->multiply(x);
         detail::add_spring_resistance(present, x, y);
         return y;
+    }
+    void require_held(const RestState& rest, const NodalConditions& present) const {
+        detail::require_held(rest, outline->pieces, present);
     }
     void take(detail::Stiffness stiffness) {
         elastic_diagonal = std::make_shared<const std::vector<Matrix3d>>(stiffness.diagonal_blocks());
@@ -114,8 +121,13 @@ struct RestStiffness::Impl {
     mutable std::unique_ptr<const detail::TwoLevel> levels;  // by two_levels()
     mutable std::once_flag factorised;
     mutable std::unique_ptr<detail::CholmodFactor> made;  // by factor()
-    std::once_flag lowest_known, approximation_known;
-    double lowest = 0.0, lowest_approximation = 0.0;
+    [[nodiscard]] const detail::Mode& slowest() const;
+
+    std::once_flag lowest_known;
+    double lowest = 0.0;
+    Matrix3Xd slowest_about;  // where slowest() begins, if given
+    mutable std::once_flag approximation_known;
+    mutable detail::Mode approximation;  // by slowest()
 };
 
 void RestStiffness::Impl::require_compatible(const NodalConditions& present) const {
@@ -264,9 +276,33 @@ const detail::SmoothSpace& RestStiffness::Impl::smooth_space() const {
     return *outline->space;
 }
 
+Matrix3Xd RestStiffness::Impl::diagonal(const NodalConditions& present) const {
+    Matrix3Xd result(3, static_cast<Eigen::Index>(elastic_diagonal->size()));
+    for (std::size_t i = 0; i < elastic_diagonal->size(); ++i) result.col(i) = (*elastic_diagonal)[i].diagonal();
+    for (std::size_t s = 0; s < present.spring_node.size(); ++s)
+        result.col(present.spring_node[s]) += present.spring_stiffness.col(s).head<3>();
+    return present.constrained.select(Matrix3Xd::Ones(3, result.cols()), result);
+}
+
+/// Precondition: something is free.
+const detail::Mode& RestStiffness::Impl::slowest() const {
+    const auto product = [this](const Matrix3Xd& x) {
+        return Matrix3Xd(conditions.constrained.select(0.0, multiply(x, conditions)));
+    };
+    constexpr detail::Patience of_given{2, 0.05};  // relaxation, which asks for it, makes up for more in fewer products
+    std::call_once(approximation_known, [&] {
+        const Matrix3Xd D = diagonal(conditions);
+        const bool given = slowest_about.size() > 0 && !slowest_about.isZero(0);
+        approximation = given ? detail::lowest_mode(product, D, slowest_about, of_given)
+                              : detail::lowest_mode(product, D, smooth_space().slowest(conditions, D));
+    });
+    return approximation;
+}
+
 RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& conditions)
     : impl_(std::make_unique<Impl>()) {
-    detail::require_held(rest, conditions);
+    impl_->outline = std::make_shared<Outline>(rest);
+    impl_->require_held(rest, conditions);
     detail::Stiffness elastic = detail::stiffness(rest, Matrix3Xd::Zero(3, rest.node_count));
     detail::add_effects(conditions.effects.surface, rest.position, elastic);
     impl_->take(std::move(elastic));
@@ -276,7 +312,8 @@ RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& condi
 
 RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& conditions, const Matrix3Xd& displacement)
     : impl_(std::make_unique<Impl>()) {
-    detail::require_held(rest, conditions);
+    impl_->outline = std::make_shared<Outline>(rest);
+    impl_->require_held(rest, conditions);
     detail::Stiffness metric = detail::stiffness(rest, displacement);
     metric.elements = detail::stiffness(rest, Matrix3Xd::Zero(3, rest.node_count)).elements;
     metric.products.stiffness = metric.products.stiffness.cwiseMax(0.0);
@@ -288,7 +325,7 @@ RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& condi
 
 RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& conditions, const RestStiffness& other)
     : impl_(std::make_unique<Impl>()) {
-    detail::require_held(rest, conditions);
+    other.impl_->require_held(rest, conditions);
     other.impl_->require_compatible(conditions);
     impl_->elastic = other.impl_->elastic;
     impl_->elastic_diagonal = other.impl_->elastic_diagonal;
@@ -296,6 +333,12 @@ RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& condi
     impl_->outline = other.impl_->outline;
     impl_->position = rest.position;
     impl_->number_free(conditions);
+}
+
+RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& conditions, const RestStiffness& other,
+                             const Matrix3Xd& slowest_about)
+    : RestStiffness(rest, conditions, other) {
+    impl_->slowest_about = conditions.constrained.select(0.0, slowest_about);
 }
 
 RestStiffness::~RestStiffness() = default;
@@ -371,13 +414,7 @@ Matrix3Xd RestStiffness::elastic_resistance(const Matrix3Xd& displacement) const
 
 Matrix3Xd RestStiffness::diagonal(const NodalConditions& conditions) const {
     impl_->require_compatible(conditions);
-    std::vector<Matrix3d> blocks = *impl_->elastic_diagonal;
-    for (std::size_t s = 0; s < conditions.spring_node.size(); ++s) {
-        blocks[conditions.spring_node[s]] += detail::spring_matrix(conditions, static_cast<int>(s));
-    }
-    Matrix3Xd result(3, static_cast<Eigen::Index>(blocks.size()));
-    for (std::size_t i = 0; i < blocks.size(); ++i) result.col(i) = blocks[i].diagonal();
-    return conditions.constrained.select(Matrix3Xd::Ones(3, result.cols()), result);
+    return impl_->diagonal(conditions);
 }
 
 double RestStiffness::lowest_eigenvalue() const {
@@ -388,16 +425,11 @@ double RestStiffness::lowest_eigenvalue() const {
 }
 
 double RestStiffness::approximate_lowest_eigenvalue() const {
-    if (impl_->free_count == 0) return std::numeric_limits<double>::infinity();
-    const auto multiply = [this](const Matrix3Xd& x) {
-        return Matrix3Xd(impl_->conditions.constrained.select(0.0, impl_->multiply(x, impl_->conditions)));
-    };
-    std::call_once(impl_->approximation_known, [&] {
-        const Matrix3Xd D = diagonal(impl_->conditions);
-        impl_->lowest_approximation =
-            detail::lowest_mode(multiply, D, impl_->smooth_space().slowest(impl_->conditions, D));
-    });
-    return impl_->lowest_approximation;
+    return impl_->free_count > 0 ? impl_->slowest().value : std::numeric_limits<double>::infinity();
+}
+
+const Matrix3Xd& RestStiffness::approximate_slowest_mode() const {
+    return impl_->slowest().x;
 }
 
 long long RestStiffness::factor_nonzeros() const {

@@ -26,6 +26,10 @@ public:
     /// The same tissue, constraints and surface effects as `other` under other springs: K₀ and the analysis of its
     /// pattern are taken over, only the numbers are factorised again. Throws InvalidInput for other constraints.
     RestStiffness(const RestState& rest, const NodalConditions& conditions, const RestStiffness& other);
+    /// The search for the slowest mode begins at `slowest_about` (3 × N), that of another one, needs no coarse lattice
+    /// and ends earlier: up to twice too high where the slowest mode is quite another one now.
+    RestStiffness(const RestState& rest, const NodalConditions& conditions, const RestStiffness& other,
+                  const Eigen::Matrix3Xd& slowest_about);
     ~RestStiffness();
     RestStiffness(RestStiffness&&) noexcept;
     RestStiffness& operator=(RestStiffness&&) noexcept;
@@ -74,6 +78,8 @@ public:
     [[nodiscard]] double lowest_eigenvalue() const;
     /// From above within some per cent, by products with K alone: no factor is needed.
     [[nodiscard]] double approximate_lowest_eigenvalue() const;
+    /// And its mode, 3 × N.
+    [[nodiscard]] const Eigen::Matrix3Xd& approximate_slowest_mode() const;
 
     /// Non-zeros of the factor, for reports.
     [[nodiscard]] long long factor_nonzeros() const;

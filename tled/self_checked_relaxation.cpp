@@ -169,18 +169,26 @@ private:
     std::optional<Matrix3Xd> stepped(int steps, const StepCoefficients& coefficients) {
         search_.require_evaluations(steps);
         search_.engine.run(steps, coefficients);
-        const bool inverted = !(search_.engine.smallest_jacobian().value > 0);
-        std::optional<Matrix3Xd> u = search_.engine.displacement();
-        if (!u->allFinite() || (inverted && !search_.engine.admits_inversion())) u.reset();
+        Matrix3Xd u = search_.engine.displacement();
+        if (!is_whole(u)) return std::nullopt;
         return u;
     }
 
+    /// One look at the end suffices: tissue inverted on the way has come right again there, or shows.
     bool open() {
         const StepCoefficients last = heavy_ball(spectrum_);
-        for (const Opening& opening : openings)
-            if (opening.momentum < last.momentum && !stepped(opening.steps, {opening.momentum, 1 / spectrum_.highest}))
-                return false;
-        return true;
+        for (const Opening& opening : openings) {
+            if (!(opening.momentum < last.momentum)) break;
+            search_.require_evaluations(opening.steps);
+            search_.engine.run(opening.steps, {opening.momentum, 1 / spectrum_.highest});
+        }
+        return is_whole(search_.engine.displacement());
+    }
+
+    /// At the engine's state.
+    [[nodiscard]] bool is_whole(const Matrix3Xd& displacement) {
+        const bool inverted = !(search_.engine.smallest_jacobian().value > 0);
+        return displacement.allFinite() && (!inverted || search_.engine.admits_inversion());
     }
 
     /// Windows of steps until what is left after the last is foreseen to be less than the tolerance; false where tissue

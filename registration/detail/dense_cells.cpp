@@ -17,9 +17,6 @@ constexpr double least_deviation = 0.05;   // voxels
 constexpr double leakage = 0.05;           // of the strongest axis: what a plane edge seems to show along itself
 constexpr double most_shift = 1.5;         // voxels
 
-/// What of sums is spread: A (00, 11, 22, 01, 02, 12), b, squares and voxels.
-using Spread = Eigen::Array<double, 11, 1>;
-
 Spread spread_of(const CellSums& sums) {
     const auto& A = sums.normal;
     Spread result;
@@ -38,9 +35,11 @@ CellSums sums_of(const Spread& s) {
 
 /// Spreads each cell's sums over a window of one cell's deviation, (1, 4, 6, 4, 1)/16 along each axis; their total
 /// stays, but for what leaves the grid.
-std::vector<Spread> windowed(const std::vector<CellSums>& sums, const CellGrid& cells) {
+const std::vector<Spread>& windowed(const std::vector<CellSums>& sums, const CellGrid& cells, WindowMemory& memory) {
     constexpr std::array<double, 3> weights{6.0 / 16, 4.0 / 16, 1.0 / 16};
-    std::vector<Spread> from(sums.size()), to(sums.size());
+    std::vector<Spread>&from = memory.from, &to = memory.to;
+    from.resize(sums.size());
+    to.resize(sums.size());
     tbb::parallel_for(std::size_t{0}, sums.size(), [&](std::size_t n) { from[n] = spread_of(sums[n]); });
     const auto& size = cells.centres().size;
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -63,9 +62,72 @@ std::vector<Spread> windowed(const std::vector<CellSums>& sums, const CellGrid& 
     return from;
 }
 
+/// Cells with voxels that count, row by row along i.
+class RowsOfCells {
+public:
+    RowsOfCells(const std::vector<CellSums>& own, const CellGrid& cells)
+        : own_(own), length_(static_cast<std::size_t>(cells.stride(1))), rows_(own.size() / length_) {
+        tbb::parallel_for(std::size_t{0}, rows_.size(), [&](std::size_t row) {
+            Row& sum = rows_[row];
+            for (std::size_t n = row * length_; n < (row + 1) * length_; ++n) {
+                if (own[n].voxels < 1) continue;
+                ++sum.counted;
+                sum.common += own[n].normal.trace();
+                sum.structure += own[n].structure;
+            }
+        });
+        for (Row& row : rows_) {
+            row.first = counted_;
+            counted_ += row.counted;
+        }
+    }
+
+    [[nodiscard]] std::size_t counted() const { return counted_; }
+
+    [[nodiscard]] double agreement() const {
+        double common = 0, structure = 0;
+        for (const Row& row : rows_) {
+            common += row.common;
+            structure += row.structure;
+        }
+        return structure > 0 ? common / structure : 0;
+    }
+
+    /// visit(cell, its place among those that count), from any thread.
+    template <class Visit>
+    void for_each_counted(const Visit& visit) const {
+        tbb::parallel_for(std::size_t{0}, rows_.size(), [&](std::size_t row) {
+            std::size_t place = rows_[row].first;
+            for (std::size_t n = row * length_; n < (row + 1) * length_; ++n)
+                if (own_[n].voxels >= 1) visit(n, place++);
+        });
+    }
+
+    /// Those without a force leave the list, which is that of all that count.
+    void drop_silent(DenseForces& forces) const {
+        std::vector<char> silent(counted_);
+        for_each_counted([&](std::size_t n, std::size_t place) { silent[place] = !forces.said[n]; });
+        if (std::find(silent.begin(), silent.end(), char{1}) == silent.end()) return;
+        std::size_t place = 0;
+        std::erase_if(forces.forces, [&](const DenseForce&) { return silent[place++] != 0; });
+    }
+
+private:
+    struct Row {
+        std::size_t counted = 0, first = 0;
+        double common = 0, structure = 0;  // CellSums: Σ tr A, Σ structure
+    };
+
+    const std::vector<CellSums>& own_;
+    std::size_t length_;
+    std::vector<Row> rows_;
+    std::size_t counted_ = 0;
+};
+
 /// Shift and information along the axes of A, voxels.
 std::optional<DenseForce> solved(const CellSums& window, const Eigen::Vector3d& place, const imaging::Geometry& grid) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(window.normal);
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
+    axes.computeDirect(window.normal);
     const Eigen::Array3d strength = axes.eigenvalues();
     const double variance = std::max(window.squares / window.voxels, descriptor_channels * least_square);
     const Eigen::Array3d raw = (independent_share / variance * (strength - leakage * strength[2])).max(0.0);
@@ -115,26 +177,20 @@ CellSums cell_sums(const DescriptorProducts& products, double voxels, const Eige
     return sums;
 }
 
-DenseForces forces_of(const std::vector<CellSums>& own, const CellGrid& cells, const imaging::Geometry& grid) {
-    const std::vector<Spread> windows = windowed(own, cells);
-    DenseForces result{{}, cells.centres(), std::vector<std::uint8_t>(own.size()), 0};
-    std::vector<DenseForce> forces(own.size());
-    tbb::parallel_for(std::size_t{0}, own.size(), [&](std::size_t n) {
-        if (own[n].voxels < 1) return;
-        const Eigen::Vector3d place = grid.point(own[n].index / own[n].voxels);
-        const std::optional<DenseForce> force = solved(sums_of(windows[n]), place, grid);
+DenseForces forces_of(const std::vector<CellSums>& own, const CellGrid& cells, const imaging::Geometry& grid,
+                      WindowMemory& memory) {
+    const std::vector<Spread>& windows = windowed(own, cells, memory);
+    const RowsOfCells rows(own, cells);
+    DenseForces result{std::vector<DenseForce>(rows.counted()), cells.centres(), std::vector<std::uint8_t>(own.size()),
+                       rows.agreement()};
+    rows.for_each_counted([&](std::size_t n, std::size_t place) {
+        const Eigen::Vector3d centre = grid.point(own[n].index / own[n].voxels);
+        const std::optional<DenseForce> force = solved(sums_of(windows[n]), centre, grid);
         if (!force) return;
-        forces[n] = *force;
+        result.forces[place] = *force;
         result.said[n] = 1;
     });
-    double common = 0, structure = 0;
-    result.forces.reserve(static_cast<std::size_t>(std::count(result.said.begin(), result.said.end(), 1)));
-    for (std::size_t n = 0; n < own.size(); ++n) {
-        common += own[n].normal.trace();
-        structure += own[n].structure;
-        if (result.said[n]) result.forces.push_back(forces[n]);
-    }
-    if (structure > 0) result.agreement = common / structure;
+    rows.drop_silent(result);
     return result;
 }
 

@@ -39,8 +39,17 @@ struct CellSums {
 /// `index` is the sum of the voxels' own.
 CellSums cell_sums(const DescriptorProducts& products, double voxels, const Eigen::Vector3d& index);
 
+/// What of sums is spread: A (00, 11, 22, 01, 02, 12), b, squares and voxels.
+using Spread = Eigen::Array<double, 11, 1>;
+
+/// Of forces_of(), kept from one call to the next: fresh memory costs more than what is computed in it.
+struct WindowMemory {
+    std::vector<Spread> from, to;
+};
+
 /// The forces of cells, in the order of `cells`, from the sums of each one's own voxels, which are spread over their
 /// neighbours first. Formulas: docs/method.md, section 11.
-DenseForces forces_of(const std::vector<CellSums>& own, const CellGrid& cells, const imaging::Geometry& grid);
+DenseForces forces_of(const std::vector<CellSums>& own, const CellGrid& cells, const imaging::Geometry& grid,
+                      WindowMemory& memory);
 
 }  // namespace tissuewarp::registration::detail

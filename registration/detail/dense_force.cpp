@@ -53,7 +53,8 @@ DenseForces dense_forces(const MatchingImage& first, const MatchingImage& second
     std::vector<CellSums> own(cells.count());
     tbb::parallel_for(std::size_t{0}, own.size(),
                       [&](std::size_t n) { own[n] = sums_of(cells.first_voxel(n), first, second, counts); });
-    return forces_of(own, cells, first.grid);
+    WindowMemory memory;
+    return forces_of(own, cells, first.grid, memory);
 }
 
 }  // namespace tissuewarp::registration::detail

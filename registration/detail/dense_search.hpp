@@ -4,6 +4,8 @@
 #include "meshing/point_location.hpp"
 #include "registration/detail/image_engine.hpp"
 
+#include <algorithm>
+
 namespace tissuewarp::registration::detail {
 
 /// Matches and where they lie in the mesh.
@@ -14,6 +16,14 @@ struct LocatedMatches {
     void reserve(std::size_t count) {
         matches.reserve(count);
         places.reserve(count);
+    }
+    /// Takes out those whose place is in no tetrahedron.
+    void drop_unlocated() {
+        const auto nowhere = [](const meshing::Location& place) { return place.tet < 0; };
+        if (std::none_of(places.begin(), places.end(), nowhere)) return;
+        std::size_t n = 0;
+        std::erase_if(matches, [&](const BlockMatch&) { return nowhere(places[n++]); });
+        std::erase_if(places, nowhere);
     }
     void add(const BlockMatch& match, const meshing::Location& place) {
         matches.push_back(match);

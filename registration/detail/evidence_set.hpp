@@ -26,9 +26,9 @@ struct EvidenceSet {
     std::vector<tled::Spring> anchors;
     bool placed = false;  ///< anchors or rigid neighbours say where the organ lies as a whole
 
-    /// `dense` computes the forces of an image; may be null. Throws InvalidInput for data that cannot be used.
+    /// `image_tools` are there where the model has an image. Throws InvalidInput for data that cannot be used.
     EvidenceSet(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options,
-                ImageEngine* dense);
+                std::optional<ImageTools>& image_tools);
 
     /// Labels say where every boundary is, and an image holds what it does not show.
     [[nodiscard]] bool only_points() const { return !labels && !image; }
@@ -40,7 +40,7 @@ struct EvidenceSet {
     [[nodiscard]] std::vector<tled::Spring> supports(const RoundPlan& plan, const State& state) const;
 
     /// Writes to the result how each of them agrees with the model.
-    void judge(const State& state, UpdateResult& result) const;
+    void judge(const State& state, UpdateResult& result);
 };
 
 /// Where the model starts: by labels; or by pairs of points that show how it is turned; or by points of its surface; or

@@ -1,6 +1,7 @@
 #pragma once
 /// Where an intraoperative image is compared with the preoperative one: on the processor, or in shaders on a device.
 
+#include "meshing/point_location.hpp"
 #include "registration/detail/block_engine.hpp"
 #include "registration/detail/dense_force.hpp"
 #include "registration/detail/evidence.hpp"
@@ -30,5 +31,12 @@ std::unique_ptr<ImageEngine> make_cpu_image_engine(const PreparedModel& prepared
 /// one of 255 steps in few channels. Throws GpuUnavailable when there is no device, the images do not fit onto it, or
 /// blocks are too large for its sums.
 std::unique_ptr<ImageEngine> make_gpu_image_engine(const PreparedModel& prepared, int gpu_index = -1);
+
+/// What updates from images share, one after the other: nothing that an image says.
+struct ImageTools {
+    std::unique_ptr<ImageEngine> engine;  ///< null where the template has no descriptors
+    meshing::PointLocator locator;        ///< in the model at rest
+    SeenMemory memory;                    ///< of the image in hand
+};
 
 }  // namespace tissuewarp::registration::detail

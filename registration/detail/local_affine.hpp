@@ -18,9 +18,9 @@ struct ScatteredMotion {
 
 /// The nearest `count` others of each point, by distance and then by index.
 std::vector<std::vector<int>> nearest_neighbours(const Eigen::Matrix3Xd& points, int count);
-/// The same of the columns `among` alone.
-std::vector<std::vector<int>> nearest_neighbours(const Eigen::Matrix3Xd& points, const std::vector<int>& among,
-                                                 int count);
+/// Of each of the columns `of`, among others of the columns `among`.
+std::vector<std::vector<int>> nearest_neighbours(const Eigen::Matrix3Xd& points, const std::vector<int>& of,
+                                                 const std::vector<int>& among, int count);
 
 struct LocalMotion {
     Eigen::Vector3d displacement;  ///< mm, at the point asked for

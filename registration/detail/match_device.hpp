@@ -7,6 +7,7 @@
 #include "shaders/catalogue.hpp"
 #include "shaders/program.hpp"
 #include "shaders/readback.hpp"
+#include "shaders/upload.hpp"
 
 #include <initializer_list>
 #include <map>
@@ -88,9 +89,12 @@ private:
     std::optional<GpuWords> fixed_seen_;
     std::map<double, Smoothed> smoothed_;  // by spacing, mm
     std::optional<Scratch> scratch_;
+    std::unique_ptr<shaders::Upload> image_upload_, seen_upload_;
     std::unique_ptr<shaders::Readback> readback_;
     std::size_t readback_bytes_ = 0;
 
+    void send(std::unique_ptr<shaders::Upload>& way, std::span<const std::byte> bytes,
+              const shaders::StorageBuffer& target);
     const GpuFloats& smoothed_for(double spacing);
     void blur(std::uint32_t axis, double deviation_mm, const GpuFloats& from, const GpuFloats& to);
     void erode(std::size_t wide, std::uint32_t axis, const GpuWords& from, const GpuWords& to);

@@ -38,15 +38,24 @@ MatchingImage pulled_back_image(const imaging::Volume& image, const imaging::Vol
                                 const imaging::Geometry& grid, const SearchRegion& region,
                                 const imaging::Volume& displacement);
 
+/// Kept from one image to the next: fresh memory costs more than what is computed in it.
+struct SeenMemory {
+    cv::Mat image, seen;
+    std::vector<std::uint8_t> one, other;
+};
+
 /// uint8 mask of what an image (float32) shows: 0 in and next to neighbourhoods of 3 × 3 × 3 voxels of one value, as
 /// padding beyond a field of view leaves them.
 imaging::Volume seen_region(const imaging::Volume& image);
+imaging::Volume seen_region(const imaging::Volume& image, SeenMemory& memory);
 
 /// An image as float32, and what it shows: made once, looked at by all that search in it.
 struct SeenImage {
     imaging::Volume image, seen;
     /// Throws InvalidInput where the image is empty, a field of vectors or not finite.
     explicit SeenImage(const imaging::Volume& given);
+    /// Serves until another one is made in the same memory.
+    SeenImage(const imaging::Volume& given, SeenMemory& memory);
 };
 
 }  // namespace tissuewarp::registration::detail

@@ -15,14 +15,14 @@ class ColumnTree {
 public:
     ColumnTree(const Eigen::Matrix3Xd& points, const std::vector<int>& columns) : points_(points), order_(columns) {
         build(0, order_.size(), 0);
+        ordered_ = points(Eigen::all, order_);
     }
 
     /// The nearest others of a column, by distance and then by index.
     [[nodiscard]] std::vector<int> nearest(int column, std::size_t count) const {
         Search search{points_.col(column), column, count, {}};
         search.found.reserve(count);
-        if (count > 0) gather(search, 0, order_.size(), 0);
-        std::sort_heap(search.found.begin(), search.found.end());
+        if (count > 0) gather(search, 0, order_.size(), 0, Eigen::Vector3d::Zero());
         std::vector<int> result;
         result.reserve(search.found.size());
         for (const auto& [distance, other] : search.found) result.push_back(other);
@@ -33,12 +33,13 @@ private:
     static constexpr std::size_t leaf = 8, worth_a_thread = 500;
     const Eigen::Matrix3Xd& points_;
     std::vector<int> order_;
+    Eigen::Matrix3Xd ordered_;  // those columns, side by side as they are met
 
     struct Search {
         Eigen::Vector3d query;
         int self;
         std::size_t count;
-        std::vector<std::pair<double, int>> found;  // a heap of squared distances, the largest first
+        std::vector<std::pair<double, int>> found;  // squared distances, ascending: few are let in
     };
 
     void build(std::size_t first, std::size_t last, int axis) {
@@ -61,48 +62,50 @@ private:
     void offer(Search& search, std::size_t n) const {
         const int other = order_[n];
         if (other == search.self) return;
-        const std::pair<double, int> candidate{(points_.col(other) - search.query).squaredNorm(), other};
+        const std::pair<double, int> candidate{
+            (ordered_.col(static_cast<Eigen::Index>(n)) - search.query).squaredNorm(), other};
         if (search.found.size() == search.count) {
-            if (!(candidate < search.found.front())) return;
-            std::pop_heap(search.found.begin(), search.found.end());
+            if (!(candidate < search.found.back())) return;
             search.found.pop_back();
         }
-        search.found.push_back(candidate);
-        std::push_heap(search.found.begin(), search.found.end());
+        search.found.insert(std::upper_bound(search.found.begin(), search.found.end(), candidate), candidate);
     }
 
-    void gather(Search& search, std::size_t first, std::size_t last, int axis) const {
+    /// `away` leads from the query to the box of these columns, along each axis.
+    void gather(Search& search, std::size_t first, std::size_t last, int axis, const Eigen::Vector3d& away) const {
         if (last - first <= leaf) {
             for (std::size_t n = first; n < last; ++n) offer(search, n);
             return;
         }
         const std::size_t middle = first + (last - first) / 2;
         offer(search, middle);
-        const double offset = search.query[axis] - points_(axis, order_[middle]);
+        const double offset = search.query[axis] - ordered_(axis, static_cast<Eigen::Index>(middle));
         const int next = (axis + 1) % 3;
-        const auto below = [&] { gather(search, first, middle, next); };
-        const auto above = [&] { gather(search, middle + 1, last, next); };
+        const auto below = [&](const Eigen::Vector3d& to) { gather(search, first, middle, next, to); };
+        const auto above = [&](const Eigen::Vector3d& to) { gather(search, middle + 1, last, next, to); };
         if (offset < 0.0)
-            below();
+            below(away);
         else
-            above();
+            above(away);
+        Eigen::Vector3d across = away;
+        across[axis] = offset;
         const bool full = search.found.size() == search.count;
-        if (full && offset * offset > search.found.front().first) return;
+        if (full && across.squaredNorm() > search.found.back().first) return;
         if (offset < 0.0)
-            above();
+            above(across);
         else
-            below();
+            below(across);
     }
 };
 
 }  // namespace
 
-std::vector<std::vector<int>> nearest_neighbours(const Eigen::Matrix3Xd& points, const std::vector<int>& among,
-                                                 int count) {
+std::vector<std::vector<int>> nearest_neighbours(const Eigen::Matrix3Xd& points, const std::vector<int>& of,
+                                                 const std::vector<int>& among, int count) {
     const ColumnTree tree(points, among);
-    std::vector<std::vector<int>> result(static_cast<std::size_t>(points.cols()));
+    std::vector<std::vector<int>> result(of.size());
     tbb::parallel_for(std::size_t{0}, result.size(), [&](std::size_t n) {
-        result[n] = tree.nearest(static_cast<int>(n), static_cast<std::size_t>(std::max(count, 0)));
+        result[n] = tree.nearest(of[n], static_cast<std::size_t>(std::max(count, 0)));
     });
     return result;
 }
@@ -110,7 +113,7 @@ std::vector<std::vector<int>> nearest_neighbours(const Eigen::Matrix3Xd& points,
 std::vector<std::vector<int>> nearest_neighbours(const Eigen::Matrix3Xd& points, int count) {
     std::vector<int> all(static_cast<std::size_t>(points.cols()));
     std::iota(all.begin(), all.end(), 0);
-    return nearest_neighbours(points, all, count);
+    return nearest_neighbours(points, all, all, count);
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace tissuewarp::registration::detail {
@@ -25,11 +26,44 @@ std::optional<meshing::Location> locate_near(const meshing::PointLocator& locato
 Eigen::Vector3d displacement_at(const meshing::TetMesh& mesh, const Eigen::Matrix3Xd& displacement,
                                 const meshing::Location& at);
 
+/// What a pull is at some displacement u.
+struct PullForce {
+    Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero();  ///< K, mN/mm
+    Eigen::Vector3d force = Eigen::Vector3d::Zero();      ///< K (target − u(X)), mN
+};
+
+/// By which weights places pull on which nodes. Made once for places that stay.
+class NodalShares {
+public:
+    struct Share {
+        int place = 0;
+        double weight = 0;  ///< barycentric
+    };
+
+    NodalShares() = default;
+    NodalShares(const meshing::TetMesh& mesh, std::span<const meshing::Location> places);
+
+    /// Nodes that have shares, ascending.
+    [[nodiscard]] const std::vector<int>& nodes() const { return nodes_; }
+    /// Those of one of them, by its place in nodes(); in the order of the places.
+    [[nodiscard]] std::span<const Share> of(std::size_t n) const {
+        return std::span(shares_).subspan(first_[n], first_[n + 1] - first_[n]);
+    }
+
+private:
+    std::vector<int> nodes_;
+    std::vector<std::size_t> first_;  // in shares_, of each of nodes_, and the end
+    std::vector<Share> shares_;
+};
+
 /// Springs on the nodes with the pulls' forces at `displacement` (3 × N, mm) and a stiffness not below theirs: node a
 /// gets K_a = Σ w_a K and the target u_a + K_a⁻¹ Σ w_a K (target − u(X)), w its barycentric weights. By Jensen's
 /// inequality Σ_a w_a ‖u_a‖²_K ≥ ‖u(X)‖²_K: equilibria under springs renewed at the equilibrium before lower the
 /// energy of tissue and pulls each time and end where the pulls' own forces balance (majorise-minimise).
 std::vector<tled::Spring> lumped_springs(const meshing::TetMesh& mesh, const std::vector<Pull>& pulls,
+                                         const Eigen::Matrix3Xd& displacement);
+/// The same of pulls at the places of `shares`.
+std::vector<tled::Spring> lumped_springs(const NodalShares& shares, std::span<const PullForce> pulls,
                                          const Eigen::Matrix3Xd& displacement);
 
 }  // namespace tissuewarp::registration::detail

@@ -33,7 +33,8 @@ std::optional<Quadratic> fit_quadratic(const std::array<double, 27>& costs) {
         size = std::max(size, std::abs(cost));
         moments.add({n % 3 - 1.0, n / 3 % 3 - 1.0, n / 9 - 1.0}, cost);
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(moments.hessian);
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
+    axes.computeDirect(moments.hessian);
     const double largest = axes.eigenvalues()[2];
     if (!(largest > 1e-12 * size)) return std::nullopt;  // rounding
     Quadratic result{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()};

@@ -3,15 +3,13 @@
 
 #include <tbb/parallel_for.h>
 
-#include <memory>
+#include <utility>
 
 namespace tissuewarp::registration::detail {
 
 using imaging::Volume;
 
 namespace {
-
-using Bytes = std::unique_ptr<std::uint8_t[]>;
 
 /// Rows of a volume and their neighbours along an axis, borders replicated: calls visit(first, count, before, after)
 /// for runs of voxels whose neighbours lie at the same distances.
@@ -59,6 +57,19 @@ void all(const Volume& image, std::size_t axis, const std::uint8_t* from, std::u
                });
 }
 
+/// Of a scalar image in memory of its own; doubles may overflow.
+Volume as_floats(const Volume& given, SeenMemory& memory) {
+    if (given.empty() || given.channels() != 1 || given.voxels.depth() == CV_32F) return given.as(CV_32F);
+    memory.image.create(3, given.voxels.size.p, CV_32FC1);
+    const cv::Mat from = given.voxels.reshape(0, given.voxels.size[0]),
+                  to = memory.image.reshape(0, given.voxels.size[0]);
+    tbb::parallel_for(0, from.rows, [&](int k) {
+        cv::Mat row = to.row(k);
+        from.row(k).convertTo(row, CV_32F);
+    });
+    return {given.geometry, memory.image};
+}
+
 /// to = the voxel beside one along i has another value: where nothing is known before.
 void differ_along_i(const Volume& image, std::uint8_t* __restrict to) {
     const float* value = image.data<float>();
@@ -73,24 +84,37 @@ void differ_along_i(const Volume& image, std::uint8_t* __restrict to) {
 }  // namespace
 
 Volume seen_region(const Volume& image) {
+    SeenMemory memory;
+    return seen_region(image, memory);
+}
+
+Volume seen_region(const Volume& image, SeenMemory& memory) {
     const auto voxels = static_cast<std::size_t>(image.geometry.voxel_count());
-    const Bytes one = std::make_unique_for_overwrite<std::uint8_t[]>(voxels),
-                other = std::make_unique_for_overwrite<std::uint8_t[]>(voxels);
-    Volume seen(image.geometry, CV_8UC1);
+    memory.one.resize(voxels);
+    memory.other.resize(voxels);
+    std::uint8_t *const one = memory.one.data(), *const other = memory.other.data();
+    memory.seen.create(3, image.voxels.size.p, CV_8UC1);
+    Volume seen(image.geometry, memory.seen);
     // A cube is of one value when its three slices are, and their centres agree.
-    differ_along_i(image, one.get());
-    differ(image, 1, one.get(), other.get());
-    differ(image, 2, other.get(), one.get());
-    all(image, 0, one.get(), other.get());
-    all(image, 1, other.get(), one.get());
-    all(image, 2, one.get(), seen.data<std::uint8_t>());
+    differ_along_i(image, one);
+    differ(image, 1, one, other);
+    differ(image, 2, other, one);
+    all(image, 0, one, other);
+    all(image, 1, other, one);
+    all(image, 2, one, seen.data<std::uint8_t>());
     return seen;
 }
 
 SeenImage::SeenImage(const Volume& given) {
-    image = given.as(CV_32F);  // which may overflow
-    require_finite(image, "block matching: the fixed image");
-    seen = seen_region(image);
+    SeenMemory memory;
+    *this = SeenImage(given, memory);
+}
+
+SeenImage::SeenImage(const Volume& given, SeenMemory& memory) {
+    image = as_floats(given, memory);
+    if (given.empty() || given.channels() != 1 || given.voxels.depth() >= CV_32F)  // whole numbers are finite
+        require_finite(image, "block matching: the fixed image");
+    seen = seen_region(image, memory);
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -7,10 +7,10 @@ layout(std430, binding = BINDING_MATCH_TARGET) writeonly buffer MatchLooks { flo
 uvec2 compare_row(int a, int b, int count) {
     uvec2 sum = uvec2(0u);
     for (int end = a + count; a < end; ++a, ++b) {
-        if ((shown_seen[a] & looked_seen[b]) == 0u) continue;
+        uint difference = 0u, both = min(shown_seen[a] & looked_seen[b], 1u);  // without a branch, loads need not wait
         for (int part = 0; part < 3; ++part)
-            sum.x += squared_difference(shown_word[3 * a + part], looked_word[3 * b + part]);
-        ++sum.y;
+            difference += squared_difference(shown_word[3 * a + part], looked_word[3 * b + part]);
+        sum += both * uvec2(difference, 1u);
     }
     return sum;
 }

@@ -1,5 +1,6 @@
 /// What block matching makes of an image, against plain definitions.
 #include "registration/detail/matching_image.hpp"
+#include "registration/detail/field_of_view.hpp"
 #include "registration/detail/local_affine.hpp"
 
 #include "tests/registration/textured_phantom.hpp"
@@ -8,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace tissuewarp::registration::detail {
 namespace {
@@ -170,6 +172,35 @@ TEST(SeenRegion, IsItsPlainDefinition) {
     EXPECT_LT(unseen, 17 * 13 * 11 - 100);
 }
 
+// A convex chain that turns the wrong way leaves out what spans the hull.
+TEST(FieldOfView, HoldsAllThatIsShownAndEndsThereAlongTheAxes) {
+    cv::RNG random(9);
+    imaging::Geometry grid;
+    grid.size = {23, 19, 7};
+    grid.spacing = {1, 1.5, 2};
+    Volume seen(grid, CV_8UC1);
+    for (int n = 0; n < 60; ++n)
+        seen.data<std::uint8_t>()[seen.offset(random.uniform(3, 20), random.uniform(2, 17), random.uniform(1, 6))] = 1;
+    const FieldOfView view(seen);
+    Eigen::Vector3d lower = Eigen::Vector3d::Constant(1e9), upper = -lower;
+    for (int k = 0; k < 7; ++k)
+        for (int j = 0; j < 19; ++j)
+            for (int i = 0; i < 23; ++i) {
+                if (!seen.data<std::uint8_t>()[seen.offset(i, j, k)]) continue;
+                const Eigen::Vector3d point = grid.point(Eigen::Vector3d(i, j, k));
+                EXPECT_LE(view.distance(point), 1e-9);
+                lower = lower.cwiseMin(point);
+                upper = upper.cwiseMax(point);
+            }
+    for (int axis = 0; axis < 3; ++axis) {
+        Eigen::Vector3d beyond = 0.5 * (lower + upper);
+        beyond[axis] = upper[axis] + 100;
+        EXPECT_NEAR(view.distance(beyond), 100, 1e-9);
+        beyond[axis] = lower[axis] - 100;
+        EXPECT_NEAR(view.distance(beyond), 100, 1e-9);
+    }
+}
+
 // A tree that prunes too early, or breaks ties by its own order.
 TEST(NearestNeighbours, AreThoseOfAFullSearch) {
     cv::RNG random(3);
@@ -179,7 +210,10 @@ TEST(NearestNeighbours, AreThoseOfAFullSearch) {
         for (const int count : {0, 1, 24, 600}) {
             std::vector<int> among;
             for (int n = 0; n < 500; n += step) among.push_back(n);
-            const auto found = nearest_neighbours(points, among, count);
+            std::vector<int> all_points(500);
+            std::iota(all_points.begin(), all_points.end(), 0);
+            const auto found = nearest_neighbours(points, all_points, among, count);
+            EXPECT_EQ(nearest_neighbours(points, {7, 3}, among, count), (std::vector{found[7], found[3]}));
             for (Eigen::Index p = 0; p < points.cols(); ++p) {
                 std::vector<std::pair<double, int>> all;
                 for (const int n : among)

@@ -1,9 +1,11 @@
 #include "shaders/buffer.hpp"
 #include "core/errors.hpp"
 #include "shaders/readback.hpp"
+#include "shaders/upload.hpp"
 
 #include <gmock/gmock.h>
 
+#include <cstring>
 #include <numeric>
 
 namespace tissuewarp::shaders {
@@ -77,6 +79,21 @@ TEST_F(BufferTest, RefusesToComeDownIntoLess) {
     Readback readback(device, 4 * sizeof(int), "mapped values");
     EXPECT_THROW((void)readback.fetch(small, 4 * sizeof(int)), InvalidInput);
     EXPECT_THROW((void)readback.fetch(large, 5 * sizeof(int)), InvalidInput);
+}
+
+// A device that reads mapped memory before it is filled, or after it was filled anew.
+TEST_F(BufferTest, IsFilledFromMappedMemoryAgainAndAgain) {
+    Buffer<int> buffer(device, 100000, "values");
+    Upload upload(device, buffer.bytes(), "values on their way");
+    for (int round = 0; round < 5; ++round) {
+        std::vector<int> values(buffer.size());
+        std::iota(values.begin(), values.end(), 1000 * round);
+        std::memcpy(upload.room().data(), values.data(), buffer.bytes());
+        upload.send(buffer, buffer.bytes());
+        EXPECT_EQ(buffer.download(), values) << round;
+    }
+    EXPECT_THROW((void)upload.send(Buffer<int>(device, 3, "small"), 4 * sizeof(int)), InvalidInput);
+    EXPECT_THROW((void)upload.send(Buffer<int>(device, 200000, "large"), 200000 * sizeof(int)), InvalidInput);
 }
 
 TEST_F(BufferTest, MayBeEmpty) {

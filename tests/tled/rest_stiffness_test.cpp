@@ -198,6 +198,19 @@ TEST_P(RestStiffnessTest, TheLowestEigenvalueWithoutAFactorIsAboutThatWithOne) {
     }
 }
 
+TEST_P(RestStiffnessTest, TheSlowestModeOfOtherSpringsIsWhereASearchMayBegin) {
+    model.mesh = meshing::box_mesh({60.0, 30.0, 30.0}, {10, 5, 5}, 0.1, 5);
+    rest = rest_state(model);
+    const auto held = [&](double springs) { return nodal_conditions(held_with_springs(springs), rest.node_count); };
+    const RestStiffness first(rest, held(0.3));
+    for (const double springs : {1e-2, 0.3, 10.0}) {
+        const RestStiffness next(rest, held(springs), first, first.approximate_slowest_mode());
+        const double about = next.approximate_lowest_eigenvalue(), exact = next.lowest_eigenvalue();
+        EXPECT_GE(about, (1 - 1e-4) * exact) << springs;
+        EXPECT_LE(about, 2 * exact) << springs;
+    }
+}
+
 TEST_P(RestStiffnessTest, TheLowestEigenvalueOfFewNodesNeedsNoFactor) {
     model.mesh = meshing::box_mesh({20.0, 20.0, 20.0}, {1, 1, 1});
     rest = rest_state(model);

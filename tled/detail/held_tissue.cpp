@@ -66,7 +66,20 @@ Eigen::Matrix<double, 6, 6> rigid_resistance(const RestState& rest, const std::v
 
 }  // namespace
 
+std::vector<std::vector<int>> connected_pieces(const RestState& rest) {
+    std::vector<std::vector<int>> pieces;
+    std::vector<bool> visited(rest.node_count, false);
+    for (int seed = 0; seed < rest.node_count; ++seed)
+        if (!visited[seed]) pieces.push_back(connected_nodes(rest, seed, visited));
+    return pieces;
+}
+
 void require_held(const RestState& rest, const NodalConditions& conditions) {
+    require_held(rest, connected_pieces(rest), conditions);
+}
+
+void require_held(const RestState& rest, const std::vector<std::vector<int>>& pieces,
+                  const NodalConditions& conditions) {
     constexpr double rigid = 1e-9;  // of the strongest resistance: a motion below it makes the factor useless
     std::vector<int> spring_of(rest.node_count, -1);
     for (std::size_t s = 0; s < conditions.spring_node.size(); ++s) {
@@ -74,10 +87,8 @@ void require_held(const RestState& rest, const NodalConditions& conditions) {
     }
     const double largest =
         conditions.spring_stiffness.size() > 0 ? conditions.spring_stiffness.cwiseAbs().maxCoeff() : 0;
-    std::vector<bool> visited(rest.node_count, false);
-    for (int seed = 0; seed < rest.node_count; ++seed) {
-        if (visited[seed]) continue;
-        const std::vector<int> piece = connected_nodes(rest, seed, visited);
+    for (const std::vector<int>& piece : pieces) {
+        const int seed = piece.front();
         if (piece.size() == 1 && conditions.constrained.col(seed).all()) continue;
         const auto resistance = rigid_resistance(rest, piece, conditions, spring_of, largest > 0 ? largest : 1.0);
         const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> modes(resistance, Eigen::EigenvaluesOnly);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 namespace tissuewarp::tled::detail {
@@ -73,9 +74,8 @@ Direction combined(const std::vector<Direction>& directions, const VectorXd& wei
 
 }  // namespace
 
-double lowest_mode(const Product& multiply_K, const Matrix3Xd& D, const Matrix3Xd& start) {
-    constexpr int most_steps = 1000, window = 4;
-    constexpr double least_gain = 0.04;
+Mode lowest_mode(const Product& multiply_K, const Matrix3Xd& D, const Matrix3Xd& start, const Patience& patience) {
+    constexpr int most_steps = 1000;
     std::vector<Direction> directions{{start, multiply_K(start)}};
     RitzPair lowest = lowest_in(inner_products(directions, D));
     Direction mode = combined(directions, lowest.weights), last;
@@ -90,11 +90,11 @@ double lowest_mode(const Product& multiply_K, const Matrix3Xd& D, const Matrix3X
         VectorXd onward = lowest.weights;
         onward[0] = 0;
         last = combined(directions, onward);
-        if (step % window != 0) continue;
-        if (lowest.value > (1 - least_gain) * before) break;
+        if (step % patience.steps != 0) continue;
+        if (lowest.value > (1 - patience.least_gain) * before) break;
         before = lowest.value;
     }
-    return lowest.value;
+    return {lowest.value, std::move(mode.x)};
 }
 
 }  // namespace tissuewarp::tled::detail

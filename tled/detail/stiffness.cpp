@@ -255,9 +255,21 @@ Stiffness stiffness(const RestState& rest, const Matrix3Xd& displacement) {
     return result;
 }
 
+namespace {
+
+/// The same rows by the same threads from product to product, in whose caches they stay.
+template <class Body>
+void for_rows(int count, const Body& body) {
+    parallel_ranges(0, static_cast<std::size_t>(count), 64, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t row = begin; row < end; ++row) body(static_cast<int>(row));
+    });
+}
+
+}  // namespace
+
 Matrix3Xd Stiffness::multiply(const Matrix3Xd& x) const {
     VectorXd rate(products.rows());  // stiffness_a ∇J_a·x
-    parallel_for(0, products.rows(), [&](int a) {
+    for_rows(products.rows(), [&](int a) {
         double sum = 0.0;
         for (int k = products.offset[a]; k < products.offset[a + 1]; ++k) {
             sum += products.gradient[k].dot(x.col(products.node[k]));
@@ -265,7 +277,7 @@ Matrix3Xd Stiffness::multiply(const Matrix3Xd& x) const {
         rate[a] = products.stiffness[a] * sum;
     });
     Matrix3Xd y(3, elements.rows());
-    parallel_for(0, elements.rows(), [&](int i) {
+    for_rows(elements.rows(), [&](int i) {
         Vector3d sum = Vector3d::Zero();
         for (int k = elements.offset[i]; k < elements.offset[i + 1]; ++k) {
             sum += elements.block[k] * x.col(elements.column[k]);
