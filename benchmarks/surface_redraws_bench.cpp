@@ -1,6 +1,6 @@
 // Registration from random parts of a surface: distribution of errors, and what the program says of its failures.
 //     surface_redraws_bench DATA [--count N] [--first SEED] [--folder NAME] [--deviation MM] [--mesh-edge MM]
-//                           [--surface-patch MM]
+//                           [--surface-patch MM] [--load-shapes N]
 // DATA/NAME (phantom-liver by default) holds preop_labels, intraop_labels and landmarks. A draw takes 10 to 60 % of the
 // true intraoperative boundary that faces a random direction, 3000 points with noise, 0 to 30 % of them 5 to 25 mm off
 // in random directions, normals in every second draw, and turns and shifts all by up to 30° and 40 mm.
@@ -30,7 +30,7 @@ namespace {
 struct Arguments {
     fs::path data;
     std::string folder = "phantom-liver";
-    int count = 50, first = 1;
+    int count = 50, first = 1, load_shapes = TissuePrior{}.load_shapes;
     double deviation_mm = 0.7, edge_length = 0, patch = SurfaceOptions{}.patch_mm;
 };
 
@@ -51,6 +51,8 @@ Arguments parse(int argc, char** argv) {
             result.edge_length = std::stod(value);
         else if (key == "--surface-patch")
             result.patch = std::stod(value);
+        else if (key == "--load-shapes")
+            result.load_shapes = std::stoi(value);
         else
             throw InvalidInput("unknown argument " + key + "; see the head of surface_redraws_bench.cpp");
     }
@@ -176,6 +178,7 @@ void run(const Arguments& arguments) {
         const Eigen::Matrix3Xd targets = draw.pose * landmarks.fixed;
         UpdateOptions options;
         options.surface.patch_mm = arguments.patch;
+        options.tissue.load_shapes = arguments.load_shapes;
         options.device = Device::Cpu;
         const Alignment rigid = align_surfaces(model, draw.seen, options.alignment);
         rigid_errors.push_back(mean_error(rigid.placement * landmarks.moving, targets));

@@ -299,28 +299,17 @@ struct Updater::Impl {
     const PreparedModel& prepared;
     UpdateOptions options;
     std::unique_ptr<tled::Engine> solver;
-<<<<<<< HEAD
-    std::unique_ptr<detail::ImageEngine> dense;  // where the model has an image of descriptors
+    std::optional<detail::ImageTools> image_tools;  // where the model has an image
     detail::LoadFinder load_finder;
 
     Impl(const PreparedModel& model, const UpdateOptions& given, std::unique_ptr<tled::Engine> engine,
          Observer& observer)
         : prepared(model), options(given), solver(std::move(engine)), load_finder(model, given.tissue.load_shapes) {
-        const bool described =
-            model.image && model.image->blocks.options().similarity == Similarity::SelfSimilarityContext;
-        if (described) dense = detail::make_image_engine(model, given, observer);
-=======
-    std::optional<detail::ImageTools> image_tools;  // where the model has an image
-
-    Impl(const PreparedModel& model, const UpdateOptions& given, std::unique_ptr<tled::Engine> engine,
-         Observer& observer)
-        : prepared(model), options(given), solver(std::move(engine)) {
         if (!model.image) return;
         const bool described = model.image->blocks.options().similarity == Similarity::SelfSimilarityContext;
         image_tools.emplace(detail::ImageTools{described ? detail::make_image_engine(model, given, observer) : nullptr,
                                                meshing::PointLocator(model.model.mesh),
                                                {}});
->>>>>>> gpu-update
     }
 
     UpdateResult update(const Intraoperative& given, Observer& observer);
