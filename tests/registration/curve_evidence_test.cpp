@@ -251,7 +251,9 @@ TEST(CurveEvidence, OutliersDoNotRepeatTheRounds) {
     const PreparedModel prepared = prepare(shapes::organ_labels({}), coarse());
     Numbers numbers(18);
     const Curves seen = seen_after(away_and_bent, 1.0, 0.4, numbers, false);
-    const UpdateResult result = update(prepared, {.curves = seen}, on_cpu());
+    UpdateOptions options = on_cpu();
+    options.tissue.load_shapes = 0;  // which has rounds of its own
+    const UpdateResult result = update(prepared, {.curves = seen}, options);
     EXPECT_LE(result.rounds.size(), 8u);
     EXPECT_LT(mean_error(result.deformation, targets(6), away_and_bent), 1.5);
 }
