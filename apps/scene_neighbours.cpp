@@ -53,13 +53,14 @@ RigidMotion rigid_motion(TomlReader& reader) {
     motion.displacement = reader.vector("displacement_mm", any_length).value_or(Eigen::Vector3d::Zero());
     auto rotation = reader.table("rotation");
     if (!rotation) return motion;
-    motion.point = rotation->required_vector("point_mm", any_length);
-    const auto axis = rotation->direction("axis");
-    if (!axis) throw InvalidInput(rotation->place() + ": a rotation needs an 'axis', [x, y, z]");
     constexpr double most_degrees = 36000;
-    const double degrees = rotation->required_number("degrees", {-most_degrees, most_degrees, "degrees"});
-    motion.turn = degrees * std::numbers::pi / 180 * *axis;
-    rotation->finish();
+    const auto point = rotation->vector("point_mm", any_length), axis = rotation->direction("axis");
+    const auto degrees = rotation->number("degrees", {-most_degrees, most_degrees, "degrees"});
+    rotation->finish();  // a misspelt key is named before what is missing
+    if (!point || !axis || !degrees)
+        throw InvalidInput(rotation->place() + ": a rotation needs 'point_mm' and 'axis', [x, y, z], and 'degrees'");
+    motion.point = *point;
+    motion.turn = *degrees * std::numbers::pi / 180 * *axis;
     return motion;
 }
 

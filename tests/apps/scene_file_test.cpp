@@ -188,13 +188,14 @@ TEST_F(SceneFiles, TurnBodiesByDegreesAboutAnAxisThroughAPoint) {
     EXPECT_LT((motion.turn - Eigen::Vector3d(0, -std::acos(-1.0) / 2, 0)).norm(), 1e-12);
     const auto turned = [&](const std::string& keys) { return refusal(ball + "rotation = { " + keys + " }\n"); };
     EXPECT_THAT(turned("point_mm = [1, 2, 3], axis = [0, 1, 0]"),
-                testing::AllOf(HasSubstr("line 12"), HasSubstr("lacks 'degrees'")));
+                testing::AllOf(HasSubstr("line 12"), HasSubstr("and 'degrees'")));
     EXPECT_THAT(turned("point_mm = [1, 2, 3], degrees = 5"), HasSubstr("axis"));
-    EXPECT_THAT(turned("axis = [0, 1, 0], degrees = 5"), HasSubstr("lacks 'point_mm'"));
+    EXPECT_THAT(turned("axis = [0, 1, 0], degrees = 5"), HasSubstr("needs 'point_mm'"));
     EXPECT_THAT(turned("point_mm = [1, 2, 3], axis = [0, 0, 0], degrees = 5"), HasSubstr("[0, 0, 0]"));
     EXPECT_THAT(turned("point_mm = [1, 2, 3], axis = [0, 1, 0], degrees = 5, radians = 1"), HasSubstr("'radians'"));
     EXPECT_THAT(turned("point_mm = [1, 2, 3], axis = [0, 1, 0], degrees = 1e6"), HasSubstr("36000"));
     EXPECT_THAT(turned("point_mm = [1, 2, 3], axis = [0, 1, 0], degree = 5"), HasSubstr("'degrees'"));
+    EXPECT_THAT(turned("pont_mm = [1, 2, 3], axis = [0, 1, 0], degrees = 90"), HasSubstr("'point_mm'"));
     EXPECT_THAT(refusal(ball + "rotaton = { }\n"), HasSubstr("did you mean 'rotation'"));
 }
 
