@@ -138,8 +138,8 @@ private:
         constexpr int times = 2;
         const Eigen::Matrix3Xd stated = loads_;
         for (int time = 0; time < times && loads_are_looked_for(); ++time) {
-            const detail::State before = state_;
-            const LastPulls pulls = result_.pulls;
+            const detail::State state = state_;
+            const UpdateResult result = result_;
             detail::Stopwatch stopwatch;
             const detail::FoundLoads found = load_finder_.find(result_.pulls, observer_);
             finding_seconds_ += stopwatch.lap("").seconds;
@@ -149,8 +149,8 @@ private:
                 settle_loads();
             } catch (const SolverFailure& failure) {
                 observer_.note(std::string("unknown loads are left out: ") + failure.what());
-                state_ = before;
-                result_.pulls = pulls;
+                state_ = state;
+                result_ = result;
                 return;
             }
         }
