@@ -223,6 +223,7 @@ double turn_of(tled::Engine& engine, const tled::RestState& rest, int steps) {
 void measure_tissues(int cells, const Options& options) {
     const Scene scene = stretched(meshing::box_mesh({edge, edge, edge}, {cells, cells, cells}));
     const std::vector<Variant> variants = tissues(scene, options.element);
+    std::fprintf(stderr, "time step %.1f us\n", 1e6 * coefficients(variants.front().rest).time_step);
     for (const std::string& threads : options.threads) {
         const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::stoul(threads));
         std::vector<std::unique_ptr<tled::Engine>> engines;

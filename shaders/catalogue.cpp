@@ -83,29 +83,54 @@ ProgramSource node_program(std::string kernel, const NodeEffects& effects) {
     return source;
 }
 
-/// Whether patches take S from the law: viscous stresses are of it, and these laws make theirs of stretch_difference.
-bool gives_second(const PatchTissue& tissue) {
-    constexpr std::array laws{Law::NeoHookeanIso, Law::NeoHookeanLnJ, Law::ArrudaBoyce, Law::TransverselyIsotropic};
-    return tissue.prony_terms > 0 && std::find(laws.begin(), laws.end(), tissue.law) != laws.end();
+bool moves_stresses(const PatchTissue& tissue, const PatchStages& stages) {
+    return tissue.prony_terms > 0 && !stages.rests;
 }
 
-/// What tetrahedra have for themselves and the forces that follow from it. Viscous stresses stay in shared memory where
-/// the sizes have places for them.
-void add_patch_forces(ProgramSource& source, const PatchTissue& tissue, bool stresses_stay, int places) {
+/// Whether patches take S from the law: viscous stresses that move are of it, and these laws make theirs of
+/// stretch_difference.
+bool gives_second(const PatchTissue& tissue, const PatchStages& stages) {
+    constexpr std::array laws{Law::NeoHookeanIso, Law::NeoHookeanLnJ, Law::ArrudaBoyce, Law::TransverselyIsotropic};
+    return moves_stresses(tissue, stages) && std::find(laws.begin(), laws.end(), tissue.law) != laws.end();
+}
+
+std::string unsigned_number(int number) {
+    return std::to_string(number) + "u";
+}
+
+/// Places in shared memory for the viscous stresses of a patch that move; 0 where they do not stay there.
+int places_of_stresses(const PatchTissue& tissue, const PatchSizes& sizes, const PatchStages& stages) {
+    return moves_stresses(tissue, stages) && stages.forces && stages.persists && sizes.each_has_one ? sizes.places : 0;
+}
+
+/// What tetrahedra have for themselves and the forces that follow from it.
+void add_patch_forces(ProgramSource& source, const PatchTissue& tissue, const PatchSizes& sizes,
+                      const PatchStages& stages) {
     const bool fibres = has_fibres(tissue.law), viscous = tissue.prony_terms > 0;
     if (viscous) source.chunks.emplace_back("viscosity");
     if (fibres || viscous) source.chunks.emplace_back("patch.tissue");
     if (fibres) source.chunks.emplace_back("patch.fibre");
-    if (viscous) {
-        source.chunks.emplace_back(stresses_stay ? "patch.stresses.shared" : "patch.stresses.memory");
+    if (viscous) source.chunks.emplace_back("patch.stresses");
+    const bool moves = moves_stresses(tissue, stages);
+    const int places = places_of_stresses(tissue, sizes, stages);
+    if (moves) {
+        source.chunks.emplace_back(places > 0 ? "patch.stresses.shared" : "patch.stresses.memory");
         source.chunks.emplace_back("patch.viscosity");
-        source.defines["PRONY_TERMS"] = std::to_string(tissue.prony_terms) + "u";
+    } else if (viscous) {
+        source.chunks.emplace_back("patch.resting");
     }
-    if (stresses_stay) source.defines["PLACES"] = std::to_string(places) + "u";
-    if (fibres || viscous) source.defines["LAW_GIVES_SECOND"] = flag(gives_second(tissue));
+    if (viscous) source.defines["PRONY_TERMS"] = unsigned_number(tissue.prony_terms);
+    if (places > 0) source.defines["PLACES"] = unsigned_number(places);
+    if (fibres || moves) source.defines["LAW_GIVES_SECOND"] = flag(gives_second(tissue, stages));
     source.chunks.emplace_back("patch.forces");
     source.defines["HAS_FIBRES"] = flag(fibres);
     source.defines["HAS_VISCOSITY"] = flag(viscous);
+    source.defines["MOVES_STRESSES"] = flag(moves);
+}
+
+PatchStages resting(PatchStages stages) {
+    stages.rests = true;
+    return stages;
 }
 
 /// But the one that advances alone, which knows no law.
@@ -219,7 +244,7 @@ ProgramSource patch_step_program(const PatchTissue& tissue, const NodeEffects& e
     const auto define = [&](const char* name, const std::string& value) { source.defines[name] = value; };
     if (stages.forces)
         for (const char* chunk :
-             {"deformation", "material", "isochoric", gives_second(tissue) ? "isochoric.second" : "isochoric.first"})
+             {"deformation", "material", "isochoric", gives_second(tissue, stages) ? "isochoric.second" : "isochoric.first"})
             add(chunk);
     if (stages.forces || stages.averages) {
         add_law(source, tissue.law);
@@ -232,10 +257,9 @@ ProgramSource patch_step_program(const PatchTissue& tissue, const NodeEffects& e
     for (const char* chunk : {"patch.exchange", "patch.nodes", "patch.units", "patch.fans"}) add(chunk);
     if (stages.averages) add("patch.pressure.averaged");
     const bool stays = stages.persists && sizes.each_has_one;
-    const bool stresses_stay = stays && stages.forces && tissue.prony_terms > 0 && sizes.places > 0;
     if (stages.forces) {
         if (!stages.averages) add("patch.pressure.element");
-        add_patch_forces(source, tissue, stresses_stay, sizes.places);
+        add_patch_forces(source, tissue, sizes, stages);
     }
     if (stages.persists) add("patch.neighbours");
     define("WORKGROUP_SIZE", std::to_string(sizes.workgroup));
@@ -245,7 +269,7 @@ ProgramSource patch_step_program(const PatchTissue& tissue, const NodeEffects& e
     define("AVERAGES", flag(stages.averages));
     define("PERSISTS", flag(stages.persists));
     define("STAYS", flag(stays));
-    define("STRESSES_STAY", flag(stresses_stay));
+    define("STRESSES_STAY", flag(places_of_stresses(tissue, sizes, stages) > 0));
     define("COHERENT", stages.persists ? "coherent" : "");
     define("SLOTS", std::to_string(sizes.slots) + "u");
     return source;
@@ -259,13 +283,14 @@ ProgramSource patch_store_program() {
     return {"patch_store", {"index", "bindings"}, {{"WORKGROUP_SIZE", workgroup_size}}, {}};
 }
 
-ProgramSource patch_stress_program(const PatchTissue& tissue, PatchStresses direction) {
+ProgramSource patch_stress_program(const PatchTissue& tissue, PatchStresses what) {
     return {"patch_stress",
             {"index", "bindings"},
             {{"WORKGROUP_SIZE", workgroup_size},
-             {"PRONY_TERMS", std::to_string(tissue.prony_terms) + "u"},
+             {"PRONY_TERMS", unsigned_number(tissue.prony_terms)},
              {"HAS_FIBRES", flag(has_fibres(tissue.law))},
-             {"LOADS", flag(direction == PatchStresses::Load)}},
+             {"LOADS", flag(what == PatchStresses::Load)},
+             {"SUMS", flag(what == PatchStresses::Sum)}},
             {}};
 }
 
@@ -402,6 +427,7 @@ void add_patch_steps(std::vector<ProgramSource>& all) {
                 const PatchTissue elastic{static_cast<Law>(law)}, viscous{static_cast<Law>(law), 3};
                 all.push_back(patch_step_program(elastic, each, {}, stages));
                 if (stages.forces) all.push_back(patch_step_program(viscous, each, {}, stages));
+                if (stages.forces) all.push_back(patch_step_program(viscous, each, {}, resting(stages)));
                 if (stages.forces && stages.persists)
                     all.push_back(patch_step_program(viscous, each, {.places = 64}, stages));
             }
@@ -429,9 +455,8 @@ std::vector<ProgramSource> every_program() {
     add_node_passes(all);
     add_patch_steps(all);
     for (const bool fibres : {false, true})
-        for (const PatchStresses direction : {PatchStresses::Load, PatchStresses::Store})
-            all.push_back(
-                patch_stress_program({fibres ? Law::TransverselyIsotropic : Law::NeoHookeanIso, 3}, direction));
+        for (const PatchStresses what : {PatchStresses::Load, PatchStresses::Store, PatchStresses::Sum})
+            all.push_back(patch_stress_program({fibres ? Law::TransverselyIsotropic : Law::NeoHookeanIso, 3}, what));
     all.push_back(patch_load_program());
     all.push_back(patch_store_program());
     all.push_back(warp_clear_program());

@@ -87,6 +87,7 @@ struct PatchStages {
     bool advances = false, volumes = false, forces = false;
     bool averages = false;  ///< the pressure
     bool persists = false;  ///< goes on for many steps
+    bool rests = false;     ///< viscous stresses do, in its forces
 };
 /// What the tetrahedra of patches are made of: laws with fibres have one for each of them.
 struct PatchTissue {
@@ -97,9 +98,9 @@ struct PatchTissue {
 ProgramSource patch_step_program(const PatchTissue& tissue, const NodeEffects& effects, const PatchSizes& sizes,
                                  const PatchStages& stages);
 bool has_fibres(Law law);
-/// Viscous stresses from elements to patches, or back.
-enum class PatchStresses { Load, Store };
-ProgramSource patch_stress_program(const PatchTissue& tissue, PatchStresses direction);
+/// Viscous stresses from elements to patches, or back; the sum of the terms, which rests.
+enum class PatchStresses { Load, Store, Sum };
+ProgramSource patch_stress_program(const PatchTissue& tissue, PatchStresses what);
 ProgramSource patch_load_program();
 ProgramSource patch_store_program();
 

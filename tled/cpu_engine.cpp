@@ -12,6 +12,7 @@
 #include "tled/detail/fan_layout.hpp"
 #include "tled/detail/parallel.hpp"
 #include "tled/detail/prony_coefficients.hpp"
+#include "tled/detail/stress_clock.hpp"
 #include "tled/engine.hpp"
 
 #include <tbb/enumerable_thread_specific.h>
@@ -27,13 +28,13 @@ namespace tissuewarp::tled {
 
 namespace {
 
-using detail::Advance;
 using detail::batch_width;
 using detail::BatchBlock;
 using detail::ElementBatches;
 using detail::FanPatch;
 using detail::Kinematics;
 using detail::record;
+using detail::Stresses;
 
 void require_columns(Eigen::Index columns, std::size_t nodes, const char* what) {
     if (static_cast<std::size_t>(columns) != nodes)
@@ -69,7 +70,8 @@ public:
           internal_(fans.internal),
           own_nodes_(fans.own_nodes),
           sources_(detail::force_sources(rest, fans, hex_layout_)),
-          pressures_(rest.pressure, fans) {
+          pressures_(rest.pressure, fans),
+          stress_clock_(rest.viscosity) {
         const std::size_t vector_size = node_count_ * record;
         displacement_.assign(vector_size, T(0));
         increment_ = scratch_ = force_load_ = force_ = displacement_;
@@ -125,6 +127,7 @@ public:
         if (contact_) contact_->forget_looks();
         for (detail::ViscousBatches<T>& viscous : viscous_)
             std::fill(viscous.stress.begin(), viscous.stress.end(), T(0));
+        stress_clock_.forget();
     }
 
     void set_increment(const Eigen::Matrix3Xd& increment) override {
@@ -137,29 +140,22 @@ public:
             }
     }
 
-    void keep_state() override { kept_ = {displacement_, increment_, viscous_}; }
+    void keep_state() override { kept_ = KeptState{displacement_, increment_, viscous_, stress_clock_}; }
 
     void return_to_kept_state() override {
-        displacement_ = kept_.displacement;
-        increment_ = kept_.increment;
-        viscous_ = kept_.viscous;
+        displacement_ = kept_->displacement;
+        increment_ = kept_->increment;
+        viscous_ = kept_->viscous;
+        stress_clock_ = kept_->stress_clock;
         if (contact_) contact_->forget_looks();
     }
 
     void run(int steps, const StepCoefficients& coefficients) override {
-        const T momentum = T(coefficients.momentum), gain = T(coefficients.gain);
-        set_time_step(coefficients.time_step);
         if (contact_) contact_->set_time_step(coefficients.time_step);
-        T* u = displacement_.data();
-        with_effects([&](auto surface, auto fluid, auto contact, auto turning) {
-            for (int step = 0; step < steps; ++step)
-                sum_all_forces(surface, fluid, u, Advance::Yes, [&](std::size_t begin, std::size_t end) {
-                    const std::size_t at = begin * record;
-                    detail::advance_nodes(momentum, gain, &inverse_mass_[at], &force_load_[at], &force_[at], &free_[at],
-                                          &increment_[at], u + at, end - begin);
-                    if constexpr (contact) contact_->settle(turning, begin, end, free_.data(), increment_.data(), u);
-                });
-        });
+        for (const auto& [count, interval] : stress_clock_.next(steps, coefficients.time_step)) {
+            set_stress_interval(interval);
+            take_steps(count, coefficients, interval > 0 ? Stresses::Move : Stresses::Rest);
+        }
     }
 
     [[nodiscard]] Eigen::Matrix3Xd displacement() const override { return to_matrix(displacement_); }
@@ -168,7 +164,8 @@ public:
     [[nodiscard]] Eigen::Matrix3Xd residual() override { return residual_at(displacement_.data()); }
 
     [[nodiscard]] Eigen::Matrix3Xd internal_force() override {
-        sum_forces(displacement_.data(), Advance::No, [](std::size_t, std::size_t) {});
+        set_stress_interval(stress_clock_.lag());
+        sum_forces(displacement_.data(), Stresses::Look, [](std::size_t, std::size_t) {});
         return to_matrix(force_);
     }
 
@@ -270,12 +267,14 @@ private:
     // by material, for tetrahedra and then again for hexahedra; empty where none is viscous
     std::vector<PronySeries> viscosity_;
     std::vector<detail::ViscousBatches<T>> viscous_;
+    detail::StressClock stress_clock_;
 
     struct KeptState {
         std::vector<T> displacement, increment;
         std::vector<detail::ViscousBatches<T>> viscous;
+        detail::StressClock stress_clock;
     };
-    KeptState kept_;
+    std::optional<KeptState> kept_;
 
     std::vector<T> change_;  // J − 1 of elements in batches
 
@@ -322,7 +321,7 @@ private:
     /// Internal forces at displacement `u` to `force_`; after(begin, end) as soon as those of nodes [begin, end) are
     /// there. It may move these nodes: no element that is still to come has one of them.
     template <class After>
-    void sum_forces(T* u, Advance advance, const After& after) {
+    void sum_forces(T* u, Stresses stresses, const After& after) {
         if (kinematics_ == Kinematics::AveragedPressure) {
             for_patches([&](const FanPatch& patch, detail::PatchScratch<T>& scratch) {
                 detail::patch_volume_changes(elements_, patch, u, scratch, pressures_.patch_changes());
@@ -330,10 +329,10 @@ private:
             pressures_.average(materials_);
         }
         for_patches([&](const FanPatch& patch, detail::PatchScratch<T>& scratch) {
-            patch_forces(patch, u, advance, scratch);
+            patch_forces(patch, u, stresses, scratch);
             after(patch.first_own, patch.first_own + patch.own_count);
         });
-        hex_forces(u, advance);
+        hex_forces(u, stresses);
         parallel_ranges(own_nodes_, node_count_, 512, [&](std::size_t begin, std::size_t end) {
             for (std::size_t node = begin; node != end; ++node) sum_contributions(node);
             after(begin, end);
@@ -362,11 +361,25 @@ private:
         });
     }
 
+    void take_steps(int steps, const StepCoefficients& coefficients, Stresses stresses) {
+        const T momentum = T(coefficients.momentum), gain = T(coefficients.gain);
+        T* u = displacement_.data();
+        with_effects([&](auto surface, auto fluid, auto contact, auto turning) {
+            for (int step = 0; step < steps; ++step)
+                sum_all_forces(surface, fluid, u, stresses, [&](std::size_t begin, std::size_t end) {
+                    const std::size_t at = begin * record;
+                    detail::advance_nodes(momentum, gain, &inverse_mass_[at], &force_load_[at], &force_[at], &free_[at],
+                                          &increment_[at], u + at, end - begin);
+                    if constexpr (contact) contact_->settle(turning, begin, end, free_.data(), increment_.data(), u);
+                });
+        });
+    }
+
     /// Internal forces less those of springs and effects, as sum_forces.
     template <class Surface, class Fluid, class After>
-    void sum_all_forces(Surface surface, Fluid fluid, T* u, Advance advance, const After& after) {
+    void sum_all_forces(Surface surface, Fluid fluid, T* u, Stresses stresses, const After& after) {
         if constexpr (surface) surface_->evaluate(u);
-        sum_forces(u, advance, [&](std::size_t begin, std::size_t end) {
+        sum_forces(u, stresses, [&](std::size_t begin, std::size_t end) {
             springs_.take_off(u, begin, end, force_.data());
             if constexpr (surface) surface_->take_off(begin, end, force_.data());
             if constexpr (fluid) fluid_->take_off(u, begin, end, force_.data());
@@ -385,17 +398,17 @@ private:
             contact_.emplace(*effects.contact, internal_);
     }
 
-    void patch_forces(const FanPatch& patch, const T* u, Advance advance, detail::PatchScratch<T>& scratch) {
+    void patch_forces(const FanPatch& patch, const T* u, Stresses stresses, detail::PatchScratch<T>& scratch) {
         const std::size_t m = patch.material;
         if (viscous_.empty() || viscous_[m].coefficient.empty())
             detail::patch_forces(materials_[m], kinematics_, elements_, patch, u, pressures_.pressure(), scratch,
                                  force_.data(), contribution_.data());
         else
-            detail::viscous_patch_forces(materials_[m], viscous_[m], advance, kinematics_, elements_, patch, u,
+            detail::viscous_patch_forces(materials_[m], viscous_[m], stresses, kinematics_, elements_, patch, u,
                                          pressures_.pressure(), scratch, force_.data(), contribution_.data());
     }
 
-    void hex_forces(const T* u, Advance advance) {
+    void hex_forces(const T* u, Stresses stresses) {
         T* hex_force = contribution_.data() + first_hex_force();
         for (const BatchBlock& block : hex_layout_.blocks) {
             const auto m = static_cast<std::size_t>(block.material), v = viscosity_.size() + m;
@@ -403,7 +416,7 @@ private:
                 if (viscous_.empty() || viscous_[v].coefficient.empty())
                     detail::hex_forces(materials_[m], hexahedra_, begin, end, u, hex_force);
                 else
-                    detail::viscous_hex_forces(materials_[m], viscous_[v], advance, hexahedra_, begin, end, u,
+                    detail::viscous_hex_forces(materials_[m], viscous_[v], stresses, hexahedra_, begin, end, u,
                                                hex_force);
             });
         }
@@ -436,13 +449,13 @@ private:
             prepare(layout_.blocks, 0);
             prepare(hex_layout_.blocks, viscosity_.size());
         }
-        set_time_step(0);
+        set_stress_interval(0);
     }
 
-    void set_time_step(double time_step) {
+    void set_stress_interval(double interval) {
         for (std::size_t m = 0; m < viscous_.size(); ++m) {
             viscous_[m].coefficient.clear();
-            for (const auto& [a, b] : detail::prony_coefficients(viscosity_[m % viscosity_.size()], time_step))
+            for (const auto& [a, b] : detail::prony_coefficients(viscosity_[m % viscosity_.size()], interval))
                 viscous_[m].coefficient.push_back({T(a), T(b)});
         }
     }
@@ -450,7 +463,7 @@ private:
     /// f_ext + f_spring − f_int, masked by the constraints.
     [[nodiscard]] Eigen::Matrix3Xd residual_at(T* u) {
         with_effects([&](auto surface, auto fluid, auto, auto) {
-            sum_all_forces(surface, fluid, u, Advance::No, [&](std::size_t begin, std::size_t end) {
+            sum_all_forces(surface, fluid, u, Stresses::Rest, [&](std::size_t begin, std::size_t end) {
                 for (std::size_t at = begin * record; at < end * record; ++at)
                     force_[at] = free_[at] * (force_load_[at] - force_[at]);
             });

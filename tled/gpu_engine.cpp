@@ -9,6 +9,7 @@
 #include "tled/detail/gpu_patches.hpp"
 #include "tled/detail/hexahedra.hpp"
 #include "tled/detail/kinematics.hpp"
+#include "tled/detail/stress_clock.hpp"
 #include "tled/engine.hpp"
 #include "tled/reference.hpp"
 #include "tled/step_shape_cache.hpp"
@@ -71,6 +72,8 @@ public:
           admits_inversion_(tled::admits_inversion(rest)),
           force_(device_, programs_, rest, blocks_),
           effects_(device_, programs_, rest),
+          stress_clock_(rest.viscosity),
+          kept_stress_clock_(rest.viscosity),
           displacement_(node_vectors("displacements")),
           increment_(node_vectors("increments")),
           inverse_mass_(node_vectors("inverse masses")),
@@ -93,6 +96,8 @@ public:
         upload_inverse_mass();
         if (shape.patch_tets > 0 && detail::GpuPatches::suit(rest, device_))
             patches_.emplace(device_, programs_, rest, shape, blocks_);
+        if (patches_) stress_clock_ = detail::StressClock(rest.viscosity, patches_->stress_pace());
+        kept_stress_clock_ = stress_clock_;
         over_patches_ = patches_.has_value();
     }
 
@@ -134,6 +139,7 @@ public:
         displacement_.upload(detail::packed(displacement));
         increment_.upload(detail::packed(increment));
         force_.forget_viscous_stresses();
+        stress_clock_.forget();
         impose();
         state_changed();
     }
@@ -151,6 +157,7 @@ public:
         kept_displacement_.copy_from(displacement_, displacement_.bytes());
         kept_increment_.copy_from(increment_, increment_.bytes());
         force_.keep_viscous_stresses();
+        kept_stress_clock_ = stress_clock_;
     }
 
     void return_to_kept_state() override {
@@ -158,40 +165,21 @@ public:
         displacement_.copy_from(kept_displacement_, displacement_.bytes());
         increment_.copy_from(kept_increment_, increment_.bytes());
         force_.return_to_kept_viscous_stresses();
+        stress_clock_ = kept_stress_clock_;
         state_changed();
     }
 
     void run(int steps, const StepCoefficients& coefficients) override {
         if (steps <= 0) return;
         const CurrentContext current = device_.make_current();
-        force_.set_time_step(coefficients.time_step);
+        const std::vector<detail::StressSteps> parts = stress_clock_.next(steps, coefficients.time_step);
         if (over_patches_) {
             blocks_.set("Displacement", displacement_);
-            patches_->run(steps, coefficients, effects_.on_nodes(), blocks_);
+            patches_->run(parts, coefficients, effects_.on_nodes(), blocks_);
             previous_residual_known_ = false;
             return;
         }
-        const Program& step = node_program(shaders::node_step_program(effects_.on_nodes(), StoreResidual::No));
-        const Program& last = node_program(shaders::node_step_program(effects_.on_nodes(), StoreResidual::Yes));
-        for (const Program* program : {&step, &last}) {
-            program->set(1, static_cast<float>(coefficients.momentum));
-            program->set(2, static_cast<float>(coefficients.gain));
-            effects_.set_time_step(*program, coefficients.time_step);
-        }
-        blocks_.set("Displacement", displacement_);
-        blocks_.set("Residual", previous_residual_);
-        force_.bind(blocks_);
-        effects_.bind(blocks_);
-        blocks_.bind(last);
-        for (int i = 1; i <= steps; ++i) {
-            effects_.dispatch();
-            force_.dispatch(detail::Advance::Yes);
-            (i < steps ? step : last).dispatch(nodes());
-            shaders::storage_barrier();
-            if (i % steps_per_flush == 0) shaders::flush();
-        }
-        previous_residual_known_ = true;
-        shaders::check_errors("time steps");
+        run_two_passes(parts, coefficients);
     }
 
     [[nodiscard]] Matrix3Xd displacement() const override { return downloaded(displacement_); }
@@ -205,7 +193,7 @@ public:
 
     [[nodiscard]] Matrix3Xd internal_force() override {
         const CurrentContext current = device_.make_current();
-        evaluate(displacement_, {}, MaskConstrained::No, residual_);
+        evaluate(displacement_, {}, MaskConstrained::No, residual_, stress_clock_.lag());
         return -downloaded(residual_);
     }
 
@@ -310,9 +298,44 @@ private:
         shaders::check_errors("imposed displacements");
     }
 
-    /// f_ext + f_spring − f_int at `displacement`, with the effects named, into `result`.
+    void run_two_passes(const std::vector<detail::StressSteps>& parts, const StepCoefficients& coefficients) {
+        const Program& step = node_program(shaders::node_step_program(effects_.on_nodes(), StoreResidual::No));
+        const Program& last = node_program(shaders::node_step_program(effects_.on_nodes(), StoreResidual::Yes));
+        for (const Program* program : {&step, &last}) {
+            program->set(1, static_cast<float>(coefficients.momentum));
+            program->set(2, static_cast<float>(coefficients.gain));
+            effects_.set_time_step(*program, coefficients.time_step);
+        }
+        blocks_.set("Displacement", displacement_);
+        blocks_.set("Residual", previous_residual_);
+        force_.bind(blocks_);
+        effects_.bind(blocks_);
+        blocks_.bind(last);
+        int taken = 0;
+        for (const auto& part : parts) {
+            force_.set_stress_interval(part.interval);
+            for (int i = 0; i < part.count; ++i) {
+                const bool ends = i + 1 == part.count && &part == &parts.back();
+                take_step(ends ? last : step, part.interval > 0 ? detail::Advance::Yes : detail::Advance::No);
+                if (++taken % steps_per_flush == 0) shaders::flush();
+            }
+        }
+        previous_residual_known_ = true;
+        shaders::check_errors("time steps");
+    }
+
+    void take_step(const Program& nodes_step, detail::Advance advance) {
+        effects_.dispatch();
+        force_.dispatch(advance);
+        nodes_step.dispatch(nodes());
+        shaders::storage_barrier();
+    }
+
+    /// f_ext + f_spring − f_int at `displacement`, with the effects named and the viscous stresses after an interval (s),
+    /// into `result`.
     void evaluate(const Buffer<Float4>& displacement, const NodeEffects& effects, MaskConstrained mask,
-                  const Buffer<Float4>& result) {
+                  const Buffer<Float4>& result, double stress_interval = 0) {
+        force_.set_stress_interval(stress_interval);
         blocks_.set("Displacement", displacement);
         blocks_.set("Residual", result);
         force_.bind(blocks_);
@@ -387,6 +410,7 @@ private:
     BlockBuffers blocks_;
     detail::GpuForce force_;
     detail::GpuEffects effects_;
+    detail::StressClock stress_clock_, kept_stress_clock_;
     std::optional<detail::GpuPatches> patches_;  ///< absent where patches do not know the scene
     Buffer<Float4> displacement_, increment_, inverse_mass_, residual_, previous_residual_, previous_displacement_,
         imposed_, kept_displacement_, kept_increment_;

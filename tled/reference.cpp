@@ -116,7 +116,7 @@ ViscousStresses unstressed(const RestState& rest) {
 }
 
 ViscousStresses advanced(const RestState& rest, ViscousStresses stresses, const Matrix3Xd& displacement,
-                         double time_step) {
+                         double interval) {
     if (rest.viscosity.empty()) return stresses;
     const auto advance = [&](std::vector<Matrix3d>& q, int material, const Material& law, const Matrix3d& F) {
         const std::vector<PronyTerm>& terms = rest.viscosity[material].terms;
@@ -124,7 +124,7 @@ ViscousStresses advanced(const RestState& rest, ViscousStresses stresses, const 
         const Matrix3d S = F.inverse() * shear_stress(law, F);
         for (std::size_t k = 0; k < terms.size(); ++k) {
             const auto [g, tau] = terms[k];
-            q[k] = (time_step * g * S + tau * q[k]) / (time_step + tau);
+            q[k] = -g * std::expm1(-interval / tau) * S + std::exp(-interval / tau) * q[k];
         }
     };
     const std::vector<int> material_of = material_of_elements(rest);

@@ -27,9 +27,9 @@ using ViscousStresses = std::vector<std::vector<Eigen::Matrix3d>>;
 /// No stress in any term.
 ViscousStresses unstressed(const RestState& rest);
 
-/// The viscous stresses after a time step (s) that ends at a displacement: q⁺ = (Δt g S_shear + τ q)/(Δt + τ).
+/// The viscous stresses after an interval (s) at a displacement (viscosity.hpp).
 ViscousStresses advanced(const RestState& rest, ViscousStresses stresses, const Eigen::Matrix3Xd& displacement,
-                         double time_step);
+                         double interval);
 
 /// f_int with the viscous stresses taken off: P = ∂W/∂F − F Σ q_i, mN, 3 × N.
 Eigen::Matrix3Xd internal_force(const RestState& rest, const Eigen::Matrix3Xd& displacement,

@@ -1,8 +1,10 @@
 // Needs: numbers, deformation, material, isochoric, a law with USES_SHEAR 1, patch.nodes, patch.units, patch.fans, and
-// patch.pressure.element or patch.pressure.averaged; patch.fibre and patch.viscosity where their flags are 1.
+// patch.pressure.element or patch.pressure.averaged; patch.fibre, and patch.viscosity or patch.resting, where their
+// flags are 1.
 // Gives: the forces of a patch's tetrahedra on its nodes, in shared memory.
 //! define HAS_FIBRES
 //! define HAS_VISCOSITY
+//! define MOVES_STRESSES
 
 shared int force_x[SLOTS], force_y[SLOTS], force_z[SLOTS];  // units of a sixth mN over scale
 
@@ -54,10 +56,13 @@ mat3 stress_of_tetrahedron(Edges t, Parameters parameters, Pressure pressure) {
     mat3 G = mat3(t.moved_b, t.moved_c, t.moved_d);
     mat3 N = mat3(t.normal_b, t.normal_c, t.normal_d);
     Deformation d = deformation((G * transpose(N)) * reciprocal(dot(t.rest_b, t.normal_b)));
-#if HAS_VISCOSITY
-    return relaxed_stress(d, stress(0u, d, parameters, 0.0), pressure_of(pressure, d.volume_change));
+    float p = pressure_of(pressure, d.volume_change);
+#if MOVES_STRESSES
+    return relaxed_stress(d, stress(0u, d, parameters, 0.0), p);
+#elif HAS_VISCOSITY
+    return stress(0u, d, parameters, p) - first_stress(d, resting_stress());
 #else
-    return stress(0u, d, parameters, pressure_of(pressure, d.volume_change));
+    return stress(0u, d, parameters, p);
 #endif
 }
 
@@ -91,7 +96,7 @@ void add_fan(uvec4 fan, Parameters parameters, Patch here, inout Tally tally) {
 /// fan_of(here, lane); each further one is fetched while the one before is computed. Ends with all of them in place.
 bool compute_forces(Patch here, uvec4 first, Parameters parameters, inout float scale, out uint largest) {
     uint lane = gl_LocalInvocationID.x;
-#if HAS_VISCOSITY
+#if MOVES_STRESSES
     advance_stresses(here.material);
 #endif
     for (;;) {
@@ -111,7 +116,7 @@ bool compute_forces(Patch here, uvec4 first, Parameters parameters, inout float 
         if (!countable(largest)) return false;
         if (fits(largest, scale)) return true;
         scale = scale_for(largest);
-#if HAS_VISCOSITY
+#if MOVES_STRESSES
         hold_stresses();
 #endif
         barrier();

@@ -1,4 +1,4 @@
-// Effect: viscous stresses of a Prony series (chunk viscosity) over patches. Needs: viscosity, patch.tissue, patch.stresses.*.
+// Effect: viscous stresses of a Prony series (chunk viscosity) over patches. Needs: viscosity, patch.stresses, patch.stresses.*.
 // Gives: relaxed_stress, P of the tetrahedron in hand (kPa) less F sum q⁺, which keeps q⁺; fetch_viscous_stress comes before it. A patch
 // that computes its forces again in a step finds its stresses advanced: advance_stresses, hold_stresses.
 //! define HAS_FIBRES
@@ -10,7 +10,7 @@ vec2 prony[PRONY_TERMS];
 vec2 stress_in_hand[3u * PRONY_TERMS];
 
 void advance_stresses(uint material) {
-    uint first = (HAS_FIBRES + 3u * PRONY_TERMS) * places + material * PRONY_TERMS;
+    uint first = first_coefficient() + material * PRONY_TERMS;
     for (uint term = 0u; term < PRONY_TERMS; ++term) prony[term] = patch_tissue[first + term];
 }
 

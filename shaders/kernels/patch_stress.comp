@@ -1,8 +1,9 @@
-// One invocation per place of the patches' tetrahedra: viscous stresses from those of elements, or back to them.
-// Needs: index, bindings.
+// One invocation per place of the patches' tetrahedra: viscous stresses from those of elements, or back to them; SUMS 1: the sum
+// of the terms, for steps in which it rests. Needs: index, bindings.
 //! define PRONY_TERMS
 //! define HAS_FIBRES
 //! define LOADS
+//! define SUMS
 
 layout(location = 0) uniform uint element_count;
 
@@ -18,6 +19,17 @@ void main() {
     if (place >= places) return;
     uint e = element_of_place[place];
     if (e == 0xffffffffu) return;
+#if SUMS
+    uint first = HAS_FIBRES * places + place, resting = (HAS_FIBRES + 3u * PRONY_TERMS) * places;
+    float halves[3];
+    for (uint i = 0u; i < 3u; ++i) {
+        vec2 sum = vec2(0.0);
+        for (uint term = 0u; term < PRONY_TERMS; ++term) sum += patch_tissue[first + (3u * term + i) * places];
+        halves[i] = uintBitsToFloat(packHalf2x16(sum));
+    }
+    patch_tissue[resting + place] = vec2(halves[0], halves[1]);
+    patch_tissue[resting + places + place / 2u][place % 2u] = halves[2];
+#else
     for (uint term = 0u; term < PRONY_TERMS; ++term) {
         uint from = 2u * term * element_count + e;
         uint to = (HAS_FIBRES + 3u * term) * places + place;
@@ -32,4 +44,5 @@ void main() {
         viscous_stress[from + element_count] = vec4(patch_tissue[to + 2u * places], 0.0, 0.0);
 #endif
     }
+#endif
 }

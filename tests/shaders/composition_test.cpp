@@ -161,6 +161,17 @@ TEST(Composition, StepsOverPatchesHoldNoTraceOfAbsentTissue) {
     EXPECT_THAT(files({Law::NeoHookeanLnJ, 1}), ::testing::Not(Contains("chunks/patch.fibre.glsl")));
 }
 
+TEST(Composition, AStepInWhichStressesRestNeitherComputesNorWritesThem) {
+    PatchStages stages{.advances = true, .forces = true};
+    const auto text = [&] { return compose(patch_step_program({Law::NeoHookeanLnJ, 2}, {}, {}, stages)).text; };
+    for (const char* word : {"keep_stress(", "advance_stresses(", "second_stress("}) EXPECT_THAT(text(), HasSubstr(word));
+    stages.rests = true;
+    for (const char* word : {"keep_stress(", "void advance_stresses("})
+        EXPECT_THAT(text(), ::testing::Not(HasSubstr(word)));
+    EXPECT_THAT(text(), HasSubstr("#define MOVES_STRESSES 0\n"));
+    EXPECT_THAT(text(), HasSubstr("readonly buffer PatchTissue"));
+}
+
 // Room that no program uses would take other workgroups' place.
 TEST(Composition, ViscousStressesStayInSharedMemoryOnlyWhereOnePatchDoes) {
     const auto stays = [](const PatchSizes& sizes, bool persists) {

@@ -3,6 +3,7 @@
 
 #include "meshing/hex_primitives.hpp"
 #include "meshing/primitives.hpp"
+#include "tled/detail/stress_clock.hpp"
 #include "tled/engine.hpp"
 #include "tled/reference.hpp"
 
@@ -171,17 +172,32 @@ struct PlainState {
     Matrix3Xd u, v, previous_residual;
 };
 
+/// Viscous stresses of plain steps, and when they move on.
+struct PlainStresses {
+    explicit PlainStresses(const RestState& rest) : stresses(unstressed(rest)), clock(rest.viscosity) {}
+    ViscousStresses stresses;
+    detail::StressClock clock;
+
+    void move(const RestState& rest, const Matrix3Xd& u, double time_step) {
+        stresses = advanced(rest, std::move(stresses), u, clock.next(1, time_step).front().interval);
+    }
+    /// f_int with the stresses of the present time.
+    [[nodiscard]] Matrix3Xd force(const RestState& rest, const Matrix3Xd& u) const {
+        return internal_force(rest, u, advanced(rest, stresses, u, clock.lag()));
+    }
+};
+
 /// The update of the interface's comment in plain float64.
 inline PlainState plain_steps(const RestState& rest, const NodalConditions& conditions, const Matrix3Xd& mass,
                               Matrix3Xd u, Matrix3Xd v, int steps, const StepCoefficients& coefficients,
-                              ViscousStresses* viscous = nullptr) {
+                              PlainStresses* viscous = nullptr) {
     const Matrix3Xd zero = Matrix3Xd::Zero(3, rest.node_count);
     u = conditions.constrained.select(conditions.imposed, u).eval();
     v = conditions.constrained.select(zero, v).eval();
     PlainState state{u, v, zero};
     for (int step = 0; step < steps; ++step) {
-        if (viscous) *viscous = advanced(rest, std::move(*viscous), state.u, coefficients.time_step);
-        state.previous_residual = plain_residual(rest, conditions, state.u, viscous);
+        if (viscous) viscous->move(rest, state.u, coefficients.time_step);
+        state.previous_residual = plain_residual(rest, conditions, state.u, viscous ? &viscous->stresses : nullptr);
         state.v =
             coefficients.momentum * state.v + coefficients.gain * state.previous_residual.cwiseQuotient(mass).eval();
         state.u += state.v;

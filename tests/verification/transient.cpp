@@ -91,9 +91,8 @@ Relaxation impose(const std::string& name, const std::string& key, int component
     int done = 0;
     for (std::size_t i = 0; i < values.at("t").size() && values.at("t")[i].get<double>() <= last; ++i) {
         const double time = values.at("t")[i].get<double>();
-        // Forces are read with the viscous stress at the end of the coming step.
         for (const int steps = static_cast<int>(std::lround(time / time_step)); done < steps; ++done) {
-            engine->run(done > 0 ? 1 : 0, {.time_step = time_step});
+            engine->run(1, {.time_step = time_step});
             engine->set_conditions(imposed(model, F((done + 1) * time_step)));
         }
         result.time.push_back(time);

@@ -147,15 +147,42 @@ void store_corner_forces(D d, const HexBatches<T>& hexahedra, std::size_t batch,
 /// Elastic tissue: nothing happens to the stress of a batch.
 struct Elastic {};
 
-/// P times `volume`: of the law's shear part, less what `after_shear` takes off its S = F⁻¹ P, and `scaled_pressure`
-/// (V p) times cof F.
-template <class Law, class D, class AfterShear>
-HWY_INLINE void stress(D d, std::size_t batch, int lane, const Strain<D>& strain, const Tissue<D>& tissue,
-                       Vec<D> volume, Vec<D> scaled_pressure, const AfterShear& after_shear, Vec<D> (&P)[3][3]) {
-    if constexpr (has_factors<Law, D> && std::is_same_v<AfterShear, Elastic>) {
+/// Tissue whose viscous stresses are known before its S.
+template <class D, class AfterShear>
+concept knows_its_stresses = requires(D d, const AfterShear& stresses) { stresses(d, std::size_t{}, int{}); };
+
+/// P times `volume`: of the law's shear part, and `scaled_pressure` (V p) times cof F.
+template <class Law, class D>
+HWY_INLINE void elastic_stress(D d, const Strain<D>& strain, const Tissue<D>& tissue, Vec<D> volume,
+                               Vec<D> scaled_pressure, Vec<D> (&P)[3][3]) {
+    if constexpr (has_factors<Law, D>) {
         auto factors = Response<Law>::shear_factors(d, strain, tissue, volume);
         factors.of_I = factors.of_I + scaled_pressure;
         stress_of<D>(factors, strain, P);
+    } else {
+        shear_stress<Law>(d, strain, tissue, volume, P);
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j) P[i][j] = hn::MulAdd(scaled_pressure, cof(d, strain, i, j), P[i][j]);
+    }
+}
+
+/// The same, less what `after_shear` takes off its S = F⁻¹ P.
+template <class Law, class D, class AfterShear>
+HWY_INLINE void stress(D d, std::size_t batch, int lane, const Strain<D>& strain, const Tissue<D>& tissue,
+                       Vec<D> volume, Vec<D> scaled_pressure, const AfterShear& after_shear, Vec<D> (&P)[3][3]) {
+    if constexpr (std::is_same_v<AfterShear, Elastic>) {
+        elastic_stress<Law>(d, strain, tissue, volume, scaled_pressure, P);
+    } else if constexpr (has_factors<Law, D> && knows_its_stresses<D, AfterShear>) {
+        auto factors = Response<Law>::shear_factors(d, strain, tissue, volume);
+        factors.of_I = factors.of_I + scaled_pressure;
+        const SecondStressOf<D> second(d, strain);
+        auto S = second.shear(factors);
+        const auto relaxed = after_shear(d, batch, lane);
+        for (int k = 0; k < 6; ++k) S.S[k] = S.S[k] - relaxed.S[k];
+        first_stress_of<D>(S, strain, P);
+    } else if constexpr (knows_its_stresses<D, AfterShear>) {
+        elastic_stress<Law>(d, strain, tissue, volume, scaled_pressure, P);
+        take_off<D>(after_shear(d, batch, lane), strain, P);
     } else if constexpr (has_factors<Law, D>) {
         const SecondStressOf<D> second(d, strain);
         auto S = second.shear(Response<Law>::shear_factors(d, strain, tissue, volume));
@@ -164,12 +191,7 @@ HWY_INLINE void stress(D d, std::size_t batch, int lane, const Strain<D>& strain
         first_stress_of<D>(S, strain, P);
     } else {
         shear_stress<Law>(d, strain, tissue, volume, P);
-        if constexpr (!std::is_same_v<AfterShear, Elastic>) {
-            Vec<D> relaxed[3][3];
-            first_stress_of<D>(after_shear(d, batch, lane, second_stress_of(d, strain, P)), strain, relaxed);
-            for (int i = 0; i < 3; ++i)
-                for (int j = 0; j < 3; ++j) P[i][j] = P[i][j] - relaxed[i][j];
-        }
+        take_off<D>(after_shear(d, batch, lane, second_stress_of(d, strain, P)), strain, P);
         for (int i = 0; i < 3; ++i)
             for (int j = 0; j < 3; ++j) P[i][j] = hn::MulAdd(scaled_pressure, cof(d, strain, i, j), P[i][j]);
     }

@@ -130,9 +130,11 @@ template <class T>
 void hex_forces(const KernelMaterial<T>& material, const HexBatches<T>& hexahedra, std::size_t begin, std::size_t end,
                 const T* u, T* force);
 
-enum class Advance { No, Yes };
+/// Of viscous stresses in a pass of the elements: taken as they rest; moved on, q⁺ = a S_shear + b q; or looked at as
+/// they would be after that.
+enum class Stresses { Rest, Move, Look };
 
-/// The viscous stresses of a material's batches and their backward-Euler step q⁺ = a S_shear + b q.
+/// The viscous stresses of a material's batches.
 template <class T>
 struct ViscousBatches {
     std::vector<std::array<T, 2>> coefficient;  ///< (a, b) of each term
@@ -140,14 +142,14 @@ struct ViscousBatches {
     std::size_t first_batch = 0;                ///< the batch that `stress` begins with
 };
 
-/// As patch_forces, with the viscous stresses at the end of the step taken off; they are kept where time advances.
+/// As patch_forces, with the viscous stresses taken off.
 template <class T>
-void viscous_patch_forces(const KernelMaterial<T>& material, ViscousBatches<T>& viscous, Advance advance,
+void viscous_patch_forces(const KernelMaterial<T>& material, ViscousBatches<T>& viscous, Stresses stresses,
                           Kinematics kinematics, const ElementBatches<T>& elements, const FanPatch& patch, const T* u,
                           const T* pressure, PatchScratch<T>& scratch, T* force, T* shared);
 
 template <class T>
-void viscous_hex_forces(const KernelMaterial<T>& material, ViscousBatches<T>& viscous, Advance advance,
+void viscous_hex_forces(const KernelMaterial<T>& material, ViscousBatches<T>& viscous, Stresses stresses,
                         const HexBatches<T>& hexahedra, std::size_t begin, std::size_t end, const T* u, T* force);
 
 /// M U'(J) for J = 1 + `change`, per pressure node of one law.

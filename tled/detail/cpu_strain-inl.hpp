@@ -172,19 +172,36 @@ HWY_INLINE SecondStress<D> second_stress_of(D d, const Strain<D>& strain, const 
     return s;
 }
 
-/// P = F S.
 template <class D>
-HWY_INLINE void first_stress_of(const SecondStress<D>& s, const Strain<D>& strain, Vec<D> (&P)[3][3]) {
-    Vec<D> full[3][3];
+HWY_INLINE void fill(const SecondStress<D>& s, Vec<D> (&full)[3][3]) {
     for (int i = 0; i < 3; ++i) {
         const int j = (i + 1) % 3;
         full[i][i] = s.S[i];
         full[i][j] = full[j][i] = s.S[3 + i];
     }
+}
+
+/// P = F S.
+template <class D>
+HWY_INLINE void first_stress_of(const SecondStress<D>& s, const Strain<D>& strain, Vec<D> (&P)[3][3]) {
+    Vec<D> full[3][3];
+    fill<D>(s, full);
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) {
             P[i][j] = full[i][j];
             for (int k = 0; k < 3; ++k) P[i][j] = hn::MulAdd(strain.H[i][k], full[k][j], P[i][j]);
+        }
+}
+
+/// P −= F S.
+template <class D>
+HWY_INLINE void take_off(const SecondStress<D>& s, const Strain<D>& strain, Vec<D> (&P)[3][3]) {
+    Vec<D> full[3][3];
+    fill<D>(s, full);
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            P[i][j] = P[i][j] - full[i][j];
+            for (int k = 0; k < 3; ++k) P[i][j] = hn::NegMulAdd(strain.H[i][k], full[k][j], P[i][j]);
         }
 }
 

@@ -78,7 +78,9 @@ GpuForce::Viscous::Viscous(const shaders::Device& device, const RestState& rest)
       coefficients(device, series.size() * terms, "Prony coefficients"),
       stress(device, 2 * terms * static_cast<std::size_t>(rest.element_count() + rest.hexahedra.count()),
              "viscous stresses"),
-      kept(device, stress.size(), "kept viscous stresses") {}
+      kept(device, stress.size(), "kept viscous stresses") {
+    coefficients.upload(prony_table(series, interval));
+}
 
 GpuForce::GpuForce(const shaders::Device& device, shaders::ProgramCache& programs, const RestState& rest,
                    BlockBuffers& blocks)
@@ -113,7 +115,6 @@ GpuForce::GpuForce(const shaders::Device& device, shaders::ProgramCache& program
     }
     if (!rest.viscosity.empty()) {
         viscous_.emplace(device, rest);
-        set_time_step(0);
         blocks.set("Prony", viscous_->coefficients);
         blocks.set("ViscousStress", viscous_->stress);
     }
@@ -162,8 +163,10 @@ Stage GpuForce::force_stage(shaders::ProgramCache& programs, const RestState& re
     return stage;
 }
 
-void GpuForce::set_time_step(double time_step) {
-    if (viscous_) viscous_->coefficients.upload(prony_table(viscous_->series, time_step));
+void GpuForce::set_stress_interval(double interval) {
+    if (!viscous_ || viscous_->interval == interval) return;
+    viscous_->interval = interval;
+    viscous_->coefficients.upload(prony_table(viscous_->series, interval));
 }
 
 void GpuForce::forget_viscous_stresses() {

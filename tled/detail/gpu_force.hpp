@@ -53,8 +53,8 @@ public:
     void dispatch(Advance advance = Advance::No) const;
     /// Those that dispatch() runs where time advances.
     [[nodiscard]] std::vector<Pass> passes() const;
-    /// Time step (s) of the viscous stresses; 0 leaves them as they are.
-    void set_time_step(double time_step);
+    /// By which viscous stresses move on, s; 0 leaves them as they are.
+    void set_stress_interval(double interval);
     void forget_viscous_stresses();
     void keep_viscous_stresses();
     void return_to_kept_viscous_stresses();
@@ -91,6 +91,7 @@ private:
         Viscous(const shaders::Device& device, const RestState& rest);
         std::vector<PronySeries> series;  ///< of each material
         std::size_t terms;                ///< the most of a material
+        double interval = 0;              ///< s, of the coefficients
         shaders::Buffer<Float2> coefficients;
         shaders::Buffer<Float4> stress, kept;
     };

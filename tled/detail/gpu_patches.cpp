@@ -96,6 +96,18 @@ constexpr std::array<PatchStages, 2> averaged_one_step{
 constexpr std::array<PatchStages, 1> averaged_many_steps{
     {{.advances = true, .volumes = true, .forces = true, .averages = true, .persists = true}}};
 
+std::vector<PatchStages> with_stresses(std::span<const PatchStages> stages, bool rest) {
+    std::vector<PatchStages> all(stages.begin(), stages.end());
+    for (PatchStages& each : all) each.rests = rest;
+    return all;
+}
+
+int count_of(const std::vector<StressSteps>& steps) {
+    int count = 0;
+    for (const StressSteps& each : steps) count += each.count;
+    return count;
+}
+
 }  // namespace
 
 bool GpuPatches::suit(const RestState& rest, const shaders::Device& device) {
@@ -168,17 +180,14 @@ bool GpuPatches::take(const shaders::NodeEffects& effects) const {
     return !effects.surface_force && storage_blocks(averages_, !tissue_->empty(), effects) <= storage_blocks_;
 }
 
-void GpuPatches::run(int steps, const StepCoefficients& coefficients, const shaders::NodeEffects& effects,
-                     const BlockBuffers& blocks) {
-    tissue_->set_time_step(coefficients.time_step);
-    begin_run(effects, blocks);
-    advance(steps, coefficients, effects, blocks);
+void GpuPatches::run(const std::vector<StressSteps>& steps, const StepCoefficients& coefficients,
+                     const shaders::NodeEffects& effects, const BlockBuffers& blocks) {
+    take_steps(steps, coefficients, effects, blocks);
     // The nodes still hold the state that the run began with.
     if (many_steps_ && gave_up()) {
         many_steps_ = false;
         forget_state();
-        begin_run(effects, blocks);
-        advance(steps, coefficients, effects, blocks);
+        take_steps(steps, coefficients, effects, blocks);
     }
     store(blocks);
     shaders::check_errors("time steps over patches");
@@ -188,29 +197,54 @@ GpuPatches::Run GpuPatches::next_steps(int steps, const StepCoefficients& coeffi
     return {step_, step_ + static_cast<std::uint32_t>(steps), coefficients};
 }
 
-/// The forces that the first step starts from. Elastic ones are those that the run before ended with.
-void GpuPatches::begin_run(const shaders::NodeEffects& effects, const BlockBuffers& blocks) {
-    if (!loaded_) load(blocks);
-    if (!loaded_ || tissue_->viscous())
-        dispatch(averages_ ? Stages(averaged_first_forces) : first_forces, 1, 1, next_steps(1, {}), effects, blocks);
-    loaded_ = true;
+void GpuPatches::take_steps(const std::vector<StressSteps>& steps, const StepCoefficients& coefficients,
+                            const shaders::NodeEffects& effects, const BlockBuffers& blocks) {
+    if (tissue_->viscous())
+        take_viscous_steps(steps, coefficients, effects, blocks);
+    else
+        take_elastic_steps(count_of(steps), coefficients, effects, blocks);
 }
 
-/// Forces that nothing follows would take viscous stresses a step further than the displacements: a run over viscous
-/// tissue ends without.
-void GpuPatches::advance(int steps, const StepCoefficients& coefficients, const shaders::NodeEffects& effects,
-                         const BlockBuffers& blocks) {
-    const Run run = next_steps(steps, coefficients);
-    const int with_forces = tissue_->viscous() ? steps - 1 : steps;
-    const Stages stages = stages_of_a_step();
-    if (many_steps_) {
-        dispatch(stages, with_forces / steps_per_dispatch, steps_per_dispatch, run, effects, blocks);
-        if (const int left = with_forces % steps_per_dispatch; left > 0)
-            dispatch(stages, 1, left, run, effects, blocks);
-    } else {
-        dispatch(stages, with_forces, 1, run, effects, blocks);
+/// The forces that the first step starts from are those that the run before ended with.
+void GpuPatches::take_elastic_steps(int steps, const StepCoefficients& coefficients,
+                                    const shaders::NodeEffects& effects, const BlockBuffers& blocks) {
+    if (!loaded_) {
+        load(blocks);
+        dispatch(stages_of_first_forces(), 1, 1, next_steps(1, {}), effects, blocks);
     }
-    if (with_forces < steps) dispatch(last_step, 1, 1, run, effects, blocks);
+    dispatch_steps(stages_of_a_step(), steps, next_steps(steps, coefficients), effects, blocks);
+}
+
+/// Forces move viscous stresses on: those of the first step are computed before it, and none after the last.
+void GpuPatches::take_viscous_steps(const std::vector<StressSteps>& steps, const StepCoefficients& coefficients,
+                                    const shaders::NodeEffects& effects, const BlockBuffers& blocks) {
+    if (!loaded_) load(blocks);
+    std::optional<Run> run;
+    for (const auto& [count, interval] : steps) {
+        const bool rest = interval == 0;
+        if (rest)
+            tissue_->sum_stresses(programs_, blocks);
+        else
+            tissue_->set_stress_interval(interval);
+        const int forces_known = run ? 0 : 1;
+        if (!run) {
+            dispatch(with_stresses(stages_of_first_forces(), rest), 1, 1, next_steps(1, {}), effects, blocks);
+            run = next_steps(count_of(steps), coefficients);
+        }
+        dispatch_steps(with_stresses(stages_of_a_step(), rest), count - forces_known, *run, effects, blocks);
+    }
+    dispatch(last_step, 1, 1, *run, effects, blocks);
+}
+
+void GpuPatches::dispatch_steps(Stages stages, int steps, const Run& run, const shaders::NodeEffects& effects,
+                                const BlockBuffers& blocks) {
+    if (!many_steps_) return dispatch(stages, steps, 1, run, effects, blocks);
+    dispatch(stages, steps / steps_per_dispatch, steps_per_dispatch, run, effects, blocks);
+    if (const int left = steps % steps_per_dispatch; left > 0) dispatch(stages, 1, left, run, effects, blocks);
+}
+
+GpuPatches::Stages GpuPatches::stages_of_first_forces() const {
+    return averages_ ? Stages(averaged_first_forces) : first_forces;
 }
 
 GpuPatches::Stages GpuPatches::stages_of_a_step() const {
@@ -272,6 +306,7 @@ void GpuPatches::dispatch(Stages stages, int repeats, int steps, const Run& run,
 
 /// State from nodes and elements to patches.
 void GpuPatches::load(const BlockBuffers& blocks) {
+    loaded_ = true;
     largest_->clear();
     forget_tangents();
     const Program& load = programs_.get(shaders::patch_load_program());

@@ -5,6 +5,7 @@
 #include "tled/detail/gpu_force.hpp"
 #include "tled/detail/patch_layout.hpp"
 #include "tled/detail/patch_tissue.hpp"
+#include "tled/detail/stress_clock.hpp"
 #include "tled/engine.hpp"
 
 #include <span>
@@ -23,13 +24,18 @@ public:
     /// Whether steps over patches know these effects, and the device has storage blocks for them.
     [[nodiscard]] bool take(const shaders::NodeEffects& effects) const;
 
-    /// Advances what is bound as Displacement and Increment, and as ViscousStress where tissue is viscous.
-    void run(int steps, const StepCoefficients& coefficients, const shaders::NodeEffects& effects,
-             const BlockBuffers& blocks);
+    /// Advances what is bound as Displacement and Increment, and as ViscousStress where tissue is viscous; at least one
+    /// step.
+    void run(const std::vector<StressSteps>& steps, const StepCoefficients& coefficients,
+             const shaders::NodeEffects& effects, const BlockBuffers& blocks);
     /// Those of a step within a run.
     [[nodiscard]] std::vector<Pass> passes(const shaders::NodeEffects& effects) const;
     /// As asked for, without many steps in a dispatch once the device has proved unable to run them.
     [[nodiscard]] GpuStepShape shape() const;
+    /// Stresses that stay in shared memory move with less than what a dispatch of their own takes.
+    [[nodiscard]] StressPace stress_pace() const {
+        return sizes_.places > 0 ? StressPace::EveryStep : StressPace::TheirOwn;
+    }
     /// Makes room for what slots keep of so many obstacles.
     void set_obstacles(std::size_t count, BlockBuffers& blocks);
     /// Displacement, Increment, masses or conditions were changed from outside.
@@ -46,9 +52,16 @@ private:
     /// Dispatches of the stages, `repeats` times, each of which counts `steps` of the run.
     void dispatch(Stages stages, int repeats, int steps, const Run& run, const shaders::NodeEffects& effects,
                   const BlockBuffers& blocks);
-    void begin_run(const shaders::NodeEffects& effects, const BlockBuffers& blocks);
-    void advance(int steps, const StepCoefficients& coefficients, const shaders::NodeEffects& effects,
-                 const BlockBuffers& blocks);
+    void take_steps(const std::vector<StressSteps>& steps, const StepCoefficients& coefficients,
+                    const shaders::NodeEffects& effects, const BlockBuffers& blocks);
+    void take_elastic_steps(int steps, const StepCoefficients& coefficients, const shaders::NodeEffects& effects,
+                            const BlockBuffers& blocks);
+    void take_viscous_steps(const std::vector<StressSteps>& steps, const StepCoefficients& coefficients,
+                            const shaders::NodeEffects& effects, const BlockBuffers& blocks);
+    /// Of a run, each with its forces at the end.
+    void dispatch_steps(Stages stages, int steps, const Run& run, const shaders::NodeEffects& effects,
+                        const BlockBuffers& blocks);
+    [[nodiscard]] Stages stages_of_first_forces() const;
     [[nodiscard]] int workgroups_of(const shaders::PatchStages& stages) const;
     void set_sizes(const shaders::Program& program, int workgroups) const;
     [[nodiscard]] Run next_steps(int steps, const StepCoefficients& coefficients) const;

@@ -26,7 +26,7 @@ TissueOfPatches::TissueOfPatches(const shaders::Device& device, const RestState&
       element_count_(static_cast<std::size_t>(rest.element_count())),
       places_(layout.element_of_place.size()) {
     if (planes() == 0) return;
-    tissue_.emplace(device, planes() * places_ + series_.size() * most_terms(series_), "tissue of patches");
+    tissue_.emplace(device, first_coefficient() + series_.size() * most_terms(series_), "tissue of patches");
     blocks.set("PatchTissue", *tissue_);
     const shaders::CurrentContext current = device.make_current();
     if (shaders::has_fibres(kind_.law)) {
@@ -39,11 +39,16 @@ TissueOfPatches::TissueOfPatches(const shaders::Device& device, const RestState&
     if (!viscous()) return;
     element_of_place_.emplace(device, layout.element_of_place, "elements of patches");
     blocks.set("PatchElement", *element_of_place_);
-    set_time_step(0);
+    upload_coefficients();
 }
 
 std::size_t TissueOfPatches::planes() const {
     return (shaders::has_fibres(kind_.law) ? 1U : 0U) + 3 * static_cast<std::size_t>(kind_.prony_terms);
+}
+
+/// As shaders/chunks/patch.tissue.glsl has it; without viscosity the end.
+std::size_t TissueOfPatches::first_coefficient() const {
+    return planes() * places_ + (viscous() ? places_ + (places_ + 1) / 2 : 0);
 }
 
 std::size_t TissueOfPatches::stress_bytes(std::size_t places) const {
@@ -54,23 +59,32 @@ void TissueOfPatches::set_places(const shaders::Program& program) const {
     if (planes() > 0) program.set(13, static_cast<std::uint32_t>(places_));
 }
 
-void TissueOfPatches::set_time_step(double time_step) {
-    if (!viscous()) return;
-    tissue_->upload(prony_table(series_, time_step), planes() * places_);
+void TissueOfPatches::set_stress_interval(double interval) {
+    if (!viscous() || interval == interval_) return;
+    interval_ = interval;
+    upload_coefficients();
+}
+
+void TissueOfPatches::upload_coefficients() {
+    tissue_->upload(prony_table(series_, interval_), first_coefficient());
 }
 
 void TissueOfPatches::load_stresses(shaders::ProgramCache& programs, const BlockBuffers& blocks) const {
-    move_stresses(shaders::PatchStresses::Load, programs, blocks);
+    run_over_places(shaders::PatchStresses::Load, programs, blocks);
 }
 
 void TissueOfPatches::store_stresses(shaders::ProgramCache& programs, const BlockBuffers& blocks) const {
-    move_stresses(shaders::PatchStresses::Store, programs, blocks);
+    run_over_places(shaders::PatchStresses::Store, programs, blocks);
 }
 
-void TissueOfPatches::move_stresses(shaders::PatchStresses direction, shaders::ProgramCache& programs,
-                                    const BlockBuffers& blocks) const {
+void TissueOfPatches::sum_stresses(shaders::ProgramCache& programs, const BlockBuffers& blocks) const {
+    run_over_places(shaders::PatchStresses::Sum, programs, blocks);
+}
+
+void TissueOfPatches::run_over_places(shaders::PatchStresses what, shaders::ProgramCache& programs,
+                                      const BlockBuffers& blocks) const {
     if (!viscous()) return;
-    const shaders::Program& program = programs.get(shaders::patch_stress_program(kind_, direction));
+    const shaders::Program& program = programs.get(shaders::patch_stress_program(kind_, what));
     program.set(0, static_cast<std::uint32_t>(element_count_));
     blocks.bind(program);
     program.dispatch(places_);

@@ -27,20 +27,24 @@ public:
     [[nodiscard]] std::size_t stress_bytes(std::size_t places) const;
     /// The uniform of shaders/chunks/patch.tissue.glsl, where the program has it.
     void set_places(const shaders::Program& program) const;
-    /// Time step (s) of the viscous stresses.
-    void set_time_step(double time_step);
+    /// By which viscous stresses move on, s.
+    void set_stress_interval(double interval);
     /// Viscous stresses from those of elements (ViscousStress of the blocks), and back to them.
     void load_stresses(shaders::ProgramCache& programs, const BlockBuffers& blocks) const;
     void store_stresses(shaders::ProgramCache& programs, const BlockBuffers& blocks) const;
+    /// What steps in which stresses rest read: the sum of the terms, in half precision.
+    void sum_stresses(shaders::ProgramCache& programs, const BlockBuffers& blocks) const;
 
 private:
-    void move_stresses(shaders::PatchStresses direction, shaders::ProgramCache& programs,
-                       const BlockBuffers& blocks) const;
+    void run_over_places(shaders::PatchStresses what, shaders::ProgramCache& programs,
+                         const BlockBuffers& blocks) const;
     [[nodiscard]] std::size_t planes() const;
+    [[nodiscard]] std::size_t first_coefficient() const;
+    void upload_coefficients();
 
     shaders::PatchTissue kind_;
     std::vector<PronySeries> series_;
-    double time_step_ = 0;
+    double interval_ = 0;
     std::size_t element_count_, places_;
     std::optional<shaders::Buffer<Float2>> tissue_;
     std::optional<shaders::Buffer<std::uint32_t>> element_of_place_;
