@@ -1,6 +1,7 @@
 // Fibres whose direction varies in space, by whole scenes.
 #include "tests/verification/effect_cases.hpp"
 #include "tests/verification/effect_column.hpp"
+#include "tests/verification/effect_scene_end.hpp"
 
 #include "meshing/primitives.hpp"
 #include "simulation/build.hpp"
@@ -18,12 +19,6 @@ using Eigen::Vector3d;
 using simulation::BuiltScene;
 using simulation::Curve;
 using simulation::Scene;
-
-Matrix3Xd end_of(const BuiltScene& built, const MakeEngine& make) {
-    Matrix3Xd displacement;
-    simulation::simulate(built, make, [&](const simulation::Frame& frame) { displacement = frame.displacement; });
-    return displacement;
-}
 
 /// ∫ f over [from, to] by Simpson's rule.
 template <class Function>

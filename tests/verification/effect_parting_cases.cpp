@@ -1,6 +1,7 @@
 // Surfaces that touch, press and slide on one another and may part.
 #include "tests/verification/effect_cases.hpp"
 #include "tests/verification/effect_column.hpp"
+#include "tests/verification/effect_scene_end.hpp"
 
 #include "meshing/primitives.hpp"
 #include "simulation/build.hpp"
@@ -25,12 +26,6 @@ using simulation::Curve;
 using simulation::HalfSpace;
 using simulation::Scene;
 using simulation::Sliding;
-
-Matrix3Xd end_of(const BuiltScene& built, const MakeEngine& make) {
-    Matrix3Xd displacement;
-    simulation::simulate(built, make, [&](const simulation::Frame& frame) { displacement = frame.displacement; });
-    return displacement;
-}
 
 /// A box in two halves along z, "lower" and "upper", that may part; the base stands.
 Scene two_blocks(const Vector3d& size, const std::array<int, 3>& cells, double stiffness) {

@@ -1,6 +1,7 @@
 // What changes in time, by whole scenes: resection, and motions that follow a curve.
 #include "tests/verification/effect_cases.hpp"
 #include "tests/verification/effect_column.hpp"
+#include "tests/verification/effect_scene_end.hpp"
 
 #include "simulation/build.hpp"
 #include "simulation/run.hpp"
@@ -103,11 +104,7 @@ Scene block_on_table(double height, const std::array<int, 3>& cells, const simul
     scene.solve.damping = 0;
     return scene;
 }
-Matrix3Xd end_of(const BuiltScene& built, const MakeEngine& make) {
-    Matrix3Xd displacement;
-    simulation::simulate(built, make, [&](const simulation::Frame& frame) { displacement = frame.displacement; });
-    return displacement;
-}
+
 double measured_drag(const MakeEngine& make) {
     const simulation::RigidMotion motion{{table_velocity * table_time, 0, 0}, {0, 0, 0}, {0, 0, 0}};
     return end_of(simulation::build(block_on_table(4.0, {4, 4, 2}, motion)), make).row(0).mean();
