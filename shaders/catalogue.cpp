@@ -243,8 +243,8 @@ ProgramSource patch_step_program(const PatchTissue& tissue, const NodeEffects& e
     const auto add = [&](const char* chunk) { source.chunks.emplace_back(chunk); };
     const auto define = [&](const char* name, const std::string& value) { source.defines[name] = value; };
     if (stages.forces)
-        for (const char* chunk :
-             {"deformation", "material", "isochoric", gives_second(tissue, stages) ? "isochoric.second" : "isochoric.first"})
+        for (const char* chunk : {"deformation", "material", "isochoric",
+                                  gives_second(tissue, stages) ? "isochoric.second" : "isochoric.first"})
             add(chunk);
     if (stages.forces || stages.averages) {
         add_law(source, tissue.law);

@@ -19,8 +19,7 @@ namespace HWY_NAMESPACE {
 /// Of a batch: terms × 6 × width.
 template <class T, class Viscous>
 HWY_INLINE T* stresses_of(Viscous& viscous, std::size_t batch, int lane) {
-    return viscous.stress.data() +
-           (batch - viscous.first_batch) * viscous.coefficient.size() * 6 * batch_width + lane;
+    return viscous.stress.data() + (batch - viscous.first_batch) * viscous.coefficient.size() * 6 * batch_width + lane;
 }
 
 /// Σ q⁺ with q⁺ = a S + b q.
@@ -104,10 +103,10 @@ void viscous_patch_forces_f32(const KernelMaterial<float>& material, ViscousBatc
     viscous_patch_forces_any(material, viscous, stresses, kinematics, elements, patch, u, pressure, scratch, force,
                              shared);
 }
-void viscous_patch_forces_f64(const KernelMaterial<double>& material, ViscousBatches<double>& viscous, Stresses stresses,
-                              Kinematics kinematics, const ElementBatches<double>& elements, const FanPatch& patch,
-                              const double* u, const double* pressure, PatchScratch<double>& scratch, double* force,
-                              double* shared) {
+void viscous_patch_forces_f64(const KernelMaterial<double>& material, ViscousBatches<double>& viscous,
+                              Stresses stresses, Kinematics kinematics, const ElementBatches<double>& elements,
+                              const FanPatch& patch, const double* u, const double* pressure,
+                              PatchScratch<double>& scratch, double* force, double* shared) {
     viscous_patch_forces_any(material, viscous, stresses, kinematics, elements, patch, u, pressure, scratch, force,
                              shared);
 }

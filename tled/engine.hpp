@@ -18,8 +18,8 @@ namespace tissuewarp::tled {
 struct StepCoefficients {
     double momentum = 0.0;  ///< ρ
     double gain = 0.0;      ///< c, s² for a mass in kg; dimensionless for a mass in mN/mm
-    /// Δt, s, in which viscous stresses move on, by steps of their own (docs/decisions/viscous_steps.md); without it (0)
-    /// they rest as they are. Not read where no material is viscous.
+    /// Δt, s, in which viscous stresses move on, by steps of their own (docs/decisions/viscous_steps.md); without it
+    /// (0) they rest as they are. Not read where no material is viscous.
     double time_step = 0.0;
 };
 
@@ -51,7 +51,8 @@ enum class Processor { Cpu, Gpu };
 
 /// State: displacement u and increment u − u⁻ (3 × N, mm), viscous stresses, nodal diagonal mass (3 × N), conditions.
 /// Copies in and out are float64 whatever the engine computes in. Viscous stresses move on with some of the steps and
-/// rest in the others; residual() and observe() take them as they rest, internal_force() brings them to the present time.
+/// rest in the others; residual() and observe() take them as they rest, internal_force() brings them to the present
+/// time.
 class Engine {
 public:
     virtual ~Engine() = default;

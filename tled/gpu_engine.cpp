@@ -331,8 +331,8 @@ private:
         shaders::storage_barrier();
     }
 
-    /// f_ext + f_spring − f_int at `displacement`, with the effects named and the viscous stresses after an interval (s),
-    /// into `result`.
+    /// f_ext + f_spring − f_int at `displacement`, with the effects named and the viscous stresses after an interval
+    /// (s), into `result`.
     void evaluate(const Buffer<Float4>& displacement, const NodeEffects& effects, MaskConstrained mask,
                   const Buffer<Float4>& result, double stress_interval = 0) {
         force_.set_stress_interval(stress_interval);

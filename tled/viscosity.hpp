@@ -1,7 +1,7 @@
 #pragma once
 /// Viscoelasticity by Prony series on the shear part of any law: S = S_elastic − Σ q_i with q_i' = (g_i S_shear −
-/// q_i)/τ_i (Simo and Hughes, Computational Inelasticity, 1998, section 10.2; Taylor et al. 2009). Over an interval h in
-/// which S_shear stays, q⁺ = g (1 − e^(−h/τ)) S_shear + e^(−h/τ) q.
+/// q_i)/τ_i (Simo and Hughes, Computational Inelasticity, 1998, section 10.2; Taylor et al. 2009). Over an interval h
+/// in which S_shear stays, q⁺ = g (1 − e^(−h/τ)) S_shear + e^(−h/τ) q.
 
 #include "tled/material.hpp"
 

@@ -164,7 +164,8 @@ TEST(Composition, StepsOverPatchesHoldNoTraceOfAbsentTissue) {
 TEST(Composition, AStepInWhichStressesRestNeitherComputesNorWritesThem) {
     PatchStages stages{.advances = true, .forces = true};
     const auto text = [&] { return compose(patch_step_program({Law::NeoHookeanLnJ, 2}, {}, {}, stages)).text; };
-    for (const char* word : {"keep_stress(", "advance_stresses(", "second_stress("}) EXPECT_THAT(text(), HasSubstr(word));
+    for (const char* word : {"keep_stress(", "advance_stresses(", "second_stress("})
+        EXPECT_THAT(text(), HasSubstr(word));
     stages.rests = true;
     for (const char* word : {"keep_stress(", "void advance_stresses("})
         EXPECT_THAT(text(), ::testing::Not(HasSubstr(word)));

@@ -161,8 +161,8 @@ TEST_P(Engines, ViscousStepsFollowThePlainLoop) {
     EXPECT_LT(largest(engine->internal_force() - fresh), 1e-5 * largest(fresh));
 }
 
-// Twenty steps for each of the stresses. A failure looks like: stresses that move with every step, or at another one than
-// the plain loop's; the sum of other terms.
+// Twenty steps for each of the stresses. A failure looks like: stresses that move with every step, or at another one
+// than the plain loop's; the sum of other terms.
 TEST_P(Engines, ViscousStressesRestBetweenTheirOwnSteps) {
     model.viscosity[1] = {{{0.5, 0.32}}};
     model.viscosity[2] = {{{0.2, 0.4}, {0.3, 0.5}, {0.2, 0.32}}};

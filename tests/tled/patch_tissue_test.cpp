@@ -116,8 +116,7 @@ TEST_P(PatchTissue, StepsInWhichStressesRestFollowThePlainLoop) {
 // One workgroup takes several patches in turn.
 TEST_P(PatchTissue, ManyStepsInWhichStressesRestAreThoseOneByOne) {
     const auto after_rests = [&](int at_once, const std::vector<int>& runs) {
-        const auto made =
-            engine({.patch_tets = 150, .longest_fan = 5, .workgroup = 128, .at_once = at_once});
+        const auto made = engine({.patch_tets = 150, .longest_fan = 5, .workgroup = 128, .at_once = at_once});
         for (const int steps : runs) made->run(steps, coefficients(0.002 / (32 * 17)));
         return made->displacement();
     };

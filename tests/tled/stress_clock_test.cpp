@@ -1,6 +1,6 @@
 /// When viscous stresses move on, and what the schedule does to a stress that follows a strain.
-#include "tled/detail/prony_coefficients.hpp"
 #include "tled/detail/stress_clock.hpp"
+#include "tled/detail/prony_coefficients.hpp"
 
 #include <gtest/gtest.h>
 
@@ -110,7 +110,8 @@ TEST(StressClock, StressesThatRestAreNeitherEarlyNorLate) {
     const PronyTerm term{0.5, 1.0};
     constexpr double time_step = 0.001;
     constexpr int steps = 20000;
-    const std::vector<double> q = followed(term, [](double t) { return std::sin(t); }, time_step, steps);
+    const std::vector<double> q = followed(
+        term, [](double t) { return std::sin(t); }, time_step, steps);
     double late = 0, size = 0, worst = 0;
     for (int i = 0; i < steps; ++i) {
         const double t = i * time_step;

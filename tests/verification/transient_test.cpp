@@ -62,8 +62,8 @@ TEST_P(Transient, PeriodIsTheSameOnEveryEngine) {
                 2e-4 * expected);
 }
 
-// Strains that stay relax exactly, whatever the steps of the stresses; a ramp to some 1e-4 at Δt = τ/400, where stresses
-// move with every step, and at τ/4000, where they rest for 124 steps.
+// Strains that stay relax exactly, whatever the steps of the stresses; a ramp to some 1e-4 at Δt = τ/400, where
+// stresses move with every step, and at τ/4000, where they rest for 124 steps.
 TEST_P(Transient, ImposedStrainsRelaxAsTheClosedForm) {
     for (const double time_step : {0.00125, 0.000125})
         for (const Relaxation& found : imposed_relaxation(time_step, 0.5, GetParam().make)) {

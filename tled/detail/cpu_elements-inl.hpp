@@ -149,7 +149,9 @@ struct Elastic {};
 
 /// Tissue whose viscous stresses are known before its S.
 template <class D, class AfterShear>
-concept knows_its_stresses = requires(D d, const AfterShear& stresses) { stresses(d, std::size_t{}, int{}); };
+concept knows_its_stresses = requires(D d, const AfterShear& stresses) {
+    stresses(d, std::size_t{}, int{});
+};
 
 /// P times `volume`: of the law's shear part, and `scaled_pressure` (V p) times cof F.
 template <class Law, class D>

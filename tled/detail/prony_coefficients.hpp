@@ -11,7 +11,8 @@
 
 namespace tissuewarp::tled::detail {
 
-/// (a, b) = (g (1 − e^(−h/τ)), e^(−h/τ)) of every term for an interval of h s; 0 leaves q as it is, below 0 it goes back.
+/// (a, b) = (g (1 − e^(−h/τ)), e^(−h/τ)) of every term for an interval of h s; 0 leaves q as it is, below 0 it goes
+/// back.
 inline std::vector<std::array<double, 2>> prony_coefficients(const PronySeries& series, double interval) {
     std::vector<std::array<double, 2>> result;
     for (const auto& [g, tau] : series.terms)
