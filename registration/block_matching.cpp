@@ -297,16 +297,17 @@ private:
             if (matches[n].point >= 0) motion.displacements.col(column) = matches[n].fixed - matches[n].moving;
             motion.weights[n] = detail::neighbour_weight(matches[n]);
         });
-        tbb::parallel_for(std::size_t{0}, points.size(), [&](std::size_t n) {
-            const auto column = static_cast<Eigen::Index>(points[n]);
-            const bool vouched = std::any_of(neighbours[n].begin(), neighbours[n].end(), [&](int other) {
+        const auto vouched = [&](const std::vector<int>& others) {
+            return std::any_of(others.begin(), others.end(), [&](int other) {
                 return motion.weights[static_cast<std::size_t>(other)].trace() > 0.1;
             });
-            if (!vouched) return;
-            const Eigen::Vector3d point = points_.col(column);
-            predicted_.col(column) =
-                point + detail::fit_local_affine(motion, point, neighbours[n], story_.trimmed_share).displacement;
-        });
+        };
+        const std::vector<detail::LocalMotion> found =
+            detail::fit_local_affine(motion, points_(Eigen::all, points), neighbours, story_.trimmed_share);
+        for (std::size_t n = 0; n < points.size(); ++n) {
+            const auto column = static_cast<Eigen::Index>(points[n]);
+            if (vouched(neighbours[n])) predicted_.col(column) = points_.col(column) + found[n].displacement;
+        }
     }
 };
 
