@@ -329,7 +329,7 @@ ProgramSource match_program(MatchPass pass, int descriptor_reach) {
     if (pass == MatchPass::Erode) source.defines["DESCRIPTOR_REACH"] = number(descriptor_reach);
     if (pass == MatchPass::Walk) {
         source.defines["MOST_STEPS"] = number(match_walk_steps);
-        source.defines["WORKGROUP_SIZE"] = "288";  // nine times the lanes of a row
+        source.defines["WORKGROUP_SIZE"] = "256";  // an invocation for each column of a block, and more
     }
     if (pass == MatchPass::Forces) {
         source.defines["CELL_SIDE"] = number(match_cell_side);
