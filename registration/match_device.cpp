@@ -166,12 +166,17 @@ void MatchDevice::erode(std::size_t wide, std::uint32_t axis, const GpuWords& fr
 }
 
 std::span<const std::byte> MatchDevice::fetch(const shaders::StorageBuffer& source, std::size_t bytes) {
+    return fetch(std::array{shaders::Readback::Piece{source, bytes}}).front();
+}
+
+std::vector<std::span<const std::byte>> MatchDevice::fetch(std::span<const shaders::Readback::Piece> pieces) {
+    const std::size_t bytes = shaders::Readback::bytes_of(pieces);
     if (bytes > readback_bytes_) {
         readback_.reset();
         readback_ = std::make_unique<shaders::Readback>(device_, bytes, "results of matching on their way down");
         readback_bytes_ = bytes;
     }
-    return readback_->fetch(source, bytes);
+    return readback_->fetch(pieces);
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -51,6 +51,9 @@ std::unique_ptr<BlockEngine> make_cpu_block_engine(const TemplateImages& moving,
 
 constexpr int first_look_stride = 3;  ///< every third row of a block, over the whole lattice
 
+constexpr std::size_t most_candidates = 27;    ///< of a first look, to be compared by all rows
+constexpr std::size_t candidates_one_of = 20;  ///< places: all candidates are among these, the lowest
+
 /// The places that a first look puts lowest, one of those that adjoin, the lowest first; entries of the lattice.
 std::vector<std::size_t> candidates(const CostLattice& first);
 

@@ -62,6 +62,8 @@ public:
     void run(shaders::MatchPass pass, std::size_t invocations, std::initializer_list<const GpuBlocks*> blocks);
     /// The first entries of a buffer, as long as nothing else is fetched.
     [[nodiscard]] std::span<const std::byte> fetch(const shaders::StorageBuffer& source, std::size_t bytes);
+    /// The same of several, for which the host waits once.
+    [[nodiscard]] std::vector<std::span<const std::byte>> fetch(std::span<const shaders::Readback::Piece> pieces);
 
 private:
     /// What passes over a wide grid leave for each other.

@@ -1,24 +1,33 @@
 // One workgroup per block: from the lowest of its candidates, by all rows, downhill to the lowest of 27 places until that
-// is the place itself; and the costs about it.
+// is the place itself; and the costs about it. Candidates are places that a first look puts lowest
+// (registration/detail/block_engine.hpp); of a way back there is one, where the block is expected.
 // Needs: index, match, match.block.
 //! define MOST_STEPS
+//! define MOST_CANDIDATES
+//! define CANDIDATES_ONE_OF
 
 #define CUBE 27u
 #define CENTRE 13u
 #define LANES 32u         // divides WORKGROUP_SIZE
+#define PICKERS 64u       // invocations that look for candidates
 #define COLUMNS 81u       // of a block along k that are compared at a time; WORKGROUP_SIZE is thrice as many or more
 #define MOST_SIDE 19      // of a slice that is looked at: most_radius of GpuBlockEngine, and one more on both sides
 #define SQUARES 3         // after the three words of a voxel
 #define VOXELS_SHIFT 24u  // above a column's difference: 17 voxels of twelve squares of eight bits
 
-/// Entries of the cube of places about where a block is expected.
-layout(std430, binding = BINDING_MATCH_SOURCE) readonly buffer MatchCandidates { uint candidate[]; };
+/// Of the cube of places about where each block is expected, block after block.
+layout(std430, binding = BINDING_MATCH_SOURCE) readonly buffer MatchLooks { float look_cost[]; };
 
 /// Where the walk ended, and 1; 0 in place of 1 where it led nowhere.
 struct Walk { ivec4 end; float costs[28]; };
 layout(std430, binding = BINDING_MATCH_TARGET) writeonly buffer MatchWalks { Walk walk[]; };
 
+/// What is sought on the way back: the block about where the walk ended, from where the first block lies; and whether it
+/// ended.
+layout(std430, binding = BINDING_MATCH_PARTIAL) writeonly buffer MatchBack { SoughtBlock back[]; };
+
 shared ivec3 place[CUBE];
+shared uint least_cost, least_place, lower;
 shared uint difference[CUBE], voxels[CUBE];
 shared float cost[CUBE];
 shared vec4 looked_slice[2][MOST_SIDE * MOST_SIDE], shown_slice[2][COLUMNS];
@@ -232,32 +241,88 @@ uint lowest() {
     return least;
 }
 
-/// The lowest candidate; a single one is not compared.
-bool start(SoughtBlock block, out ivec3 at) {
-    uint first = uint(block.shown.w), count = uint(block.looked.w), local = gl_LocalInvocationID.x;
-    at = block.looked.xyz;
-    if (count == 1u) at += place_in_cube(candidate[first], reach);
+bool adjoins_any(ivec3 at, uint count) {
+    for (uint n = 0u; n < count; ++n)
+        if (all(lessThanEqual(abs(at - place[n]), ivec3(1)))) return true;
+    return false;
+}
+
+/// Of a block's first look: leaves the lowest cost of the places that adjoin none of those chosen so far in `least_cost`,
+/// its first place in `least_place`, which is the number of places where there is none.
+void find_lowest(uint first_look, uint places, ivec3 looked, uint chosen) {
+    uint local = gl_LocalInvocationID.x, own = places;
     float least = nowhere;
-    for (uint begin = 0u; begin < count && count > 1u; begin += CUBE) {
-        uint some = min(count - begin, CUBE);
-        if (local < some) place[local] = block.looked.xyz + place_in_cube(candidate[first + begin + local], reach);
-        barrier();
-        compare(block.shown.xyz, some);
-        uint best = lowest();
-        if (cost[best] < least) {
-            least = cost[best];
-            at = place[best];
+    if (local == 0u) {
+        least_cost = floatBitsToUint(nowhere);
+        least_place = places;
+        lower = 0u;
+    }
+    barrier();
+    for (uint n = local; n < places && local < PICKERS; n += PICKERS) {
+        float found = look_cost[first_look + n];
+        if (found < least && !adjoins_any(looked + place_in_cube(n, reach), chosen)) {
+            least = found;
+            own = n;
+        }
+    }
+    if (own < places) atomicMin(least_cost, floatBitsToUint(least));  // positive floats are in the order of their bits
+    barrier();
+    if (own < places && floatBitsToUint(least) == least_cost) atomicMin(least_place, own);
+    barrier();
+}
+
+/// Leaves in `lower` how many places come before one: of lower cost, or of the same and first.
+void count_lower(uint first_look, uint places, uint at) {
+    uint local = gl_LocalInvocationID.x, own = 0u;
+    float limit = look_cost[first_look + at];
+    for (uint n = local; n < places && local < PICKERS; n += PICKERS) {
+        float found = look_cost[first_look + n];
+        if (found < limit || (found == limit && n < at)) ++own;
+    }
+    if (own > 0u) atomicAdd(lower, own);
+    barrier();
+}
+
+/// Leaves candidates in `place`, and returns their number.
+uint choose(uint n, ivec3 looked) {
+    uint side = uint(2 * reach + 1), places = side * side * side, chosen = 0u;
+    for (bool more = true; more && chosen < MOST_CANDIDATES; chosen += uint(more)) {
+        find_lowest(n * places, places, looked, chosen);
+        uint lowest_place = least_place;
+        more = lowest_place < places;
+        if (more) {
+            count_lower(n * places, places, lowest_place);
+            more = lower < 1u + places / CANDIDATES_ONE_OF;
+            if (more && gl_LocalInvocationID.x == 0u) place[chosen] = looked + place_in_cube(lowest_place, reach);
         }
         barrier();
     }
-    return count == 1u || least < nowhere;
+    return chosen;
+}
+
+/// The lowest candidate; a single one is not compared.
+bool start(uint n, out ivec3 at) {
+    SoughtBlock block = sought[n];
+    at = block.looked.xyz;
+    if (is_way_back != 0u) return block.shown.w != 0;
+    uint count = choose(n, at);
+    if (count == 0u) return false;
+    uint best = 0u;
+    if (count > 1u) {
+        compare(block.shown.xyz, count);
+        best = lowest();
+    }
+    at = place[best];
+    bool seen = count == 1u || cost[best] < nowhere;
+    barrier();
+    return seen;
 }
 
 void main() {
     uint n = invocation_index() / WORKGROUP_SIZE, local = gl_LocalInvocationID.x;
     if (n >= block_count) return;
     ivec3 at;
-    bool walking = start(sought[n], at), arrived = false;
+    bool walking = start(n, at), arrived = false;
     for (uint step = 0u; step < MOST_STEPS && walking; ++step) {
         compare_cube(sought[n].shown.xyz, at);
         uint best = lowest();
@@ -266,6 +331,9 @@ void main() {
         if (walking) at += place_in_cube(best, 1);
         barrier();
     }
-    if (local == 0u) walk[n].end = ivec4(at, arrived ? 1 : 0);
+    if (local == 0u) {
+        walk[n].end = ivec4(at, arrived ? 1 : 0);
+        if (is_way_back == 0u) back[n] = SoughtBlock(ivec4(at, arrived ? 1 : 0), sought[n].shown);
+    }
     if (local < CUBE) walk[n].costs[local] = cost[local];
 }
