@@ -106,6 +106,7 @@ std::unique_ptr<FixedBlocks> GpuBlockEngine::fixed_on(const imaging::Geometry& g
                     samples = matching_.samples();
     matching_.run(MatchPass::SampleStill, wide_voxels, {&fixed, &samples});
     matching_.describe(wide, *words, *shown);
+    shaders::flush();  // what is sought is listed meanwhile
     return std::make_unique<GpuFixedBlocks>(*this, moving_[level], DescribedOnDevice{grid, *words, *shown});
 }
 

@@ -103,6 +103,14 @@ GpuBlocks MatchDevice::fixed_for(const imaging::Geometry& wide, double spacing, 
     return {{"MatchFixed", &smoothed_for(spacing)}, {"MatchFixedSeen", &*fixed_seen_}};
 }
 
+void MatchDevice::begin_smoothing(double spacing) {
+    const shaders::CurrentContext current = device_.make_current();
+    const imaging::Geometry& fixed = fixed_.geometry;
+    grid_.upload(std::array{match_grid_block(fixed, fixed, {1, 1, 1}, Eigen::Isometry3d::Identity())});
+    smoothed_for(spacing);
+    shaders::flush();
+}
+
 const GpuFloats& MatchDevice::smoothed_for(double spacing) {
     Smoothed& smoothed = smoothed_[spacing];
     reserve(smoothed.voxels, device_, fixed_.voxels.total(), "smoothed image");

@@ -46,6 +46,8 @@ public:
     [[nodiscard]] const shaders::Device& device() const { return device_; }
     void set_fixed(const SeenImage& fixed);
 
+    /// Begins to smooth the image for working grids of a spacing, which fixed_for() will ask for.
+    void begin_smoothing(double spacing);
     /// The intraoperative image as match_sample reads it, smoothed for working grids of a spacing; and what it shows.
     /// `wide` is the grid that is to be sampled, whose block MatchGrid is uploaded.
     GpuBlocks fixed_for(const imaging::Geometry& wide, double spacing, const Eigen::Isometry3d& placement,
