@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 
 namespace tissuewarp::registration {
@@ -160,10 +161,14 @@ public:
         for (int n = options_.skipped_levels; n < whole; ++n) {
             Level level = prepare(n, order_);
             std::vector<BlockMatch> matches(order_.size());
-            match(level, level.searched, matches);
+            const bool last_of_all = n + 1 == whole;
+            Prediction next;
+            match(level, level.searched, matches, [&] {
+                if (n + 1 < levels) next = prediction(level, last_of_all ? sought_later(level) : order_);
+            });
             const double found = mean_certainty(matches, level.searched);
-            const Level& best_now = found >= certainty ? level : *best_level;
-            if (n + 1 < levels) predict(matches, level.searched, n + 1 < whole ? order_ : sought_later(best_now));
+            if (n + 1 < levels && last_of_all && found < certainty) next = prediction(level, sought_later(*best_level));
+            predict(matches, next);
             if (found >= certainty) {
                 certainty = found;
                 best = std::move(matches);
@@ -247,17 +252,20 @@ private:
     }
 
     /// Fills in the entries of some points; `point` stays −1 where the block was not found.
-    void match(const Level& level, const std::vector<std::size_t>& points, std::vector<BlockMatch>& matches) const {
+    void match(
+        const Level& level, const std::vector<std::size_t>& points, std::vector<BlockMatch>& matches,
+        const std::function<void()>& meanwhile = [] {}) const {
         std::vector<SoughtBlock> blocks(points.size());
         tbb::parallel_for(std::size_t{0}, points.size(), [&](std::size_t place) {
             blocks[place] = sought(level, static_cast<Eigen::Index>(points[place]));
         });
-        level.fixed->look(blocks, level.reach, options_.least_share, [&](std::size_t place, const BlockSight& sight) {
+        const auto visit = [&](std::size_t place, const BlockSight& sight) {
             const auto found = match_of(level, blocks[place].moving, sight);
             if (!found) return;
             matches[points[place]] = *found;
             matches[points[place]].point = static_cast<int>(points[place]);
-        });
+        };
+        level.fixed->look(blocks, level.reach, options_.least_share, visit, meanwhile);
     }
 
     /// The block about a point of the template, and where it is expected.
@@ -285,12 +293,23 @@ private:
         return result;
     }
 
-    /// What is looked for next starts from what the searched neighbours of each of `points` agree on.
-    void predict(const std::vector<BlockMatch>& matches, const std::vector<std::size_t>& searched,
-                 const std::vector<std::size_t>& points) {
-        const auto neighbours =
-            detail::nearest_neighbours(points_, std::vector<int>(points.begin(), points.end()),
-                                       std::vector<int>(searched.begin(), searched.end()), story_.neighbours);
+    /// Points, and the nearest of those that a level searches.
+    struct Prediction {
+        std::vector<std::size_t> points;
+        std::vector<std::vector<int>> neighbours;
+    };
+
+    [[nodiscard]] Prediction prediction(const Level& level, std::vector<std::size_t> points) const {
+        auto neighbours = detail::nearest_neighbours(
+            points_, std::vector<int>(points.begin(), points.end()),
+            std::vector<int>(level.searched.begin(), level.searched.end()), story_.neighbours);
+        return {std::move(points), std::move(neighbours)};
+    }
+
+    /// What is looked for next starts from what the searched neighbours of each point agree on.
+    void predict(const std::vector<BlockMatch>& matches, const Prediction& next) {
+        const auto& [points, neighbours] = next;
+        if (points.empty()) return;
         detail::ScatteredMotion motion{points_, predicted_ - points_, std::vector<Eigen::Matrix3d>(matches.size())};
         tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t n) {
             const auto column = static_cast<Eigen::Index>(n);

@@ -48,7 +48,9 @@ public:
     CpuFixedBlocks(const MatchingImage& moving, MatchingImage fixed, int radius)
         : moving_(moving), fixed_(std::move(fixed)), radius_(radius) {}
 
-    void look(const std::vector<SoughtBlock>& blocks, int reach, double least_share, const Visit& visit) override {
+    void look(const std::vector<SoughtBlock>& blocks, int reach, double least_share, const Visit& visit,
+              const std::function<void()>& meanwhile) override {
+        meanwhile();
         tbb::enumerable_thread_specific<Windows> windows;
         tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t n) {
             visit(n, sight({blocks[n].moving, radius_, least_share}, blocks[n].fixed, reach, windows.local()));

@@ -53,7 +53,8 @@ public:
     GpuFixedBlocks(GpuBlockEngine& engine, const DescribedOnDevice& moving, const DescribedOnDevice& fixed)
         : engine_(engine), moving_(moving), fixed_(fixed) {}
 
-    void look(const std::vector<SoughtBlock>& blocks, int reach, double least_share, const Visit& visit) override {
+    void look(const std::vector<SoughtBlock>& blocks, int reach, double least_share, const Visit& visit,
+              const std::function<void()>& meanwhile) override {
         const std::size_t batch = GpuBlockEngine::most_blocks(reach);
         for (std::size_t first = 0; first < blocks.size(); first += batch) {
             const auto some = std::span(blocks).subspan(first, std::min(batch, blocks.size() - first));
@@ -61,7 +62,9 @@ public:
             std::transform(some.begin(), some.end(), sought.begin(), [](const SoughtBlock& block) {
                 return MatchSoughtBlock{packed4(block.moving), packed4(block.fixed)};
             });
-            const GpuBlockEngine::Sights sights = engine_.search({moving_, fixed_, reach, least_share}, sought);
+            engine_.begin_search({moving_, fixed_, reach, least_share}, sought);
+            if (first == 0) meanwhile();
+            const GpuBlockEngine::Sights sights = engine_.found();
             tbb::parallel_for(tbb::blocked_range<std::size_t>(0, some.size()), [&](const auto& range) {
                 BlockSight sight;
                 for (std::size_t n = range.begin(); n < range.end(); ++n) {
@@ -133,7 +136,7 @@ MatchSearchBlock GpuBlockEngine::parameters(const Search& search, std::size_t bl
 }
 
 /// Nothing comes up before the way back is done: what is sought on it is left there by the way forward.
-GpuBlockEngine::Sights GpuBlockEngine::search(const Search& search, std::span<const MatchSoughtBlock> blocks) {
+void GpuBlockEngine::begin_search(const Search& search, std::span<const MatchSoughtBlock> blocks) {
     const shaders::Device& device = matching_.device();
     const shaders::CurrentContext current = device.make_current();
     const auto side = static_cast<std::size_t>(2 * search.reach + 1), places = side * side * side;
@@ -156,10 +159,16 @@ GpuBlockEngine::Sights GpuBlockEngine::search(const Search& search, std::span<co
     const auto workgroup = static_cast<std::size_t>(matching_.program(MatchPass::Walk).workgroup_size());
     run(MatchPass::Walk, blocks.size() * workgroup, search, there);
     run(MatchPass::Walk, blocks.size() * workgroup, home, back);
-    const std::size_t walk_bytes = blocks.size() * sizeof(MatchWalk);
-    const auto found = matching_.fetch(std::array{
-        shaders::Readback::Piece{*looks_, blocks.size() * places * sizeof(float)},
-        shaders::Readback::Piece{*walks_, walk_bytes}, shaders::Readback::Piece{*walks_back_, walk_bytes}});
+    shaders::flush();
+    look_bytes_ = blocks.size() * places * sizeof(float);
+    walk_bytes_ = blocks.size() * sizeof(MatchWalk);
+}
+
+GpuBlockEngine::Sights GpuBlockEngine::found() {
+    const shaders::CurrentContext current = matching_.device().make_current();
+    const auto found = matching_.fetch(std::array{shaders::Readback::Piece{*looks_, look_bytes_},
+                                                  shaders::Readback::Piece{*walks_, walk_bytes_},
+                                                  shaders::Readback::Piece{*walks_back_, walk_bytes_}});
     return {found[0], found[1], found[2]};
 }
 

@@ -53,16 +53,21 @@ MatchDevice::MatchDevice(int gpu_index)
     require_limits(device_);
 }
 
-void MatchDevice::set_fixed(const SeenImage& fixed) {
-    fixed_ = fixed.image;
-    const std::size_t voxels = fixed_.voxels.total(), words = (voxels + 3) / 4;
+void MatchDevice::set_image(const imaging::Volume& fixed) {
+    fixed_ = fixed;
+    const std::size_t voxels = fixed_.voxels.total();
     reserve(fixed_voxels_, device_, voxels, "fixed image");
     reserve(blurred_, device_, voxels, "fixed image along one axis");
-    reserve(fixed_seen_, device_, words, "what the fixed image shows");
     const shaders::CurrentContext current = device_.make_current();
     send(image_upload_, std::as_bytes(std::span(fixed_.data<float>(), voxels)), *fixed_voxels_);
-    send(seen_upload_, std::as_bytes(std::span(fixed.seen.data<std::uint8_t>(), voxels)), *fixed_seen_);
     for (auto& [spacing, smoothed] : smoothed_) smoothed.current = false;
+}
+
+void MatchDevice::set_seen(const imaging::Volume& seen) {
+    const std::size_t voxels = seen.voxels.total();
+    reserve(fixed_seen_, device_, (voxels + 3) / 4, "what the fixed image shows");
+    const shaders::CurrentContext current = device_.make_current();
+    send(seen_upload_, std::as_bytes(std::span(seen.data<std::uint8_t>(), voxels)), *fixed_seen_);
 }
 
 /// In all threads: one alone takes longer than the way to the device.

@@ -33,7 +33,10 @@ public:
 
     /// Looks for blocks within `reach` voxels along each axis of where they are expected. Calls visit(n, sight) once
     /// for each, from any thread. A cost counts where both images show `least_share` of the block's voxels.
-    virtual void look(const std::vector<SoughtBlock>& blocks, int reach, double least_share, const Visit& visit) = 0;
+    /// `meanwhile` is called once on the caller's thread: where a device searches, while it does.
+    virtual void look(
+        const std::vector<SoughtBlock>& blocks, int reach, double least_share, const Visit& visit,
+        const std::function<void()>& meanwhile = [] {}) = 0;
 };
 
 class BlockEngine {

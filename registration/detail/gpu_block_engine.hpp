@@ -35,7 +35,7 @@ public:
         int reach;
         double least_share;
     };
-    /// As the device leaves it, until the next search: costs of first looks, walks and walks back, block after block.
+    /// As the device leaves it, until the next search begins: costs of first looks, walks and walks back, block after block.
     struct Sights {
         std::span<const std::byte> looks, walks, back;
 
@@ -43,7 +43,9 @@ public:
         void read(std::size_t n, const Voxel& centre, int reach, BlockSight& sight) const;
     };
     /// Of as many blocks as most_blocks() says.
-    [[nodiscard]] Sights search(const Search& search, std::span<const MatchSoughtBlock> blocks);
+    void begin_search(const Search& search, std::span<const MatchSoughtBlock> blocks);
+    /// Waits for the search that was begun.
+    [[nodiscard]] Sights found();
     [[nodiscard]] static std::size_t most_blocks(int reach);
 
 private:
@@ -59,6 +61,7 @@ private:
     std::optional<shaders::Buffer<MatchSoughtBlock>> sought_, sought_back_;
     std::optional<GpuFloats> looks_;
     std::optional<shaders::Buffer<MatchWalk>> walks_, walks_back_;
+    std::size_t look_bytes_ = 0, walk_bytes_ = 0;  // of the search begun
 
     [[nodiscard]] MatchSearchBlock parameters(const Search& search, std::size_t blocks) const;
     void run(shaders::MatchPass pass, std::size_t invocations, const Search& search, const GpuBlocks& own);

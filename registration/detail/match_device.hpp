@@ -38,13 +38,15 @@ struct DescribedOnDevice {
     const GpuWords& shown;  ///< one a voxel
 };
 
-/// All members but the first three, reserve_wide() and samples() need the context current.
+/// All members but the first four, begin_smoothing(), reserve_wide() and samples() need the context current.
 class MatchDevice {
 public:
     explicit MatchDevice(int gpu_index);
 
     [[nodiscard]] const shaders::Device& device() const { return device_; }
-    void set_fixed(const SeenImage& fixed);
+    void set_image(const imaging::Volume& fixed);
+    /// What that image shows.
+    void set_seen(const imaging::Volume& seen);
 
     /// Begins to smooth the image for working grids of a spacing, which fixed_for() will ask for.
     void begin_smoothing(double spacing);
