@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <optional>
 
@@ -128,14 +129,21 @@ double mean_certainty(const std::vector<BlockMatch>& matches, const std::vector<
 
 /// Points by cubes of 16 mm: those searched one after the other find the image in the cache.
 std::vector<std::size_t> near_after_near(const Eigen::Matrix3Xd& points) {
-    std::vector<std::pair<std::array<double, 3>, std::size_t>> cubes(static_cast<std::size_t>(points.cols()));
+    constexpr double cube_mm = 16;
+    constexpr unsigned bits = 21;  // of a cube's number along an axis: farther off all lie in one
+    std::vector<std::pair<std::uint64_t, std::size_t>> cubes(static_cast<std::size_t>(points.cols()));
     for (std::size_t n = 0; n < cubes.size(); ++n) {
-        const Eigen::Vector3d point = points.col(static_cast<Eigen::Index>(n)) / 16;
-        cubes[n] = {{std::floor(point[2]), std::floor(point[1]), std::floor(point[0])}, n};
+        const Eigen::Array3d cube = (points.col(static_cast<Eigen::Index>(n)).array() / cube_mm).floor();
+        std::uint64_t key = 0;
+        for (const Eigen::Index axis : {2, 1, 0}) {
+            constexpr double most = 1U << (bits - 1);
+            key = key << bits | static_cast<std::uint64_t>(std::clamp(cube[axis] + most, 0.0, 2 * most - 1));
+        }
+        cubes[n] = {key, n};
     }
     std::sort(cubes.begin(), cubes.end());
-    std::vector<std::size_t> order;
-    for (const auto& [cube, n] : cubes) order.push_back(n);
+    std::vector<std::size_t> order(cubes.size());
+    std::transform(cubes.begin(), cubes.end(), order.begin(), [](const auto& cube) { return cube.second; });
     return order;
 }
 
