@@ -9,7 +9,6 @@
 #define CUBE 27u
 #define CENTRE 13u
 #define LANES 32u         // divides WORKGROUP_SIZE
-#define PICKERS 64u       // invocations that look for candidates
 #define COLUMNS 81u       // of a block along k that are compared at a time; WORKGROUP_SIZE is thrice as many or more
 #define MOST_SIDE 19      // of a slice that is looked at: most_radius of GpuBlockEngine, and one more on both sides
 #define SQUARES 3         // after the three words of a voxel
@@ -258,7 +257,7 @@ void find_lowest(uint first_look, uint places, ivec3 looked, uint chosen) {
         lower = 0u;
     }
     barrier();
-    for (uint n = local; n < places && local < PICKERS; n += PICKERS) {
+    for (uint n = local; n < places; n += WORKGROUP_SIZE) {
         float found = look_cost[first_look + n];
         if (found < least && !adjoins_any(looked + place_in_cube(n, reach), chosen)) {
             least = found;
@@ -275,7 +274,7 @@ void find_lowest(uint first_look, uint places, ivec3 looked, uint chosen) {
 void count_lower(uint first_look, uint places, uint at) {
     uint local = gl_LocalInvocationID.x, own = 0u;
     float limit = look_cost[first_look + at];
-    for (uint n = local; n < places && local < PICKERS; n += PICKERS) {
+    for (uint n = local; n < places; n += WORKGROUP_SIZE) {
         float found = look_cost[first_look + n];
         if (found < limit || (found == limit && n < at)) ++own;
     }
