@@ -111,9 +111,11 @@ vec4 channels_of(uint word) { return vec4(uvec4(word, word >> 8, word >> 16, wor
 
 /// Four channels, or the sum of squares of all and 1; zeros where the voxel does not count.
 vec4 value_of(uvec4 found, int part) {
-    vec4 first = channels_of(found.x), second = channels_of(found.y), third = channels_of(found.z);
+    vec4 first = channels_of(found.x);
+    if (part < SQUARES) return float(found.w) * first;
+    vec4 second = channels_of(found.y), third = channels_of(found.z);
     float squares = dot(first, first) + dot(second, second) + dot(third, third);
-    return float(found.w) * (part < SQUARES ? first : vec4(squares, 1.0, 0.0, 0.0));
+    return float(found.w) * vec4(squares, 1.0, 0.0, 0.0);
 }
 
 void put(int n, vec4 value, int room) {
@@ -127,8 +129,12 @@ void put(int n, vec4 value, int room) {
 /// Sums over a column, of three places beside each other along j, for places before, at and after a slice of it along k.
 struct Sums { vec3 before, here, after; };
 
+float plus_product(float sum, vec4 a, vec4 b) { return fma(a.w, b.w, fma(a.z, b.z, fma(a.y, b.y, fma(a.x, b.x, sum)))); }
+
 /// Whole numbers below 2^24, which floats hold exactly.
-vec3 plus_products(vec3 sum, vec4 own, vec4 a, vec4 b, vec4 c) { return sum + vec3(dot(own, a), dot(own, b), dot(own, c)); }
+vec3 plus_products(vec3 sum, vec4 own, vec4 a, vec4 b, vec4 c) {
+    return vec3(plus_product(sum.x, own, a), plus_product(sum.y, own, b), plus_product(sum.z, own, c));
+}
 
 /// |a|² where both count, and |b|².
 vec3 plus_squares(vec3 sum, vec4 own, vec4 a, vec4 b, vec4 c) {
@@ -145,9 +151,10 @@ void compare_columns(ivec3 shown, ivec3 at, int first_column) {
     int side = 2 * block_radius + 1, wide = side + 2, steps = side + 2;
     int column = min(first_column + own, side * side - 1), corner = column % side + slice + wide * (column / side);
     int second = local + int(WORKGROUP_SIZE);
+    bool are_more = wide * wide + int(COLUMNS) > int(WORKGROUP_SIZE);  // entries than invocations
     Entry entry = entry_of(shown, at, local, first_column), further = entry_of(shown, at, second, first_column);
     put(local, value_of(read(entry, 0, 0), 0), 0);
-    put(second, value_of(read(further, 0, 0), 0), 0);
+    if (are_more) put(second, value_of(read(further, 0, 0), 0), 0);
     barrier();
     ivec3 difference_before = ivec3(0), difference_here = ivec3(0), difference_after = ivec3(0);
     vec3 none = vec3(0.0);
@@ -160,10 +167,8 @@ void compare_columns(ivec3 shown, ivec3 at, int first_column) {
             bool turn = step + 1 == steps;
             int next_step = turn ? 0 : step + 1, next_part = turn ? part + 1 : part;
             uvec4 found = uvec4(0u), found_further = uvec4(0u);
-            if (next_part <= SQUARES) {
-                found = read(entry, next_step, next_part);
-                found_further = read(further, next_step, next_part);
-            }
+            if (next_part <= SQUARES) found = read(entry, next_step, next_part);
+            if (next_part <= SQUARES && are_more) found_further = read(further, next_step, next_part);
             vec4 next = shown_slice[room][own];
             vec4 a = looked_slice[room][corner], b = looked_slice[room][corner + wide], c = looked_slice[room][corner + 2 * wide];
             if (part < SQUARES) {
@@ -189,7 +194,7 @@ void compare_columns(ivec3 shown, ivec3 at, int first_column) {
             now = next;
             room = 1 - room;
             put(local, value_of(found, next_part), room);
-            put(second, value_of(found_further, next_part), room);
+            if (are_more) put(second, value_of(found_further, next_part), room);
             barrier();
         }
     }
