@@ -308,9 +308,9 @@ private:
     };
 
     [[nodiscard]] Prediction prediction(const Level& level, std::vector<std::size_t> points) const {
-        auto neighbours = detail::nearest_neighbours(
-            points_, std::vector<int>(points.begin(), points.end()),
-            std::vector<int>(level.searched.begin(), level.searched.end()), story_.neighbours);
+        auto neighbours = detail::nearest_neighbours(points_, std::vector<int>(points.begin(), points.end()),
+                                                     std::vector<int>(level.searched.begin(), level.searched.end()),
+                                                     story_.neighbours);
         return {std::move(points), std::move(neighbours)};
     }
 

@@ -151,10 +151,16 @@ void GpuBlockEngine::begin_search(const Search& search, std::span<const MatchSou
     reserve(walks_, device, blocks.size(), "walks");
     reserve(walks_back_, device, blocks.size(), "walks back");
     sought_->upload(blocks);
-    const GpuBlocks there{{"MatchSearch", &there_}, {"MatchBlocks", &*sought_}, {"MatchLooks", &*looks_},
-                    {"MatchWalks", &*walks_}, {"MatchBack", &*sought_back_}};
-    const GpuBlocks back{{"MatchSearch", &back_}, {"MatchBlocks", &*sought_back_}, {"MatchLooks", &*looks_},
-                         {"MatchWalks", &*walks_back_}, {"MatchBack", &*sought_}};
+    const GpuBlocks there{{"MatchSearch", &there_},
+                          {"MatchBlocks", &*sought_},
+                          {"MatchLooks", &*looks_},
+                          {"MatchWalks", &*walks_},
+                          {"MatchBack", &*sought_back_}};
+    const GpuBlocks back{{"MatchSearch", &back_},
+                         {"MatchBlocks", &*sought_back_},
+                         {"MatchLooks", &*looks_},
+                         {"MatchWalks", &*walks_back_},
+                         {"MatchBack", &*sought_}};
     run(MatchPass::Look, blocks.size() * places, search, there);
     const auto workgroup = static_cast<std::size_t>(matching_.program(MatchPass::Walk).workgroup_size());
     run(MatchPass::Walk, blocks.size() * workgroup, search, there);

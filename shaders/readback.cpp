@@ -60,8 +60,8 @@ std::vector<std::span<const std::byte>> Readback::fetch(std::span<const Piece> p
     for (const auto& [source, bytes] : pieces) {
         source.require_range(0, bytes);
         if (first + bytes > bytes_)
-            throw InvalidInput(std::to_string(bytes) + " bytes of " + source.what_ + " for " + what_ +
-                               ", which hold " + std::to_string(bytes_ - first));
+            throw InvalidInput(std::to_string(bytes) + " bytes of " + source.what_ + " for " + what_ + ", which hold " +
+                               std::to_string(bytes_ - first));
         fetched.emplace_back(mapped_ + first, bytes);
         if (bytes == 0) continue;
         glCopyNamedBufferSubData(source.id_, id_, 0, static_cast<GLintptr>(first), static_cast<GLsizeiptr>(bytes));

@@ -35,7 +35,8 @@ public:
         int reach;
         double least_share;
     };
-    /// As the device leaves it, until the next search begins: costs of first looks, walks and walks back, block after block.
+    /// As the device leaves it, until the next search begins: costs of first looks, walks and walks back, block after
+    /// block.
     struct Sights {
         std::span<const std::byte> looks, walks, back;
 

@@ -27,8 +27,8 @@ struct LocalMotion {
     double residual_mm = 0;                                  ///< median of the neighbours' residuals √(eᵀ W e)
 };
 
-/// Least trimmed squares fits of affine displacements about points (columns), each to its own neighbours, the point itself
-/// not among them; of these a share of 0 to less than 1 is trimmed.
+/// Least trimmed squares fits of affine displacements about points (columns), each to its own neighbours, the point
+/// itself not among them; of these a share of 0 to less than 1 is trimmed.
 std::vector<LocalMotion> fit_local_affine(const ScatteredMotion& motion, const Eigen::Matrix3Xd& points,
                                           const std::vector<std::vector<int>>& neighbours, double trimmed_share);
 

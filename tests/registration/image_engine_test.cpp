@@ -138,9 +138,9 @@ TEST(ImageEngine, TheDeviceFindsTheBlocksThatTheProcessorFinds) {
     EXPECT_LT(summarise(distances).maximum, 0.1);
 }
 
-/// Blocks that are cut by both images' borders, of fewer columns and of more than a workgroup compares at a time: the same
-/// candidates lead to the same places, there and back, at the same costs. A column left out, one counted twice or a slice
-/// read a step too late changes a cost by more than rounding of descriptors does.
+/// Blocks that are cut by both images' borders, of fewer columns and of more than a workgroup compares at a time: the
+/// same candidates lead to the same places, there and back, at the same costs. A column left out, one counted twice or
+/// a slice read a step too late changes a cost by more than rounding of descriptors does.
 TEST(ImageEngine, TheDeviceComparesBlocksOfEverySizeAsTheProcessor) {
     PreparedModel prepared = textured_model();
     for (const int radius : {1, 4, 5, 8}) {

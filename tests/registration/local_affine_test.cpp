@@ -96,7 +96,8 @@ ScatteredMotion scattered(int count) {
     G << vector(), vector(), vector();
     for (int n = 0; n < count; ++n) {
         motion.points.col(n) = 30 * vector();
-        motion.displacements.col(n) = 0.1 * G * motion.points.col(n) + 0.2 * vector() + (n % 5 == 0 ? 8.0 : 0.0) * vector();
+        motion.displacements.col(n) =
+            0.1 * G * motion.points.col(n) + 0.2 * vector() + (n % 5 == 0 ? 8.0 : 0.0) * vector();
         Eigen::Matrix3d W = Eigen::Matrix3d::Zero();
         for (int rank = 0; rank <= n % 3; ++rank) {
             const Eigen::Vector3d along = vector().normalized();
@@ -107,8 +108,8 @@ ScatteredMotion scattered(int count) {
     return motion;
 }
 
-// A lane that sees another's neighbours, an entry of the normal matrix in the wrong place, ranks that ties or lanes with
-// fewer neighbours upset: 203 points, so that the last vector is not full, with 0 to 24 neighbours each.
+// A lane that sees another's neighbours, an entry of the normal matrix in the wrong place, ranks that ties or lanes
+// with fewer neighbours upset: 203 points, so that the last vector is not full, with 0 to 24 neighbours each.
 TEST(LocalAffine, LanesAgreeWithFitsOneByOne) {
     constexpr int count = 203;
     const ScatteredMotion motion = scattered(count);

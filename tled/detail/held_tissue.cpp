@@ -46,9 +46,8 @@ std::vector<int> connected_nodes(const RestState& rest, int seed, std::vector<bo
 
 // Rᵀ K R of what holds the piece, for R the three translations and three rotations (scaled by the piece's radius) about
 // its centre. Springs count by the ratio to the stiffest one, prescribed components as one.
-Matrix6d rigid_resistance(const RestState& rest, const std::vector<int>& piece,
-                                             const NodalConditions& conditions, const std::vector<int>& spring_of,
-                                             double spring_scale) {
+Matrix6d rigid_resistance(const RestState& rest, const std::vector<int>& piece, const NodalConditions& conditions,
+                          const std::vector<int>& spring_of, double spring_scale) {
     Vector3d centre = Vector3d::Zero();
     for (const int node : piece) centre += rest.position.col(node) / static_cast<double>(piece.size());
     double radius = 0.0;
