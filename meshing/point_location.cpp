@@ -29,25 +29,17 @@ void for_each_cell(const Box& box, const std::array<int, 3>& cells, const Visit&
                            static_cast<std::size_t>(cells[1]) * static_cast<std::size_t>(k)));
 }
 
-Eigen::Vector4d barycentric(const Eigen::Matrix<double, 3, 4>& corners, const Eigen::Vector3d& point) {
-    const Eigen::Vector3d a = corners.col(1) - corners.col(0), b = corners.col(2) - corners.col(0);
-    const Eigen::Vector3d c = corners.col(3) - corners.col(0), p = point - corners.col(0);
-    const double six_volumes = a.cross(b).dot(c);
-    Eigen::Vector4d weights;
-    weights[1] = p.dot(b.cross(c)) / six_volumes;
-    weights[2] = p.dot(c.cross(a)) / six_volumes;
-    weights[3] = p.dot(a.cross(b)) / six_volumes;
-    weights[0] = 1.0 - weights[1] - weights[2] - weights[3];
-    return weights;
-}
-
 }  // namespace
 
-PointLocator::PointLocator(const TetMesh& mesh) : nodes_(mesh.nodes), tets_(mesh.tets) {
+PointLocator::PointLocator(const TetMesh& mesh) {
     require_valid(mesh, "point locator");
-    Eigen::Array3Xd lower(3, tets_.cols()), upper(3, tets_.cols());
-    for (Eigen::Index t = 0; t < tets_.cols(); ++t) {
-        const Eigen::Matrix<double, 3, 4> corners = nodes_(Eigen::all, tets_.col(t));
+    const Eigen::Index count = mesh.tets.cols();
+    tets_.reserve(static_cast<std::size_t>(count));
+    Eigen::Array3Xd lower(3, count), upper(3, count);
+    for (Eigen::Index t = 0; t < count; ++t) {
+        const Eigen::Matrix<double, 3, 4> corners = mesh.nodes(Eigen::all, mesh.tets.col(t));
+        const Eigen::Matrix3d edges = corners.rightCols<3>().colwise() - corners.col(0);
+        tets_.push_back({corners.col(0), edges.inverse()});
         lower.col(t) = corners.rowwise().minCoeff();
         upper.col(t) = corners.rowwise().maxCoeff();
     }
@@ -57,7 +49,7 @@ PointLocator::PointLocator(const TetMesh& mesh) : nodes_(mesh.nodes), tets_(mesh
     // of tetrahedra. The bound of 2 cells per tetrahedron keeps thin or scattered meshes from exhausting memory.
     const Eigen::Array3d extent = upper.rowwise().maxCoeff() - lower_.array();
     const double mean = std::max((upper - lower).mean(), 1e-12 * extent.maxCoeff());
-    const double bound = std::cbrt(extent.max(mean).prod() / (2.0 * static_cast<double>(tets_.cols()) + 64.0));
+    const double bound = std::cbrt(extent.max(mean).prod() / (2.0 * static_cast<double>(count) + 64.0));
     const double side = std::max(mean, bound);
     for (int axis = 0; axis < 3; ++axis) cells_[axis] = static_cast<int>(std::floor(extent[axis] / side)) + 1;
     cell_ = Eigen::Vector3d::Constant(side);
@@ -69,12 +61,12 @@ PointLocator::PointLocator(const TetMesh& mesh) : nodes_(mesh.nodes), tets_(mesh
     const std::size_t cell_count =
         static_cast<std::size_t>(cells_[0]) * static_cast<std::size_t>(cells_[1]) * static_cast<std::size_t>(cells_[2]);
     offset_.assign(cell_count + 1, 0);
-    for (Eigen::Index t = 0; t < tets_.cols(); ++t)
+    for (Eigen::Index t = 0; t < count; ++t)
         for_each_cell(box_of(t), cells_, [&](std::size_t cell) { ++offset_[cell + 1]; });
     for (std::size_t cell = 0; cell < cell_count; ++cell) offset_[cell + 1] += offset_[cell];
     entry_.resize(static_cast<std::size_t>(offset_.back()));
     std::vector<int> next(offset_.begin(), offset_.end() - 1);
-    for (Eigen::Index t = 0; t < tets_.cols(); ++t)
+    for (Eigen::Index t = 0; t < count; ++t)
         for_each_cell(box_of(t), cells_,
                       [&](std::size_t cell) { entry_[static_cast<std::size_t>(next[cell]++)] = static_cast<int>(t); });
 }
@@ -92,7 +84,10 @@ std::optional<Location> PointLocator::find(const Eigen::Vector3d& point, double 
         for (int e = offset_[cell]; e < offset_[cell + 1]; ++e) {
             const int tet = entry_[static_cast<std::size_t>(e)];
             if (best.tet >= 0 && tet >= best.tet) break;  // entries ascend
-            const Eigen::Vector4d weights = barycentric(nodes_(Eigen::all, tets_.col(tet)), point);
+            const auto& [corner, inverse] = tets_[static_cast<std::size_t>(tet)];
+            Eigen::Vector4d weights;
+            weights.tail<3>().noalias() = inverse * (point - corner);
+            weights[0] = 1.0 - weights.tail<3>().sum();
             if (weights.minCoeff() >= -tolerance) best = {tet, weights};
         }
     });

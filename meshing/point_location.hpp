@@ -3,6 +3,8 @@
 
 #include "meshing/tet_mesh.hpp"
 
+#include <Eigen/Core>
+
 #include <array>
 #include <optional>
 #include <vector>
@@ -24,8 +26,12 @@ public:
     [[nodiscard]] std::optional<Location> find(const Eigen::Vector3d& point, double tolerance = 1e-9) const;
 
 private:
-    Eigen::Matrix3Xd nodes_;
-    Eigen::Matrix4Xi tets_;
+    /// The last three barycentric coordinates of x are inverse (x − corner).
+    struct Cell {
+        Eigen::Vector3d corner;
+        Eigen::Matrix3d inverse;
+    };
+    std::vector<Cell> tets_;
     Eigen::Vector3d lower_, cell_;
     Eigen::Vector3d reach_;  ///< largest extent of a tetrahedron along each axis, mm
     std::array<int, 3> cells_{};

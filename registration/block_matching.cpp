@@ -10,6 +10,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <functional>
 #include <optional>
 
 namespace tissuewarp::registration {
@@ -127,14 +129,21 @@ double mean_certainty(const std::vector<BlockMatch>& matches, const std::vector<
 
 /// Points by cubes of 16 mm: those searched one after the other find the image in the cache.
 std::vector<std::size_t> near_after_near(const Eigen::Matrix3Xd& points) {
-    std::vector<std::pair<std::array<double, 3>, std::size_t>> cubes(static_cast<std::size_t>(points.cols()));
+    constexpr double cube_mm = 16;
+    constexpr unsigned bits = 21;  // of a cube's number along an axis: farther off all lie in one
+    std::vector<std::pair<std::uint64_t, std::size_t>> cubes(static_cast<std::size_t>(points.cols()));
     for (std::size_t n = 0; n < cubes.size(); ++n) {
-        const Eigen::Vector3d point = points.col(static_cast<Eigen::Index>(n)) / 16;
-        cubes[n] = {{std::floor(point[2]), std::floor(point[1]), std::floor(point[0])}, n};
+        const Eigen::Array3d cube = (points.col(static_cast<Eigen::Index>(n)).array() / cube_mm).floor();
+        std::uint64_t key = 0;
+        for (const Eigen::Index axis : {2, 1, 0}) {
+            constexpr double most = 1U << (bits - 1);
+            key = key << bits | static_cast<std::uint64_t>(std::clamp(cube[axis] + most, 0.0, 2 * most - 1));
+        }
+        cubes[n] = {key, n};
     }
     std::sort(cubes.begin(), cubes.end());
-    std::vector<std::size_t> order;
-    for (const auto& [cube, n] : cubes) order.push_back(n);
+    std::vector<std::size_t> order(cubes.size());
+    std::transform(cubes.begin(), cubes.end(), order.begin(), [](const auto& cube) { return cube.second; });
     return order;
 }
 
@@ -160,10 +169,14 @@ public:
         for (int n = options_.skipped_levels; n < whole; ++n) {
             Level level = prepare(n, order_);
             std::vector<BlockMatch> matches(order_.size());
-            match(level, level.searched, matches);
+            const bool last_of_all = n + 1 == whole;
+            Prediction next;
+            match(level, level.searched, matches, [&] {
+                if (n + 1 < levels) next = prediction(level, last_of_all ? sought_later(level) : order_);
+            });
             const double found = mean_certainty(matches, level.searched);
-            const Level& best_now = found >= certainty ? level : *best_level;
-            if (n + 1 < levels) predict(matches, level.searched, n + 1 < whole ? order_ : sought_later(best_now));
+            if (n + 1 < levels && last_of_all && found < certainty) next = prediction(level, sought_later(*best_level));
+            predict(matches, next);
             if (found >= certainty) {
                 certainty = found;
                 best = std::move(matches);
@@ -247,17 +260,20 @@ private:
     }
 
     /// Fills in the entries of some points; `point` stays −1 where the block was not found.
-    void match(const Level& level, const std::vector<std::size_t>& points, std::vector<BlockMatch>& matches) const {
+    void match(
+        const Level& level, const std::vector<std::size_t>& points, std::vector<BlockMatch>& matches,
+        const std::function<void()>& meanwhile = [] {}) const {
         std::vector<SoughtBlock> blocks(points.size());
         tbb::parallel_for(std::size_t{0}, points.size(), [&](std::size_t place) {
             blocks[place] = sought(level, static_cast<Eigen::Index>(points[place]));
         });
-        level.fixed->look(blocks, level.reach, options_.least_share, [&](std::size_t place, const BlockSight& sight) {
+        const auto visit = [&](std::size_t place, const BlockSight& sight) {
             const auto found = match_of(level, blocks[place].moving, sight);
             if (!found) return;
             matches[points[place]] = *found;
             matches[points[place]].point = static_cast<int>(points[place]);
-        });
+        };
+        level.fixed->look(blocks, level.reach, options_.least_share, visit, meanwhile);
     }
 
     /// The block about a point of the template, and where it is expected.
@@ -285,28 +301,40 @@ private:
         return result;
     }
 
-    /// What is looked for next starts from what the searched neighbours of each of `points` agree on.
-    void predict(const std::vector<BlockMatch>& matches, const std::vector<std::size_t>& searched,
-                 const std::vector<std::size_t>& points) {
-        const auto neighbours =
-            detail::nearest_neighbours(points_, std::vector<int>(points.begin(), points.end()),
-                                       std::vector<int>(searched.begin(), searched.end()), story_.neighbours);
+    /// Points, and the nearest of those that a level searches.
+    struct Prediction {
+        std::vector<std::size_t> points;
+        std::vector<std::vector<int>> neighbours;
+    };
+
+    [[nodiscard]] Prediction prediction(const Level& level, std::vector<std::size_t> points) const {
+        auto neighbours = detail::nearest_neighbours(points_, std::vector<int>(points.begin(), points.end()),
+                                                     std::vector<int>(level.searched.begin(), level.searched.end()),
+                                                     story_.neighbours);
+        return {std::move(points), std::move(neighbours)};
+    }
+
+    /// What is looked for next starts from what the searched neighbours of each point agree on.
+    void predict(const std::vector<BlockMatch>& matches, const Prediction& next) {
+        const auto& [points, neighbours] = next;
+        if (points.empty()) return;
         detail::ScatteredMotion motion{points_, predicted_ - points_, std::vector<Eigen::Matrix3d>(matches.size())};
         tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t n) {
             const auto column = static_cast<Eigen::Index>(n);
             if (matches[n].point >= 0) motion.displacements.col(column) = matches[n].fixed - matches[n].moving;
             motion.weights[n] = detail::neighbour_weight(matches[n]);
         });
-        tbb::parallel_for(std::size_t{0}, points.size(), [&](std::size_t n) {
-            const auto column = static_cast<Eigen::Index>(points[n]);
-            const bool vouched = std::any_of(neighbours[n].begin(), neighbours[n].end(), [&](int other) {
+        const auto vouched = [&](const std::vector<int>& others) {
+            return std::any_of(others.begin(), others.end(), [&](int other) {
                 return motion.weights[static_cast<std::size_t>(other)].trace() > 0.1;
             });
-            if (!vouched) return;
-            const Eigen::Vector3d point = points_.col(column);
-            predicted_.col(column) =
-                point + detail::fit_local_affine(motion, point, neighbours[n], story_.trimmed_share).displacement;
-        });
+        };
+        const std::vector<detail::LocalMotion> found =
+            detail::fit_local_affine(motion, points_(Eigen::all, points), neighbours, story_.trimmed_share);
+        for (std::size_t n = 0; n < points.size(); ++n) {
+            const auto column = static_cast<Eigen::Index>(points[n]);
+            if (vouched(neighbours[n])) predicted_.col(column) = points_.col(column) + found[n].displacement;
+        }
     }
 };
 

@@ -48,7 +48,9 @@ public:
     CpuFixedBlocks(const MatchingImage& moving, MatchingImage fixed, int radius)
         : moving_(moving), fixed_(std::move(fixed)), radius_(radius) {}
 
-    void look(const std::vector<SoughtBlock>& blocks, int reach, double least_share, const Visit& visit) override {
+    void look(const std::vector<SoughtBlock>& blocks, int reach, double least_share, const Visit& visit,
+              const std::function<void()>& meanwhile) override {
+        meanwhile();
         tbb::enumerable_thread_specific<Windows> windows;
         tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t n) {
             visit(n, sight({blocks[n].moving, radius_, least_share}, blocks[n].fixed, reach, windows.local()));
@@ -95,7 +97,6 @@ private:
 }  // namespace
 
 std::vector<std::size_t> candidates(const CostLattice& first) {
-    constexpr std::size_t one_of = 20;  // places is compared in full
     const auto adjoin = [&](std::size_t n, std::size_t other) {
         const Voxel a = first.displacement(n), b = first.displacement(other);
         return std::abs(a[0] - b[0]) <= 1 && std::abs(a[1] - b[1]) <= 1 && std::abs(a[2] - b[2]) <= 1;
@@ -104,10 +105,10 @@ std::vector<std::size_t> candidates(const CostLattice& first) {
     ranked.reserve(first.costs.size());
     for (std::size_t n = 0; n < first.costs.size(); ++n)
         if (std::isfinite(first.costs[n])) ranked.emplace_back(first.costs[n], n);
-    const std::size_t count = std::min(ranked.size(), 1 + first.costs.size() / one_of);
+    const std::size_t count = std::min(ranked.size(), 1 + first.costs.size() / candidates_one_of);
     std::partial_sort(ranked.begin(), ranked.begin() + static_cast<std::ptrdiff_t>(count), ranked.end());
     std::vector<std::size_t> result;
-    for (std::size_t n = 0; n < count; ++n) {
+    for (std::size_t n = 0; n < count && result.size() < most_candidates; ++n) {
         const std::size_t place = ranked[n].second;
         if (std::none_of(result.begin(), result.end(), [&](std::size_t other) { return adjoin(place, other); }))
             result.push_back(place);

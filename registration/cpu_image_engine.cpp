@@ -27,7 +27,9 @@ class CpuImageEngine : public ImageEngine {
 public:
     explicit CpuImageEngine(const PreparedModel& prepared) : prepared_(prepared) {}
 
-    void set_fixed(const SeenImage& fixed) override {
+    void begin_fixed(const imaging::Volume&) override {}
+
+    void finish_fixed(const SeenImage& fixed) override {
         fixed_ = fixed;
         blocks_ = make_cpu_block_engine(prepared_.image->blocks.images(), *fixed_);
     }

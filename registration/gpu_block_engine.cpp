@@ -16,6 +16,8 @@ using shaders::MatchPass;
 namespace {
 
 static_assert(shaders::match_walk_steps == most_walk_steps);
+static_assert(shaders::match_most_candidates == most_candidates);
+static_assert(shaders::match_candidates_one_of == candidates_one_of);
 
 constexpr float nowhere = 1e30F;  // chunks/match.block.glsl
 
@@ -34,58 +36,48 @@ T entry(std::span<const std::byte> bytes, std::size_t n) {
     return value;
 }
 
-/// Looks first, walks on from the candidates, and walks back.
+void read_walk(const MatchWalk& walk, std::optional<CostLattice>& near) {
+    if (walk.end[3] == 0) {
+        near.reset();
+        return;
+    }
+    if (!near) near.emplace();
+    near->centre = {walk.end[0], walk.end[1], walk.end[2]};
+    near->reach = 1;
+    near->costs.resize(27);
+    std::transform(walk.costs.begin(), walk.costs.begin() + 27, near->costs.begin(), as_cost);
+}
+
 class GpuFixedBlocks : public FixedBlocks {
 public:
-    GpuFixedBlocks(GpuBlockEngine& engine, const shaders::Device& device, const DescribedOnDevice& moving,
-                   const DescribedOnDevice& fixed)
-        : engine_(engine), device_(device), moving_(moving), fixed_(fixed) {}
+    GpuFixedBlocks(GpuBlockEngine& engine, const DescribedOnDevice& moving, const DescribedOnDevice& fixed)
+        : engine_(engine), moving_(moving), fixed_(fixed) {}
 
-    void look(const std::vector<SoughtBlock>& blocks, int reach, double least_share, const Visit& visit) override {
-        std::vector<BlockSight> sights = looked_at({moving_, fixed_, reach, least_share}, blocks);
-        walk_back({fixed_, moving_, 0, least_share}, blocks, sights);
-        tbb::parallel_for(std::size_t{0}, sights.size(), [&](std::size_t n) { visit(n, sights[n]); });
+    void look(const std::vector<SoughtBlock>& blocks, int reach, double least_share, const Visit& visit,
+              const std::function<void()>& meanwhile) override {
+        const std::size_t batch = GpuBlockEngine::most_blocks(reach);
+        for (std::size_t first = 0; first < blocks.size(); first += batch) {
+            const auto some = std::span(blocks).subspan(first, std::min(batch, blocks.size() - first));
+            std::vector<MatchSoughtBlock> sought(some.size());
+            std::transform(some.begin(), some.end(), sought.begin(), [](const SoughtBlock& block) {
+                return MatchSoughtBlock{packed4(block.moving), packed4(block.fixed)};
+            });
+            engine_.begin_search({moving_, fixed_, reach, least_share}, sought);
+            if (first == 0) meanwhile();
+            const GpuBlockEngine::Sights sights = engine_.found();
+            tbb::parallel_for(tbb::blocked_range<std::size_t>(0, some.size()), [&](const auto& range) {
+                BlockSight sight;
+                for (std::size_t n = range.begin(); n < range.end(); ++n) {
+                    sights.read(n, some[n].fixed, reach, sight);
+                    visit(first + n, sight);
+                }
+            });
+        }
     }
 
 private:
     GpuBlockEngine& engine_;
-    const shaders::Device& device_;
     DescribedOnDevice moving_, fixed_;
-
-    std::vector<BlockSight> looked_at(const GpuBlockEngine::Search& search, const std::vector<SoughtBlock>& blocks) {
-        const shaders::CurrentContext current = device_.make_current();
-        std::vector<MatchSoughtBlock> sought;
-        for (const SoughtBlock& block : blocks) sought.push_back({packed4(block.moving), packed4(block.fixed)});
-        GpuBlockEngine::Lattices looks = engine_.look(search, sought);
-        std::vector<std::vector<std::size_t>> places(blocks.size());
-        tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t n) { places[n] = candidates(looks[n]); });
-        std::vector<std::uint32_t> all;
-        for (std::size_t n = 0; n < blocks.size(); ++n) {
-            sought[n].shown[3] = static_cast<std::int32_t>(all.size());
-            sought[n].looked[3] = static_cast<std::int32_t>(places[n].size());
-            for (const std::size_t place : places[n]) all.push_back(static_cast<std::uint32_t>(place));
-        }
-        auto walks = engine_.walk(search, sought, all);
-        std::vector<BlockSight> sights(blocks.size());
-        for (std::size_t n = 0; n < blocks.size(); ++n)
-            sights[n] = {std::move(looks[n]), std::move(walks[n]), std::nullopt};
-        return sights;
-    }
-
-    /// Of the blocks that were found.
-    void walk_back(const GpuBlockEngine::Search& search, const std::vector<SoughtBlock>& blocks,
-                   std::vector<BlockSight>& sights) {
-        const shaders::CurrentContext current = device_.make_current();
-        std::vector<std::size_t> found;
-        std::vector<MatchSoughtBlock> sought;
-        for (std::size_t n = 0; n < blocks.size(); ++n) {
-            if (!sights[n].forward) continue;
-            found.push_back(n);
-            sought.push_back({packed4(sights[n].forward->centre), packed4(blocks[n].moving, 1)});
-        }
-        auto walks = engine_.walk(search, sought, std::array<std::uint32_t, 1>{0});  // from the place itself
-        for (std::size_t n = 0; n < found.size(); ++n) sights[found[n]].back = std::move(walks[n]);
-    }
 };
 
 }  // namespace
@@ -95,7 +87,8 @@ GpuBlockEngine::GpuBlockEngine(MatchDevice& matching, std::vector<DescribedOnDev
       moving_(std::move(moving)),
       fixed_(moving_.size()),
       radius_(block_radius),
-      search_(matching.device(), 1, "search for blocks") {
+      there_(matching.device(), 1, "search for blocks"),
+      back_(matching.device(), 1, "search for blocks on the way back") {
     constexpr int most_radius = 8;  // 17³ voxels of twelve squares of eight bits are less than 2³²
     if (block_radius > most_radius)
         throw GpuUnavailable("block matching: the sums of blocks of radius " + std::to_string(block_radius) +
@@ -116,78 +109,92 @@ std::unique_ptr<FixedBlocks> GpuBlockEngine::fixed_on(const imaging::Geometry& g
                     samples = matching_.samples();
     matching_.run(MatchPass::SampleStill, wide_voxels, {&fixed, &samples});
     matching_.describe(wide, *words, *shown);
-    return std::make_unique<GpuFixedBlocks>(*this, matching_.device(), moving_[level],
-                                            DescribedOnDevice{grid, *words, *shown});
+    shaders::flush();  // what is sought is listed meanwhile
+    return std::make_unique<GpuFixedBlocks>(*this, moving_[level], DescribedOnDevice{grid, *words, *shown});
 }
 
-void GpuBlockEngine::upload(const Search& search, std::span<const MatchSoughtBlock> blocks) {
+std::size_t GpuBlockEngine::most_blocks(int reach) {
+    constexpr std::size_t most_costs = 16U << 20U;
+    const auto side = static_cast<std::size_t>(2 * reach + 1);
+    return std::max<std::size_t>(1, most_costs / (side * side * side));
+}
+
+MatchSearchBlock GpuBlockEngine::parameters(const Search& search, std::size_t blocks) const {
     const auto least = [&](int stride) {
         return static_cast<float>(least_voxels(radius_, stride, search.least_share));
     };
-    search_.upload(
-        std::array{MatchSearchBlock{packed4(search.shown.grid.size), packed4(search.looked.grid.size), radius_,
-                                    search.reach, first_look_stride, first_row(radius_, first_look_stride),
-                                    least(first_look_stride), least(1), static_cast<std::uint32_t>(blocks.size()), 0}});
-    reserve(sought_, matching_.device(), blocks.size(), "blocks sought");
-    sought_->upload(blocks);
+    return {packed4(search.shown.grid.size),
+            packed4(search.looked.grid.size),
+            radius_,
+            search.reach,
+            first_look_stride,
+            first_row(radius_, first_look_stride),
+            least(first_look_stride),
+            least(1),
+            static_cast<std::uint32_t>(blocks),
+            0};
 }
 
-GpuBlocks GpuBlockEngine::blocks_of(const Search& search) const {
-    return {{"MatchSearch", &search_},
-            {"MatchBlocks", &*sought_},
-            {"MatchShownWords", &search.shown.words},
-            {"MatchShownSeen", &search.shown.shown},
-            {"MatchLookedWords", &search.looked.words},
-            {"MatchLookedSeen", &search.looked.shown}};
-}
-
-GpuBlockEngine::Lattices GpuBlockEngine::look(const Search& search, std::span<const MatchSoughtBlock> blocks) {
-    constexpr std::size_t most_costs = 16U << 20U;  // in one go
+/// Nothing comes up before the way back is done: what is sought on it is left there by the way forward.
+void GpuBlockEngine::begin_search(const Search& search, std::span<const MatchSoughtBlock> blocks) {
+    const shaders::Device& device = matching_.device();
+    const shaders::CurrentContext current = device.make_current();
     const auto side = static_cast<std::size_t>(2 * search.reach + 1), places = side * side * side;
-    const std::size_t batch = std::max<std::size_t>(1, most_costs / places);
-    Lattices result(blocks.size());
-    for (std::size_t first = 0; first < blocks.size(); first += batch) {
-        const auto some = blocks.subspan(first, std::min(batch, blocks.size() - first));
-        upload(search, some);
-        reserve(looks_, matching_.device(), some.size() * places, "costs of first looks");
-        GpuBlocks own = blocks_of(search);
-        own["MatchLooks"] = &*looks_;
-        matching_.run(MatchPass::Look, some.size() * places, {&own});
-        const auto bytes = matching_.fetch(*looks_, some.size() * places * sizeof(float));
-        tbb::parallel_for(std::size_t{0}, some.size(), [&](std::size_t n) {
-            const auto& centre = some[n].looked;
-            CostLattice& lattice = result[first + n];
-            lattice = {{centre[0], centre[1], centre[2]}, search.reach, std::vector<double>(places)};
-            for (std::size_t place = 0; place < places; ++place)
-                lattice.costs[place] = as_cost(entry<float>(bytes, n * places + place));
-        });
-    }
-    return result;
+    const Search home{search.looked, search.shown, search.reach, search.least_share};
+    MatchSearchBlock way_back = parameters(home, blocks.size());
+    way_back.is_way_back = 1;
+    there_.upload(std::array{parameters(search, blocks.size())});
+    back_.upload(std::array{way_back});
+    reserve(sought_, device, blocks.size(), "blocks sought");
+    reserve(sought_back_, device, blocks.size(), "blocks found");
+    reserve(looks_, device, blocks.size() * places, "costs of first looks");
+    reserve(walks_, device, blocks.size(), "walks");
+    reserve(walks_back_, device, blocks.size(), "walks back");
+    sought_->upload(blocks);
+    const GpuBlocks there{{"MatchSearch", &there_},
+                          {"MatchBlocks", &*sought_},
+                          {"MatchLooks", &*looks_},
+                          {"MatchWalks", &*walks_},
+                          {"MatchBack", &*sought_back_}};
+    const GpuBlocks back{{"MatchSearch", &back_},
+                         {"MatchBlocks", &*sought_back_},
+                         {"MatchLooks", &*looks_},
+                         {"MatchWalks", &*walks_back_},
+                         {"MatchBack", &*sought_}};
+    run(MatchPass::Look, blocks.size() * places, search, there);
+    const auto workgroup = static_cast<std::size_t>(matching_.program(MatchPass::Walk).workgroup_size());
+    run(MatchPass::Walk, blocks.size() * workgroup, search, there);
+    run(MatchPass::Walk, blocks.size() * workgroup, home, back);
+    shaders::flush();
+    look_bytes_ = blocks.size() * places * sizeof(float);
+    walk_bytes_ = blocks.size() * sizeof(MatchWalk);
 }
 
-std::vector<std::optional<CostLattice>> GpuBlockEngine::walk(const Search& search,
-                                                             std::span<const MatchSoughtBlock> blocks,
-                                                             std::span<const std::uint32_t> candidates) {
-    std::vector<std::optional<CostLattice>> result(blocks.size());
-    if (blocks.empty()) return result;
-    upload(search, blocks);
-    reserve(candidates_, matching_.device(), candidates.size(), "candidates");
-    candidates_->upload(candidates);
-    reserve(walks_, matching_.device(), blocks.size(), "walks");
-    GpuBlocks own = blocks_of(search);
-    own["MatchCandidates"] = &*candidates_;
-    own["MatchWalks"] = &*walks_;
-    const auto workgroup = static_cast<std::size_t>(matching_.program(MatchPass::Walk).workgroup_size());
-    matching_.run(MatchPass::Walk, blocks.size() * workgroup, {&own});
-    const auto bytes = matching_.fetch(*walks_, blocks.size() * sizeof(MatchWalk));
-    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t n) {
-        const auto walk = entry<MatchWalk>(bytes, n);
-        if (walk.end[3] == 0) return;
-        CostLattice near{{walk.end[0], walk.end[1], walk.end[2]}, 1, std::vector<double>(27)};
-        std::transform(walk.costs.begin(), walk.costs.begin() + 27, near.costs.begin(), as_cost);
-        result[n] = std::move(near);
-    });
-    return result;
+GpuBlockEngine::Sights GpuBlockEngine::found() {
+    const shaders::CurrentContext current = matching_.device().make_current();
+    const auto found = matching_.fetch(std::array{shaders::Readback::Piece{*looks_, look_bytes_},
+                                                  shaders::Readback::Piece{*walks_, walk_bytes_},
+                                                  shaders::Readback::Piece{*walks_back_, walk_bytes_}});
+    return {found[0], found[1], found[2]};
+}
+
+void GpuBlockEngine::run(MatchPass pass, std::size_t invocations, const Search& search, const GpuBlocks& own) {
+    const GpuBlocks images{{"MatchShownWords", &search.shown.words},
+                           {"MatchShownSeen", &search.shown.shown},
+                           {"MatchLookedWords", &search.looked.words},
+                           {"MatchLookedSeen", &search.looked.shown}};
+    matching_.run(pass, invocations, {&images, &own});
+}
+
+void GpuBlockEngine::Sights::read(std::size_t n, const Voxel& centre, int reach, BlockSight& sight) const {
+    const auto side = static_cast<std::size_t>(2 * reach + 1), places = side * side * side;
+    sight.first.centre = centre;
+    sight.first.reach = reach;
+    sight.first.costs.resize(places);
+    for (std::size_t place = 0; place < places; ++place)
+        sight.first.costs[place] = as_cost(entry<float>(looks, n * places + place));
+    read_walk(entry<MatchWalk>(walks, n), sight.forward);
+    read_walk(entry<MatchWalk>(back, n), sight.back);
 }
 
 }  // namespace tissuewarp::registration::detail

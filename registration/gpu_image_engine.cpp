@@ -83,7 +83,13 @@ public:
           memory_(matching_.device(), static_cast<std::size_t>(prepared.model.mesh.node_count()), levels_.back()),
           blocks_(matching_, described(levels_), prepared.image->blocks.options().block_radius) {}
 
-    void set_fixed(const SeenImage& fixed) override { matching_.set_fixed(fixed); }
+    /// The device smooths while the processor prepares the first search.
+    void begin_fixed(const imaging::Volume& image) override {
+        matching_.set_image(image);
+        for (const Level& level : levels_) matching_.begin_smoothing(level.moving.grid.spacing[0]);
+    }
+
+    void finish_fixed(const SeenImage& fixed) override { matching_.set_seen(fixed.seen); }
 
     BlockEngine& blocks() override { return blocks_; }
 

@@ -29,7 +29,10 @@ double median_distance(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
 ImageEvidence::ImageEvidence(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
                              ImageTools& tools, double energy)
     : prepared_(prepared),
-      fixed_(fixed, tools.memory),
+      fixed_(fixed, tools.memory,
+             [&](const imaging::Volume& image) {
+                 if (tools.engine) tools.engine->begin_fixed(image);
+             }),
       options_(options),
       view_(fixed_.seen),
       locator_(tools.locator),
@@ -39,7 +42,7 @@ ImageEvidence::ImageEvidence(const PreparedModel& prepared, const imaging::Volum
         block_engine_ = own_blocks_.get();
         return;
     }
-    tools.engine->set_fixed(fixed_);
+    tools.engine->finish_fixed(fixed_);
     block_engine_ = &tools.engine->blocks();
     dense_.emplace(prepared, *tools.engine);
 }

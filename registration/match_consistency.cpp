@@ -30,14 +30,14 @@ std::vector<BlockMatch> consistent_matches(const std::vector<BlockMatch>& matche
                  [&](const BlockMatch& match) { return match.confidence >= options.least_confidence; });
     const detail::ScatteredMotion motion = motion_of(candidates);
     const auto neighbours = detail::nearest_neighbours(motion.points, options.neighbours);
+    const std::vector<detail::LocalMotion> story =
+        detail::fit_local_affine(motion, motion.points, neighbours, options.trimmed_share);
     std::vector<char> agrees(candidates.size(), 0);
     tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t n) {
         const auto column = static_cast<Eigen::Index>(n);
-        const detail::LocalMotion local =
-            detail::fit_local_affine(motion, motion.points.col(column), neighbours[n], options.trimmed_share);
-        const Eigen::Vector3d e = motion.displacements.col(column) - local.displacement;
+        const Eigen::Vector3d e = motion.displacements.col(column) - story[n].displacement;
         const double residual = std::sqrt(e.dot(motion.weights[n] * e) / candidates[n].confidence);
-        agrees[n] = std::max(residual, local.residual_mm) <= options.most_residual_mm;
+        agrees[n] = std::max(residual, story[n].residual_mm) <= options.most_residual_mm;
     });
     std::vector<BlockMatch> result;
     for (std::size_t n = 0; n < candidates.size(); ++n)

@@ -53,16 +53,21 @@ MatchDevice::MatchDevice(int gpu_index)
     require_limits(device_);
 }
 
-void MatchDevice::set_fixed(const SeenImage& fixed) {
-    fixed_ = fixed.image;
-    const std::size_t voxels = fixed_.voxels.total(), words = (voxels + 3) / 4;
+void MatchDevice::set_image(const imaging::Volume& fixed) {
+    fixed_ = fixed;
+    const std::size_t voxels = fixed_.voxels.total();
     reserve(fixed_voxels_, device_, voxels, "fixed image");
     reserve(blurred_, device_, voxels, "fixed image along one axis");
-    reserve(fixed_seen_, device_, words, "what the fixed image shows");
     const shaders::CurrentContext current = device_.make_current();
     send(image_upload_, std::as_bytes(std::span(fixed_.data<float>(), voxels)), *fixed_voxels_);
-    send(seen_upload_, std::as_bytes(std::span(fixed.seen.data<std::uint8_t>(), voxels)), *fixed_seen_);
     for (auto& [spacing, smoothed] : smoothed_) smoothed.current = false;
+}
+
+void MatchDevice::set_seen(const imaging::Volume& seen) {
+    const std::size_t voxels = seen.voxels.total();
+    reserve(fixed_seen_, device_, (voxels + 3) / 4, "what the fixed image shows");
+    const shaders::CurrentContext current = device_.make_current();
+    send(seen_upload_, std::as_bytes(std::span(seen.data<std::uint8_t>(), voxels)), *fixed_seen_);
 }
 
 /// In all threads: one alone takes longer than the way to the device.
@@ -101,6 +106,14 @@ GpuBlocks MatchDevice::fixed_for(const imaging::Geometry& wide, double spacing, 
                                  const std::array<int, 3>& cells) {
     grid_.upload(std::array{match_grid_block(wide, fixed_.geometry, cells, placement)});
     return {{"MatchFixed", &smoothed_for(spacing)}, {"MatchFixedSeen", &*fixed_seen_}};
+}
+
+void MatchDevice::begin_smoothing(double spacing) {
+    const shaders::CurrentContext current = device_.make_current();
+    const imaging::Geometry& fixed = fixed_.geometry;
+    grid_.upload(std::array{match_grid_block(fixed, fixed, {1, 1, 1}, Eigen::Isometry3d::Identity())});
+    smoothed_for(spacing);
+    shaders::flush();
 }
 
 const GpuFloats& MatchDevice::smoothed_for(double spacing) {
@@ -166,12 +179,17 @@ void MatchDevice::erode(std::size_t wide, std::uint32_t axis, const GpuWords& fr
 }
 
 std::span<const std::byte> MatchDevice::fetch(const shaders::StorageBuffer& source, std::size_t bytes) {
+    return fetch(std::array{shaders::Readback::Piece{source, bytes}}).front();
+}
+
+std::vector<std::span<const std::byte>> MatchDevice::fetch(std::span<const shaders::Readback::Piece> pieces) {
+    const std::size_t bytes = shaders::Readback::bytes_of(pieces);
     if (bytes > readback_bytes_) {
         readback_.reset();
         readback_ = std::make_unique<shaders::Readback>(device_, bytes, "results of matching on their way down");
         readback_bytes_ = bytes;
     }
-    return readback_->fetch(source, bytes);
+    return readback_->fetch(pieces);
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -354,7 +354,9 @@ ProgramSource match_program(MatchPass pass, int descriptor_reach) {
     if (pass == MatchPass::Erode) source.defines["DESCRIPTOR_REACH"] = number(descriptor_reach);
     if (pass == MatchPass::Walk) {
         source.defines["MOST_STEPS"] = number(match_walk_steps);
-        source.defines["WORKGROUP_SIZE"] = "288";  // nine times the lanes of a row
+        source.defines["MOST_CANDIDATES"] = number(match_most_candidates);
+        source.defines["CANDIDATES_ONE_OF"] = number(match_candidates_one_of);
+        source.defines["WORKGROUP_SIZE"] = "256";  // an invocation for each column of a block, and more
     }
     if (pass == MatchPass::Forces) {
         source.defines["CELL_SIDE"] = number(match_cell_side);

@@ -145,6 +145,8 @@ enum class MatchPass {
 inline constexpr int match_pass_count = 14;
 /// Steps downhill of MatchPass::Walk, at most.
 inline constexpr int match_walk_steps = 8;
+/// Candidates from which it begins, at most; they are among one of so many places of a first look, the lowest.
+inline constexpr int match_most_candidates = 27, match_candidates_one_of = 20;
 /// Workgroups of MatchPass::Difference, and invocations of MatchPass::Mean, which merges what they leave.
 inline constexpr int match_partials = 128;
 /// Voxels along each axis of a cell of forces; its cube is the workgroup of MatchPass::Forces.

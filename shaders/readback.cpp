@@ -3,8 +3,19 @@
 #include "shaders/detail/gl.hpp"
 
 #include <algorithm>
+#include <array>
 
 namespace tissuewarp::shaders {
+
+namespace {
+
+/// Where the next piece may begin.
+std::size_t rounded(std::size_t bytes) {
+    constexpr std::size_t alignment = 16;
+    return (bytes + alignment - 1) / alignment * alignment;
+}
+
+}  // namespace
 
 Readback::Readback(const Device& device, std::size_t bytes, std::string what)
     : device_(device), bytes_(bytes), what_(std::move(what)) {
@@ -33,17 +44,33 @@ Readback::~Readback() {
 }
 
 std::span<const std::byte> Readback::fetch(const StorageBuffer& source, std::size_t bytes) {
-    source.require_range(0, bytes);
-    if (bytes > bytes_)
-        throw InvalidInput(std::to_string(bytes) + " bytes of " + source.what_ + " for " + what_ + ", which hold " +
-                           std::to_string(bytes_));
-    if (bytes == 0) return {};
+    return fetch(std::array{Piece{source, bytes}}).front();
+}
+
+std::size_t Readback::bytes_of(std::span<const Piece> pieces) {
+    std::size_t bytes = 0;
+    for (const Piece& piece : pieces) bytes += rounded(piece.bytes);
+    return bytes;
+}
+
+std::vector<std::span<const std::byte>> Readback::fetch(std::span<const Piece> pieces) {
     glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-    glCopyNamedBufferSubData(source.id_, id_, 0, 0, static_cast<GLsizeiptr>(bytes));
+    std::vector<std::span<const std::byte>> fetched;
+    std::size_t first = 0;
+    for (const auto& [source, bytes] : pieces) {
+        source.require_range(0, bytes);
+        if (first + bytes > bytes_)
+            throw InvalidInput(std::to_string(bytes) + " bytes of " + source.what_ + " for " + what_ + ", which hold " +
+                               std::to_string(bytes_ - first));
+        fetched.emplace_back(mapped_ + first, bytes);
+        if (bytes == 0) continue;
+        glCopyNamedBufferSubData(source.id_, id_, 0, static_cast<GLintptr>(first), static_cast<GLsizeiptr>(bytes));
+        first += rounded(bytes);
+    }
     glMemoryBarrier(GL_CLIENT_MAPPED_BUFFER_BARRIER_BIT);
     glFinish();
-    check_errors("download of " + source.what_);
-    return {mapped_, bytes};
+    check_errors("download into " + what_);
+    return fetched;
 }
 
 }  // namespace tissuewarp::shaders

@@ -3,6 +3,9 @@
 
 #include "shaders/buffer.hpp"
 
+#include <span>
+#include <vector>
+
 namespace tissuewarp::shaders {
 
 /// Bytes of the host that a device copies its buffers into. fetch() needs the device's context current; construction
@@ -18,6 +21,16 @@ public:
     /// The first `bytes` of `source`, once all that was recorded before is done. The next call overwrites them. Throws
     /// InvalidInput when either side is smaller.
     [[nodiscard]] std::span<const std::byte> fetch(const StorageBuffer& source, std::size_t bytes);
+
+    /// The first bytes of a buffer.
+    struct Piece {
+        const StorageBuffer& source;
+        std::size_t bytes;
+    };
+    /// Of several buffers, for which the host waits once.
+    [[nodiscard]] std::vector<std::span<const std::byte>> fetch(std::span<const Piece> pieces);
+    /// What they need room for.
+    [[nodiscard]] static std::size_t bytes_of(std::span<const Piece> pieces);
 
 private:
     const Device& device_;

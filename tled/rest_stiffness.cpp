@@ -94,6 +94,15 @@ struct RestStiffness::Impl {
         detail::add_spring_resistance(present, x, y);
         return y;
     }
+    /// With the springs of `conditions`, zero where these constrain.
+    [[nodiscard]] Matrix3Xd multiply_free(const Matrix3Xd& x) const {
+        Matrix3Xd y = multiply(x, conditions);
+        parallel_ranges(0, static_cast<std::size_t>(y.size()), 4096, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t d = begin; d < end; ++d)
+                if (conditions.constrained.data()[d]) y.data()[d] = 0.0;
+        });
+        return y;
+    }
     void require_held(const RestState& rest, const NodalConditions& present) const {
         detail::require_held(rest, outline->pieces, present);
     }
@@ -260,9 +269,7 @@ detail::BlockRows RestStiffness::Impl::free_rows(const NodalConditions& springs)
 
 const detail::TwoLevel& RestStiffness::Impl::two_levels() const {
     std::call_once(divided, [this] {
-        const auto product = [this](const Matrix3Xd& x) {
-            return Matrix3Xd(conditions.constrained.select(0.0, multiply(x, conditions)));
-        };
+        const auto product = [this](const Matrix3Xd& x) { return multiply_free(x); };
         levels =
             std::make_unique<const detail::TwoLevel>(free_rows(conditions), product, position, conditions.constrained);
     });
@@ -286,9 +293,7 @@ Matrix3Xd RestStiffness::Impl::diagonal(const NodalConditions& present) const {
 
 /// Precondition: something is free.
 const detail::Mode& RestStiffness::Impl::slowest() const {
-    const auto product = [this](const Matrix3Xd& x) {
-        return Matrix3Xd(conditions.constrained.select(0.0, multiply(x, conditions)));
-    };
+    const auto product = [this](const Matrix3Xd& x) { return multiply_free(x); };
     constexpr detail::Patience of_given{2, 0.05};  // relaxation, which asks for it, makes up for more in fewer products
     std::call_once(approximation_known, [&] {
         const Matrix3Xd D = diagonal(conditions);

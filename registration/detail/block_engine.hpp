@@ -33,7 +33,10 @@ public:
 
     /// Looks for blocks within `reach` voxels along each axis of where they are expected. Calls visit(n, sight) once
     /// for each, from any thread. A cost counts where both images show `least_share` of the block's voxels.
-    virtual void look(const std::vector<SoughtBlock>& blocks, int reach, double least_share, const Visit& visit) = 0;
+    /// `meanwhile` is called once on the caller's thread: where a device searches, while it does.
+    virtual void look(
+        const std::vector<SoughtBlock>& blocks, int reach, double least_share, const Visit& visit,
+        const std::function<void()>& meanwhile = [] {}) = 0;
 };
 
 class BlockEngine {
@@ -50,6 +53,9 @@ public:
 std::unique_ptr<BlockEngine> make_cpu_block_engine(const TemplateImages& moving, const SeenImage& fixed);
 
 constexpr int first_look_stride = 3;  ///< every third row of a block, over the whole lattice
+
+constexpr std::size_t most_candidates = 27;    ///< of a first look, to be compared by all rows
+constexpr std::size_t candidates_one_of = 20;  ///< places: all candidates are among these, the lowest
 
 /// The places that a first look puts lowest, one of those that adjoin, the lowest first; entries of the lattice.
 std::vector<std::size_t> candidates(const CostLattice& first);

@@ -11,7 +11,7 @@ struct MatchSearchBlock {
     std::array<std::int32_t, 4> shown_size, looked_size;
     std::int32_t block_radius, reach, look_stride, look_first;
     float look_least, walk_least;
-    std::uint32_t block_count, unused;
+    std::uint32_t block_count, is_way_back;
 };
 struct MatchSoughtBlock {
     std::array<std::int32_t, 4> shown, looked;
@@ -29,18 +29,25 @@ public:
     std::unique_ptr<FixedBlocks> fixed_on(const imaging::Geometry& grid, const SearchRegion& region,
                                           std::size_t level) override;
 
-    /// Of blocks that one image shows and another is looked at for: first looks of each; and where walks end.
+    /// Images that show blocks of one and are looked at for them.
     struct Search {
         DescribedOnDevice shown, looked;
         int reach;
         double least_share;
     };
-    using Lattices = std::vector<CostLattice>;
-    [[nodiscard]] Lattices look(const Search& search, std::span<const MatchSoughtBlock> blocks);
-    /// `candidates` are entries of lattices, to which the blocks refer.
-    [[nodiscard]] std::vector<std::optional<CostLattice>> walk(const Search& search,
-                                                               std::span<const MatchSoughtBlock> blocks,
-                                                               std::span<const std::uint32_t> candidates);
+    /// As the device leaves it, until the next search begins: costs of first looks, walks and walks back, block after
+    /// block.
+    struct Sights {
+        std::span<const std::byte> looks, walks, back;
+
+        /// Of a block, `centre` being where it is expected, with first looks of some reach.
+        void read(std::size_t n, const Voxel& centre, int reach, BlockSight& sight) const;
+    };
+    /// Of as many blocks as most_blocks() says.
+    void begin_search(const Search& search, std::span<const MatchSoughtBlock> blocks);
+    /// Waits for the search that was begun.
+    [[nodiscard]] Sights found();
+    [[nodiscard]] static std::size_t most_blocks(int reach);
 
 private:
     struct Described {
@@ -51,14 +58,14 @@ private:
     std::vector<DescribedOnDevice> moving_;
     std::vector<Described> fixed_;  // of each level
     int radius_;
-    shaders::Buffer<MatchSearchBlock> search_;
-    std::optional<shaders::Buffer<MatchSoughtBlock>> sought_;
+    shaders::Buffer<MatchSearchBlock> there_, back_;
+    std::optional<shaders::Buffer<MatchSoughtBlock>> sought_, sought_back_;
     std::optional<GpuFloats> looks_;
-    std::optional<GpuWords> candidates_;
-    std::optional<shaders::Buffer<MatchWalk>> walks_;
+    std::optional<shaders::Buffer<MatchWalk>> walks_, walks_back_;
+    std::size_t look_bytes_ = 0, walk_bytes_ = 0;  // of the search begun
 
-    void upload(const Search& search, std::span<const MatchSoughtBlock> blocks);
-    [[nodiscard]] GpuBlocks blocks_of(const Search& search) const;
+    [[nodiscard]] MatchSearchBlock parameters(const Search& search, std::size_t blocks) const;
+    void run(shaders::MatchPass pass, std::size_t invocations, const Search& search, const GpuBlocks& own);
 };
 
 }  // namespace tissuewarp::registration::detail

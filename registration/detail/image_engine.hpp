@@ -16,7 +16,13 @@ public:
     virtual ~ImageEngine() = default;
 
     /// The intraoperative image of the calls that follow.
-    virtual void set_fixed(const SeenImage& fixed) = 0;
+    void set_fixed(const SeenImage& fixed) {
+        begin_fixed(fixed.image);
+        finish_fixed(fixed);
+    }
+    /// The same in two steps: what needs the image alone is begun before what it shows is known.
+    virtual void begin_fixed(const imaging::Volume& image) = 0;
+    virtual void finish_fixed(const SeenImage& fixed) = 0;
     /// Forces on the moving grid of a level of the template, from the fixed image pulled back by the model's map
     /// φ(X) = placement · (X + u(X)). Within eight voxels outside the mesh φ continues what lies next to it.
     virtual DenseForces forces(const State& state, std::size_t level) = 0;

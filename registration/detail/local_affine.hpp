@@ -23,13 +23,14 @@ std::vector<std::vector<int>> nearest_neighbours(const Eigen::Matrix3Xd& points,
                                                  const std::vector<int>& among, int count);
 
 struct LocalMotion {
-    Eigen::Vector3d displacement;  ///< mm, at the point asked for
-    double residual_mm;            ///< median of the neighbours' residuals √(eᵀ W e)
+    Eigen::Vector3d displacement = Eigen::Vector3d::Zero();  ///< mm, at the point asked for
+    double residual_mm = 0;                                  ///< median of the neighbours' residuals √(eᵀ W e)
 };
 
-/// Least trimmed squares fit of an affine displacement to neighbours about a point, the point itself not among them.
-LocalMotion fit_local_affine(const ScatteredMotion& motion, const Eigen::Vector3d& point,
-                             const std::vector<int>& neighbours, double trimmed_share);
+/// Least trimmed squares fits of affine displacements about points (columns), each to its own neighbours, the point
+/// itself not among them; of these a share of 0 to less than 1 is trimmed.
+std::vector<LocalMotion> fit_local_affine(const ScatteredMotion& motion, const Eigen::Matrix3Xd& points,
+                                          const std::vector<std::vector<int>>& neighbours, double trimmed_share);
 
 /// Weight of a match among its neighbours: confidence times the information, scaled to its largest eigenvalue.
 Eigen::Matrix3d neighbour_weight(const BlockMatch& match);

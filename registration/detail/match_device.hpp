@@ -38,14 +38,18 @@ struct DescribedOnDevice {
     const GpuWords& shown;  ///< one a voxel
 };
 
-/// All members but the first three, reserve_wide() and samples() need the context current.
+/// All members but the first four, begin_smoothing(), reserve_wide() and samples() need the context current.
 class MatchDevice {
 public:
     explicit MatchDevice(int gpu_index);
 
     [[nodiscard]] const shaders::Device& device() const { return device_; }
-    void set_fixed(const SeenImage& fixed);
+    void set_image(const imaging::Volume& fixed);
+    /// What that image shows.
+    void set_seen(const imaging::Volume& seen);
 
+    /// Begins to smooth the image for working grids of a spacing, which fixed_for() will ask for.
+    void begin_smoothing(double spacing);
     /// The intraoperative image as match_sample reads it, smoothed for working grids of a spacing; and what it shows.
     /// `wide` is the grid that is to be sampled, whose block MatchGrid is uploaded.
     GpuBlocks fixed_for(const imaging::Geometry& wide, double spacing, const Eigen::Isometry3d& placement,
@@ -62,6 +66,8 @@ public:
     void run(shaders::MatchPass pass, std::size_t invocations, std::initializer_list<const GpuBlocks*> blocks);
     /// The first entries of a buffer, as long as nothing else is fetched.
     [[nodiscard]] std::span<const std::byte> fetch(const shaders::StorageBuffer& source, std::size_t bytes);
+    /// The same of several, for which the host waits once.
+    [[nodiscard]] std::vector<std::span<const std::byte>> fetch(std::span<const shaders::Readback::Piece> pieces);
 
 private:
     /// What passes over a wide grid leave for each other.

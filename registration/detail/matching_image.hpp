@@ -4,6 +4,8 @@
 #include "registration/detail/self_similarity.hpp"
 #include "registration/image_matching.hpp"
 
+#include <functional>
+
 namespace tissuewarp::registration::detail {
 
 using Voxel = std::array<int, 3>;
@@ -54,8 +56,10 @@ struct SeenImage {
     imaging::Volume image, seen;
     /// Throws InvalidInput where the image is empty, a field of vectors or not finite.
     explicit SeenImage(const imaging::Volume& given);
-    /// Serves until another one is made in the same memory.
-    SeenImage(const imaging::Volume& given, SeenMemory& memory);
+    /// Serves until another one is made in the same memory. `converted` gets the image before what it shows is found.
+    SeenImage(
+        const imaging::Volume& given, SeenMemory& memory,
+        const std::function<void(const imaging::Volume&)>& converted = [](const imaging::Volume&) {});
 };
 
 }  // namespace tissuewarp::registration::detail

@@ -110,10 +110,11 @@ SeenImage::SeenImage(const Volume& given) {
     *this = SeenImage(given, memory);
 }
 
-SeenImage::SeenImage(const Volume& given, SeenMemory& memory) {
+SeenImage::SeenImage(const Volume& given, SeenMemory& memory, const std::function<void(const Volume&)>& converted) {
     image = as_floats(given, memory);
     if (given.empty() || given.channels() != 1 || given.voxels.depth() >= CV_32F)  // whole numbers are finite
         require_finite(image, "block matching: the fixed image");
+    converted(image);
     seen = seen_region(image, memory);
 }
 

@@ -12,10 +12,10 @@ layout(std430, binding = BINDING_MATCH_SEARCH) readonly buffer MatchSearch {
     int look_first;                 // row
     float look_least, walk_least;   // voxels that must be seen in both
     uint block_count;
-    uint unused;
+    uint is_way_back;               // of blocks that were found, from which a walk begins where they are expected
 };
 
-/// Centres of a block and of where it is expected; with them the first of its candidates and their number.
+/// Centres of a block and of where it is expected; shown.w is 0 where there is none.
 struct SoughtBlock { ivec4 shown, looked; };
 layout(std430, binding = BINDING_MATCH_BLOCKS) readonly buffer MatchBlocks { SoughtBlock sought[]; };
 

@@ -138,6 +138,60 @@ TEST(ImageEngine, TheDeviceFindsTheBlocksThatTheProcessorFinds) {
     EXPECT_LT(summarise(distances).maximum, 0.1);
 }
 
+/// Blocks that are cut by both images' borders, of fewer columns and of more than a workgroup compares at a time: the
+/// same candidates lead to the same places, there and back, at the same costs. A column left out, one counted twice or
+/// a slice read a step too late changes a cost by more than rounding of descriptors does.
+TEST(ImageEngine, TheDeviceComparesBlocksOfEverySizeAsTheProcessor) {
+    PreparedModel prepared = textured_model();
+    for (const int radius : {1, 4, 5, 8}) {
+        ImageModelOptions image;
+        image.features.count = 60;
+        image.blocks.grid_spacing_mm = spacing_mm;
+        image.blocks.levels = 1;
+        image.blocks.block_radius = radius;
+        prepare_image(prepared, Volume(prepared.image->image), image);
+        const auto& images = prepared.image->blocks.images();
+        const imaging::Geometry& grid = images.levels[0].grid;
+        const auto& size = prepared.image->image.geometry.size;
+        const SeenImage seen(imaging::crop(prepared.image->image, {0, 0, 0}, {2 * size[0] / 3, size[1], size[2]}));
+        std::vector<SoughtBlock> blocks;
+        for (Eigen::Index n = 0; n < images.points.cols(); ++n) {
+            const Eigen::Vector3d index = grid.index(images.points.col(n));
+            const Voxel centre{int(std::lround(index[0])), int(std::lround(index[1])), int(std::lround(index[2]))};
+            blocks.push_back({centre, {centre[0] + 1, centre[1] - 2, centre[2] + 1}});
+        }
+        const auto sights = [&](const std::unique_ptr<ImageEngine>& engine) {
+            engine->set_fixed(seen);
+            std::vector<BlockSight> result(blocks.size());
+            engine->blocks()
+                .fixed_on(grid, SearchRegion(grid), 0)
+                ->look(blocks, 3, 0.05, [&](std::size_t n, const BlockSight& sight) { result[n] = sight; });
+            return result;
+        };
+        const auto by_cpu = sights(make_cpu_image_engine(prepared)), by_gpu = sights(make_gpu_image_engine(prepared));
+        int found = 0, elsewhere = 0;
+        const auto compare = [&](const std::optional<CostLattice>& cpu, const std::optional<CostLattice>& gpu) {
+            if (!cpu && !gpu) return;
+            ++found;
+            if (!cpu || !gpu || cpu->centre != gpu->centre) {
+                ++elsewhere;
+                return;
+            }
+            for (std::size_t k = 0; k < cpu->costs.size(); ++k) {
+                ASSERT_EQ(std::isfinite(cpu->costs[k]), std::isfinite(gpu->costs[k]));
+                if (!std::isfinite(cpu->costs[k])) continue;
+                EXPECT_NEAR(cpu->costs[k], gpu->costs[k], 2e-4) << radius;
+            }
+        };
+        for (std::size_t n = 0; n < blocks.size(); ++n) {
+            compare(by_cpu[n].forward, by_gpu[n].forward);
+            compare(by_cpu[n].back, by_gpu[n].back);
+        }
+        EXPECT_GT(found, 20) << radius;
+        EXPECT_LE(elsewhere, found / 20) << radius;
+    }
+}
+
 // Buffers that the larger search of an image before left behind must not show.
 TEST(ImageEngine, TheDeviceLooksForFewerBlocksAsForMany) {
     const Scene scene;

@@ -74,6 +74,24 @@ TEST_F(BufferTest, ComesDownThroughMappedMemory) {
     EXPECT_TRUE(fetched(0).empty());
 }
 
+TEST_F(BufferTest, SeveralComeDownTogether) {
+    const std::vector<int> one{1, 2, 3}, other{4, 5};
+    const Buffer<int> first(device, one, "one"), empty(device, 1, "nothing of it"), second(device, other, "other");
+    const std::array pieces{Readback::Piece{first, first.bytes()}, Readback::Piece{empty, 0},
+                            Readback::Piece{second, second.bytes()}};
+    Readback readback(device, Readback::bytes_of(pieces), "mapped values");
+    const auto fetched = readback.fetch(pieces);
+    const auto values = [&](std::size_t n) {
+        const auto* begin = reinterpret_cast<const int*>(fetched.at(n).data());
+        return std::vector<int>(begin, begin + fetched[n].size() / sizeof(int));
+    };
+    EXPECT_EQ(values(0), one);
+    EXPECT_TRUE(values(1).empty());
+    EXPECT_EQ(values(2), other);
+    Readback smaller(device, first.bytes(), "too little");
+    EXPECT_THROW((void)smaller.fetch(pieces), InvalidInput);
+}
+
 TEST_F(BufferTest, RefusesToComeDownIntoLess) {
     const Buffer<int> small(device, 3, "small"), large(device, 5, "large");
     Readback readback(device, 4 * sizeof(int), "mapped values");

@@ -3,10 +3,13 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
+#include <algorithm>
+#include <numeric>
 #include <string>
 #include <vector>
 
 #include "core/errors.hpp"
+#include "tled/detail/parallel.hpp"
 #include "tled/detail/springs.hpp"
 
 namespace tissuewarp::tled::detail {
@@ -16,6 +19,8 @@ using Eigen::Matrix3Xd;
 using Eigen::Vector3d;
 
 namespace {
+
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 // Nodes connected with `seed` by elements. `visited` marks them.
 std::vector<int> connected_nodes(const RestState& rest, int seed, std::vector<bool>& visited) {
@@ -41,27 +46,31 @@ std::vector<int> connected_nodes(const RestState& rest, int seed, std::vector<bo
 
 // Rᵀ K R of what holds the piece, for R the three translations and three rotations (scaled by the piece's radius) about
 // its centre. Springs count by the ratio to the stiffest one, prescribed components as one.
-Eigen::Matrix<double, 6, 6> rigid_resistance(const RestState& rest, const std::vector<int>& piece,
-                                             const NodalConditions& conditions, const std::vector<int>& spring_of,
-                                             double spring_scale) {
+Matrix6d rigid_resistance(const RestState& rest, const std::vector<int>& piece, const NodalConditions& conditions,
+                          const std::vector<int>& spring_of, double spring_scale) {
     Vector3d centre = Vector3d::Zero();
     for (const int node : piece) centre += rest.position.col(node) / static_cast<double>(piece.size());
     double radius = 0.0;
     for (const int node : piece) radius = std::max(radius, (rest.position.col(node) - centre).norm());
 
-    Eigen::Matrix<double, 6, 6> resistance = Eigen::Matrix<double, 6, 6>::Zero();
-    for (const int node : piece) {
+    const auto of_node = [&](int node, Matrix6d& resistance) {
         Matrix3d hold = conditions.constrained.col(node).cast<double>().asDiagonal();
         if (spring_of[node] >= 0) {
             hold += spring_matrix(conditions, spring_of[node]) / spring_scale;
         }
-        if (hold.isZero(0.0)) continue;
+        if (hold.isZero(0.0)) return;
         const Vector3d x = radius > 0.0 ? Vector3d((rest.position.col(node) - centre) / radius) : Vector3d::Zero();
         Eigen::Matrix<double, 3, 6> motion;
         motion << Matrix3d::Identity(), Matrix3d{{0, x[2], -x[1]}, {-x[2], 0, x[0]}, {x[1], -x[0], 0}};
         resistance += motion.transpose() * hold * motion;
-    }
-    return resistance;
+    };
+    constexpr std::size_t some = 256;  // nodes of a sum: the same for any number of threads
+    std::vector<Matrix6d> sums((piece.size() + some - 1) / some, Matrix6d::Zero());
+    parallel_ranges(0, sums.size(), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t n = begin; n < end; ++n)
+            for (std::size_t k = n * some; k < std::min(piece.size(), (n + 1) * some); ++k) of_node(piece[k], sums[n]);
+    });
+    return std::accumulate(sums.begin(), sums.end(), Matrix6d(Matrix6d::Zero()));
 }
 
 }  // namespace
@@ -91,7 +100,7 @@ void require_held(const RestState& rest, const std::vector<std::vector<int>>& pi
         const int seed = piece.front();
         if (piece.size() == 1 && conditions.constrained.col(seed).all()) continue;
         const auto resistance = rigid_resistance(rest, piece, conditions, spring_of, largest > 0 ? largest : 1.0);
-        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> modes(resistance, Eigen::EigenvaluesOnly);
+        const Eigen::SelfAdjointEigenSolver<Matrix6d> modes(resistance, Eigen::EigenvaluesOnly);
         if (modes.eigenvalues()[0] > rigid * modes.eigenvalues()[5]) continue;
         const int free = static_cast<int>((modes.eigenvalues().array() <= rigid * modes.eigenvalues()[5]).count());
         throw InvalidInput(

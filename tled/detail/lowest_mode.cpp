@@ -1,11 +1,13 @@
 #include "tled/detail/lowest_mode.hpp"
 
+#include "tled/detail/parallel.hpp"
+
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
-#include <vector>
 
 namespace tissuewarp::tled::detail {
 
@@ -15,32 +17,57 @@ using Eigen::VectorXd;
 
 namespace {
 
+constexpr Eigen::Index piece = 512;  // entries, that stay in the cache: large vectors are read once for all they serve
+
+/// visit(first, size, number) for the pieces of vectors, in all threads.
+template <class Visit>
+void for_each_piece(Eigen::Index entries, const Visit& visit) {
+    const Eigen::Index pieces = (entries + piece - 1) / piece;
+    parallel_ranges(0, static_cast<std::size_t>(pieces), 1, [&](std::size_t begin, std::size_t end) {
+        for (auto number = static_cast<Eigen::Index>(begin); number < static_cast<Eigen::Index>(end); ++number)
+            visit(number * piece, std::min(piece, entries - number * piece), number);
+    });
+}
+
+auto part(const Matrix3Xd& x, Eigen::Index first, Eigen::Index size) {
+    return Eigen::Map<const Eigen::ArrayXd>(x.data() + first, size);
+}
+auto part(Matrix3Xd& x, Eigen::Index first, Eigen::Index size) {
+    return Eigen::Map<Eigen::ArrayXd>(x.data() + first, size);
+}
+
 /// A vector with its product.
 struct Direction {
     Matrix3Xd x, Kx;
 };
+using Directions = std::array<Direction, 3>;
 
 /// xᵀ K x and xᵀ D x of directions.
 struct InnerProducts {
     MatrixXd K, D;
 };
 
-/// In pieces that stay in the cache: large vectors are read once for all products.
-InnerProducts inner_products(const std::vector<Direction>& directions, const Matrix3Xd& D) {
-    constexpr Eigen::Index piece = 512;
-    const auto count = static_cast<Eigen::Index>(directions.size());
-    InnerProducts sum{MatrixXd::Zero(count, count), MatrixXd::Zero(count, count)};
-    for (Eigen::Index first = 0; first < D.size(); first += piece) {
-        const Eigen::Index size = std::min(piece, D.size() - first);
-        const auto part = [&](const Matrix3Xd& x) { return Eigen::Map<const VectorXd>(x.data() + first, size); };
-        for (Eigen::Index i = 0; i < count; ++i) {
-            const VectorXd weighted = part(D).cwiseProduct(part(directions[i].x));
-            for (Eigen::Index j = 0; j <= i; ++j) {
-                sum.D(i, j) += weighted.dot(part(directions[j].x));
-                sum.K(i, j) += part(directions[i].Kx).dot(part(directions[j].x));
+/// Of the first `count` directions; the same numbers for any number of threads.
+InnerProducts inner_products(const Directions& directions, std::size_t count, const Matrix3Xd& D) {
+    const auto size = static_cast<Eigen::Index>(count);
+    Eigen::MatrixXd sums(2 * count * count, (D.size() + piece - 1) / piece);  // of each piece
+    for_each_piece(D.size(), [&](Eigen::Index first, Eigen::Index entries, Eigen::Index number) {
+        for (std::size_t i = 0, n = 0; i < count; ++i) {
+            const Eigen::Array<double, Eigen::Dynamic, 1, 0, piece> weighted =
+                part(D, first, entries) * part(directions[i].x, first, entries);
+            for (std::size_t j = 0; j <= i; ++j) {
+                const auto other = part(directions[j].x, first, entries);
+                sums(n++, number) = (part(directions[i].Kx, first, entries) * other).sum();
+                sums(n++, number) = (weighted * other).sum();
             }
         }
-    }
+    });
+    InnerProducts sum{MatrixXd::Zero(size, size), MatrixXd::Zero(size, size)};
+    for (Eigen::Index i = 0, n = 0; i < size; ++i)
+        for (Eigen::Index j = 0; j <= i; ++j) {
+            sum.K(i, j) = sums.row(n++).sum();
+            sum.D(i, j) = sums.row(n++).sum();
+        }
     sum.K = sum.K.selfadjointView<Eigen::Lower>();
     sum.D = sum.D.selfadjointView<Eigen::Lower>();
     return sum;
@@ -63,37 +90,47 @@ RitzPair lowest_in(const InnerProducts& products) {
     return {ritz.eigenvalues()[0], basis * ritz.eigenvectors().col(0)};
 }
 
-Direction combined(const std::vector<Direction>& directions, const VectorXd& weights) {
-    Direction sum{weights[0] * directions[0].x, weights[0] * directions[0].Kx};
-    for (std::size_t k = 1; k < directions.size(); ++k) {
-        sum.x += weights[static_cast<Eigen::Index>(k)] * directions[k].x;
-        sum.Kx += weights[static_cast<Eigen::Index>(k)] * directions[k].Kx;
-    }
-    return sum;
+/// The mode takes its place and the way that led there that of the last; then downhill, without its product, is that of
+/// the mode.
+void advance(const RitzPair& lowest, const Matrix3Xd& D, Directions& directions) {
+    auto& [mode, downhill, last] = directions;
+    const double w0 = lowest.weights[0], w1 = lowest.weights[1],
+                 w2 = lowest.weights.size() > 2 ? lowest.weights[2] : 0.0;
+    for_each_piece(D.size(), [&](Eigen::Index first, Eigen::Index size, Eigen::Index) {
+        const auto move = [&](Matrix3Xd& mode_part, const Matrix3Xd& downhill_part, Matrix3Xd& last_part) {
+            auto way = part(last_part, first, size);
+            way = w1 * part(downhill_part, first, size) + w2 * way;
+            part(mode_part, first, size) = w0 * part(mode_part, first, size) + way;
+        };
+        move(mode.x, downhill.x, last.x);
+        move(mode.Kx, downhill.Kx, last.Kx);
+        part(downhill.x, first, size) =
+            part(mode.Kx, first, size) / part(D, first, size) - lowest.value * part(mode.x, first, size);
+    });
 }
 
 }  // namespace
 
 Mode lowest_mode(const Product& multiply_K, const Matrix3Xd& D, const Matrix3Xd& start, const Patience& patience) {
     constexpr int most_steps = 1000;
-    std::vector<Direction> directions{{start, multiply_K(start)}};
-    RitzPair lowest = lowest_in(inner_products(directions, D));
-    Direction mode = combined(directions, lowest.weights), last;
+    const Matrix3Xd zero = Matrix3Xd::Zero(3, D.cols());
+    Directions directions{{{start, multiply_K(start)}, {zero, zero}, {zero, zero}}};
+    auto& [mode, downhill, last] = directions;
+    RitzPair lowest = lowest_in(inner_products(directions, 1, D));
+    lowest.weights.conservativeResizeLike(VectorXd::Zero(2));
     double before = lowest.value;
     for (int step = 1; step <= most_steps; ++step) {
-        const Matrix3Xd downhill = mode.Kx.cwiseQuotient(D) - lowest.value * mode.x;
-        if (downhill.isZero(0)) break;
-        directions = {std::move(mode), {downhill, multiply_K(downhill)}};
-        if (last.x.size() > 0 && !last.x.isZero(0)) directions.push_back(std::move(last));
-        lowest = lowest_in(inner_products(directions, D));
-        mode = combined(directions, lowest.weights);
-        VectorXd onward = lowest.weights;
-        onward[0] = 0;
-        last = combined(directions, onward);
+        advance(lowest, D, directions);
+        const bool moved = !lowest.weights.tail(lowest.weights.size() - 1).isZero(0);
+        downhill.Kx = multiply_K(downhill.x);
+        const InnerProducts products = inner_products(directions, moved ? 3 : 2, D);
+        if (products.D(1, 1) == 0) return {lowest.value, std::move(mode.x)};
+        lowest = lowest_in(products);
         if (step % patience.steps != 0) continue;
         if (lowest.value > (1 - patience.least_gain) * before) break;
         before = lowest.value;
     }
+    advance(lowest, D, directions);
     return {lowest.value, std::move(mode.x)};
 }
 

@@ -2,6 +2,7 @@
 /// Springs of NodalConditions as matrices and forces.
 
 #include "tled/conditions.hpp"
+#include "tled/detail/parallel.hpp"
 
 #include <Eigen/Core>
 
@@ -15,10 +16,12 @@ inline Eigen::Matrix3d spring_matrix(const NodalConditions& conditions, int spri
 
 /// y += K u at every spring, mN.
 inline void add_spring_resistance(const NodalConditions& conditions, const Eigen::Matrix3Xd& u, Eigen::Matrix3Xd& y) {
-    for (int s = 0; s < static_cast<int>(conditions.spring_node.size()); ++s) {
-        const int node = conditions.spring_node[static_cast<std::size_t>(s)];
-        y.col(node) += spring_matrix(conditions, s) * u.col(node);
-    }
+    parallel_ranges(0, conditions.spring_node.size(), 256, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t s = begin; s < end; ++s) {
+            const int node = conditions.spring_node[s];
+            y.col(node) += spring_matrix(conditions, static_cast<int>(s)) * u.col(node);
+        }
+    });
 }
 
 /// External forces plus K·target of the springs, mN, 3 × N.
