@@ -1,11 +1,11 @@
 // Registration from every kind of intraoperative data against known truth, with sweeps of one option:
 //     registration_bench DATA [--case PART] [--OPTION V1,V2,…] [--mesh-edge MM] [--poisson NU] [--count POINTS]
 //                        [--errors FOLDER] [--repeats N] [--device cpu|gpu|auto]
-// DATA holds phantom-brainshift, phantom-brain-sag, phantom-liver and lung-ct; PART selects cases whose name holds it. Errors are at
-// the landmarks or, where there is a true field, at its points in the mask; FOLDER gets them point by point, as CSV.
-// With --repeats every update runs N times, and a line per case tells the time from data in to warped image out, the
-// model prepared: on the processor (the default) through the displacement field of all voxels, on a GPU through
-// GpuWarp, whose voxels outside the mesh follow the placement.
+// DATA holds phantom-brainshift, phantom-brain-sag, phantom-liver and lung-ct; PART selects cases whose name holds it.
+// Errors are at the landmarks or, where there is a true field, at its points in the mask; FOLDER gets them point by
+// point, as CSV. With --repeats every update runs N times, and a line per case tells the time from data in to warped
+// image out, the model prepared: on the processor (the default) through the displacement field of all voxels, on a GPU
+// through GpuWarp, whose voxels outside the mesh follow the placement.
 
 #include "core/errors.hpp"
 #include "imaging/image_io.hpp"

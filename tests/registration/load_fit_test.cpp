@@ -89,11 +89,11 @@ TEST(LoadFit, IsTheMeanUnderThePriorOfSmoothLoads) {
         units.block<3, 3>(3 * held[k], 3 * Eigen::Index(k)).setIdentity();
     }
     const detail::Posterior with(prepared, seen), without(prepared, unseen);
-    const detail::LoadShapes shapes(prepared, without, energy, 8);
+    const detail::LoadShapes shapes(detail::principal_loads(prepared, 8), without, energy);
     const detail::LoadFit fit(shapes, with);
     const VectorXd shown = with.inverse(pulls), found = shown + fit.answers(fit.coefficients(shown, size));
 
-    const MatrixXd answers = without.inverse(units), loads = shapes.forces(prepared);
+    const MatrixXd answers = without.inverse(units), loads = shapes.scale() * detail::principal_loads(prepared, 8);
     const MatrixXd covariance =
         energy * answers + size * size * without.inverse(loads) * (loads.transpose() * answers);  // with the held nodes
     const MatrixXd between =
@@ -119,7 +119,8 @@ TEST(LoadFit, LoadsOfSizeOneHaveTheStrainEnergyOfOneDeviation) {
     const PreparedModel prepared = organ(12);
     const double energy = 60;
     const detail::Posterior unseen(prepared, prior(prepared, energy));
-    const MatrixXd loads = detail::LoadShapes(prepared, unseen, energy, 16).forces(prepared);
+    const MatrixXd drawn = detail::principal_loads(prepared, 16);
+    const MatrixXd loads = detail::LoadShapes(drawn, unseen, energy).scale() * drawn;
     EXPECT_NEAR(0.5 * loads.cwiseProduct(unseen.inverse(loads)).sum() / energy, 1, 1e-9);
 }
 
