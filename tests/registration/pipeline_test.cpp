@@ -103,8 +103,10 @@ TEST(Pipeline, AWrongPieceOfALabelMapStaysLocal) {
     options.align = false;
     const auto result = update(prepare(labels, coarse()), {.labels = wrong}, options);
     const auto& deformation = result.deformation;
-    for (Eigen::Index n = 0; n < deformation.displacement.cols(); ++n)
-        if ((deformation.mesh.nodes.col(n) - top).norm() > 30) EXPECT_LT(deformation.displacement.col(n).norm(), 0.3);
+    for (Eigen::Index n = 0; n < deformation.displacement.cols(); ++n) {
+        if ((deformation.mesh.nodes.col(n) - top).norm() < 30) continue;
+        EXPECT_LT(deformation.displacement.col(n).norm(), 0.3);
+    }
     EXPECT_LT(std::sqrt(deformation.displacement.colwise().squaredNorm().mean()), 0.5);
 }
 
