@@ -157,17 +157,16 @@ private:
         }
     }
 
-    /// Half of a time budget is kept for what follows.
+    /// Half of a time budget is kept for what follows; nine tenths where labels are seen, whose models are large: the
+    /// coarser mesh that their loads are found on takes longer than all before it.
     [[nodiscard]] bool loads_are_looked_for() const {
+        const double kept = weight_is_unknown() ? 0.9 : 0.5;
         return (placement_is_free() || weight_is_unknown()) && options_.tissue.load_shapes > 0 && !result_.cut_short &&
-               pace_.share_left() > 0.5;
+               pace_.share_left() > kept;
     }
 
-    /// Labels show the boundary all over, whatever presses on it there: what they do not show is a force within. The
-    /// mesh that it is found on takes longer than a time budget leaves.
-    [[nodiscard]] bool weight_is_unknown() const {
-        return evidence_.labels && !evidence_.image && !evidence_.placed && options_.time_budget_s <= 0;
-    }
+    /// Labels show the boundary all over, whatever presses on it there: what they do not show is a force within.
+    [[nodiscard]] bool weight_is_unknown() const { return evidence_.labels && !evidence_.image && !evidence_.placed; }
 
     detail::FoundLoads find_loads() {
         if (!weight_is_unknown()) return load_finder_.find(detail::LoadKind::Smooth, result_.pulls, observer_);

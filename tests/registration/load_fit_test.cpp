@@ -202,14 +202,6 @@ TEST(UnknownWeights, OfAnOrganThatLiesStillAreNothing) {
     EXPECT_LT(result.pulls.load_size, 0.2);
 }
 
-// Nor are they looked for where there is little time.
-TEST(UnknownWeights, AreNotLookedForWithinATimeBudget) {
-    const PreparedModel prepared = organ(12);
-    UpdateOptions options = with_shapes(48);
-    options.time_budget_s = 1000;
-    EXPECT_EQ(update(prepared, {.labels = labels_after(prepared, sagged(prepared))}, options).pulls.load_size, 0);
-}
-
 // Around an organ that is held, hold and loads are one.
 TEST(UnknownLoads, AreNotLookedForWhereTheOrganIsHeld) {
     const PreparedModel prepared = organ(12);
