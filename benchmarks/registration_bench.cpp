@@ -1,11 +1,11 @@
 // Registration from every kind of intraoperative data against known truth, with sweeps of one option:
 //     registration_bench DATA [--case PART] [--OPTION V1,V2,…] [--mesh-edge MM] [--poisson NU] [--count POINTS]
 //                        [--errors FOLDER] [--repeats N] [--device cpu|gpu|auto]
-// DATA holds phantom-brainshift, phantom-brain-sag and lung-ct; PART selects cases whose name holds it. Errors are at
-// the landmarks or, where there is a true field, at its points in the mask; FOLDER gets them point by point, as CSV.
-// With --repeats every update runs N times, and a line per case tells the time from data in to warped image out, the
-// model prepared: on the processor (the default) through the displacement field of all voxels, on a GPU through
-// GpuWarp, whose voxels outside the mesh follow the placement.
+// DATA holds phantom-brainshift, phantom-brain-sag, phantom-liver and lung-ct; PART selects cases whose name holds it.
+// Errors are at the landmarks or, where there is a true field, at its points in the mask; FOLDER gets them point by
+// point, as CSV. With --repeats every update runs N times, and a line per case tells the time from data in to warped
+// image out, the model prepared: on the processor (the default) through the displacement field of all voxels, on a GPU
+// through GpuWarp, whose voxels outside the mesh follow the placement.
 
 #include "core/errors.hpp"
 #include "imaging/image_io.hpp"
@@ -112,6 +112,21 @@ std::vector<std::function<Case()>> cases(const fs::path& data, const std::string
             return study;
         };
     };
+    /// Label maps alone.
+    const auto label_case = [](const fs::path& folder, const std::string& moving, const std::string& fixed) {
+        return Case{{},
+                    imaging::read_volume(folder / "preop.nii.gz"),
+                    imaging::read_labels(folder / moving),
+                    {.labels = imaging::read_labels(folder / fixed)},
+                    {}};
+    };
+    const auto organs_case = [label_case](const fs::path& folder) {
+        return [label_case, folder] {
+            Case study = label_case(folder, "preop_labels.nii.gz", "intraop_labels.nii.gz");
+            study.targets = read_landmarks(folder / "landmarks.csv");
+            return study;
+        };
+    };
     const auto surface_case = [](const fs::path& folder, double deviation_mm, bool align) {
         return [folder, deviation_mm, align] {
             Case study{{},
@@ -130,6 +145,18 @@ std::vector<std::function<Case()>> cases(const fs::path& data, const std::string
     add("brain sag degraded image", sag_case("intraop_degraded.nii.gz"));
     add("lung image and masks", lung_case(true));
     add("lung image", lung_case(false));
+    add("brain shift labels", organs_case(shift));
+    add("liver labels", organs_case(liver));
+    add("brain sag masks", [label_case, sag] {
+        Case study = label_case(sag, "preop_mask.nii.gz", "intraop_mask.nii.gz");
+        study.targets = field_targets(sag / "truth_forward.nii.gz", sag / "preop_mask.nii.gz");
+        return study;
+    });
+    add("lung masks", [lung_case] {
+        Case study = lung_case(true)();
+        study.seen.image.reset();
+        return study;
+    });
     return result;
 }
 

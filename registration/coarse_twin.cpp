@@ -56,7 +56,8 @@ std::vector<tled::Spring> sampled(const std::vector<tled::Spring>& springs, cons
     for (const InterfaceNode& node : to.interfaces.nodes()) {
         Eigen::Index nearest = 0;
         (places.colwise() - to.model.mesh.nodes.col(node.node)).colwise().squaredNorm().minCoeff(&nearest);
-        result.push_back({node.node, springs[static_cast<std::size_t>(nearest)].stiffness, Eigen::Vector3d::Zero()});
+        const tled::Spring& spring = springs[static_cast<std::size_t>(nearest)];
+        result.push_back({node.node, spring.stiffness, spring.target});
     }
     const double share = total(springs) / total(result);
     for (tled::Spring& spring : result) spring.stiffness *= share;

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <set>
 #include <tuple>
 
 namespace tissuewarp::registration {
@@ -48,6 +49,24 @@ Eigen::Matrix3Xd Interfaces::normals(const Eigen::Matrix3Xd& positions) const {
     }
     normals.colwise().normalize();
     return normals;
+}
+
+std::vector<std::vector<int>> Interfaces::neighbours() const {
+    std::vector<std::set<int>> adjacent(nodes_.size());
+    for (const std::array<int, 3>& entries : face_entries_)
+        for (const int entry : entries)
+            adjacent[static_cast<std::size_t>(entry)].insert(entries.begin(), entries.end());
+    std::vector<std::vector<int>> result;
+    for (std::size_t entry = 0; entry < adjacent.size(); ++entry) {
+        std::set<int> near;
+        for (const int next : adjacent[entry]) {
+            const std::set<int>& beyond = adjacent[static_cast<std::size_t>(next)];
+            near.insert(beyond.begin(), beyond.end());
+        }
+        near.erase(static_cast<int>(entry));
+        result.emplace_back(near.begin(), near.end());
+    }
+    return result;
 }
 
 namespace {

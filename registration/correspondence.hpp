@@ -29,6 +29,8 @@ public:
     [[nodiscard]] std::vector<InterfaceNode>& nodes() { return nodes_; }
     /// Unit normals at other node positions (3 × mesh nodes), one column per interface node.
     [[nodiscard]] Eigen::Matrix3Xd normals(const Eigen::Matrix3Xd& positions) const;
+    /// Positions in nodes() of those that two edges or fewer along the same interface lead to, without the node itself.
+    [[nodiscard]] std::vector<std::vector<int>> neighbours() const;
 
 private:
     std::vector<InterfaceNode> nodes_;

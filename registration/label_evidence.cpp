@@ -17,13 +17,17 @@ std::vector<int> labels_of(const PreparedModel& prepared) {
 
 LabelEvidence::LabelEvidence(const PreparedModel& prepared, const imaging::Volume& fixed_labels,
                              const UpdateOptions& options)
-    : prepared_(prepared), options_(options), fixed_(fixed_labels, labels_of(prepared)) {}
+    : prepared_(prepared),
+      options_(options),
+      fixed_(fixed_labels, labels_of(prepared)),
+      neighbours_(prepared.interfaces.neighbours()) {}
 
 Contribution LabelEvidence::contribution(const RoundPlan& plan, const State& state) const {
     const Interfaces& interfaces = prepared_.interfaces;
     const Eigen::Matrix3Xd normals = interfaces.normals(prepared_.model.mesh.nodes + state.displacement);
     std::vector<Match> matches = match_interfaces(prepared_, fixed_, state, normals, plan, options_.max_angle_deg);
-    if (plan.last) trim(matches, options_.trimmed_share, options_.residual_scale_mm);
+    weigh(matches, neighbours_, plan.scale_mm);
+    bound(matches, plan.most_step_mm);
     Contribution result{matched_springs(interfaces, matches, normals, state.displacement, prepared_.options),
                         holding_springs(interfaces, state.displacement, prepared_.options),
                         static_cast<int>(matches.size()),

@@ -1,24 +1,19 @@
 #include "registration/detail/load_fit.hpp"
 
-#include "registration/detail/unknown_loads.hpp"
-
 #include <Eigen/Eigenvalues>
 
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace tissuewarp::registration::detail {
 
-LoadShapes::LoadShapes(const PreparedModel& prepared, const Posterior& unseen, double energy, int count)
-    : forces_(principal_loads(prepared, count)), answers_(unseen.inverse(forces_)), energy_(energy) {
+LoadShapes::LoadShapes(Eigen::MatrixXd loads, const Posterior& unseen, double energy)
+    : forces_(std::move(loads)), answers_(unseen.inverse(forces_)), energy_(energy) {
     const double drawn = 0.5 * answers_.cwiseProduct(forces_).sum();
     scale_ = std::sqrt(energy / drawn);
     forces_ *= scale_;
     answers_ *= scale_;
-}
-
-Eigen::MatrixXd LoadShapes::forces(const PreparedModel& prepared) const {
-    return scale_ * principal_loads(prepared, static_cast<int>(forces_.cols()));
 }
 
 LoadFit::LoadFit(const LoadShapes& shapes, const Posterior& seen)

@@ -1,5 +1,7 @@
 #include "registration/detail/matching.hpp"
 
+#include "registration/detail/percentile.hpp"
+
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -22,22 +24,26 @@ std::vector<Match> match_interfaces(const PreparedModel& prepared, const LabelBo
         const double distance = crossing - node.offset;
         matches[i].found = true;
         matches[i].held_back = std::abs(distance) > plan.most_step_mm;
-        matches[i].distance_mm = std::clamp(distance, -plan.most_step_mm, plan.most_step_mm);
-        matches[i].weight = robust_weight(distance, plan.scale_mm);
+        matches[i].distance_mm = distance;
     });
     return matches;
 }
 
-void trim(std::vector<Match>& matches, double share, double scale_mm) {
-    std::vector<double> distances;
-    for (const Match& match : matches)
-        if (match.found) distances.push_back(std::abs(match.distance_mm));
-    if (distances.empty()) return;
-    const auto kept = static_cast<std::size_t>((1 - share) * double(distances.size() - 1));
-    std::nth_element(distances.begin(), distances.begin() + static_cast<std::ptrdiff_t>(kept), distances.end());
-    const double limit = std::max(distances[kept], scale_mm);
-    for (Match& match : matches)
-        if (std::abs(match.distance_mm) > limit) match.weight = 0;
+void weigh(std::vector<Match>& matches, const std::vector<std::vector<int>>& neighbours, double scale_mm) {
+    tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t i) {
+        if (!matches[i].found) return;
+        std::vector<double> near;
+        for (const int n : neighbours[i])
+            if (const Match& other = matches[static_cast<std::size_t>(n)]; other.found)
+                near.push_back(other.distance_mm);
+        const double expected = near.empty() ? 0 : percentile(near, 50);
+        const double deviation = std::abs(matches[i].distance_mm - expected);
+        matches[i].weight = deviation <= scale_mm ? 1 : scale_mm / deviation;
+    });
+}
+
+void bound(std::vector<Match>& matches, double most_step_mm) {
+    for (Match& match : matches) match.distance_mm = std::clamp(match.distance_mm, -most_step_mm, most_step_mm);
 }
 
 double mean_residual(const std::vector<Match>& matches) {

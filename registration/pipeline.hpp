@@ -129,7 +129,8 @@ struct TissuePrior {
     double strain_length_mm = 10;   ///< … of this size
     double free_motion_mm = 20;     ///< of the organ's surface, from where the organ lies as a whole
     double held_motion_mm = 5;      ///< the same where the images are in one frame: what is around holds the organ
-    int load_shapes = 48;  ///< of unknown loads that move what points do not show, where the placement is free; 0: none
+    int load_shapes = 48;  ///< of unknown loads that move what points do not show, where the placement is free; 0:
+                           ///< none, and no unknown weight where labels are seen
 };
 
 /// What acts on the tissue in the operating room and did not when the preoperative image was taken. Only its size
@@ -177,8 +178,7 @@ struct UpdateOptions {
     double first_range_mm = 15.0;  ///< correspondence search range of the first round
     double last_range_mm = 4.0;    ///< and of the last, geometric in between
     double max_angle_deg = 50.0;   ///< between mesh normal and image boundary normal
-    double residual_scale_mm = 1.0;  ///< Geman–McClure scale of the last round for what the model cannot follow
-    double trimmed_share = 0.02;     ///< of the matches, dropped in the last round: those the model did not follow
+    double residual_scale_mm = 1.0;  ///< of the last round's weights for what a label map or an image shows wrongly
     /// Seconds that an update may take. When they run short the last round comes early, and where they do not suffice
     /// for that either, the rounds end: the result then says so. 0: as long as it takes.
     double time_budget_s = 0;
@@ -252,7 +252,7 @@ struct LastPulls {
     std::vector<tled::Spring> ground;    ///< the prior where points alone show the organ; otherwise none
     std::vector<tled::Spring> supports;  ///< anchors, and contact with rigid neighbours
     Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();  ///< moving → fixed, as it was in that round
-    Eigen::Matrix3Xd loads;       ///< on the nodes, 3 × N, mN, those found among them
+    Eigen::Matrix3Xd loads;                                       ///< on the nodes, 3 × N, mN, those found among them
     double energy = 1;            ///< mN mm that weighs as much as one standard deviation of a datum
     bool free_placement = false;  ///< nothing but the data says where the organ lies: the ground moves with it
     double load_size = 0;         ///< of unknown loads that were found: they strain tissue by about its square times

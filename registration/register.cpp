@@ -6,6 +6,7 @@
 #include "registration/detail/doubts.hpp"
 #include "registration/detail/engine_choice.hpp"
 #include "registration/detail/evidence_set.hpp"
+#include "registration/detail/ground.hpp"
 #include "registration/detail/load_finder.hpp"
 #include "registration/detail/loads.hpp"
 #include "registration/detail/pace.hpp"
@@ -132,7 +133,7 @@ private:
         return round < last ? last : options_.rematches;
     }
 
-    /// What points show was done by loads that nobody stated; these also move what no point shows. A second time, since
+    /// What data show was done by loads that nobody stated; these also move what they do not show. A second time, since
     /// the first brings more points within reach. Where tissue does not bear them, it stays as it was without.
     void explain_by_loads() {
         constexpr int times = 2;
@@ -141,7 +142,7 @@ private:
             const detail::State state = state_;
             const UpdateResult result = result_;
             detail::Stopwatch stopwatch;
-            const detail::FoundLoads found = load_finder_.find(result_.pulls, observer_);
+            const detail::FoundLoads found = find_loads();
             finding_seconds_ += stopwatch.lap("").seconds;
             try {
                 loads_ = stated + found.forces;
@@ -156,9 +157,24 @@ private:
         }
     }
 
-    /// Half of a time budget is kept for what follows.
+    /// Half of a time budget is kept for what follows; nine tenths where labels are seen, whose models are large: the
+    /// coarser mesh that their loads are found on takes longer than all before it.
     [[nodiscard]] bool loads_are_looked_for() const {
-        return placement_is_free() && options_.tissue.load_shapes > 0 && !result_.cut_short && pace_.share_left() > 0.5;
+        const double kept = weight_is_unknown() ? 0.9 : 0.5;
+        return (placement_is_free() || weight_is_unknown()) && options_.tissue.load_shapes > 0 && !result_.cut_short &&
+               pace_.share_left() > kept;
+    }
+
+    /// Labels show the boundary all over, whatever presses on it there: what they do not show is a force within.
+    [[nodiscard]] bool weight_is_unknown() const { return evidence_.labels && !evidence_.image && !evidence_.placed; }
+
+    detail::FoundLoads find_loads() {
+        if (!weight_is_unknown()) return load_finder_.find(detail::LoadKind::Smooth, result_.pulls, observer_);
+        LastPulls pulls = result_.pulls;
+        pulls.ground = detail::ground_springs(prepared_, evidence_.energy,
+                                              [this](const InterfaceNode&) { return options_.tissue.free_motion_mm; });
+        pulls.free_placement = true;
+        return load_finder_.find(detail::LoadKind::Weight, pulls, observer_);
     }
 
     void settle_loads() {

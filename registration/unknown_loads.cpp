@@ -49,6 +49,12 @@ Columns weighted(const Columns& vectors, const Eigen::VectorXd& weights) {
     return result;
 }
 
+/// Loads and what holds the organ against them as a whole, all over its surface.
+Columns in_equilibrium(const Columns& loads, const Eigen::Matrix3Xd& nodes, const Eigen::VectorXd& areas) {
+    const Columns motions = rigid_motions(nodes), held = weighted(motions, areas);
+    return loads - held * (motions.transpose() * held).ldlt().solve(motions.transpose() * loads);
+}
+
 /// A smooth Gaussian field of vectors by random waves (Rahimi and Recht 2007), each component of variance 1.
 class SmoothField {
 public:
@@ -88,9 +94,16 @@ Columns unknown_loads(const PreparedModel& prepared, int count, std::uint64_t se
             if (areas[n] > 0) loads.block<3, 1>(3 * n, k) += areas[n] * tractions[draw](nodes.col(n));
         }
     });
-    // What holds the organ as a whole acts all over its surface.
-    const Columns motions = rigid_motions(nodes), held = weighted(motions, areas);
-    return loads - held * (motions.transpose() * held).ldlt().solve(motions.transpose() * loads);
+    return in_equilibrium(loads, nodes, areas);
+}
+
+Columns unknown_weights(const PreparedModel& prepared) {
+    const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
+    const Eigen::VectorXd densities = nodal_volumes(prepared.model.mesh) / radius_of(nodes);
+    Columns weights(nodes.size(), 3);
+    for (Eigen::Index n = 0; n < nodes.cols(); ++n)
+        weights.middleRows<3>(3 * n) = densities[n] * Eigen::Matrix3d::Identity();
+    return in_equilibrium(weights, nodes, nodal_areas(prepared));
 }
 
 Columns principal_loads(const PreparedModel& prepared, int count) {

@@ -17,6 +17,7 @@ private:
     const PreparedModel& prepared_;
     const UpdateOptions& options_;
     LabelBoundaryField fixed_;
+    std::vector<std::vector<int>> neighbours_;  // of interface nodes
 };
 
 }  // namespace tissuewarp::registration::detail

@@ -3,6 +3,7 @@
 
 #include "registration/detail/load_fit.hpp"
 
+#include <array>
 #include <optional>
 
 namespace tissuewarp::registration::detail {
@@ -12,24 +13,35 @@ struct FoundLoads {
     double size = 0;          ///< s of load_fit.hpp
 };
 
+/// What may act on the tissue.
+enum class LoadKind {
+    Smooth,  ///< body force, and tractions smooth over half the organ's radius
+    Weight   ///< body force alone
+};
+
 class LoadFinder {
 public:
-    /// The model outlives this.
+    /// `shapes` of smooth loads. The model outlives this.
     LoadFinder(const PreparedModel& prepared, int shapes) : prepared_(prepared), count_(shapes) {}
 
-    /// The loads that data pulling like `pulls` tell. The prior's springs are the same in every call. Of a model of
-    /// more than 6000 nodes they are found on a coarser mesh of the organ, since they are smooth and a factor would
-    /// take long. Throws InvalidInput where the springs do not hold the tissue, Cancelled.
-    FoundLoads find(const LastPulls& pulls, Observer& observer);
+    /// The loads of this kind that data pulling like `pulls` tell. The prior's springs are the same in every call. Of a
+    /// model of more than 6000 nodes they are found on a coarser mesh of the organ, since they are smooth and a factor
+    /// would take long. Throws InvalidInput where the springs do not hold the tissue, Cancelled.
+    FoundLoads find(LoadKind kind, const LastPulls& pulls, Observer& observer);
 
 private:
     const PreparedModel& prepared_;
     int count_;
     std::optional<PreparedModel> twin_;
-    std::optional<LoadShapes> shapes_;  // of the twin, or of the model
-    Eigen::MatrixXd forces_;            // theirs on the model's nodes
+    struct Shapes {
+        LoadShapes known;        // of the twin, or of the model
+        Eigen::MatrixXd forces;  // theirs on the model's nodes
+    };
+    std::array<std::optional<Shapes>, 2> shapes_;  // of each kind
 
-    [[nodiscard]] FoundLoads found(const PreparedModel& model, const LastPulls& pulls);
+    [[nodiscard]] Eigen::MatrixXd loads(LoadKind kind, const PreparedModel& model) const;
+    [[nodiscard]] const Shapes& shapes(LoadKind kind, const PreparedModel& model, const WeighedSprings& unseen);
+    [[nodiscard]] FoundLoads found(LoadKind kind, const PreparedModel& model, const LastPulls& pulls);
 };
 
 }  // namespace tissuewarp::registration::detail

@@ -18,16 +18,16 @@ namespace tissuewarp::registration::detail {
 /// Shapes of loads and what they do to tissue that no data hold.
 class LoadShapes {
 public:
-    /// `count` of them; `unseen` is of the prior's springs alone, `energy` is ε (mN mm).
-    LoadShapes(const PreparedModel& prepared, const Posterior& unseen, double energy, int count);
+    /// `loads` on the nodes, 3N × count, mN; `unseen` is of the prior's springs alone, `energy` is ε (mN mm).
+    LoadShapes(Eigen::MatrixXd loads, const Posterior& unseen, double energy);
 
-    /// B on the nodes of a mesh of the same organ, 3N × count, mN. Loads a of size s have the mean strain energy s² ε.
-    [[nodiscard]] Eigen::MatrixXd forces(const PreparedModel& prepared) const;
+    /// B over the loads given, so that loads a of size s have the mean strain energy s² ε.
+    [[nodiscard]] double scale() const { return scale_; }
 
 private:
     friend class LoadFit;
     Eigen::MatrixXd forces_, answers_;  // B and K⁻¹ B, 3N × count, mN and mm
-    double energy_, scale_ = 1;         // ε, and B over what is drawn
+    double energy_, scale_ = 1;         // ε, and B over what was given
 };
 
 class LoadFit {

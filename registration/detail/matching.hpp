@@ -11,8 +11,13 @@ namespace tissuewarp::registration::detail {
 std::vector<Match> match_interfaces(const PreparedModel& prepared, const LabelBoundaryField& fixed, const State& state,
                                     const Eigen::Matrix3Xd& normals, const RoundPlan& plan, double max_angle_deg);
 
-/// Drops the share of matches that the model follows least, where they are further off than `scale_mm` (Clatz 2005).
-void trim(std::vector<Match>& matches, double share, double scale_mm);
+/// Weighs each match by how far its distance is from the median of its neighbours' (Interfaces::neighbours), by Huber's
+/// function: 1 up to the scale, then the scale over that deviation (Huber, Ann Math Statist 35 (1964) 73). Where tissue
+/// resists, matches are off together with those about them; where a label map is wrong, alone.
+void weigh(std::vector<Match>& matches, const std::vector<std::vector<int>>& neighbours, double scale_mm);
+
+/// No match asks for more than `most_step_mm`.
+void bound(std::vector<Match>& matches, double most_step_mm);
 
 /// Weighted mean of |distance|, mm.
 double mean_residual(const std::vector<Match>& matches);

@@ -18,7 +18,7 @@ struct Match {
     bool found = false;
     bool held_back = false;  ///< the image's boundary lies further away than this round may pull
     double distance_mm = 0;  ///< along the normal, from the node's material boundary to the image's boundary
-    double weight = 0;       ///< in [0, 1]
+    double weight = 1;       ///< in [0, 1]
 };
 
 /// Springs from `displacement` (3 × N, moving frame) along `normals` (one column per interface node) to the matches.

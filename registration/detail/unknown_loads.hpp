@@ -13,6 +13,9 @@ namespace tissuewarp::registration::detail {
 /// that vary smoothly over half the organ's radius, of about 1 kPa. Only their shape tells; their size is arbitrary.
 Eigen::MatrixXd unknown_loads(const PreparedModel& prepared, int count, std::uint64_t seed);
 
+/// Unknown weight: the three uniform body forces of such loads, of variance 1 each, 3N × 3, mN.
+Eigen::MatrixXd unknown_weights(const PreparedModel& prepared);
+
 /// The `count` principal shapes of such loads, 3N × count, mN: with independent coefficients of variance 1 their sum is
 /// distributed as they are, as nearly as so many shapes can be (Karhunen and Loève, of 256 draws).
 Eigen::MatrixXd principal_loads(const PreparedModel& prepared, int count);

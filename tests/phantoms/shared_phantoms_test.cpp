@@ -54,15 +54,18 @@ TEST_F(SharedPhantoms, LungFromMasks) {
     const auto result = update(prepare(moving, compressible), {.labels = fixed}, on_cpu());
     const TargetError error = target_error(landmarks, PointTransform(result.deformation)(landmarks.moving));
     EXPECT_GT(error.before.mean, 30);
-    EXPECT_LT(error.after.mean, 5.5);  // elastix and plastimatch from masks: 5.67 and 7.12
+    EXPECT_LT(error.after.mean, 4.1);  // 3.98; elastix and plastimatch from masks: 5.67 and 7.12
     EXPECT_GT(dice(result.deformation, moving, fixed), 0.95);
     EXPECT_EQ(mesh_jacobians(result.deformation).folded, 0);
 }
 
-TEST_F(SharedPhantoms, ALungThatTissueResistsIsDoubted) {
+TEST_F(SharedPhantoms, ALungThatTissueResistsIsFollowedAndDoubted) {
     const auto moving = imaging::read_labels(data / "lung-ct" / "moving_mask.mha");
     const auto fixed = imaging::read_labels(data / "lung-ct" / "fixed_mask.mha");
+    const Landmarks landmarks = read_landmarks(data / "lung-ct" / "moving_pts.txt", data / "lung-ct" / "fixed_pts.txt");
     const auto result = update(prepare(moving), {.labels = fixed}, on_cpu());
+    const TargetError error = target_error(landmarks, PointTransform(result.deformation)(landmarks.moving));
+    EXPECT_LT(error.after.mean, 4.2);  // 3.90; 6.15 with weights that let go of the boundary
     ASSERT_FALSE(result.doubts.empty());
     EXPECT_NE(result.doubts.back().find("Poisson"), std::string::npos);
 }
@@ -88,7 +91,7 @@ TEST_F(SharedPhantoms, SaggedBrainFromMasks) {
                 ++count;
             }
     ASSERT_GT(count, 2000);
-    EXPECT_LT(sum / count, 1.1);  // mm; 3.7 before; plastimatch and elastix from masks: 1.23 and 1.53
+    EXPECT_LT(sum / count, 0.9);  // mm; 3.7 before; plastimatch and elastix from masks: 1.23 and 1.53
 }
 
 }  // namespace

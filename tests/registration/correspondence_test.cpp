@@ -4,6 +4,7 @@
 #include "core/errors.hpp"
 
 #include "meshing/primitives.hpp"
+#include "registration/detail/matching.hpp"
 #include "tests/support/label_shapes.hpp"
 
 #include <gtest/gtest.h>
@@ -13,6 +14,7 @@
 namespace tissuewarp::registration {
 namespace {
 
+using detail::Match;
 using Eigen::Vector3d;
 
 const shapes::Organ ball_organ{{0, 0, 0}, {40, 40, 40}, {0, 0, 0}, 15};
@@ -79,6 +81,74 @@ TEST(Interfaces, NormalsTurnWithTheMesh) {
     for (std::size_t i = 0; i < interfaces.nodes().size(); ++i)
         EXPECT_NEAR((turned.col(static_cast<Eigen::Index>(i)) - motion.linear() * interfaces.nodes()[i].normal).norm(),
                     0, 1e-12);
+}
+
+// In the middle of a face of 8 × 8 squares two edges lead no further than two squares, and never through the box.
+TEST(Interfaces, NeighboursAreTwoEdgesAwayOnTheSurface) {
+    const auto mesh = meshing::box_mesh({8, 8, 1}, {8, 8, 1});
+    const Interfaces interfaces(mesh);
+    const std::vector<std::vector<int>> neighbours = interfaces.neighbours();
+    const auto place = [&](int entry) {
+        return Vector3d(mesh.nodes.col(interfaces.nodes()[static_cast<std::size_t>(entry)].node));
+    };
+    const Vector3d corner = mesh.nodes.rowwise().minCoeff();
+    for (int i = 0; i < static_cast<int>(neighbours.size()); ++i) {
+        if ((place(i) - corner - Vector3d(4, 4, 0)).norm() > 1e-9) continue;
+        const auto& near = neighbours[static_cast<std::size_t>(i)];
+        EXPECT_GE(near.size(), 12u);
+        EXPECT_LE(near.size(), 24u);
+        for (const int n : near) {
+            EXPECT_NE(n, i);
+            EXPECT_LE((place(n) - place(i)).cwiseAbs().maxCoeff(), 2 + 1e-9);
+            EXPECT_NEAR(place(n)[2], place(i)[2], 1e-9);
+        }
+    }
+}
+
+std::vector<Match> row_of(const std::vector<double>& distances) {
+    std::vector<Match> matches;
+    for (const double distance : distances) {
+        Match match;
+        match.found = true;
+        match.distance_mm = distance;
+        matches.push_back(match);
+    }
+    return matches;
+}
+
+// Each has two on both sides, as on a surface.
+std::vector<std::vector<int>> along_a_row(int count) {
+    std::vector<std::vector<int>> neighbours(static_cast<std::size_t>(count));
+    for (int i = 0; i < count; ++i)
+        for (const int j : {i - 2, i - 1, i + 1, i + 2})
+            if (j >= 0 && j < count) neighbours[static_cast<std::size_t>(i)].push_back(j);
+    return neighbours;
+}
+
+// Tissue that resists leaves its boundary off by more than the scale all over: every match keeps its weight.
+TEST(Weigh, MatchesThatAreOffTogetherKeepTheirWeight) {
+    auto matches = row_of({3.0, 3.2, 3.4, 3.6, 3.8, 4.0, 4.2});
+    detail::weigh(matches, along_a_row(7), 1.0);
+    for (const auto& match : matches) EXPECT_EQ(match.weight, 1);
+}
+
+TEST(Weigh, AMatchThatIsOffAlonePullsWithTheForceOfOneScale) {
+    auto matches = row_of({0.1, 0.0, -0.1, 4.0, 0.1, 0.0, 0.1});
+    detail::weigh(matches, along_a_row(7), 1.0);
+    for (std::size_t i = 0; i < matches.size(); ++i) {
+        if (i == 3)
+            EXPECT_NEAR(matches[i].weight * 4.0, 1, 0.05);
+        else
+            EXPECT_EQ(matches[i].weight, 1) << i;
+    }
+}
+
+// Nothing vouches for it.
+TEST(Weigh, AMatchWithoutNeighboursIsJudgedByItsDistance) {
+    auto matches = row_of({2.0, 9.0});
+    matches[1].found = false;
+    detail::weigh(matches, {{1}, {0}}, 1.0);
+    EXPECT_NEAR(matches[0].weight, 0.5, 1e-12);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include "registration/detail/rigid_part.hpp"
 #include "registration/detail/unknown_loads.hpp"
 #include "registration/field.hpp"
+#include "registration/warp.hpp"
 #include "tests/support/label_shapes.hpp"
 
 #include <gtest/gtest.h>
@@ -89,11 +90,11 @@ TEST(LoadFit, IsTheMeanUnderThePriorOfSmoothLoads) {
         units.block<3, 3>(3 * held[k], 3 * Eigen::Index(k)).setIdentity();
     }
     const detail::Posterior with(prepared, seen), without(prepared, unseen);
-    const detail::LoadShapes shapes(prepared, without, energy, 8);
+    const detail::LoadShapes shapes(detail::principal_loads(prepared, 8), without, energy);
     const detail::LoadFit fit(shapes, with);
     const VectorXd shown = with.inverse(pulls), found = shown + fit.answers(fit.coefficients(shown, size));
 
-    const MatrixXd answers = without.inverse(units), loads = shapes.forces(prepared);
+    const MatrixXd answers = without.inverse(units), loads = shapes.scale() * detail::principal_loads(prepared, 8);
     const MatrixXd covariance =
         energy * answers + size * size * without.inverse(loads) * (loads.transpose() * answers);  // with the held nodes
     const MatrixXd between =
@@ -119,7 +120,8 @@ TEST(LoadFit, LoadsOfSizeOneHaveTheStrainEnergyOfOneDeviation) {
     const PreparedModel prepared = organ(12);
     const double energy = 60;
     const detail::Posterior unseen(prepared, prior(prepared, energy));
-    const MatrixXd loads = detail::LoadShapes(prepared, unseen, energy, 16).forces(prepared);
+    const MatrixXd drawn = detail::principal_loads(prepared, 16);
+    const MatrixXd loads = detail::LoadShapes(drawn, unseen, energy).scale() * drawn;
     EXPECT_NEAR(0.5 * loads.cwiseProduct(unseen.inverse(loads)).sum() / energy, 1, 1e-9);
 }
 
@@ -146,6 +148,60 @@ TEST(UnknownLoads, MoveWhatNoPairShows) {
     EXPECT_GT(with.min_jacobian, 0.5);
 }
 
+/// A map of the organ after a deformation.
+imaging::Volume labels_after(const PreparedModel& prepared, const Matrix3Xd& displacement) {
+    const Deformation deformation{prepared.model.mesh, displacement, Eigen::Isometry3d::Identity()};
+    return warp_labels(prepared.labels, displacement_fixed_to_moving(deformation, prepared.labels.geometry));
+}
+
+double error_at_nodes(const UpdateResult& result, const PreparedModel& prepared, const Matrix3Xd& truth) {
+    const Matrix3Xd found = PointTransform(result.deformation)(prepared.model.mesh.nodes);
+    return (found - prepared.model.mesh.nodes - truth).colwise().norm().mean();
+}
+
+/// What weight along x does to the organ, 4 mm in root mean square.
+Matrix3Xd sagged(const PreparedModel& prepared) {
+    const MatrixXd u = detail::Posterior(prepared, prior(prepared, 1)).inverse(detail::unknown_weights(prepared));
+    const Matrix3Xd field = Eigen::Map<const Matrix3Xd>(u.data(), 3, u.rows() / 3);
+    return 4 / std::sqrt(field.colwise().squaredNorm().mean()) * field;
+}
+
+TEST(UnknownWeights, AreInEquilibriumAndAlike) {
+    const PreparedModel prepared = organ(12);
+    const MatrixXd weights = detail::unknown_weights(prepared);
+    ASSERT_EQ(weights.cols(), 3);
+    const MatrixXd motions = detail::rigid_motions(prepared.model.mesh.nodes);
+    EXPECT_LT((motions.transpose() * weights).norm(), 1e-9 * weights.norm() * motions.norm());
+    const MatrixXd drawn = detail::unknown_loads(prepared, 4, 3);
+    EXPECT_LT((weights.colwise().norm().maxCoeff()) / drawn.colwise().norm().mean(), 3);
+}
+
+// A boundary all over shows weight by how the surface bulges; without, tissue within slides back along it.
+TEST(UnknownWeights, MoveWhatLabelsDoNotShow) {
+    const PreparedModel prepared = organ(10);
+    const Matrix3Xd truth = sagged(prepared);
+    const imaging::Volume labels = labels_after(prepared, truth);
+    UpdateOptions options = with_shapes(0);
+    options.align = false;
+    const UpdateResult without = update(prepared, {.labels = labels}, options);
+    options.tissue.load_shapes = 48;
+    const UpdateResult with = update(prepared, {.labels = labels}, options);
+    EXPECT_EQ(without.pulls.load_size, 0);
+    EXPECT_GT(with.pulls.load_size, 1);
+    EXPECT_TRUE(with.pulls.ground.empty());  // of the fit alone
+    const double before = error_at_nodes(without, prepared, truth), after = error_at_nodes(with, prepared, truth);
+    EXPECT_LT(after, 0.8 * before) << before << " mm without";
+    EXPECT_GT(with.min_jacobian, 0.5);
+}
+
+// An organ that did not move has none.
+TEST(UnknownWeights, OfAnOrganThatLiesStillAreNothing) {
+    const PreparedModel prepared = organ(10);
+    const UpdateResult result = update(prepared, {.labels = prepared.labels}, with_shapes(48));
+    EXPECT_LT(result.deformation.displacement.colwise().norm().maxCoeff(), 0.05);
+    EXPECT_LT(result.pulls.load_size, 0.2);
+}
+
 // Around an organ that is held, hold and loads are one.
 TEST(UnknownLoads, AreNotLookedForWhereTheOrganIsHeld) {
     const PreparedModel prepared = organ(12);
@@ -153,8 +209,6 @@ TEST(UnknownLoads, AreNotLookedForWhereTheOrganIsHeld) {
     options.align = false;
     const UpdateResult result = update(prepared, {.points = left_of_the_middle(prepared, bent(prepared))}, options);
     EXPECT_EQ(result.pulls.load_size, 0);
-    const UpdateResult of_labels = update(prepared, {.labels = prepared.labels}, with_shapes(48));
-    EXPECT_EQ(of_labels.pulls.load_size, 0);
 }
 
 // An updater keeps shapes, not what an earlier update found.
