@@ -55,7 +55,7 @@ class Dial(PhantomTest):
         self.assertEqual(report["dial"]["time_budget_s"], 60)
         stages = {entry["stage"]: entry["seconds"] for entry in report["stages"]}
         counted = sum(stages[name] for name in ("rigid alignment", "boundary maps", "correspondence", "equilibrium",
-                                                "fields", "warp"))
+                                                "unknown loads", "fields", "warp"))
         self.assertAlmostEqual(report["intraoperative_seconds"], counted, delta=0.2 * counted + 0.05)
         self.assertFalse(any("time budget" in doubt for doubt in report["doubts"]))
 
