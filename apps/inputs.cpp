@@ -91,6 +91,7 @@ void require_known_surroundings(const Volume& moving_labels, const RegisterOptio
 }
 
 void validate_fixed_labels(RegistrationInputs& inputs, const RegisterOptions& options) {
+    inputs.fixed_labels_as_given = inputs.fixed_labels;
     match_grid(inputs.fixed_labels, inputs.fixed, options.fixed, options.fixed_labels, options.resample_labels);
     require_millimetres(inputs.fixed_labels.geometry, options.fixed_labels);
     imaging::require_labels(inputs.fixed_labels, {}, options.fixed_labels.string().c_str());

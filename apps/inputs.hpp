@@ -25,6 +25,7 @@ struct InputFile {
 struct RegistrationInputs {
     imaging::Volume moving, fixed;                             ///< grey images; empty when not given
     imaging::Volume moving_labels, fixed_labels;               ///< the latter empty when not given
+    imaging::Volume fixed_labels_as_given;                     ///< the same before they were resampled
     std::optional<registration::SurfacePoints> fixed_surface;  ///< to register to, as the pairs
     std::optional<registration::PointPairs> point_pairs;
     std::optional<registration::Curves> curves;

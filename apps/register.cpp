@@ -86,7 +86,9 @@ imaging::Geometry output_grid(const RegistrationRun& run) {
 Intraoperative seen(const RegistrationInputs& inputs, const RegisterOptions& options) {
     Intraoperative seen{.surface = inputs.fixed_surface, .points = inputs.point_pairs, .curves = inputs.curves};
     if (options.match_image) seen.image = inputs.fixed;
-    if (!inputs.fixed_labels.empty()) seen.labels = inputs.fixed_labels;
+    // An image that is only the grid of the output must not coarsen the boundary that is matched.
+    if (!inputs.fixed_labels.empty())
+        seen.labels = options.match_image ? inputs.fixed_labels : inputs.fixed_labels_as_given;
     return seen;
 }
 

@@ -10,7 +10,7 @@ import unittest
 import nibabel
 import numpy
 
-from phantom import CENTRE_LPS, MOVING_AFFINE, PROGRAM, PhantomTest, lps_of_voxels, run, save
+from phantom import CENTRE_LPS, FIXED_AFFINE, MOVING_AFFINE, PROGRAM, PhantomTest, lps_of_voxels, run, save
 
 
 class CommandLine(PhantomTest):
@@ -97,6 +97,20 @@ class CommandLine(PhantomTest):
         result = self.phantom.register("--resample-labels", "--dry-run", moving_labels=path)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("warped.nii.gz", result.stdout)
+
+    def test_an_image_that_is_only_a_grid_does_not_coarsen_the_boundary(self):
+        coarse = FIXED_AFFINE @ numpy.diag([2.0, 2.0, 2.0, 1.0])
+        image = save(self.phantom.fixed_array[::2, ::2, ::2], coarse, self.phantom.folder / "coarse.nii.gz")
+
+        def last_round(**files):
+            output = self.phantom.folder / ("of_" + "_".join(files))
+            result = self.phantom.register("--resample-labels", "--edge-length", "5", output=output, **files)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            return json.loads((output / "report.json").read_text())["rounds"][-1]
+
+        with_image, without = last_round(fixed=image), last_round(fixed=None)
+        for name in ("matched", "mean_residual_mm", "force_evaluations"):
+            self.assertEqual(with_image[name], without[name], name)
 
     def test_headers_that_differ_in_a_late_digit_are_one_grid(self):
         affine = MOVING_AFFINE.copy()
