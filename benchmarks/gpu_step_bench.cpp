@@ -3,7 +3,7 @@
 //     gpu_step_bench [--list] [--device N] [--cells 14,24,55,128] [--steps N] [--repeats N] [--compare-limit ELEMENTS]
 //                    [--element t4|averaged] [--law lnj|iso] [--mesh FILE.vtu] [--shapes
 //                    TETS:FAN:WORKGROUP[:AT_ONCE],…]
-//                    [--render-passes] [--stretch 0.2] [--tissue]
+//                    [--render-passes] [--stretch 0.2] [--tissue [--only TEXT]]
 // Without options: on hardware 14, 24, 55 and 128 cells an edge and 1000 steps, on a software rasteriser 14 and 24
 // cells and 50 steps; five repeats, the median is printed; both elements, both laws. The float64 engine runs the same
 // steps where the mesh has no more than --compare-limit elements (1 100 000, with --tissue 100 000). A mesh file of
@@ -11,7 +11,7 @@
 // without them the suggested one. --render-passes adds the fragment shaders of 2007 for T4.
 // --tissue times what fibres and viscosity cost instead: for each element all tissues of the cube in turn, with the
 // ratio to plain neo-Hookean in the same shape, in the suggested shape and in others of its patches; 14, 24, 40 and 55
-// cells.
+// cells. --only takes plain iso and the tissues whose names hold TEXT.
 
 #include "benchmarks/stretched_cube.hpp"
 #include "core/errors.hpp"
@@ -47,6 +47,7 @@ struct Options {
     std::vector<tled::GpuStepShape> shapes;  // empty: the suggested one
     bool render_passes = false;
     bool tissue = false;
+    std::string only;  // with --tissue
 };
 
 void set_start(tled::Engine& engine, const Scene& scene) {
@@ -187,7 +188,11 @@ void measure_tissue(const meshing::TetMesh& mesh, const std::string& mesh_name, 
     const Scene scene = stretched(mesh, options.stretch);
     for (const char* element : {"t4", "averaged"}) {
         if (!options.element.empty() && options.element != element) continue;
-        const std::vector<Variant> variants = tissues(scene, element);
+        std::vector<Variant> variants = tissues(scene, element);
+        variants.erase(
+            std::remove_if(variants.begin() + 1, variants.end(),
+                           [&](const Variant& each) { return each.name.find(options.only) == each.name.npos; }),
+            variants.end());
         std::fprintf(stderr, "%s: time step %.1f us\n", element, 1e6 * coefficients(variants.front().rest).time_step);
         for (const tled::GpuStepShape& shape : tissue_shapes(variants.front().rest, options)) try {
                 report_tissues(variants, scene, shape, std::string(element) + " " + mesh_name, options);
@@ -243,6 +248,8 @@ Options parsed(int argc, char** argv) {
             options.law = value;
         else if (name == "--mesh")
             options.mesh = value;
+        else if (name == "--only")
+            options.only = value;
         else if (name == "--stretch")
             options.stretch = std::stod(value);
         else if (name == "--shapes") {

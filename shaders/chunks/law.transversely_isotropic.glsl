@@ -12,14 +12,13 @@ mat3 fibre_stress(vec3 a, vec3 f);
 
 /// P of the neo-Hookean part and 2 eta (I4 - 1) j (f aᵀ - (a·C a)/3 F⁻ᵀ) with f = F a, whose second term joins the pressure.
 mat3 stress(uint e, Deformation d, Parameters p, float pressure) {
-    if (!(d.volume_change > -1.0)) return mat3(not_a_number());
     vec3 a = fibre_of(e);
     vec3 stretch = d.H * a;
     float excess = 2.0 * dot(a, stretch) + dot(stretch, stretch);  // a·C a - 1
     float J = 1.0 + d.volume_change;
     float j = isochoric_factor(d);
     float sum = 1.0 + j + j * j;
-    float inverse = 1.0 / (J * J * sum);
+    float inverse = reciprocal(J * J * sum);
     // With j³ = J⁻², 1 - j = (1 - j³)/(1 + j + j²) keeps small strains.
     float strength = excess - d.volume_change * (1.0 + J) * inverse * (1.0 + excess);  // I4 - 1
     float third = (1.0 + excess) * (1.0 / 3.0) * (inverse * J * sum);

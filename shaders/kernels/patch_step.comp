@@ -7,8 +7,7 @@
 // A stage that reads what others left runs in a later dispatch. So T4 advances and computes forces in one dispatch, and
 // averaged pressure takes two. PERSISTS 1 instead goes on for `steps` in one dispatch: a patch waits for its neighbours alone,
 // and all workgroups must run at the same time, which OpenGL does not promise: one that has waited too long says so, and all
-// give up. STAYS 1 where each of these has one patch, whose positions and displacements stay in shared memory, and with
-// STRESSES_STAY 1 its viscous stresses.
+// give up. STAYS 1 where each of these has one patch, whose positions and displacements stay in shared memory.
 // Needs: the patch chunks of its stages and what they need; patch.neighbours where PERSISTS is 1.
 //! define ADVANCES
 //! define VOLUMES
@@ -16,7 +15,6 @@
 //! define AVERAGES
 //! define PERSISTS
 //! define STAYS
-//! define STRESSES_STAY
 
 layout(location = 0) uniform uint first_step;  // of this dispatch; its parity tells which forces the first step reads
 layout(location = 1) uniform float momentum;
@@ -29,12 +27,20 @@ layout(location = 5) uniform uint run_end;
 /// mN), and the largest volume change (24 times mm³).
 layout(std430, binding = BINDING_PATCH_LARGEST) COHERENT buffer PatchLargest { uvec2 patch_largest[]; };
 
-// Of a patch in hand, `fan` is the first fan of the invocation and `largest` patch_largest of the step before.
+/// What an invocation keeps of the patch in hand.
+struct Kept {
+    uvec4 fan;      // its first
+    uvec4 tissue;   // of the first tetrahedron of that
+    uvec2 largest;  // patch_largest of the step before
+};
 
-Patch begin_patch(uint p, out uvec4 fan, out uvec2 largest) {
+Patch begin_patch(uint p, out Kept kept) {
     Patch here = patch_of(p);
-    fan = fan_of(here, gl_LocalInvocationID.x);
-    largest = patch_largest[p];
+    kept.fan = fan_of(here, gl_LocalInvocationID.x);
+#if FORCES
+    kept.tissue = first_tissue(here, gl_LocalInvocationID.x);
+#endif
+    kept.largest = patch_largest[p];
     for (uint i = gl_LocalInvocationID.x; i < here.slots; i += WORKGROUP_SIZE) load_node(p * SLOTS + i, i);
     return here;
 }
@@ -52,15 +58,15 @@ void advance_nodes(Patch here, uint step) {
 #endif
 
 #if VOLUMES
-void leave_volumes(Patch here, uvec4 fan, inout uint largest, uint step) {
+void leave_volumes(Patch here, inout Kept kept, uint step) {
     uint lane = gl_LocalInvocationID.x;
     for (uint i = lane; i < here.slots; i += WORKGROUP_SIZE) node_volume[i] = 0;
     if (lane == 0u) largest_of_patch = 0u;
     barrier();
-    float scale = scale_for(largest);
-    bool finite = compute_volumes(here, fan, scale, largest);
+    float scale = scale_for(kept.largest.y);
+    bool finite = compute_volumes(here, kept.fan, scale, kept.largest.y);
     for (uint i = lane; i < here.slots; i += WORKGROUP_SIZE) send_volume(here.index * SLOTS + i, i, scale, finite);
-    if (lane == 0u) patch_largest[here.index].y = largest;
+    if (lane == 0u) patch_largest[here.index].y = kept.largest.y;
 #if PERSISTS
     tell_neighbours(here, 2u * step + 1u);
 #endif
@@ -69,7 +75,7 @@ void leave_volumes(Patch here, uvec4 fan, inout uint largest, uint step) {
 
 #if FORCES
 /// An invocation handles the same nodes here as in begin_patch and advance_nodes.
-void leave_forces(Patch here, uvec4 fan, inout uint largest, uint step) {
+void leave_forces(Patch here, inout Kept kept, uint step) {
     uint lane = gl_LocalInvocationID.x;
     uint first_slot = here.index * SLOTS;
     for (uint i = lane; i < here.slots; i += WORKGROUP_SIZE) {
@@ -80,13 +86,13 @@ void leave_forces(Patch here, uvec4 fan, inout uint largest, uint step) {
     }
     if (lane == 0u) largest_of_patch = 0u;
     barrier();
-    float scale = scale_for(largest);
-    bool finite = compute_forces(here, fan, parameters_of(here.material), scale, largest);
+    float scale = scale_for(kept.largest.x);
+    bool finite = compute_forces(here, kept.fan, kept.tissue, parameters_of(here.material), scale, kept.largest.x);
     float unit = finite ? force_unit(scale) : not_a_number();
     uint sent = step + 1u == run_end ? here.slots : here.shared_slots;
     for (uint i = lane; i < sent; i += WORKGROUP_SIZE)
         send_force(first_slot + i, 1u - (step & 1u), force_here(i, unit));
-    if (lane == 0u) patch_largest[here.index].x = largest;
+    if (lane == 0u) patch_largest[here.index].x = kept.largest.x;
 #if PERSISTS
     tell_neighbours(here, 2u * step + 2u);
 #endif
@@ -96,7 +102,7 @@ void leave_forces(Patch here, uvec4 fan, inout uint largest, uint step) {
 #endif
 
 /// The part of a step that needs what neighbours left in the step before; false where they did not come.
-bool begin_step(Patch here, uvec4 fan, inout uvec2 largest, uint step) {
+bool begin_step(Patch here, inout Kept kept, uint step) {
 #if PERSISTS
     if (step != first_step && !neighbours_arrived(here, 2u * step)) return false;
 #endif
@@ -104,18 +110,18 @@ bool begin_step(Patch here, uvec4 fan, inout uvec2 largest, uint step) {
     advance_nodes(here, step);
 #endif
 #if VOLUMES
-    leave_volumes(here, fan, largest.y, step);
+    leave_volumes(here, kept, step);
 #endif
     return true;
 }
 
 /// The rest, which with averaged pressure needs what they left in begin_step.
-bool end_step(Patch here, uvec4 fan, inout uvec2 largest, uint step) {
+bool end_step(Patch here, inout Kept kept, uint step) {
 #if FORCES
 #if PERSISTS && AVERAGES
     if (!neighbours_arrived(here, 2u * step + 1u)) return false;
 #endif
-    leave_forces(here, fan, largest.x, step);
+    leave_forces(here, kept, step);
 #endif
     return true;
 }
@@ -125,45 +131,46 @@ void end_patch(Patch here) {
 #if STAYS
     for (uint i = gl_LocalInvocationID.x; i < here.slots; i += WORKGROUP_SIZE)
         store_displacement(here.index * SLOTS + i, i);
-#if STRESSES_STAY
-    leave_stresses(here);
-#endif
 #else
     barrier();  // before the next patch takes the shared memory
 #endif
 }
 
+#if !STAYS
+/// There and back: what one sweep ends with the next begins with, while a cache that is too small for all patches still has it.
+uint patch_in_turn(uint first, uint turn, uint turns, uint sweep) {
+    return first + ((sweep & 1u) == 0u ? turn : turns - 1u - turn) * workgroup_count;
+}
+#endif
+
 /// False where it came to no end.
 bool run_steps(uint first) {
-    uvec4 fan;
-    uvec2 largest;
+    Kept kept;
     bool good = true;
     uint step = first_step;
 #if STAYS
-    Patch here = begin_patch(first, fan, largest);
-#if STRESSES_STAY
-    take_stresses(here);
-#endif
+    Patch here = begin_patch(first, kept);
     for (; step != first_step + steps && good; ++step) {
-        good = begin_step(here, fan, largest, step);
-        if (good) good = end_step(here, fan, largest, step);
+        good = begin_step(here, kept, step);
+        if (good) good = end_step(here, kept, step);
     }
     end_patch(here);
 #else
+    uint turns = (patch_count - first + workgroup_count - 1u) / workgroup_count;
     for (; step != first_step + steps && good; ++step) {
-        for (uint p = first; p < patch_count && good; p += workgroup_count) {
-            Patch here = begin_patch(p, fan, largest);
-            good = begin_step(here, fan, largest, step);
+        for (uint turn = 0u; turn < turns && good; ++turn) {
+            Patch here = begin_patch(patch_in_turn(first, turn, turns, (1u + AVERAGES) * step), kept);
+            good = begin_step(here, kept, step);
 #if !AVERAGES
-            if (good) good = end_step(here, fan, largest, step);
+            if (good) good = end_step(here, kept, step);
 #endif
             end_patch(here);
         }
 #if AVERAGES
         // Not before all patches of the workgroup have left what the others, and each other, need for the second part.
-        for (uint p = first; p < patch_count && good; p += workgroup_count) {
-            Patch here = begin_patch(p, fan, largest);
-            good = end_step(here, fan, largest, step);
+        for (uint turn = 0u; turn < turns && good; ++turn) {
+            Patch here = begin_patch(patch_in_turn(first, turn, turns, 2u * step + 1u), kept);
+            good = end_step(here, kept, step);
             end_patch(here);
         }
 #endif
@@ -180,10 +187,9 @@ void main() {
     // A driver may end loops early: llvmpipe after 65535 turns of all loops of an invocation together.
     if (!run_steps(first) && gl_LocalInvocationID.x == 0u) give_up();
 #else
-    uvec4 fan;
-    uvec2 largest;
-    Patch here = begin_patch(first, fan, largest);
-    begin_step(here, fan, largest, first_step);
-    end_step(here, fan, largest, first_step);
+    Kept kept;
+    Patch here = begin_patch(first, kept);
+    begin_step(here, kept, first_step);
+    end_step(here, kept, first_step);
 #endif
 }
