@@ -87,7 +87,8 @@ bool moves_stresses(const PatchTissue& tissue, const PatchStages& stages) {
     return tissue.prony_terms > 0 && !stages.rests;
 }
 
-/// Whether patches take S from the law: these make theirs of stretch_difference, and viscous stresses are of S.
+/// Whether patches take S from the law: viscous stresses are of it, and these laws make theirs of
+/// stretch_difference.
 bool gives_second(const PatchTissue& tissue) {
     constexpr std::array laws{Law::NeoHookeanIso, Law::NeoHookeanLnJ, Law::ArrudaBoyce, Law::TransverselyIsotropic};
     return tissue.prony_terms > 0 && std::find(laws.begin(), laws.end(), tissue.law) != laws.end();
@@ -97,18 +98,30 @@ std::string unsigned_number(int number) {
     return std::to_string(number) + "u";
 }
 
+/// Places in shared memory for the viscous stresses of a patch that move; 0 where they do not stay there.
+int places_of_stresses(const PatchTissue& tissue, const PatchSizes& sizes, const PatchStages& stages) {
+    return moves_stresses(tissue, stages) && stages.forces && stages.persists && sizes.each_has_one ? sizes.places : 0;
+}
+
 /// What tetrahedra have for themselves and the forces that follow from it.
-void add_patch_forces(ProgramSource& source, const PatchTissue& tissue, const PatchStages& stages) {
+void add_patch_forces(ProgramSource& source, const PatchTissue& tissue, const PatchSizes& sizes,
+                      const PatchStages& stages) {
     const bool fibres = has_fibres(tissue.law), viscous = tissue.prony_terms > 0;
-    const bool moves = moves_stresses(tissue, stages);
     if (viscous) source.chunks.emplace_back("viscosity");
     if (fibres || viscous) source.chunks.emplace_back("patch.tissue");
     if (fibres) source.chunks.emplace_back("patch.fibre");
-    if (fibres || viscous) {
-        source.chunks.emplace_back(moves ? "patch.moving" : viscous ? "patch.resting" : "patch.fibres");
-        source.defines["LAW_GIVES_SECOND"] = flag(gives_second(tissue));
+    if (viscous) source.chunks.emplace_back("patch.stresses");
+    const bool moves = moves_stresses(tissue, stages);
+    const int places = places_of_stresses(tissue, sizes, stages);
+    if (moves) {
+        source.chunks.emplace_back(places > 0 ? "patch.stresses.shared" : "patch.stresses.memory");
+        source.chunks.emplace_back("patch.viscosity");
+    } else if (viscous) {
+        source.chunks.emplace_back("patch.resting");
     }
-    if (moves) source.defines["PRONY_TERMS"] = unsigned_number(tissue.prony_terms);
+    if (viscous) source.defines["PRONY_TERMS"] = unsigned_number(tissue.prony_terms);
+    if (places > 0) source.defines["PLACES"] = unsigned_number(places);
+    if (fibres || viscous) source.defines["LAW_GIVES_SECOND"] = flag(gives_second(tissue));
     source.chunks.emplace_back("patch.forces");
     source.defines["HAS_FIBRES"] = flag(fibres);
     source.defines["HAS_VISCOSITY"] = flag(viscous);
@@ -246,7 +259,7 @@ ProgramSource patch_step_program(const PatchTissue& tissue, const NodeEffects& e
     const bool stays = stages.persists && sizes.each_has_one;
     if (stages.forces) {
         if (!stages.averages) add("patch.pressure.element");
-        add_patch_forces(source, tissue, stages);
+        add_patch_forces(source, tissue, sizes, stages);
     }
     if (stages.persists) add("patch.neighbours");
     define("WORKGROUP_SIZE", std::to_string(sizes.workgroup));
@@ -256,6 +269,7 @@ ProgramSource patch_step_program(const PatchTissue& tissue, const NodeEffects& e
     define("AVERAGES", flag(stages.averages));
     define("PERSISTS", flag(stages.persists));
     define("STAYS", flag(stays));
+    define("STRESSES_STAY", flag(places_of_stresses(tissue, sizes, stages) > 0));
     define("COHERENT", stages.persists ? "coherent" : "");
     define("SLOTS", std::to_string(sizes.slots) + "u");
     return source;
@@ -269,11 +283,12 @@ ProgramSource patch_store_program() {
     return {"patch_store", {"index", "bindings"}, {{"WORKGROUP_SIZE", workgroup_size}}, {}};
 }
 
-ProgramSource patch_stress_program(int prony_terms, PatchStresses what) {
+ProgramSource patch_stress_program(const PatchTissue& tissue, PatchStresses what) {
     return {"patch_stress",
             {"index", "bindings"},
             {{"WORKGROUP_SIZE", workgroup_size},
-             {"PRONY_TERMS", unsigned_number(prony_terms)},
+             {"PRONY_TERMS", unsigned_number(tissue.prony_terms)},
+             {"HAS_FIBRES", flag(has_fibres(tissue.law))},
              {"LOADS", flag(what == PatchStresses::Load)},
              {"SUMS", flag(what == PatchStresses::Sum)}},
             {}};
@@ -401,7 +416,8 @@ void add_node_passes(std::vector<ProgramSource>& all) {
 }
 
 /// Laws and effects do not meet in the code of a patch: every law, elastic and viscous, with no effect and with all of
-/// them, one law with the other combinations. Viscosity is in stages with forces.
+/// them, one law with the other combinations. Viscosity is in stages with forces, and may stay in shared memory where
+/// they go on.
 void add_patch_steps(std::vector<ProgramSource>& all) {
     using E = NodeEffects;
     const std::vector<NodeEffects> effects =
@@ -414,6 +430,8 @@ void add_patch_steps(std::vector<ProgramSource>& all) {
                 all.push_back(patch_step_program(elastic, each, {}, stages));
                 if (stages.forces) all.push_back(patch_step_program(viscous, each, {}, stages));
                 if (stages.forces) all.push_back(patch_step_program(viscous, each, {}, resting(stages)));
+                if (stages.forces && stages.persists)
+                    all.push_back(patch_step_program(viscous, each, {.places = 64}, stages));
             }
         for (std::size_t i = 1; i + 1 < effects.size(); ++i)
             all.push_back(patch_step_program({Law::NeoHookeanIso}, effects[i], {}, stages));
@@ -438,8 +456,9 @@ std::vector<ProgramSource> every_program() {
     }
     add_node_passes(all);
     add_patch_steps(all);
-    for (const PatchStresses what : {PatchStresses::Load, PatchStresses::Store, PatchStresses::Sum})
-        all.push_back(patch_stress_program(3, what));
+    for (const bool fibres : {false, true})
+        for (const PatchStresses what : {PatchStresses::Load, PatchStresses::Store, PatchStresses::Sum})
+            all.push_back(patch_stress_program({fibres ? Law::TransverselyIsotropic : Law::NeoHookeanIso, 3}, what));
     all.push_back(patch_load_program());
     all.push_back(patch_store_program());
     all.push_back(warp_clear_program());

@@ -80,6 +80,7 @@ struct PatchSizes {
     int slots = 64;            ///< for each patch, in shared memory
     int workgroup = 128;       ///< invocations
     bool each_has_one = true;  ///< where a dispatch persists: whether each workgroup has one patch
+    int places = 0;            ///< where each has one: tetrahedra whose viscous stresses stay in shared memory
 };
 /// What one dispatch over patches does (kernels/patch_step.comp).
 struct PatchStages {
@@ -99,7 +100,7 @@ ProgramSource patch_step_program(const PatchTissue& tissue, const NodeEffects& e
 bool has_fibres(Law law);
 /// Viscous stresses from elements to patches, or back; the sum of the terms, which rests.
 enum class PatchStresses { Load, Store, Sum };
-ProgramSource patch_stress_program(int prony_terms, PatchStresses what);
+ProgramSource patch_stress_program(const PatchTissue& tissue, PatchStresses what);
 ProgramSource patch_load_program();
 ProgramSource patch_store_program();
 

@@ -96,6 +96,8 @@ public:
         upload_inverse_mass();
         if (shape.patch_tets > 0 && detail::GpuPatches::suit(rest, device_))
             patches_.emplace(device_, programs_, rest, shape, blocks_);
+        if (patches_) stress_clock_ = detail::StressClock(rest.viscosity, patches_->stress_pace());
+        kept_stress_clock_ = stress_clock_;
         over_patches_ = patches_.has_value();
     }
 

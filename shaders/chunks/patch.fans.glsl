@@ -17,8 +17,6 @@ struct Ring {
 
 Ring ring_of(uvec4 fan) { return Ring(fan.y >> 16u, fan.zw); }
 
-bool is_last(Ring ring) { return (ring.behind.x & 0xffffu) == no_node; }
-
 Ring next_of_ring(Ring ring) {
     return Ring(ring.behind.x & 0xffffu,
                 uvec2(ring.behind.x >> 16u | ring.behind.y << 16u, ring.behind.y >> 16u | 0xffff0000u));

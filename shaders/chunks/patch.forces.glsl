@@ -1,5 +1,6 @@
 // Needs: numbers, deformation, material, isochoric, a law with USES_SHEAR 1, patch.nodes, patch.units, patch.fans, and
-// patch.pressure.element or patch.pressure.averaged; patch.tissue and what it needs, where their flags are 1.
+// patch.pressure.element or patch.pressure.averaged; patch.fibre, and patch.viscosity or patch.resting, where their
+// flags are 1.
 // Gives: the forces of a patch's tetrahedra on its nodes, in shared memory.
 //! define HAS_FIBRES
 //! define HAS_VISCOSITY
@@ -37,6 +38,19 @@ void leave_force(uint i, vec3 f, inout Tally tally) {
     add_force(i, units);
 }
 
+#if HAS_FIBRES || HAS_VISCOSITY
+/// What the next tetrahedron of a fan has for itself is fetched well before it is needed.
+void next_tetrahedron() {
+    next_place();
+#if HAS_FIBRES
+    fetch_fibre();
+#endif
+#if HAS_VISCOSITY
+    fetch_viscous_stress();
+#endif
+}
+#endif
+
 /// P of a tetrahedron.
 mat3 stress_of_tetrahedron(Edges t, Parameters parameters, Pressure pressure) {
     mat3 G = mat3(t.moved_b, t.moved_c, t.moved_d);
@@ -44,7 +58,7 @@ mat3 stress_of_tetrahedron(Edges t, Parameters parameters, Pressure pressure) {
     Deformation d = deformation((G * transpose(N)) * reciprocal(dot(t.rest_b, t.normal_b)));
     float p = pressure_of(pressure, d.volume_change);
 #if MOVES_STRESSES
-    return moved_stress(d, stress(0u, d, parameters, 0.0), p);
+    return relaxed_stress(d, stress(0u, d, parameters, 0.0), p);
 #elif HAS_VISCOSITY
     return rested_stress(d, stress(0u, d, parameters, p));
 #else
@@ -52,17 +66,8 @@ mat3 stress_of_tetrahedron(Edges t, Parameters parameters, Pressure pressure) {
 #endif
 }
 
-/// Of the first tetrahedron of fan f, where tetrahedra have something for themselves.
-uvec4 first_tissue(Patch here, uint f) {
-#if HAS_FIBRES || HAS_VISCOSITY
-    return tissue_at(first_place(here, f));
-#else
-    return uvec4(0u);
-#endif
-}
-
 /// Six times the forces of a fan's nodes; the force on a is minus the sum of the others, to the unit.
-void add_fan(Patch here, uint f, uvec4 fan, uvec4 tissue, Parameters parameters, inout Tally tally) {
+void add_fan(uvec4 fan, Parameters parameters, Patch here, inout Tally tally) {
     uint a = fan.x & 0xffffu, b = fan.x >> 16u, c = fan.y & 0xffffu;
     Node node_of_a = node(a);
     Edges t = first_edges(node_of_a, node(b), node(c));
@@ -70,11 +75,10 @@ void add_fan(Patch here, uint f, uvec4 fan, uvec4 tissue, Parameters parameters,
     vec3 force_b = vec3(0.0);
     vec3 force_c = vec3(0.0);
     tally.sum = ivec3(0);
-#if HAS_FIBRES || HAS_VISCOSITY
-    place = first_place(here, f);
-    take_tissue(tissue);
-#endif
     for (Ring ring = ring_of(fan); ring.next != no_node; ring = next_of_ring(ring)) {
+#if HAS_FIBRES || HAS_VISCOSITY
+        next_tetrahedron();
+#endif
         t = next_edges(t, node_of_a, node(ring.next));
         take_next_node(pressure, ring.next);
         mat3 P = stress_of_tetrahedron(t, parameters, pressure);
@@ -82,20 +86,15 @@ void add_fan(Patch here, uint f, uvec4 fan, uvec4 tissue, Parameters parameters,
         leave_force(c, force_c + P * t.normal_c, tally);
         force_c = P * t.normal_d;
         c = ring.next;
-#if HAS_FIBRES || HAS_VISCOSITY
-        next_place();
-        if (!is_last(ring)) take_tissue(tissue_at(place));
-#endif
     }
     leave_force(c, force_c, tally);
     leave_force(b, force_b, tally);
     add_force(a, -tally.sum);
 }
 
-/// Forces of all fans in units of scale, which is changed when they do not fit; true where they are numbers. `first` and
-/// `first_of_it` are fan_of and first_tissue of fan lane; each further fan is fetched while the one before is computed. Ends with all of
-/// them in place.
-bool compute_forces(Patch here, uvec4 first, uvec4 first_of_it, Parameters parameters, inout float scale, out uint largest) {
+/// Forces of all fans in units of scale, which is changed when they do not fit; true where they are numbers. `first` is
+/// fan_of(here, lane); each further one is fetched while the one before is computed. Ends with all of them in place.
+bool compute_forces(Patch here, uvec4 first, Parameters parameters, inout float scale, out uint largest) {
     uint lane = gl_LocalInvocationID.x;
 #if MOVES_STRESSES
     advance_stresses(here.material);
@@ -103,13 +102,13 @@ bool compute_forces(Patch here, uvec4 first, uvec4 first_of_it, Parameters param
     for (;;) {
         Tally tally = Tally(scale, 0u, ivec3(0));
         uvec4 fan = first;
-        uvec4 tissue = first_of_it;
         for (uint f = lane; f < here.fans; f += WORKGROUP_SIZE) {
             uvec4 next = fan_of(here, f + WORKGROUP_SIZE);
-            uvec4 next_tissue = first_tissue(here, f + WORKGROUP_SIZE);
-            add_fan(here, f, fan, tissue, parameters, tally);
+#if HAS_FIBRES || HAS_VISCOSITY
+            begin_fan(here, f);
+#endif
+            add_fan(fan, parameters, here, tally);
             fan = next;
-            tissue = next_tissue;
         }
         atomicMax(largest_of_patch, tally.largest);
         barrier();

@@ -7,7 +7,8 @@
 // A stage that reads what others left runs in a later dispatch. So T4 advances and computes forces in one dispatch, and
 // averaged pressure takes two. PERSISTS 1 instead goes on for `steps` in one dispatch: a patch waits for its neighbours alone,
 // and all workgroups must run at the same time, which OpenGL does not promise: one that has waited too long says so, and all
-// give up. STAYS 1 where each of these has one patch, whose positions and displacements stay in shared memory.
+// give up. STAYS 1 where each of these has one patch, whose positions and displacements stay in shared memory, and with
+// STRESSES_STAY 1 its viscous stresses.
 // Needs: the patch chunks of its stages and what they need; patch.neighbours where PERSISTS is 1.
 //! define ADVANCES
 //! define VOLUMES
@@ -15,6 +16,7 @@
 //! define AVERAGES
 //! define PERSISTS
 //! define STAYS
+//! define STRESSES_STAY
 
 layout(location = 0) uniform uint first_step;  // of this dispatch; its parity tells which forces the first step reads
 layout(location = 1) uniform float momentum;
@@ -27,20 +29,12 @@ layout(location = 5) uniform uint run_end;
 /// mN), and the largest volume change (24 times mm³).
 layout(std430, binding = BINDING_PATCH_LARGEST) COHERENT buffer PatchLargest { uvec2 patch_largest[]; };
 
-/// What an invocation keeps of the patch in hand.
-struct Kept {
-    uvec4 fan;      // its first
-    uvec4 tissue;   // of the first tetrahedron of that
-    uvec2 largest;  // patch_largest of the step before
-};
+// Of a patch in hand, `fan` is the first fan of the invocation and `largest` patch_largest of the step before.
 
-Patch begin_patch(uint p, out Kept kept) {
+Patch begin_patch(uint p, out uvec4 fan, out uvec2 largest) {
     Patch here = patch_of(p);
-    kept.fan = fan_of(here, gl_LocalInvocationID.x);
-#if FORCES
-    kept.tissue = first_tissue(here, gl_LocalInvocationID.x);
-#endif
-    kept.largest = patch_largest[p];
+    fan = fan_of(here, gl_LocalInvocationID.x);
+    largest = patch_largest[p];
     for (uint i = gl_LocalInvocationID.x; i < here.slots; i += WORKGROUP_SIZE) load_node(p * SLOTS + i, i);
     return here;
 }
@@ -58,15 +52,15 @@ void advance_nodes(Patch here, uint step) {
 #endif
 
 #if VOLUMES
-void leave_volumes(Patch here, inout Kept kept, uint step) {
+void leave_volumes(Patch here, uvec4 fan, inout uint largest, uint step) {
     uint lane = gl_LocalInvocationID.x;
     for (uint i = lane; i < here.slots; i += WORKGROUP_SIZE) node_volume[i] = 0;
     if (lane == 0u) largest_of_patch = 0u;
     barrier();
-    float scale = scale_for(kept.largest.y);
-    bool finite = compute_volumes(here, kept.fan, scale, kept.largest.y);
+    float scale = scale_for(largest);
+    bool finite = compute_volumes(here, fan, scale, largest);
     for (uint i = lane; i < here.slots; i += WORKGROUP_SIZE) send_volume(here.index * SLOTS + i, i, scale, finite);
-    if (lane == 0u) patch_largest[here.index].y = kept.largest.y;
+    if (lane == 0u) patch_largest[here.index].y = largest;
 #if PERSISTS
     tell_neighbours(here, 2u * step + 1u);
 #endif
@@ -75,7 +69,7 @@ void leave_volumes(Patch here, inout Kept kept, uint step) {
 
 #if FORCES
 /// An invocation handles the same nodes here as in begin_patch and advance_nodes.
-void leave_forces(Patch here, inout Kept kept, uint step) {
+void leave_forces(Patch here, uvec4 fan, inout uint largest, uint step) {
     uint lane = gl_LocalInvocationID.x;
     uint first_slot = here.index * SLOTS;
     for (uint i = lane; i < here.slots; i += WORKGROUP_SIZE) {
@@ -86,13 +80,13 @@ void leave_forces(Patch here, inout Kept kept, uint step) {
     }
     if (lane == 0u) largest_of_patch = 0u;
     barrier();
-    float scale = scale_for(kept.largest.x);
-    bool finite = compute_forces(here, kept.fan, kept.tissue, parameters_of(here.material), scale, kept.largest.x);
+    float scale = scale_for(largest);
+    bool finite = compute_forces(here, fan, parameters_of(here.material), scale, largest);
     float unit = finite ? force_unit(scale) : not_a_number();
     uint sent = step + 1u == run_end ? here.slots : here.shared_slots;
     for (uint i = lane; i < sent; i += WORKGROUP_SIZE)
         send_force(first_slot + i, 1u - (step & 1u), force_here(i, unit));
-    if (lane == 0u) patch_largest[here.index].x = kept.largest.x;
+    if (lane == 0u) patch_largest[here.index].x = largest;
 #if PERSISTS
     tell_neighbours(here, 2u * step + 2u);
 #endif
@@ -102,7 +96,7 @@ void leave_forces(Patch here, inout Kept kept, uint step) {
 #endif
 
 /// The part of a step that needs what neighbours left in the step before; false where they did not come.
-bool begin_step(Patch here, inout Kept kept, uint step) {
+bool begin_step(Patch here, uvec4 fan, inout uvec2 largest, uint step) {
 #if PERSISTS
     if (step != first_step && !neighbours_arrived(here, 2u * step)) return false;
 #endif
@@ -110,18 +104,18 @@ bool begin_step(Patch here, inout Kept kept, uint step) {
     advance_nodes(here, step);
 #endif
 #if VOLUMES
-    leave_volumes(here, kept, step);
+    leave_volumes(here, fan, largest.y, step);
 #endif
     return true;
 }
 
 /// The rest, which with averaged pressure needs what they left in begin_step.
-bool end_step(Patch here, inout Kept kept, uint step) {
+bool end_step(Patch here, uvec4 fan, inout uvec2 largest, uint step) {
 #if FORCES
 #if PERSISTS && AVERAGES
     if (!neighbours_arrived(here, 2u * step + 1u)) return false;
 #endif
-    leave_forces(here, kept, step);
+    leave_forces(here, fan, largest.x, step);
 #endif
     return true;
 }
@@ -131,6 +125,9 @@ void end_patch(Patch here) {
 #if STAYS
     for (uint i = gl_LocalInvocationID.x; i < here.slots; i += WORKGROUP_SIZE)
         store_displacement(here.index * SLOTS + i, i);
+#if STRESSES_STAY
+    leave_stresses(here);
+#endif
 #else
     barrier();  // before the next patch takes the shared memory
 #endif
@@ -145,32 +142,36 @@ uint patch_in_turn(uint first, uint turn, uint turns, uint sweep) {
 
 /// False where it came to no end.
 bool run_steps(uint first) {
-    Kept kept;
+    uvec4 fan;
+    uvec2 largest;
     bool good = true;
     uint step = first_step;
 #if STAYS
-    Patch here = begin_patch(first, kept);
+    Patch here = begin_patch(first, fan, largest);
+#if STRESSES_STAY
+    take_stresses(here);
+#endif
     for (; step != first_step + steps && good; ++step) {
-        good = begin_step(here, kept, step);
-        if (good) good = end_step(here, kept, step);
+        good = begin_step(here, fan, largest, step);
+        if (good) good = end_step(here, fan, largest, step);
     }
     end_patch(here);
 #else
     uint turns = (patch_count - first + workgroup_count - 1u) / workgroup_count;
     for (; step != first_step + steps && good; ++step) {
         for (uint turn = 0u; turn < turns && good; ++turn) {
-            Patch here = begin_patch(patch_in_turn(first, turn, turns, (1u + AVERAGES) * step), kept);
-            good = begin_step(here, kept, step);
+            Patch here = begin_patch(patch_in_turn(first, turn, turns, (1u + AVERAGES) * step), fan, largest);
+            good = begin_step(here, fan, largest, step);
 #if !AVERAGES
-            if (good) good = end_step(here, kept, step);
+            if (good) good = end_step(here, fan, largest, step);
 #endif
             end_patch(here);
         }
 #if AVERAGES
         // Not before all patches of the workgroup have left what the others, and each other, need for the second part.
         for (uint turn = 0u; turn < turns && good; ++turn) {
-            Patch here = begin_patch(patch_in_turn(first, turn, turns, 2u * step + 1u), kept);
-            good = end_step(here, kept, step);
+            Patch here = begin_patch(patch_in_turn(first, turn, turns, 2u * step + 1u), fan, largest);
+            good = end_step(here, fan, largest, step);
             end_patch(here);
         }
 #endif
@@ -187,9 +188,10 @@ void main() {
     // A driver may end loops early: llvmpipe after 65535 turns of all loops of an invocation together.
     if (!run_steps(first) && gl_LocalInvocationID.x == 0u) give_up();
 #else
-    Kept kept;
-    Patch here = begin_patch(first, kept);
-    begin_step(here, kept, first_step);
-    end_step(here, kept, first_step);
+    uvec4 fan;
+    uvec2 largest;
+    Patch here = begin_patch(first, fan, largest);
+    begin_step(here, fan, largest, first_step);
+    end_step(here, fan, largest, first_step);
 #endif
 }

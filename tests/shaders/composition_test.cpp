@@ -157,21 +157,34 @@ TEST(Composition, StepsOverPatchesHoldNoTraceOfAbsentTissue) {
     };
     using ::testing::Contains;
     EXPECT_THAT(files({Law::TransverselyIsotropic}), Contains("chunks/patch.fibre.glsl"));
-    EXPECT_THAT(files({Law::TransverselyIsotropic}), ::testing::Not(Contains("chunks/patch.moving.glsl")));
-    EXPECT_THAT(files({Law::NeoHookeanLnJ, 1}), Contains("chunks/patch.moving.glsl"));
+    EXPECT_THAT(files({Law::TransverselyIsotropic}), ::testing::Not(Contains("chunks/patch.viscosity.glsl")));
+    EXPECT_THAT(files({Law::NeoHookeanLnJ, 1}), Contains("chunks/patch.viscosity.glsl"));
     EXPECT_THAT(files({Law::NeoHookeanLnJ, 1}), ::testing::Not(Contains("chunks/patch.fibre.glsl")));
 }
 
 TEST(Composition, AStepInWhichStressesRestNeitherComputesNorWritesThem) {
     PatchStages stages{.advances = true, .forces = true};
     const auto text = [&] { return compose(patch_step_program({Law::NeoHookeanLnJ, 2}, {}, {}, stages)).text; };
-    for (const char* word : {"place_in_plane(", "advance_stresses(", "second_stress("})
+    for (const char* word : {"keep_stress(", "advance_stresses(", "second_stress("})
         EXPECT_THAT(text(), HasSubstr(word));
     stages.rests = true;
-    for (const char* word : {"place_in_plane(", "void advance_stresses("})
+    for (const char* word : {"keep_stress(", "void advance_stresses("})
         EXPECT_THAT(text(), ::testing::Not(HasSubstr(word)));
     EXPECT_THAT(text(), HasSubstr("#define MOVES_STRESSES 0\n"));
     EXPECT_THAT(text(), HasSubstr("readonly buffer PatchTissue"));
+}
+
+// Room that no program uses would take other workgroups' place.
+TEST(Composition, ViscousStressesStayInSharedMemoryOnlyWhereOnePatchDoes) {
+    const auto stays = [](const PatchSizes& sizes, bool persists) {
+        const PatchStages stages{.advances = true, .forces = true, .persists = persists};
+        return compose(patch_step_program({Law::NeoHookeanLnJ, 1}, {}, sizes, stages)).text.find("stresses_here") !=
+               std::string::npos;
+    };
+    EXPECT_TRUE(stays({.places = 64}, true));
+    EXPECT_FALSE(stays({.places = 0}, true));
+    EXPECT_FALSE(stays({.places = 64}, false));
+    EXPECT_FALSE(stays({.each_has_one = false, .places = 64}, true));
 }
 
 // NVIDIA's compiler evaluates a call within matrix arithmetic once for each column where the function branches

@@ -42,6 +42,14 @@ TEST(StressClock, LongTimeStepsMoveStressesEachTime) {
     EXPECT_DOUBLE_EQ(steps[1].interval, 0.002);
 }
 
+TEST(StressClock, MayBeToldToMoveStressesEachTime) {
+    StressClock clock(two_series, StressPace::EveryStep);
+    const std::vector<StressSteps> steps = clock.next(10, 0.001);
+    ASSERT_EQ(steps.size(), 2U);
+    EXPECT_EQ(steps[1].count, 9);
+    EXPECT_DOUBLE_EQ(steps[1].interval, 0.001);
+}
+
 std::vector<double> intervals(StressClock clock, const std::vector<int>& portions, double time_step) {
     std::vector<double> all;
     for (const int portion : portions)

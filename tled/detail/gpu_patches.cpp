@@ -72,6 +72,19 @@ PatchLayout fitting_layout(const RestState& rest, const GpuStepShape& shape, std
     return patch_layout(rest, patches);
 }
 
+/// Places that a patch has in shared memory for viscous stresses, in steps as slots have them; 0 where all workgroups
+/// of a multiprocessor together have no room for these beside their nodes.
+int places_that_stay(const TissueOfPatches& tissue, const PatchCapacity& capacity, bool averages, int workgroups,
+                     const shaders::DeviceLimits& limits) {
+    if (!tissue.viscous()) return 0;
+    const std::size_t places = slots_for(static_cast<std::size_t>(capacity.longest_fan * capacity.fans));
+    const int multiprocessors = limits.multiprocessors > 0 ? limits.multiprocessors : default_multiprocessors;
+    const auto side_by_side = static_cast<std::size_t>((workgroups + multiprocessors - 1) / multiprocessors);
+    const std::size_t bytes =
+        shared_bytes(static_cast<std::size_t>(capacity.slots), averages) + tissue.stress_bytes(places);
+    return side_by_side * bytes <= limits.shared_memory_bytes ? static_cast<int>(places) : 0;
+}
+
 constexpr std::array<PatchStages, 1> first_forces{{{.forces = true}}};
 constexpr std::array<PatchStages, 1> one_step{{{.advances = true, .forces = true}}};
 constexpr std::array<PatchStages, 1> many_steps{{{.advances = true, .forces = true, .persists = true}}};
@@ -125,6 +138,8 @@ GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& pro
     capacity_ = c;
     tissue_.emplace(device, rest, layout, blocks);
     sizes_ = {c.slots, shape.workgroup, workgroups_ == c.patches};
+    if (many_steps_ && sizes_.each_has_one)
+        sizes_.places = places_that_stay(*tissue_, c, averages_, workgroups_, device.limits());
     slot_count_ = layout.node_of_slot.size();
     std::vector<Uint4> head = layout.head;
     head.insert(head.end(), layout.fans.begin(), layout.fans.end());

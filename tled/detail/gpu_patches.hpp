@@ -32,6 +32,10 @@ public:
     [[nodiscard]] std::vector<Pass> passes(const shaders::NodeEffects& effects) const;
     /// As asked for, without many steps in a dispatch once the device has proved unable to run them.
     [[nodiscard]] GpuStepShape shape() const;
+    /// Stresses that stay in shared memory move with less than what a dispatch of their own takes.
+    [[nodiscard]] StressPace stress_pace() const {
+        return sizes_.places > 0 ? StressPace::EveryStep : StressPace::TheirOwn;
+    }
     /// Makes room for what slots keep of so many obstacles.
     void set_obstacles(std::size_t count, BlockBuffers& blocks);
     /// Displacement, Increment, masses or conditions were changed from outside.

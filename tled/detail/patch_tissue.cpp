@@ -1,38 +1,16 @@
 #include "tled/detail/patch_tissue.hpp"
 
-#include "tled/detail/folded_fibre.hpp"
 #include "tled/detail/prony_coefficients.hpp"
-
-#include <bit>
 
 namespace tissuewarp::tled::detail {
 namespace {
 
 constexpr std::uint32_t none = 0xffffffffU;
 
-/// Of every place; 0 where a fan has none.
-std::vector<std::uint32_t> folded_fibres(const RestState& rest, const PatchLayout& layout) {
-    std::vector<std::uint32_t> fibres(layout.element_of_place.size());
-    for (std::size_t place = 0; place < fibres.size(); ++place)
-        if (const std::uint32_t e = layout.element_of_place[place]; e != none)
-            fibres[place] = folded_fibre(rest.fibre.col(static_cast<Eigen::Index>(e)));
-    return fibres;
-}
-
-/// Four words of a place of which the fibre is the last: no stress yet.
-std::vector<std::uint32_t> with_resting_stresses(const std::vector<std::uint32_t>& fibres) {
-    std::vector<std::uint32_t> words(4 * fibres.size());
-    for (std::size_t place = 0; place < fibres.size(); ++place) words[4 * place + 3] = fibres[place];
-    return words;
-}
-
-std::vector<std::uint32_t> words_of(const std::vector<Float2>& numbers) {
-    std::vector<std::uint32_t> words;
-    for (const auto& [x, y] : numbers) {
-        words.push_back(std::bit_cast<std::uint32_t>(x));
-        words.push_back(std::bit_cast<std::uint32_t>(y));
-    }
-    return words;
+/// (x, y) of the fibre, or of its opposite, on the half z ≥ 0 of the octahedron |x| + |y| + z = 1.
+Float2 folded(const Eigen::Vector3d& fibre) {
+    const double scale = (fibre.z() < 0 ? -1 : 1) / fibre.lpNorm<1>();
+    return {static_cast<float>(scale * fibre.x()), static_cast<float>(scale * fibre.y())};
 }
 
 }  // namespace
@@ -47,15 +25,16 @@ TissueOfPatches::TissueOfPatches(const shaders::Device& device, const RestState&
       series_(rest.viscosity),
       element_count_(static_cast<std::size_t>(rest.element_count())),
       places_(layout.element_of_place.size()) {
-    const bool fibres = shaders::has_fibres(kind_.law);
-    if (!fibres && !viscous()) return;
-    tissue_.emplace(device, viscous() ? first_coefficient() + 2 * series_.size() * most_terms(series_) : places_,
-                    "tissue of patches");
+    if (planes() == 0) return;
+    tissue_.emplace(device, first_coefficient() + series_.size() * most_terms(series_), "tissue of patches");
     blocks.set("PatchTissue", *tissue_);
     const shaders::CurrentContext current = device.make_current();
-    if (fibres) {
-        const std::vector<std::uint32_t> words = folded_fibres(rest, layout);
-        tissue_->upload(viscous() ? with_resting_stresses(words) : words);
+    if (shaders::has_fibres(kind_.law)) {
+        std::vector<Float2> fibres(places_, Float2{0.0F, 0.0F});
+        for (std::size_t place = 0; place < places_; ++place)
+            if (const std::uint32_t e = layout.element_of_place[place]; e != none)
+                fibres[place] = folded(rest.fibre.col(static_cast<Eigen::Index>(e)));
+        tissue_->upload(fibres);
     }
     if (!viscous()) return;
     element_of_place_.emplace(device, layout.element_of_place, "elements of patches");
@@ -63,12 +42,21 @@ TissueOfPatches::TissueOfPatches(const shaders::Device& device, const RestState&
     upload_coefficients();
 }
 
+std::size_t TissueOfPatches::planes() const {
+    return (shaders::has_fibres(kind_.law) ? 1U : 0U) + 3 * static_cast<std::size_t>(kind_.prony_terms);
+}
+
+/// As shaders/chunks/patch.tissue.glsl has it; without viscosity the end.
 std::size_t TissueOfPatches::first_coefficient() const {
-    return (4 + 6 * static_cast<std::size_t>(kind_.prony_terms)) * places_;
+    return planes() * places_ + (viscous() ? places_ + (places_ + 1) / 2 : 0);
+}
+
+std::size_t TissueOfPatches::stress_bytes(std::size_t places) const {
+    return 3 * static_cast<std::size_t>(kind_.prony_terms) * sizeof(Float2) * places;
 }
 
 void TissueOfPatches::set_places(const shaders::Program& program) const {
-    if (tissue_) program.set(13, static_cast<std::uint32_t>(places_));
+    if (planes() > 0) program.set(13, static_cast<std::uint32_t>(places_));
 }
 
 void TissueOfPatches::set_stress_interval(double interval) {
@@ -78,7 +66,7 @@ void TissueOfPatches::set_stress_interval(double interval) {
 }
 
 void TissueOfPatches::upload_coefficients() {
-    tissue_->upload(words_of(prony_table(series_, interval_)), first_coefficient());
+    tissue_->upload(prony_table(series_, interval_), first_coefficient());
 }
 
 void TissueOfPatches::load_stresses(shaders::ProgramCache& programs, const BlockBuffers& blocks) const {
@@ -96,7 +84,7 @@ void TissueOfPatches::sum_stresses(shaders::ProgramCache& programs, const BlockB
 void TissueOfPatches::run_over_places(shaders::PatchStresses what, shaders::ProgramCache& programs,
                                       const BlockBuffers& blocks) const {
     if (!viscous()) return;
-    const shaders::Program& program = programs.get(shaders::patch_stress_program(kind_.prony_terms, what));
+    const shaders::Program& program = programs.get(shaders::patch_stress_program(kind_, what));
     program.set(0, static_cast<std::uint32_t>(element_count_));
     blocks.bind(program);
     program.dispatch(places_);

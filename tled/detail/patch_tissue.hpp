@@ -1,6 +1,6 @@
 #pragma once
 /// What the tetrahedra of patches have for themselves on the device: fibres and viscous stresses, in the layout of
-/// shaders/chunks/patch.fibres.glsl, patch.resting.glsl and patch.moving.glsl. Empty where the scene has neither. Needs the device's context current, except
+/// shaders/chunks/patch.tissue.glsl. Empty where the scene has neither. Needs the device's context current, except
 /// construction.
 
 #include "tled/detail/gpu_force.hpp"
@@ -23,6 +23,8 @@ public:
     /// Neither fibres nor viscosity.
     [[nodiscard]] bool empty() const { return !tissue_; }
     [[nodiscard]] bool viscous() const { return kind_.prony_terms > 0; }
+    /// Bytes of shared memory of `places` tetrahedra's viscous stresses.
+    [[nodiscard]] std::size_t stress_bytes(std::size_t places) const;
     /// The uniform of shaders/chunks/patch.tissue.glsl, where the program has it.
     void set_places(const shaders::Program& program) const;
     /// By which viscous stresses move on, s.
@@ -36,14 +38,16 @@ public:
 private:
     void run_over_places(shaders::PatchStresses what, shaders::ProgramCache& programs,
                          const BlockBuffers& blocks) const;
-    [[nodiscard]] std::size_t first_coefficient() const;  ///< word
+    [[nodiscard]] std::size_t planes() const;
+    [[nodiscard]] std::size_t first_coefficient() const;
     void upload_coefficients();
 
     shaders::PatchTissue kind_;
     std::vector<PronySeries> series_;
     double interval_ = 0;
     std::size_t element_count_, places_;
-    std::optional<shaders::Buffer<std::uint32_t>> tissue_, element_of_place_;
+    std::optional<shaders::Buffer<Float2>> tissue_;
+    std::optional<shaders::Buffer<std::uint32_t>> element_of_place_;
 };
 
 }  // namespace tissuewarp::tled::detail

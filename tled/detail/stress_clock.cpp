@@ -19,7 +19,7 @@ void append(std::vector<StressSteps>& all, const StressSteps& next) {
 
 }  // namespace
 
-StressClock::StressClock(const std::vector<PronySeries>& series) {
+StressClock::StressClock(const std::vector<PronySeries>& series, StressPace pace) : pace_(pace) {
     for (const PronySeries& each : series)
         for (const PronyTerm& term : each.terms) shortest_ = std::min(shortest_, term.relaxation_time);
 }
@@ -44,6 +44,7 @@ void StressClock::forget() {
 }
 
 int StressClock::steps_of_interval() const {
+    if (pace_ == StressPace::EveryStep) return 1;
     const double steps = std::floor(shortest_ / (steps_of_relaxation * time_step_));
     return steps < fewest_steps_of_rest ? 1 : static_cast<int>(std::min(steps, 1e6));
 }

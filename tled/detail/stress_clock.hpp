@@ -19,10 +19,12 @@ struct StressSteps {
     friend bool operator==(const StressSteps&, const StressSteps&) = default;
 };
 
+enum class StressPace { TheirOwn, EveryStep };
+
 /// Of all materials together: the shortest relaxation time sets the pace.
 class StressClock {
 public:
-    explicit StressClock(const std::vector<PronySeries>& series);
+    explicit StressClock(const std::vector<PronySeries>& series, StressPace pace = StressPace::TheirOwn);
 
     /// What the next `steps` time steps of `time_step` s do, and counts them as done. With a time step of 0, and where
     /// nothing is viscous, stresses rest. Any division of a run into portions gives the same.
@@ -37,6 +39,7 @@ private:
     void change_time_step(double time_step);
     double move();
 
+    StressPace pace_;
     double shortest_ = std::numeric_limits<double>::infinity();  ///< relaxation time, s
     double time_step_ = 0;
     double ahead_ = 0;  ///< s, of the stresses before the present time when they last moved
