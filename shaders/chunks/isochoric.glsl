@@ -1,10 +1,8 @@
 // Needs: numbers, deformation.
-// Gives: what the laws of the isochoric invariants share.
+// Gives: what the laws of the isochoric invariants share. Precondition of all: J > 0.
 
-/// J^(-2/3), NaN where J <= 0, and with it every stress made of it.
-float isochoric_factor(Deformation d) {
-    return d.volume_change > -1.0 ? pow(1.0 + d.volume_change, -2.0 / 3.0) : not_a_number();
-}
+/// J^(-2/3).
+float isochoric_factor(Deformation d) { return pow(1.0 + d.volume_change, -2.0 / 3.0); }
 
 /// tr C - 3 = 2 tr H + H:H.
 float trace_excess(Deformation d) {
@@ -36,6 +34,6 @@ mat3 stretch_difference(Deformation d, float c, float q);
 /// bracket is F - F⁻ᵀ - x/3 cof F / J.
 mat3 first_invariant_stress(Deformation d, float psi_1, float j, float pressure) {
     float c = 2.0 * psi_1 * j;
-    float third = trace_excess(d) * (1.0 / 3.0) * reciprocal(1.0 + d.volume_change);
+    float third = trace_excess(d) * (1.0 / 3.0) / (1.0 + d.volume_change);
     return stretch_difference(d, c, pressure - c * third);
 }

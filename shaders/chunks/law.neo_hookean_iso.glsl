@@ -5,6 +5,7 @@
 
 #if USES_SHEAR
 mat3 stress(uint e, Deformation d, Parameters p, float pressure) {
+    if (!(d.volume_change > -1.0)) return mat3(not_a_number());
     return first_invariant_stress(d, 0.5 * p.a.x, isochoric_factor(d), pressure);
 }
 #endif

@@ -35,6 +35,7 @@ vec3 ogden_term(float modulus, float exponent, vec3 log_stretch) {
 
 /// S = sum T_i / c_i n_i n_iᵀ, P = F S + pressure cof F; c_i = 1 + the eigenvalues of C - I, by cyclic Jacobi rotations.
 mat3 stress(uint e, Deformation d, Parameters p, float pressure) {
+    if (!(d.volume_change > -1.0)) return mat3(not_a_number());
     mat3 E = strain_excess(d);
     float xx = E[0][0], yy = E[1][1], zz = E[2][2], xy = E[0][1], yz = E[1][2], zx = E[2][0];
     vec3 n0 = vec3(1.0, 0.0, 0.0), n1 = vec3(0.0, 1.0, 0.0), n2 = vec3(0.0, 0.0, 1.0);

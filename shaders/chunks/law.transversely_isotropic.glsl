@@ -16,7 +16,7 @@ mat3 stress(uint e, Deformation d, Parameters p, float pressure) {
     vec3 stretch = d.H * a;
     float excess = 2.0 * dot(a, stretch) + dot(stretch, stretch);  // a·C a - 1
     float J = 1.0 + d.volume_change;
-    float j = isochoric_factor(d);
+    float j = J > 0.0 ? isochoric_factor(d) : not_a_number();
     float sum = 1.0 + j + j * j;
     float inverse = reciprocal(J * J * sum);
     // With j³ = J⁻², 1 - j = (1 - j³)/(1 + j + j²) keeps small strains.
