@@ -92,6 +92,11 @@ Intraoperative seen(const RegistrationInputs& inputs, const RegisterOptions& opt
     return seen;
 }
 
+/// Labels, and points of an organ that may lie anywhere, also tell loads that nobody stated.
+bool looks_for_loads(const RegistrationRun& run) {
+    return !run.options.match_image && (!run.inputs.fixed_labels.empty() || !run.options.no_align);
+}
+
 FitOptions fit_options(const RegisterOptions& options) {
     FitOptions result;
     for (const std::string& name : options.fit) result.parameters.push_back(fit_parameter(name));
@@ -197,6 +202,7 @@ void run_register(const RegisterOptions& options) {
     progress.begin("preparing the model", 0.02, 0.20);
     run.prepared = std::make_unique<PreparedModel>(prepare(run.inputs.moving_labels, prepare_options(run), progress));
     if (options.match_image) prepare_image(*run.prepared, run.inputs.moving, {}, progress);
+    if (looks_for_loads(run)) prepare_loads(*run.prepared, progress);
     append(run.times, run.prepared->times);
 
     progress.begin("registering", 0.20, 0.47);

@@ -9,8 +9,6 @@ namespace tissuewarp::registration::detail {
 
 namespace {
 
-constexpr int most_nodes = 6000;
-
 Eigen::VectorXd forces_of(const std::vector<tled::Spring>& springs, Eigen::Index rows) {
     Eigen::VectorXd forces = Eigen::VectorXd::Zero(rows);
     for (const tled::Spring& spring : springs) forces.segment<3>(3 * spring.node) += spring.stiffness * spring.target;
@@ -20,9 +18,15 @@ Eigen::VectorXd forces_of(const std::vector<tled::Spring>& springs, Eigen::Index
 }  // namespace
 
 FoundLoads LoadFinder::find(LoadKind kind, const LastPulls& pulls, Observer& observer) {
-    if (prepared_.rest.node_count <= most_nodes) return found(kind, prepared_, pulls);
-    if (!twin_) twin_ = coarse_model(prepared_, suggested_edge_length_without_labels(prepared_.labels), observer);
-    return found(kind, *twin_, pulls_on(*twin_, prepared_, pulls));
+    if (!loads_take_coarse_model(prepared_)) return found(kind, prepared_, pulls);
+    const PreparedModel& coarse = twin(observer);
+    return found(kind, coarse, pulls_on(coarse, prepared_, pulls));
+}
+
+const PreparedModel& LoadFinder::twin(Observer& observer) {
+    if (prepared_.coarse) return *prepared_.coarse;
+    if (!twin_) twin_ = coarse_model_for_loads(prepared_, observer);
+    return *twin_;
 }
 
 Eigen::MatrixXd LoadFinder::loads(LoadKind kind, const PreparedModel& model) const {
@@ -32,8 +36,9 @@ Eigen::MatrixXd LoadFinder::loads(LoadKind kind, const PreparedModel& model) con
 const LoadFinder::Shapes& LoadFinder::shapes(LoadKind kind, const PreparedModel& model, const WeighedSprings& unseen) {
     std::optional<Shapes>& shapes = shapes_[static_cast<std::size_t>(kind)];
     if (!shapes) {
-        LoadShapes known(loads(kind, model), Posterior(model, unseen), unseen.energy);
-        Eigen::MatrixXd forces = known.scale() * loads(kind, prepared_);
+        const Eigen::MatrixXd drawn = loads(kind, model);
+        LoadShapes known(drawn, Posterior(model, unseen), unseen.energy);
+        Eigen::MatrixXd forces = known.scale() * (&model == &prepared_ ? drawn : loads(kind, prepared_));
         shapes.emplace(Shapes{std::move(known), std::move(forces)});
     }
     return *shapes;

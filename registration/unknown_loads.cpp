@@ -39,7 +39,8 @@ Eigen::VectorXd nodal_areas(const PreparedModel& prepared) {
 }
 
 double radius_of(const Eigen::Matrix3Xd& nodes) {
-    return std::sqrt((nodes.colwise() - nodes.rowwise().mean()).colwise().squaredNorm().mean());
+    const Eigen::Vector3d middle = nodes.rowwise().mean();
+    return std::sqrt((nodes.colwise() - middle).colwise().squaredNorm().mean());
 }
 
 /// Every node's vectors times its weight.

@@ -7,10 +7,12 @@
 #include "registration/warp.hpp"
 #include "tests/support/label_shapes.hpp"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 #include <Eigen/Cholesky>
 
 #include <cmath>
+#include <string>
+#include <vector>
 
 namespace tissuewarp::registration {
 namespace {
@@ -222,9 +224,16 @@ TEST(UnknownLoads, DoNotDependOnTheUpdateBefore) {
               used.update({.points = pairs}).deformation.displacement);
 }
 
-// Found on a coarser mesh of the organ, they do the same.
+/// The names of stages, as they come.
+struct Stages : Observer {
+    std::vector<std::string> names;
+    void progress(std::string_view stage, double) override { names.emplace_back(stage); }
+};
+
+// Found on a coarser mesh of the organ, they do the same; and where that one was made beforehand, exactly the same.
 TEST(UnknownLoads, OfALargeModelAreThoseOfASmallOne) {
-    const PreparedModel small = organ(6.5), large = organ(3.6);
+    const PreparedModel small = organ(6.5);
+    PreparedModel large = organ(3.6);
     ASSERT_GT(large.rest.node_count, 6000);
     ASSERT_LT(small.rest.node_count, 6000);
     const Matrix3Xd truth = bent(large);
@@ -234,6 +243,31 @@ TEST(UnknownLoads, OfALargeModelAreThoseOfASmallOne) {
                        without = update(large, {.points = pairs}, with_shapes(0));
     EXPECT_NEAR(std::log2(of_large.pulls.load_size / of_small.pulls.load_size), 0, 1);
     EXPECT_LT(error_on_the_right(large, of_large, truth), 0.7 * error_on_the_right(large, without, truth));
+
+    prepare_loads(large);
+    ASSERT_TRUE(large.coarse);
+    EXPECT_EQ(large.times.back().stage, "coarse model");
+    Stages stages;
+    const UpdateResult of_prepared = update(large, {.points = pairs}, with_shapes(48), stages);
+    EXPECT_EQ(of_prepared.deformation.displacement, of_large.deformation.displacement);
+    EXPECT_THAT(stages.names, ::testing::Not(::testing::Contains("relaxing the mesh")));
+
+    const tled::MaterialTable softer{{1, tled::neo_hookean_lnj(2, 0.4)}, {2, tled::neo_hookean_lnj(5, 0.3)}};
+    large = with_materials(std::move(large), softer);
+    EXPECT_EQ(large.coarse->model.materials, softer);
+}
+
+TEST(UnknownLoads, TakeACoarserModelOfALargeFreeOneAlone) {
+    PreparedModel small = organ(12);
+    prepare_loads(small);
+    EXPECT_FALSE(small.coarse);
+    PrepareOptions held;
+    held.meshing.edge_length = 3.6;
+    held.anchors = {2};
+    PreparedModel large = prepare(shapes::organ_labels({}), held);
+    ASSERT_GT(large.rest.node_count, 6000);
+    prepare_loads(large);
+    EXPECT_FALSE(large.coarse);
 }
 
 }  // namespace
