@@ -72,13 +72,13 @@ Polylines read_lines(const std::filesystem::path& path) {
     std::transform(extension.begin(), extension.end(), extension.begin(),
                    [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
     if (extension == ".csv") return read_table(path);
-    if (extension == ".vtk") return meshing::read_polylines(path);
+    if (extension == ".vtk" || extension == ".vtp") return meshing::read_polylines(path);
     if (is_slicer_markups(path)) {
         Markups markups = read_slicer_markups(path);
         return {std::move(markups.points), std::move(markups.lines)};
     }
     throw InvalidInput(path.string() +
-                       ": curves are read from .vtk (legacy polydata), .csv (x,y,z,line) and markups of 3D Slicer");
+                       ": curves are read from .vtk and .vtp (polydata), .csv (x,y,z,line) and markups of 3D Slicer");
 }
 
 void require_usable_lines(const std::vector<Eigen::Matrix3Xd>& lines) {
@@ -158,8 +158,9 @@ Curves read_curves(const std::filesystem::path& moving, const std::filesystem::p
     constexpr double least_reach_mm = 2.5;
     const Polylines before = read_lines(moving), during = read_lines(fixed);
     if (before.lines.empty())
-        throw InvalidInput(moving.string() +
-                           ": holds no line; give .vtk with LINES, .csv with a column 'line', or curves of 3D Slicer");
+        throw InvalidInput(
+            moving.string() +
+            ": holds no line; give .vtk or .vtp with lines, .csv with a column 'line', or curves of 3D Slicer");
     Curves curves;
     for (const std::vector<int>& line : before.lines) curves.moving.emplace_back(before.nodes(Eigen::all, line));
     curves.fixed = during.nodes;

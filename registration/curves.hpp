@@ -7,8 +7,8 @@
 
 namespace tissuewarp::registration {
 
-/// Reads the preoperative lines and the intraoperative points, LPS mm: .vtk (legacy polydata with LINES); markups of 3D
-/// Slicer, whose curves and lines are the polylines of their control points; or .csv with
+/// Reads the preoperative lines and the intraoperative points, LPS mm: the lines of polydata, .vtk (legacy) or .vtp
+/// (XML); markups of 3D Slicer, whose curves and lines are the polylines of their control points; or .csv with
 /// a header that names x, y, z and line (further columns ignored); rows with the same entry there are the points of one
 /// line, in their order. Points of the fixed file need no line (column `line` absent or empty); those on a line that is
 /// long enough get its tangent. `deviation_mm` is taken over. Throws IoError or InvalidInput naming the file.
