@@ -183,7 +183,7 @@ struct Parser {
         declare_register(verbs.emplace_back(app, "register", "Register a segmented volume to another, or to points"));
         declare_mesh(verbs.emplace_back(app, "mesh", "Turn a label map into tetrahedra"));
         declare_warp(verbs.emplace_back(app, "warp", "Carry an image, labels, points or a surface along"));
-        declare_evaluate(verbs.emplace_back(app, "evaluate", "Score label maps, landmarks and fields"));
+        declare_evaluate(verbs.emplace_back(app, "evaluate", "Score label maps, landmarks, curves and fields"));
         declare_info(verbs.emplace_back(app, "info", "Print what a file holds, or the devices of this machine"));
         declare_bench(verbs.emplace_back(app, "bench", "Time the solver's engines on this machine"));
         declare_simulate(verbs.emplace_back(app, "simulate", "Simulate what a scene file names"));
@@ -340,6 +340,13 @@ struct Parser {
             ->type_name("MM")
             ->delimiter(',')
             ->capture_default_str();
+        CLI::Option* moving_curves = verb.path("--moving-curves", o.moving_curves,
+                                               "Preoperative centre lines of vessels, as register takes them");
+        CLI::Option* fixed_curves =
+            verb.path("--fixed-curves", o.fixed_curves,
+                      "Intraoperative points along them: how far they lie from the lines, before and after");
+        moving_curves->needs(fixed_curves);
+        fixed_curves->needs(moving_curves);
         verb.path("--held-out", o.held_out,
                   "Intraoperative surface points that were not registered to: their distance to the warped surface of "
                   "--moving-labels; .ply, .stl, .obj, .vtk, .vtp, .csv, .xyz (mm, LPS)")
