@@ -29,16 +29,22 @@ const PreparedModel& LoadFinder::twin(Observer& observer) {
     return *twin_;
 }
 
-Eigen::MatrixXd LoadFinder::loads(LoadKind kind, const PreparedModel& model) const {
-    return kind == LoadKind::Weight ? unknown_weights(model) : principal_loads(model, count_);
+std::pair<Eigen::MatrixXd, Eigen::MatrixXd> LoadFinder::loads(LoadKind kind, const PreparedModel& model) const {
+    const bool same = &model == &prepared_;
+    if (kind == LoadKind::Weight) {
+        Eigen::MatrixXd weights = unknown_weights(model);
+        return {weights, same ? weights : unknown_weights(prepared_)};
+    }
+    const PrincipalLoads principal = principal_loads(model, count_);
+    return {principal.loads, same ? principal.loads : loads_along(prepared_, principal.axes)};
 }
 
 const LoadFinder::Shapes& LoadFinder::shapes(LoadKind kind, const PreparedModel& model, const WeighedSprings& unseen) {
     std::optional<Shapes>& shapes = shapes_[static_cast<std::size_t>(kind)];
     if (!shapes) {
-        const Eigen::MatrixXd drawn = loads(kind, model);
-        LoadShapes known(drawn, Posterior(model, unseen), unseen.energy);
-        Eigen::MatrixXd forces = known.scale() * (&model == &prepared_ ? drawn : loads(kind, prepared_));
+        auto [fitted, applied] = loads(kind, model);
+        LoadShapes known(std::move(fitted), Posterior(model, unseen), unseen.energy);
+        Eigen::MatrixXd forces = known.scale() * applied;
         shapes.emplace(Shapes{std::move(known), std::move(forces)});
     }
     return *shapes;

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <optional>
+#include <utility>
 
 namespace tissuewarp::registration::detail {
 
@@ -40,7 +41,8 @@ private:
     std::array<std::optional<Shapes>, 2> shapes_;  // of each kind
 
     [[nodiscard]] const PreparedModel& twin(Observer& observer);
-    [[nodiscard]] Eigen::MatrixXd loads(LoadKind kind, const PreparedModel& model) const;
+    /// On the model that they are found on, and the same on the model itself.
+    [[nodiscard]] std::pair<Eigen::MatrixXd, Eigen::MatrixXd> loads(LoadKind kind, const PreparedModel& model) const;
     [[nodiscard]] const Shapes& shapes(LoadKind kind, const PreparedModel& model, const WeighedSprings& unseen);
     [[nodiscard]] FoundLoads found(LoadKind kind, const PreparedModel& model, const LastPulls& pulls);
 };
