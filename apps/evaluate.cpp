@@ -1,4 +1,4 @@
-// tissuewarp evaluate: scores label maps, landmarks and displacement fields, whoever made them.
+// tissuewarp evaluate: scores label maps, landmarks, curves and displacement fields, whoever made them.
 
 #include "apps/file_kind.hpp"
 #include "apps/inputs.hpp"
@@ -10,6 +10,7 @@
 #include "apps/verbs.hpp"
 #include "core/errors.hpp"
 #include "imaging/labels.hpp"
+#include "registration/curves.hpp"
 #include "registration/label_surface.hpp"
 #include "registration/surface_points.hpp"
 
@@ -113,6 +114,35 @@ void evaluate_landmarks(const EvaluateOptions& options, const Volume& field, con
     sheet.add(targets.binned("data at", "by_distance_to_data", distances, options.bin_edges));
 }
 
+/// The preoperative lines where the field takes them.
+std::vector<Eigen::Matrix3Xd> displaced_lines(const fs::path& path, const Curves& curves, const Volume& field) {
+    constexpr double step_mm = 1;  // the field bends what is between two points of a file
+    std::vector<Eigen::Matrix3Xd> lines;
+    try {
+        for (const Eigen::Matrix3Xd& line : curves.moving)
+            lines.push_back(displaced(evenly_along(line, step_mm), field));
+    } catch (const InvalidInput& problem) {
+        throw InvalidInput(fmt::format("{}, every {} mm: {}", path.string(), step_mm, problem.what()));
+    }
+    return lines;
+}
+
+void evaluate_curves(const EvaluateOptions& options, const Volume& field, ScoreSheet& sheet) {
+    constexpr double farthest_mm = 100;
+    const Curves curves = read_curves(options.moving_curves, options.fixed_curves);
+    const std::vector<std::vector<int>> pieces = read_curve_file(options.fixed_curves).lines;
+    CurveErrors errors{curve_residual(curves.moving, curves.fixed, pieces), std::nullopt};
+    if (!field.empty())
+        errors.after = curve_residual(displaced_lines(options.moving_curves, curves, field), curves.fixed, pieces);
+    const double median = (errors.after ? *errors.after : errors.before).to_lines.median;
+    if (median > farthest_mm)
+        throw InvalidInput(fmt::format(
+            "{}: half of the points lie {:.0f} mm or more from the lines of {}; both must be LPS mm, each in "
+            "the frame of its image: for RAS, negate x and y",
+            options.fixed_curves.string(), median, options.moving_curves.string()));
+    sheet.add(errors);
+}
+
 void evaluate_field(const EvaluateOptions& options, const Volume& field, ScoreSheet& sheet) {
     Volume mask;
     if (!options.mask.empty()) {
@@ -134,9 +164,11 @@ void evaluate_held_out(const EvaluateOptions& options, const Volume& field, cons
 }
 
 void require_something(const EvaluateOptions& options) {
-    if (options.labels.empty() && !options.landmarks.given() && options.displacement.empty())
+    if (options.labels.empty() && !options.landmarks.given() && options.displacement.empty() &&
+        options.moving_curves.empty())
         throw InvalidInput(
-            "nothing to evaluate; give --labels with --reference-labels, --landmarks, or --displacement");
+            "nothing to evaluate; give --labels with --reference-labels, --landmarks, --moving-curves with "
+            "--fixed-curves, or --displacement");
     if (options.landmarks.given()) return;
     const char* unused = !options.data_surface.empty()  ? "--data-surface"
                          : !options.data_points.empty() ? "--data-points"
@@ -157,6 +189,7 @@ void run_evaluate(const EvaluateOptions& options) {
     if (!options.labels.empty()) evaluate_labels(options, sheet);
     const Volume field = read_field(options.displacement), organ = read_organ(options.moving_labels);
     if (options.landmarks.given()) evaluate_landmarks(options, field, organ, notes, sheet);
+    if (!options.moving_curves.empty()) evaluate_curves(options, field, sheet);
     if (!field.empty()) evaluate_field(options, field, sheet);
     if (!options.held_out.empty()) evaluate_held_out(options, field, organ, sheet);
     sheet.add_notes(notes);

@@ -16,7 +16,7 @@ inline FileKind file_kind(const std::filesystem::path& path) {
         if (name.ends_with(extension)) return FileKind::Image;
     for (const char* extension : {".csv", ".xyz"})
         if (name.ends_with(extension)) return FileKind::Points;
-    for (const char* extension : {".ply", ".stl", ".obj", ".vtk"})
+    for (const char* extension : {".ply", ".stl", ".obj", ".vtk", ".vtp"})
         if (name.ends_with(extension)) return FileKind::Surface;
     if (name.ends_with(".vtu")) return FileKind::Mesh;
     return name.ends_with(".h5") ? FileKind::Record : FileKind::Unknown;

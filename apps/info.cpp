@@ -126,7 +126,7 @@ void print_file(const fs::path& path, bool labels) {
     }
     throw InvalidInput("'" + path.string() +
                        "' has an unknown extension; give .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, a DICOM "
-                       "folder, .vtu, .ply, .stl, .obj, .vtk, .csv, .xyz or .h5");
+                       "folder, .vtu, .ply, .stl, .obj, .vtk, .vtp, .csv, .xyz or .h5");
 }
 
 }  // namespace

@@ -183,7 +183,7 @@ struct Parser {
         declare_register(verbs.emplace_back(app, "register", "Register a segmented volume to another, or to points"));
         declare_mesh(verbs.emplace_back(app, "mesh", "Turn a label map into tetrahedra"));
         declare_warp(verbs.emplace_back(app, "warp", "Carry an image, labels, points or a surface along"));
-        declare_evaluate(verbs.emplace_back(app, "evaluate", "Score label maps, landmarks and fields"));
+        declare_evaluate(verbs.emplace_back(app, "evaluate", "Score label maps, landmarks, curves and fields"));
         declare_info(verbs.emplace_back(app, "info", "Print what a file holds, or the devices of this machine"));
         declare_bench(verbs.emplace_back(app, "bench", "Time the solver's engines on this machine"));
         declare_simulate(verbs.emplace_back(app, "simulate", "Simulate what a scene file names"));
@@ -203,7 +203,7 @@ struct Parser {
         verb.path("--fixed", o.fixed, "Intraoperative grey image: gives the output grid; alone, it is what is matched");
         verb.path("--fixed-labels", o.fixed_labels, "Intraoperative label map: what is matched");
         verb.path("--fixed-surface", o.fixed_surface,
-                  "Intraoperative points of a part of the surface: .ply, .stl, .obj, .vtk, .csv, .xyz (mm, LPS)");
+                  "Intraoperative points of a part of the surface: .ply, .stl, .obj, .vtk, .vtp, .csv, .xyz (mm, LPS)");
         verb.number("--surface-sd", o.surface_deviation, "MM", 1e-3, 100.0,
                     "Standard deviation of these points along the normal (mm)");
         CLI::Option* fixed_points =
@@ -214,10 +214,10 @@ struct Parser {
             ->needs(fixed_points);
         verb.number("--points-sd", o.point_pairs.deviation, "MM", 1e-3, 100.0,
                     "Standard deviation of a pair along each axis (mm)");
-        CLI::Option* moving_curves =
-            verb.path("--moving-curves", o.curves.moving,
-                      "Preoperative centre lines of vessels: .vtk with LINES, curves of 3D Slicer, or CSV x,y,z,line "
-                      "(mm, LPS)");
+        CLI::Option* moving_curves = verb.path(
+            "--moving-curves", o.curves.moving,
+            "Preoperative centre lines of vessels: lines in .vtk or .vtp, curves of 3D Slicer, or CSV x,y,z,line "
+            "(mm, LPS)");
         CLI::Option* fixed_curves = verb.path("--fixed-curves", o.curves.fixed,
                                               "Intraoperative points along the same vessels to register to, likewise; "
                                               "those of no line need no column 'line'");
@@ -228,7 +228,7 @@ struct Parser {
         verb.path("-o,--output", o.output, "Folder for the results")->required()->type_name("FOLDER");
         verb.landmarks(o.landmarks);
         verb.path("--points", o.points, "Moving points to carry along: CSV x,y,z (mm, LPS)");
-        verb.path("--surface", o.surface, "Moving surface to carry along: .ply, .stl, .obj, .vtk (mm, LPS)");
+        verb.path("--surface", o.surface, "Moving surface to carry along: .ply, .stl, .obj, .vtk, .vtp (mm, LPS)");
         verb.text("--accuracy", accuracy,
                   "Choose the mesh for this error of targets (mm, root mean square), for instance 0.5mm");
         verb.text("--time-budget", time_budget,
@@ -294,7 +294,7 @@ struct Parser {
     void declare_warp(Verb& verb) {
         WarpOptions& o = warp;
         verb.path("input", o.input,
-                  "Image, label map, points (.csv) or surface (.ply, .stl, .obj, .vtk) of the moving frame")
+                  "Image, label map, points (.csv) or surface (.ply, .stl, .obj, .vtk, .vtp) of the moving frame")
             ->required();
         verb.path("-o,--output", o.output, "File to write")->required();
         CLI::Option* record = verb.path("--record", o.record, "record.h5 of a registration");
@@ -340,9 +340,16 @@ struct Parser {
             ->type_name("MM")
             ->delimiter(',')
             ->capture_default_str();
+        CLI::Option* moving_curves = verb.path("--moving-curves", o.moving_curves,
+                                               "Preoperative centre lines of vessels, as register takes them");
+        CLI::Option* fixed_curves =
+            verb.path("--fixed-curves", o.fixed_curves,
+                      "Intraoperative points along them: how far they lie from the lines, before and after");
+        moving_curves->needs(fixed_curves);
+        fixed_curves->needs(moving_curves);
         verb.path("--held-out", o.held_out,
                   "Intraoperative surface points that were not registered to: their distance to the warped surface of "
-                  "--moving-labels; .ply, .stl, .obj, .vtk, .csv, .xyz (mm, LPS)")
+                  "--moving-labels; .ply, .stl, .obj, .vtk, .vtp, .csv, .xyz (mm, LPS)")
             ->needs(field)
             ->needs(organ);
         verb.path("--json", o.json, "Also write the scores as JSON");

@@ -96,11 +96,12 @@ struct EvaluateOptions {
     CommonOptions common;
     std::filesystem::path labels, reference_labels, displacement, inverse, mask, json;
     LandmarkFiles landmarks;
-    double moved = 2.0;                               ///< mm
-    std::filesystem::path moving_labels;              ///< where the organ's surface is, moving frame
-    std::filesystem::path data_surface, data_points;  ///< what was registered to, fixed frame
-    std::filesystem::path held_out;                   ///< surface points that were not registered to, fixed frame
-    std::vector<double> bin_edges{5, 10, 20};         ///< mm, of depths and distances to data
+    double moved = 2.0;                                 ///< mm
+    std::filesystem::path moving_labels;                ///< where the organ's surface is, moving frame
+    std::filesystem::path data_surface, data_points;    ///< what was registered to, fixed frame
+    std::filesystem::path moving_curves, fixed_curves;  ///< centre lines of vessels, and points along them
+    std::filesystem::path held_out;                     ///< surface points that were not registered to, fixed frame
+    std::vector<double> bin_edges{5, 10, 20};           ///< mm, of depths and distances to data
 };
 
 struct InfoOptions {

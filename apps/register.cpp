@@ -12,6 +12,8 @@
 #include "imaging/filters.hpp"
 #include "imaging/labels.hpp"
 #include "meshing/mesh_io.hpp"
+#include "registration/curve_residual.hpp"
+#include "registration/curves.hpp"
 #include "registration/field.hpp"
 #include "registration/warp.hpp"
 
@@ -92,6 +94,11 @@ Intraoperative seen(const RegistrationInputs& inputs, const RegisterOptions& opt
     return seen;
 }
 
+/// Labels, and points of an organ that may lie anywhere, also tell loads that nobody stated.
+bool looks_for_loads(const RegistrationRun& run) {
+    return !run.options.match_image && (!run.inputs.fixed_labels.empty() || !run.options.no_align);
+}
+
 FitOptions fit_options(const RegisterOptions& options) {
     FitOptions result;
     for (const std::string& name : options.fit) result.parameters.push_back(fit_parameter(name));
@@ -149,6 +156,16 @@ void estimate_errors(RegistrationRun& run, ProgressLine& progress) {
         doubts.push_back(std::move(doubt));
 }
 
+CurveDistances curve_distances(const RegistrationRun& run) {
+    constexpr double step_mm = 1;  // tissue bends what is between two points of a file
+    const Curves& curves = *run.inputs.curves;
+    const PointTransform transform(run.result.deformation, {run.options.fade});
+    std::vector<Eigen::Matrix3Xd> carried;
+    for (const Eigen::Matrix3Xd& line : curves.moving) carried.push_back(transform(evenly_along(line, step_mm)));
+    return {curve_residual(curves.moving, curves.fixed, {}).to_lines,
+            curve_residual(carried, curves.fixed, {}).to_lines};
+}
+
 Scores score(const RegistrationRun& run) {
     Scores scores;
     const auto without_neighbours = [&](const imaging::Volume& labels) {
@@ -165,6 +182,7 @@ Scores score(const RegistrationRun& run) {
     scores.organ = field_jacobians(run.products.moving_to_fixed, &organ);
     scores.grid = field_jacobians(run.products.moving_to_fixed);
     if (run.inputs.landmarks) scores.target_error = target_error(*run.inputs.landmarks, run.products.landmarks);
+    if (run.inputs.curves) scores.curves = curve_distances(run);
     return scores;
 }
 
@@ -197,6 +215,7 @@ void run_register(const RegisterOptions& options) {
     progress.begin("preparing the model", 0.02, 0.20);
     run.prepared = std::make_unique<PreparedModel>(prepare(run.inputs.moving_labels, prepare_options(run), progress));
     if (options.match_image) prepare_image(*run.prepared, run.inputs.moving, {}, progress);
+    if (looks_for_loads(run)) prepare_loads(*run.prepared, progress);
     append(run.times, run.prepared->times);
 
     progress.begin("registering", 0.20, 0.47);

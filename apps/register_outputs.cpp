@@ -195,6 +195,10 @@ std::string summary_text(const RegistrationRun& run, double total_seconds) {
         const std::string moved = fmt::format("moved > {:g} mm, ", error->moved_mm);
         text += summary_row(moved + "before", error->moved_before) + summary_row(moved + "after", error->moved_after);
     }
+    if (const auto& curves = run.scores.curves) {
+        text += "curves to lines (mm)     count    mean  median    95th     max\n";
+        text += summary_row("before", curves->before) + summary_row("after", curves->after);
+    }
     if (const auto& fit = run.result.image)
         text += fmt::format("image: {} of {} blocks found, {:.2f} mm from the tissue; near {:.0f} % of the organ\n",
                             fit->matched, fit->blocks, fit->residual_mm, 100 * fit->shown_share);

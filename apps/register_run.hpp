@@ -23,11 +23,17 @@ struct Products {
     std::optional<meshing::SurfaceMesh> surface;
 };
 
+/// From points along vessels to the nearest place on the preoperative lines, mm.
+struct CurveDistances {
+    registration::Summary before, after;  ///< as the headers place the lines, and as they were carried
+};
+
 /// How good the result is.
 struct Scores {
     std::map<int, registration::Overlap> before, after;  ///< per label, 0 is their union; empty without fixed labels
     registration::JacobianReport mesh, organ, grid;      ///< of the elements, of labelled voxels, of all voxels
     std::optional<registration::TargetError> target_error;
+    std::optional<CurveDistances> curves;  ///< where such points were registered to
 };
 
 struct RegistrationRun {

@@ -328,6 +328,9 @@ json report_json(const RegistrationRun& run, double total_seconds) {
     if (run.dial) report["dial"] = dial(run);
     if (!run.fit.parameters.empty()) report["fit"] = fitted(run.fit);
     if (scores.target_error) report["target_registration_error"] = to_json(*scores.target_error);
+    if (scores.curves)
+        report["curves"]["to_lines"] = {{"before", to_json(scores.curves->before)},
+                                        {"after", to_json(scores.curves->after)}};
     return report;
 }
 

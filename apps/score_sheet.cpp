@@ -92,6 +92,21 @@ void ScoreSheet::add(const registration::SurfaceResidual& residual) {
     text_ += fmt::format("  {:<30}{:>8}{:>9.3f}\n", "signed, outward positive", "", residual.mean_signed_mm);
 }
 
+void ScoreSheet::add(const CurveErrors& errors) {
+    nlohmann::json& curves = json_["curves"] = nlohmann::json::object();
+    heading("curves (mm)");
+    const auto add = [&](const std::string& when, const registration::CurveResidual& residual) {
+        curves["to_lines"][when] = to_json(residual.to_lines);
+        row("points to lines, " + when, residual.to_lines);
+        if (residual.from_lines.count == 0) return;
+        curves["from_lines"][when] = to_json(residual.from_lines);
+        curves["shown_mm"][when] = residual.shown_mm;
+        row("lines to points, " + when, residual.from_lines);
+    };
+    add("before", errors.before);
+    if (errors.after) add("after", *errors.after);
+}
+
 void ScoreSheet::add_notes(const std::vector<std::string>& notes) {
     if (notes.empty()) return;
     json_["notes"] = notes;

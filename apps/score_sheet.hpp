@@ -1,6 +1,7 @@
 #pragma once
 /// What `evaluate` found, as a table to read and as JSON.
 
+#include "registration/curve_residual.hpp"
 #include "registration/inverse_consistency.hpp"
 #include "registration/surface_residual.hpp"
 #include "registration/target_bins.hpp"
@@ -21,6 +22,12 @@ struct BinnedErrors {
     std::optional<std::vector<registration::ErrorBin>> after;
 };
 
+/// Of curves as the headers place them; `after` where a field carried the lines.
+struct CurveErrors {
+    registration::CurveResidual before;
+    std::optional<registration::CurveResidual> after;
+};
+
 /// Scores in the order in which they are added. Lengths in mm; a count of 0 is followed by – in the table, null in
 /// JSON.
 class ScoreSheet {
@@ -32,6 +39,7 @@ public:
     void add(const registration::JacobianReport& jacobian);
     void add(const registration::InverseConsistency& consistency);
     void add(const registration::SurfaceResidual& residual);
+    void add(const CurveErrors& errors);
     void add_notes(const std::vector<std::string>& notes);
 
     [[nodiscard]] const nlohmann::json& json() const { return json_; }

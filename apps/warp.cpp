@@ -78,7 +78,7 @@ void run_warp(const WarpOptions& options) {
         throw InvalidInput(
             "'" + options.input.string() +
             "' is of no kind that can be warped; give an image, points (.csv, .xyz) or a surface (.ply, .stl, "
-            ".obj, .vtk)");
+            ".obj, .vtk, .vtp)");
     }
 }
 

@@ -345,7 +345,10 @@ void run(const Arguments& arguments) {
         PreparedModel prepared = prepare(study.labels, options);
         ImageModelOptions image_options;
         image_options.features.count = arguments.count;
-        if (study.seen.image) prepare_image(prepared, study.moving, image_options);
+        if (study.seen.image)
+            prepare_image(prepared, study.moving, image_options);
+        else
+            prepare_loads(prepared);
         for (const double value : arguments.values) {
             UpdateOptions update_options;
             update_options.device = arguments.device;

@@ -24,8 +24,9 @@ void write_vtu(const TetMesh& mesh, const std::filesystem::path& path, const std
 void write_vtu(const MixedMesh& mesh, const std::filesystem::path& path,
                const std::vector<MeshArray>& point_arrays = {}, const std::vector<MeshArray>& cell_arrays = {});
 
-/// Reads a .vtu of tetrahedra: what write_vtu makes, and the ascii, base64-inline and raw-appended (uncompressed)
-/// variants that VTK and meshio write. A missing `label` array means label 1. Throws IoError or InvalidInput.
+/// Reads a .vtu of tetrahedra: what write_vtu makes, and the variants that VTK and meshio write, ascii, inline or
+/// appended, uncompressed or compressed by zlib, little-endian and in one piece. A missing `label` array means label 1.
+/// Throws IoError or InvalidInput.
 TetMesh read_vtu(const std::filesystem::path& path);
 /// The same for a mesh of tetrahedra, hexahedra (VTK types 10 and 12) or both.
 MixedMesh read_mixed_vtu(const std::filesystem::path& path);
@@ -40,8 +41,8 @@ struct Surface {
     Eigen::Matrix3Xd normals;
 };
 
-/// Reads .ply, .stl, .obj, .vtk (legacy polydata) and point lists .csv/.xyz (x,y,z[,nx,ny,nz], mm LPS) by extension.
-/// Point clouds have no triangles. Throws IoError or InvalidInput.
+/// Reads .ply, .stl, .obj, .vtk (legacy polydata), .vtp (XML polydata, as .vtu) and point lists .csv/.xyz
+/// (x,y,z[,nx,ny,nz], mm LPS) by extension. Point clouds have no triangles. Throws IoError or InvalidInput.
 Surface read_surface(const std::filesystem::path& path);
 
 /// Points, some of them joined by lines: indices of nodes, two at least each.
@@ -50,10 +51,10 @@ struct Polylines {
     std::vector<std::vector<int>> lines;
 };
 
-/// Reads the LINES of a legacy VTK polydata file. Throws IoError or InvalidInput.
+/// Reads the lines of VTK polydata, legacy (.vtk) or XML (.vtp). Throws IoError or InvalidInput.
 Polylines read_polylines(const std::filesystem::path& path);
 
-/// Writes .ply (binary), .stl, .obj or .vtk by extension. Complete or absent. Throws IoError.
+/// Writes .ply (binary), .stl, .obj, .vtk or .vtp by extension. Complete or absent. Throws IoError.
 void write_surface(const SurfaceMesh& surface, const std::filesystem::path& path);
 
 }  // namespace tissuewarp::meshing

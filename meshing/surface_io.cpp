@@ -1,5 +1,6 @@
 #include "core/atomic_file.hpp"
 #include "meshing/detail/surface_formats.hpp"
+#include "meshing/detail/vtk_appended.hpp"
 #include "meshing/mesh_io.hpp"
 
 #include <Eigen/Dense>
@@ -21,8 +22,10 @@ RawSurface read_by_extension(const std::filesystem::path& path, FileReader& file
     if (extension == ".stl") return detail::read_stl(file);
     if (extension == ".obj") return detail::read_obj(file);
     if (extension == ".vtk") return detail::read_vtk_polydata(file);
+    if (extension == ".vtp") return detail::read_vtp(file);
     if (extension == ".csv" || extension == ".xyz") return detail::read_point_list(file);
-    file.fail("has the extension '" + extension + "'; surfaces are read from .ply, .stl, .obj, .vtk, .csv and .xyz");
+    file.fail("has the extension '" + extension +
+              "'; surfaces are read from .ply, .stl, .obj, .vtk, .vtp, .csv and .xyz");
 }
 
 Eigen::Matrix3Xd checked_nodes(const RawSurface& raw, const FileReader& file) {
@@ -136,14 +139,38 @@ std::string vtk_document(const SurfaceMesh& surface) {
     return bytes + "\n";
 }
 
+std::string vtp_document(const SurfaceMesh& surface) {
+    const auto count = static_cast<std::size_t>(surface.triangle_count());
+    std::vector<std::int64_t> offsets(count);
+    for (std::size_t t = 0; t < count; ++t) offsets[t] = 3 * static_cast<std::int64_t>(t + 1);
+    const auto nodes = surface.nodes.reshaped();
+    const auto corners = surface.triangles.reshaped();
+    detail::VtkAppended data;
+    std::string xml =
+        "<?xml version=\"1.0\"?>\n"
+        "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"
+        "<PolyData>\n<FieldData>\n<Array type=\"String\" Name=\"SPACE\" NumberOfTuples=\"1\" format=\"ascii\">"
+        "76 80 83 0</Array>\n</FieldData>\n<Piece NumberOfPoints=\"" +  // LPS
+        std::to_string(surface.node_count()) +
+        "\" NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"" + std::to_string(count) +
+        "\">\n<Points>\n";
+    xml += data.array("Float64", "Points", 3, std::vector<double>(nodes.begin(), nodes.end()));
+    xml += "</Points>\n<Polys>\n";
+    xml += data.array("Int64", "connectivity", 1, std::vector<std::int64_t>(corners.begin(), corners.end()));
+    xml += data.array("Int64", "offsets", 1, offsets);
+    xml += "</Polys>\n</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">\n_";
+    return xml + data.bytes() + "\n</AppendedData>\n</VTKFile>\n";
+}
+
 std::string document(const SurfaceMesh& surface, const std::filesystem::path& path) {
     const std::string extension = detail::extension_of(path);
     if (extension == ".ply") return ply_document(surface);
     if (extension == ".stl") return stl_document(surface);
     if (extension == ".obj") return obj_document(surface);
     if (extension == ".vtk") return vtk_document(surface);
+    if (extension == ".vtp") return vtp_document(surface);
     throw IoError("'" + path.string() + "' has the extension '" + extension +
-                  "'; surfaces are written as .ply, .stl, .obj or .vtk");
+                  "'; surfaces are written as .ply, .stl, .obj, .vtk or .vtp");
 }
 
 }  // namespace
@@ -155,8 +182,10 @@ Surface read_surface(const std::filesystem::path& path) {
 
 Polylines read_polylines(const std::filesystem::path& path) {
     FileReader file(path);
-    if (detail::extension_of(path) != ".vtk") file.fail("is no .vtk; lines are read from legacy VTK polydata");
-    const RawSurface raw = detail::read_vtk_polydata(file);
+    const std::string extension = detail::extension_of(path);
+    if (extension != ".vtk" && extension != ".vtp")
+        file.fail("has the extension '" + extension + "'; lines are read from .vtk and .vtp");
+    const RawSurface raw = read_by_extension(path, file);
     Polylines result{checked_nodes(raw, file), {}};
     for (const std::vector<long long>& line : raw.lines) {
         if (line.size() < 2) file.refuse("has a line of fewer than two points");

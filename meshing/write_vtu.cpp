@@ -3,66 +3,19 @@
 
 #include "core/atomic_file.hpp"
 #include "core/errors.hpp"
+#include "meshing/detail/vtk_appended.hpp"
 #include "meshing/mesh_io.hpp"
 
-#include <bit>
 #include <cstdint>
-#include <cstring>
 #include <fstream>
 
 namespace tissuewarp::meshing {
 
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "VTU files are written in the machine's byte order");
+using detail::VtkAppended;
 
-std::string escaped(const std::string& text) {
-    std::string result;
-    for (char c : text) {
-        switch (c) {
-            case '&':
-                result += "&amp;";
-                break;
-            case '<':
-                result += "&lt;";
-                break;
-            case '>':
-                result += "&gt;";
-                break;
-            case '"':
-                result += "&quot;";
-                break;
-            default:
-                result += c;
-        }
-    }
-    return result;
-}
-
-/// Collects the header's <DataArray> elements and, in the same order, the bytes they refer to.
-class Appended {
-public:
-    template <class T>
-    std::string array(const char* type, const std::string& name, Eigen::Index components,
-                      const std::vector<T>& values) {
-        const std::string element = std::string("<DataArray type=\"") + type + "\" Name=\"" + escaped(name) +
-                                    "\" NumberOfComponents=\"" + std::to_string(components) +
-                                    "\" format=\"appended\" offset=\"" + std::to_string(bytes_.size()) + "\"/>\n";
-        const std::uint64_t size = values.size() * sizeof(T);
-        append(&size, sizeof size);
-        append(values.data(), size);
-        return element;
-    }
-
-    [[nodiscard]] const std::string& bytes() const { return bytes_; }
-
-private:
-    void append(const void* data, std::size_t size) { bytes_.append(static_cast<const char*>(data), size); }
-
-    std::string bytes_;
-};
-
-std::string arrays(Appended& data, const std::vector<MeshArray>& list, Eigen::Index count, const char* what) {
+std::string arrays(VtkAppended& data, const std::vector<MeshArray>& list, Eigen::Index count, const char* what) {
     std::string elements;
     for (const MeshArray& array : list) {
         if (array.values.cols() != count || array.values.rows() == 0)
@@ -99,7 +52,7 @@ std::string document(const TetMesh& mesh, const HexCells& hexahedra, const std::
     cells.add(vtk_hexahedron, hexahedra.hexes, hexahedra.labels);
     const std::size_t count = cells.types.size();
 
-    Appended data;
+    VtkAppended data;
     std::string xml =
         "<?xml version=\"1.0\"?>\n"
         "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"

@@ -8,6 +8,8 @@ namespace tissuewarp::registration::detail {
 
 namespace {
 
+constexpr int most_nodes_for_loads = 6000;
+
 PrepareOptions coarse_options(const PreparedModel& prepared, double edge_length) {
     PrepareOptions options = prepared.options;
     options.meshing.edge_length = edge_length;
@@ -83,6 +85,19 @@ Eigen::MatrixXd carried(const meshing::TetMesh& from, const Eigen::MatrixXd& nod
 
 PreparedModel coarse_model(const PreparedModel& prepared, double edge_length, Observer& observer) {
     return prepare(prepared.labels, coarse_options(prepared, edge_length), observer);
+}
+
+bool loads_take_coarse_model(const PreparedModel& prepared) {
+    return prepared.rest.node_count > most_nodes_for_loads;
+}
+
+PreparedModel coarse_model_for_loads(const PreparedModel& prepared, Observer& observer) {
+    return coarse_model(prepared, suggested_edge_length_without_labels(prepared.labels), observer);
+}
+
+PreparedModel coarse_model_for_loads(const PreparedModel& prepared, meshing::TetMesh mesh, Observer& observer) {
+    const double edge_length = suggested_edge_length_without_labels(prepared.labels);
+    return prepare(std::move(mesh), prepared.labels, coarse_options(prepared, edge_length), observer);
 }
 
 LastPulls pulls_on(const PreparedModel& coarse, const PreparedModel& prepared, const LastPulls& given) {

@@ -65,25 +65,6 @@ CurvePoints made_ready(const Curves& curves, const CurveOptions& options) {
     return data;
 }
 
-/// Places along a polyline, evenly, about `step` mm apart, the ends among them.
-Eigen::Matrix3Xd resampled(const Eigen::Matrix3Xd& line, double step) {
-    std::vector<double> lengths{0};
-    for (Eigen::Index n = 1; n < line.cols(); ++n)
-        lengths.push_back(lengths.back() + (line.col(n) - line.col(n - 1)).norm());
-    const auto pieces = std::max<Eigen::Index>(1, std::lround(lengths.back() / step));
-    Eigen::Matrix3Xd result(3, pieces + 1);
-    std::size_t next = 1;
-    for (Eigen::Index n = 0; n <= pieces; ++n) {
-        const double length = lengths.back() * double(n) / double(pieces);
-        while (next + 1 < lengths.size() && lengths[next] < length) ++next;
-        const double whole = lengths[next] - lengths[next - 1];
-        const double share = whole > 0 ? std::clamp((length - lengths[next - 1]) / whole, 0.0, 1.0) : 0.0;
-        const auto to = static_cast<Eigen::Index>(next);
-        result.col(n) = (1 - share) * line.col(to - 1) + share * line.col(to);
-    }
-    return result;
-}
-
 }  // namespace
 
 std::vector<CurveMatch> match_curves(const CurveTree& lines, const CurvePoints& points,
@@ -113,7 +94,7 @@ void CurveEvidence::take_lines(const std::vector<Eigen::Matrix3Xd>& lines) {
     std::vector<Eigen::Vector3d> samples;
     for (const Eigen::Matrix3Xd& line : lines) {
         int first = static_cast<int>(samples.size());
-        const Eigen::Matrix3Xd places = resampled(line, options_.step_mm);
+        const Eigen::Matrix3Xd places = evenly_along(line, options_.step_mm);
         for (const auto& place : places.colwise()) {
             if (const auto at = locate_near(locator, place)) {
                 samples.emplace_back(place);

@@ -67,20 +67,6 @@ Polylines read_table(const std::filesystem::path& path) {
     return result;
 }
 
-Polylines read_lines(const std::filesystem::path& path) {
-    std::string extension = path.extension().string();
-    std::transform(extension.begin(), extension.end(), extension.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    if (extension == ".csv") return read_table(path);
-    if (extension == ".vtk") return meshing::read_polylines(path);
-    if (is_slicer_markups(path)) {
-        Markups markups = read_slicer_markups(path);
-        return {std::move(markups.points), std::move(markups.lines)};
-    }
-    throw InvalidInput(path.string() +
-                       ": curves are read from .vtk (legacy polydata), .csv (x,y,z,line) and markups of 3D Slicer");
-}
-
 void require_usable_lines(const std::vector<Eigen::Matrix3Xd>& lines) {
     constexpr double most_length_mm = 1e5;
     if (lines.empty()) refuse("the moving curves hold no line; lines of two points or more are needed");
@@ -112,6 +98,20 @@ void require_usable_tangents(const Curves& curves) {
 
 }  // namespace
 
+Polylines read_curve_file(const std::filesystem::path& path) {
+    std::string extension = path.extension().string();
+    std::transform(extension.begin(), extension.end(), extension.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    if (extension == ".csv") return read_table(path);
+    if (extension == ".vtk" || extension == ".vtp") return meshing::read_polylines(path);
+    if (is_slicer_markups(path)) {
+        Markups markups = read_slicer_markups(path);
+        return {std::move(markups.points), std::move(markups.lines)};
+    }
+    throw InvalidInput(path.string() +
+                       ": curves are read from .vtk and .vtp (polydata), .csv (x,y,z,line) and markups of 3D Slicer");
+}
+
 Eigen::Matrix3Xd points_of(const std::vector<Eigen::Matrix3Xd>& lines) {
     Eigen::Index count = 0;
     for (const auto& line : lines) count += line.cols();
@@ -141,6 +141,24 @@ Eigen::Matrix3Xd tangents_along(const Eigen::Matrix3Xd& line, double reach_mm) {
     return tangents;
 }
 
+Eigen::Matrix3Xd evenly_along(const Eigen::Matrix3Xd& line, double step_mm) {
+    std::vector<double> lengths{0};
+    for (Eigen::Index n = 1; n < line.cols(); ++n)
+        lengths.push_back(lengths.back() + (line.col(n) - line.col(n - 1)).norm());
+    const auto pieces = std::max<Eigen::Index>(1, std::lround(lengths.back() / step_mm));
+    Eigen::Matrix3Xd result(3, pieces + 1);
+    std::size_t next = 1;
+    for (Eigen::Index n = 0; n <= pieces; ++n) {
+        const double length = lengths.back() * double(n) / double(pieces);
+        while (next + 1 < lengths.size() && lengths[next] < length) ++next;
+        const double whole = lengths[next] - lengths[next - 1];
+        const double share = whole > 0 ? std::clamp((length - lengths[next - 1]) / whole, 0.0, 1.0) : 0.0;
+        const auto to = static_cast<Eigen::Index>(next);
+        result.col(n) = (1 - share) * line.col(to - 1) + share * line.col(to);
+    }
+    return result;
+}
+
 void require_usable(const Curves& curves) {
     constexpr Eigen::Index least_points = 5;
     require_usable_lines(curves.moving);
@@ -156,10 +174,11 @@ void require_usable(const Curves& curves) {
 
 Curves read_curves(const std::filesystem::path& moving, const std::filesystem::path& fixed, double deviation_mm) {
     constexpr double least_reach_mm = 2.5;
-    const Polylines before = read_lines(moving), during = read_lines(fixed);
+    const Polylines before = read_curve_file(moving), during = read_curve_file(fixed);
     if (before.lines.empty())
-        throw InvalidInput(moving.string() +
-                           ": holds no line; give .vtk with LINES, .csv with a column 'line', or curves of 3D Slicer");
+        throw InvalidInput(
+            moving.string() +
+            ": holds no line; give .vtk or .vtp with lines, .csv with a column 'line', or curves of 3D Slicer");
     Curves curves;
     for (const std::vector<int>& line : before.lines) curves.moving.emplace_back(before.nodes(Eigen::all, line));
     curves.fixed = during.nodes;

@@ -39,7 +39,7 @@ EvidenceSet::EvidenceSet(const PreparedModel& prepared, const Intraoperative& se
         });
     if (prepared.neighbours) contact.emplace(prepared, energy);
     anchors = anchor_springs(prepared, energy);
-    placed = contact || !anchors.empty();
+    placed = is_held(prepared);
 }
 
 Contribution EvidenceSet::contribution(const RoundPlan& plan, const State& state) {

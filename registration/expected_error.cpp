@@ -14,7 +14,8 @@ constexpr int places = 16;
 
 std::vector<int> spread_nodes(const Eigen::Matrix3Xd& nodes) {
     std::vector<int> chosen;
-    Eigen::RowVectorXd nearest = (nodes.colwise() - nodes.rowwise().mean()).colwise().squaredNorm();
+    const Eigen::Vector3d middle = nodes.rowwise().mean();
+    Eigen::RowVectorXd nearest = (nodes.colwise() - middle).colwise().squaredNorm();
     Eigen::Index node = 0;
     nearest.minCoeff(&node);
     nearest.setConstant(1e30);

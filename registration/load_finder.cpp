@@ -9,8 +9,6 @@ namespace tissuewarp::registration::detail {
 
 namespace {
 
-constexpr int most_nodes = 6000;
-
 Eigen::VectorXd forces_of(const std::vector<tled::Spring>& springs, Eigen::Index rows) {
     Eigen::VectorXd forces = Eigen::VectorXd::Zero(rows);
     for (const tled::Spring& spring : springs) forces.segment<3>(3 * spring.node) += spring.stiffness * spring.target;
@@ -20,20 +18,33 @@ Eigen::VectorXd forces_of(const std::vector<tled::Spring>& springs, Eigen::Index
 }  // namespace
 
 FoundLoads LoadFinder::find(LoadKind kind, const LastPulls& pulls, Observer& observer) {
-    if (prepared_.rest.node_count <= most_nodes) return found(kind, prepared_, pulls);
-    if (!twin_) twin_ = coarse_model(prepared_, suggested_edge_length_without_labels(prepared_.labels), observer);
-    return found(kind, *twin_, pulls_on(*twin_, prepared_, pulls));
+    if (!loads_take_coarse_model(prepared_)) return found(kind, prepared_, pulls);
+    const PreparedModel& coarse = twin(observer);
+    return found(kind, coarse, pulls_on(coarse, prepared_, pulls));
 }
 
-Eigen::MatrixXd LoadFinder::loads(LoadKind kind, const PreparedModel& model) const {
-    return kind == LoadKind::Weight ? unknown_weights(model) : principal_loads(model, count_);
+const PreparedModel& LoadFinder::twin(Observer& observer) {
+    if (prepared_.coarse) return *prepared_.coarse;
+    if (!twin_) twin_ = coarse_model_for_loads(prepared_, observer);
+    return *twin_;
+}
+
+std::pair<Eigen::MatrixXd, Eigen::MatrixXd> LoadFinder::loads(LoadKind kind, const PreparedModel& model) const {
+    const bool same = &model == &prepared_;
+    if (kind == LoadKind::Weight) {
+        Eigen::MatrixXd weights = unknown_weights(model);
+        return {weights, same ? weights : unknown_weights(prepared_)};
+    }
+    const PrincipalLoads principal = principal_loads(model, count_);
+    return {principal.loads, same ? principal.loads : loads_along(prepared_, principal.axes)};
 }
 
 const LoadFinder::Shapes& LoadFinder::shapes(LoadKind kind, const PreparedModel& model, const WeighedSprings& unseen) {
     std::optional<Shapes>& shapes = shapes_[static_cast<std::size_t>(kind)];
     if (!shapes) {
-        LoadShapes known(loads(kind, model), Posterior(model, unseen), unseen.energy);
-        Eigen::MatrixXd forces = known.scale() * loads(kind, prepared_);
+        auto [fitted, applied] = loads(kind, model);
+        LoadShapes known(std::move(fitted), Posterior(model, unseen), unseen.energy);
+        Eigen::MatrixXd forces = known.scale() * applied;
         shapes.emplace(Shapes{std::move(known), std::move(forces)});
     }
     return *shapes;

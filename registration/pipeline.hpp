@@ -89,6 +89,7 @@ struct PreparedModel {
     std::vector<StageTime> times;
     std::optional<ImageModel> image;  ///< see prepare_image
     std::optional<RigidNeighbours> neighbours;
+    std::unique_ptr<PreparedModel> coarse;  ///< of the same organ, see prepare_loads
 };
 
 /// Label map → mesh → rest state → rest stiffness, its pattern analysed. Throws InvalidInput, Cancelled.
@@ -99,14 +100,20 @@ PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions
 PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_labels, const PrepareOptions& options = {},
                       Observer& observer = silent_observer());
 
-/// The same model of other tissue: rest state and stiffness are made anew. Throws InvalidInput for materials that do
-/// not fit the model.
+/// The same model of other tissue: rest state and stiffness are made anew, its coarser one's too. Throws InvalidInput
+/// for materials that do not fit the model.
 PreparedModel with_materials(PreparedModel prepared, const tled::MaterialTable& materials);
 
 /// Adds what registering to a bare intraoperative volume takes: blocks of the preoperative image about feature points
 /// in and near the labels. Throws InvalidInput, Cancelled.
 void prepare_image(PreparedModel& prepared, const imaging::Volume& moving, const ImageModelOptions& options = {},
                    Observer& observer = silent_observer());
+
+/// Adds what updates take that look for loads which nobody stated, from labels alone or from points of a free organ: of
+/// a model of more than 6000 nodes a coarser one, with edges of suggested_edge_length_without_labels, on which they are
+/// found. Without it the first such update makes one, in seconds. Adds nothing to a smaller model, nor to one that
+/// anchors or rigid neighbours hold, whose loads are not looked for. Throws InvalidInput, Cancelled.
+void prepare_loads(PreparedModel& prepared, Observer& observer = silent_observer());
 
 enum class Device { Auto, Cpu, Gpu };
 

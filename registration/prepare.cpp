@@ -1,5 +1,6 @@
 // Before the operation: label map → mesh → rest state → rest stiffness.
 
+#include "registration/detail/coarse_twin.hpp"
 #include "registration/detail/stopwatch.hpp"
 #include "registration/detail/surface_springs.hpp"
 #include "registration/detail/surroundings.hpp"
@@ -86,7 +87,7 @@ PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_label
     make_ready(stiffness);
     times.push_back(stopwatch.lap("rest stiffness"));
     return {std::move(model),     std::move(organ), options,      std::move(interfaces), std::move(rest),
-            std::move(stiffness), std::move(times), std::nullopt, std::move(neighbours)};
+            std::move(stiffness), std::move(times), std::nullopt, std::move(neighbours), nullptr};
 }
 
 PreparedModel with_materials(PreparedModel prepared, const tled::MaterialTable& materials) {
@@ -95,6 +96,7 @@ PreparedModel with_materials(PreparedModel prepared, const tled::MaterialTable& 
     const auto springs = detail::full_weight_springs(prepared.interfaces, prepared.options);
     prepared.stiffness = tled::RestStiffness(prepared.rest, tled::nodal_conditions(springs, prepared.rest.node_count));
     make_ready(prepared.stiffness);
+    if (prepared.coarse) *prepared.coarse = with_materials(std::move(*prepared.coarse), materials);
     return prepared;
 }
 
@@ -106,6 +108,14 @@ void prepare_image(PreparedModel& prepared, const imaging::Volume& moving, const
         select_feature_points(moving, imaging::mask_of_all(prepared.labels), options.features);
     prepared.image = ImageModel{moving, MatchingTemplate(moving, features.points, options.blocks)};
     prepared.times.push_back(stopwatch.lap("feature points"));
+}
+
+void prepare_loads(PreparedModel& prepared, Observer& observer) {
+    if (!detail::loads_take_coarse_model(prepared) || detail::is_held(prepared)) return;
+    detail::Stopwatch stopwatch;
+    observer.checkpoint("coarse model", 0.0);
+    prepared.coarse = std::make_unique<PreparedModel>(detail::coarse_model_for_loads(prepared, observer));
+    prepared.times.push_back(stopwatch.lap("coarse model"));
 }
 
 }  // namespace tissuewarp::registration

@@ -1,5 +1,6 @@
 #include "registration/prepared_io.hpp"
 
+#include "registration/detail/coarse_twin.hpp"
 #include "registration/detail/stored_model.hpp"
 #include "registration/detail/surroundings.hpp"
 
@@ -11,6 +12,7 @@ namespace {
 
 constexpr const char* format = "tissuewarp prepared model";
 constexpr int version = 3;
+constexpr const char* coarse_mesh = "coarse_mesh";  // absent without a coarse model
 
 std::vector<hsize_t> voxel_shape(const imaging::Geometry& grid) {
     return {static_cast<hsize_t>(grid.size[2]), static_cast<hsize_t>(grid.size[1]), static_cast<hsize_t>(grid.size[0])};
@@ -86,6 +88,15 @@ tled::Material only_material(const Hdf5Input& file, const std::string& group) {
     return table.begin()->second;
 }
 
+void read_coarse_model(const Hdf5Input& file, const std::filesystem::path& path, PreparedModel& prepared,
+                       Observer& observer) {
+    meshing::TetMesh mesh = detail::read_mesh(file, coarse_mesh);
+    const std::string name = path.string() + ": " + coarse_mesh;
+    meshing::require_valid(mesh, name.c_str());
+    prepared.coarse =
+        std::make_unique<PreparedModel>(detail::coarse_model_for_loads(prepared, std::move(mesh), observer));
+}
+
 }  // namespace
 
 void write_prepared(const PreparedModel& prepared, const std::filesystem::path& path) {
@@ -99,6 +110,7 @@ void write_prepared(const PreparedModel& prepared, const std::filesystem::path& 
     file.scalar<double>("options/tangential_ratio", prepared.options.tangential_ratio, "1");
     write_list(file, "options/anchors", prepared.options.anchors);
     write_list(file, "options/rigid_neighbours", prepared.options.rigid_neighbours);
+    if (prepared.coarse) detail::write_mesh(file, coarse_mesh, prepared.coarse->model.mesh);
     detail::write_stages(file, "stages/prepare", prepared.times);
     file.close();
     target.commit();
@@ -118,7 +130,9 @@ PreparedModel read_prepared(const std::filesystem::path& path, Observer& observe
     options.rigid_neighbours = read_list(file, "options/rigid_neighbours");
     if (!(options.data_stiffness > 0) || !(options.tangential_ratio > 0))
         throw InvalidInput("'" + path.string() + "': the stiffness of the data must be positive");
-    return prepare(std::move(model.mesh), read_label_map(file), options, observer);
+    PreparedModel prepared = prepare(std::move(model.mesh), read_label_map(file), options, observer);
+    if (file.holds(coarse_mesh)) read_coarse_model(file, path, prepared, observer);
+    return prepared;
 }
 
 }  // namespace tissuewarp::registration

@@ -157,8 +157,8 @@ private:
         }
     }
 
-    /// Half of a time budget is kept for what follows; nine tenths where labels are seen, whose models are large: the
-    /// coarser mesh that their loads are found on takes longer than all before it.
+    /// Half of a time budget is kept for what follows; nine tenths where labels are seen, since the rounds of their
+    /// large models, begun again, are as long as those before.
     [[nodiscard]] bool loads_are_looked_for() const {
         const double kept = weight_is_unknown() ? 0.9 : 0.5;
         return (placement_is_free() || weight_is_unknown()) && options_.tissue.load_shapes > 0 && !result_.cut_short &&

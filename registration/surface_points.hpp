@@ -7,9 +7,9 @@
 
 namespace tissuewarp::registration {
 
-/// Reads .ply (ascii, binary), .stl, .obj, .vtk (legacy polydata), .csv and .xyz (x y z[ nx ny nz]), LPS mm, with what
-/// normals the file holds, or those of its triangles. `deviation_mm` is taken over. Throws IoError or InvalidInput
-/// naming the file, also where the extent cannot be that of tissue in mm.
+/// Reads .ply (ascii, binary), .stl, .obj, .vtk (legacy polydata), .vtp (XML polydata), .csv and .xyz (x y z[ nx ny
+/// nz]), LPS mm, with what normals the file holds, or those of its triangles. `deviation_mm` is taken over. Throws
+/// IoError or InvalidInput naming the file, also where the extent cannot be that of tissue in mm.
 SurfacePoints read_surface_points(const std::filesystem::path& path, double deviation_mm = 1.0);
 
 /// Throws InvalidInput unless there are at least ten finite points, normals that are unit or absent, a positive finite

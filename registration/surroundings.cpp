@@ -78,6 +78,10 @@ std::vector<int> anchored_nodes(const PreparedModel& prepared) {
     return {nodes.begin(), nodes.end()};
 }
 
+bool is_held(const PreparedModel& prepared) {
+    return prepared.neighbours || !anchored_nodes(prepared).empty();
+}
+
 std::vector<tled::Spring> anchor_springs(const PreparedModel& prepared, double energy) {
     constexpr double deviation_mm = 0.1;
     const Eigen::Matrix3d stiffness = energy / (deviation_mm * deviation_mm) * Eigen::Matrix3d::Identity();

@@ -20,6 +20,7 @@ using Columns = Eigen::MatrixXd;  // 3N × k, nodes' vectors one after the other
 
 constexpr int waves = 20;            // of each component of a smooth traction
 constexpr double smooth_over = 0.5;  // of the organ's radius
+constexpr int draws = 256;           // whose principal shapes are taken
 
 /// mm³ of each node's share of its elements.
 Eigen::VectorXd nodal_volumes(const meshing::TetMesh& mesh) {
@@ -39,7 +40,8 @@ Eigen::VectorXd nodal_areas(const PreparedModel& prepared) {
 }
 
 double radius_of(const Eigen::Matrix3Xd& nodes) {
-    return std::sqrt((nodes.colwise() - nodes.rowwise().mean()).colwise().squaredNorm().mean());
+    const Eigen::Vector3d middle = nodes.rowwise().mean();
+    return std::sqrt((nodes.colwise() - middle).colwise().squaredNorm().mean());
 }
 
 /// Every node's vectors times its weight.
@@ -106,15 +108,30 @@ Columns unknown_weights(const PreparedModel& prepared) {
     return in_equilibrium(weights, nodes, nodal_areas(prepared));
 }
 
-Columns principal_loads(const PreparedModel& prepared, int count) {
-    constexpr int draws = 256;
+namespace {
+
+/// The same on every mesh of an organ.
+Columns draws_of(const PreparedModel& prepared) {
     constexpr std::uint64_t seed = 0x10ad5;  // an error estimate draws others
-    const Eigen::MatrixXd drawn = unknown_loads(prepared, draws, seed);
+    return unknown_loads(prepared, draws, seed);
+}
+
+}  // namespace
+
+PrincipalLoads principal_loads(const PreparedModel& prepared, int count) {
+    const Columns drawn = draws_of(prepared);
     const meshing::TetMesh& mesh = prepared.model.mesh;
     const Eigen::VectorXd sizes = nodal_areas(prepared) + nodal_volumes(mesh) / radius_of(mesh.nodes);
     const Columns densities = weighted(drawn, sizes.cwiseInverse());  // tractions, where there is a surface
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(drawn.transpose() * densities);
-    return drawn * modes.eigenvectors().rightCols(std::min(count, draws)) / std::sqrt(double(draws));
+    PrincipalLoads result;
+    result.axes = modes.eigenvectors().rightCols(std::min(count, draws));
+    result.loads = drawn * result.axes / std::sqrt(double(draws));
+    return result;
+}
+
+Columns loads_along(const PreparedModel& prepared, const Eigen::MatrixXd& axes) {
+    return draws_of(prepared) * axes / std::sqrt(double(draws));
 }
 
 }  // namespace tissuewarp::registration::detail

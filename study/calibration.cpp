@@ -117,7 +117,8 @@ private:
         Stopwatch stopwatch;
         PrepareOptions options;
         options.meshing.edge_length = organ_size(phantom.moving_labels) / density;
-        const PreparedModel prepared = prepare(phantom.moving_labels, options);
+        PreparedModel prepared = prepare(phantom.moving_labels, options);
+        prepare_loads(prepared);
         const double preparation = stopwatch.lap();
         Updater updater(prepared, plan_.update);
         for (const DataKind kind : {DataKind::Labels, DataKind::Partial}) {

@@ -26,7 +26,8 @@ DialTrial tried(const Phantom& phantom, DataKind kind, const DialRequest& reques
     const DialChoice choice = choose(fronts, request, case_of(phantom, kind));
     PrepareOptions options;
     options.meshing.edge_length = choice.edge_length_mm;
-    const PreparedModel prepared = prepare(phantom.moving_labels, options);
+    PreparedModel prepared = prepare(phantom.moving_labels, options);
+    prepare_loads(prepared);
     const imaging::Volume image = phantom.moving_labels.as(CV_32F);
     update.time_budget_s = choice.update_budget_s;
     Updater updater(prepared, update);

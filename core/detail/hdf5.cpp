@@ -244,6 +244,10 @@ void Hdf5Input::refuse(const std::string& name, const std::string& reason) const
     throw InvalidInput("'" + path_.string() + "', dataset '" + name + "': " + reason);
 }
 
+bool Hdf5Input::holds(const std::string& name) const {
+    return H5Lexists(file_, name.c_str(), H5P_DEFAULT) > 0;
+}
+
 Hdf5Handle Hdf5Input::dataset(const std::string& name) const {
     Hdf5Handle data(H5Dopen2(file_, name.c_str(), H5P_DEFAULT), H5Dclose);
     if (!data.valid()) refuse(name, "missing or damaged");

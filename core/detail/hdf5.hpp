@@ -96,6 +96,8 @@ public:
     /// Fills memory for exactly this shape.
     template <class T>
     void array(const std::string& name, T* values, const std::vector<hsize_t>& shape) const;
+    /// Whether the root has a group or dataset of this name.
+    [[nodiscard]] bool holds(const std::string& name) const;
     /// Throws unless the dataset has this shape: before memory is set aside for it.
     void require_shape(const std::string& name, const std::vector<hsize_t>& wanted) const;
     [[nodiscard]] std::vector<std::string> texts(const std::string& name) const;

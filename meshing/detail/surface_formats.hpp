@@ -13,7 +13,7 @@ struct RawSurface {
     std::vector<Eigen::Vector3d> nodes;
     std::vector<Eigen::Vector3d> normals;  ///< as many as nodes, or none
     std::vector<std::array<long long, 3>> triangles;
-    std::vector<std::vector<long long>> lines;  ///< legacy VTK alone has them
+    std::vector<std::vector<long long>> lines;  ///< of VTK's files alone
 
     /// Cuts a polygon into a fan of triangles.
     void add_polygon(const std::vector<long long>& corners) {
@@ -24,7 +24,8 @@ struct RawSurface {
 RawSurface read_ply(FileReader& file);
 RawSurface read_stl(FileReader& file);
 RawSurface read_obj(FileReader& file);
-RawSurface read_vtk_polydata(FileReader& file);
+RawSurface read_vtk_polydata(FileReader& file);  ///< legacy
+RawSurface read_vtp(FileReader& file);
 RawSurface read_point_list(FileReader& file);
 
 }  // namespace tissuewarp::meshing::detail

@@ -18,6 +18,14 @@ struct CoarseTwin {
 /// Cancelled.
 PreparedModel coarse_model(const PreparedModel& prepared, double edge_length, Observer& observer);
 
+/// Whether unknown loads are found on a coarser model, because they are smooth and a factor of this one takes long: it
+/// has more than 6000 nodes.
+bool loads_take_coarse_model(const PreparedModel& prepared);
+
+/// That model. The second is of a mesh that was made for it before. Throws InvalidInput, Cancelled.
+PreparedModel coarse_model_for_loads(const PreparedModel& prepared, Observer& observer);
+PreparedModel coarse_model_for_loads(const PreparedModel& prepared, meshing::TetMesh mesh, Observer& observer);
+
 /// What pulls at a model, on the nodes of its coarse model nearby: springs and prior alone.
 LastPulls pulls_on(const PreparedModel& coarse, const PreparedModel& prepared, const LastPulls& pulls);
 

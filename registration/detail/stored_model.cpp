@@ -59,15 +59,27 @@ tled::MaterialTable read_materials(const Hdf5Input& file, const std::string& gro
     return materials;
 }
 
+void write_mesh(Hdf5Output& file, const std::string& group, const meshing::TetMesh& mesh) {
+    file.columns<double>(group + "/nodes", mesh.nodes, "mm");
+    file.attribute(group + "/nodes", "frame", "moving image, LPS");
+    file.columns<int>(group + "/tetrahedra", mesh.tets, "1");
+    file.vector<int>(group + "/labels", mesh.labels, "1");
+}
+
+meshing::TetMesh read_mesh(const Hdf5Input& file, const std::string& group) {
+    meshing::TetMesh mesh;
+    mesh.nodes = file.columns<double>(group + "/nodes", 3);
+    mesh.tets = file.columns<int>(group + "/tetrahedra", 4);
+    mesh.labels = file.vector<int>(group + "/labels", mesh.tets.cols());
+    return mesh;
+}
+
 void write_model(Hdf5Output& file, const tled::Model& model) {
     if (model.hexahedra.count() > 0 || !model.viscosity.empty() || model.fibre.size() > 0)
         throw InvalidInput(
             "a record holds tetrahedra and elastic materials only: this model has hexahedra, viscosity or fibre "
             "directions by element");
-    file.columns<double>("mesh/nodes", model.mesh.nodes, "mm");
-    file.attribute("mesh/nodes", "frame", "moving image, LPS");
-    file.columns<int>("mesh/tetrahedra", model.mesh.tets, "1");
-    file.vector<int>("mesh/labels", model.mesh.labels, "1");
+    write_mesh(file, "mesh", model.mesh);
     write_materials(file, "materials", model.materials);
     file.texts("element", {element_names[static_cast<int>(model.element)]});
     file.scalar<double>("density", model.density, "kg/mm^3");
@@ -75,9 +87,7 @@ void write_model(Hdf5Output& file, const tled::Model& model) {
 
 tled::Model read_model(const Hdf5Input& file) {
     tled::Model model;
-    model.mesh.nodes = file.columns<double>("mesh/nodes", 3);
-    model.mesh.tets = file.columns<int>("mesh/tetrahedra", 4);
-    model.mesh.labels = file.vector<int>("mesh/labels", model.mesh.tets.cols());
+    model.mesh = read_mesh(file, "mesh");
     model.materials = read_materials(file, "materials");
     model.element = element_named(file.text("element"));
     model.density = file.scalar<double>("density");

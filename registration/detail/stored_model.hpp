@@ -7,6 +7,11 @@
 
 namespace tissuewarp::registration::detail {
 
+/// A group with nodes, tetrahedra, labels.
+void write_mesh(Hdf5Output& file, const std::string& group, const meshing::TetMesh& mesh);
+/// Not checked.
+meshing::TetMesh read_mesh(const Hdf5Input& file, const std::string& group);
+
 /// Groups /mesh, /materials, and /element, /density.
 void write_model(Hdf5Output& file, const tled::Model& model);
 /// Throws InvalidInput when the model is not valid (tled::require_valid).

@@ -18,6 +18,9 @@ Intraoperative without_neighbours(const Intraoperative& seen, const std::vector<
 /// Nodes of the mesh that belong to a tetrahedron of an anchor, ascending.
 std::vector<int> anchored_nodes(const PreparedModel& prepared);
 
+/// Anchors or rigid neighbours say where the organ lies as a whole.
+bool is_held(const PreparedModel& prepared);
+
 /// Springs that hold every anchored node where the rigid placement has it, to 0.1 mm: `energy` (mN mm) is the strain
 /// energy that weighs as much as one standard deviation.
 std::vector<tled::Spring> anchor_springs(const PreparedModel& prepared, double energy);

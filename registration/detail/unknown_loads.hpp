@@ -16,8 +16,16 @@ Eigen::MatrixXd unknown_loads(const PreparedModel& prepared, int count, std::uin
 /// Unknown weight: the three uniform body forces of such loads, of variance 1 each, 3N × 3, mN.
 Eigen::MatrixXd unknown_weights(const PreparedModel& prepared);
 
-/// The `count` principal shapes of such loads, 3N × count, mN: with independent coefficients of variance 1 their sum is
-/// distributed as they are, as nearly as so many shapes can be (Karhunen and Loève, of 256 draws).
-Eigen::MatrixXd principal_loads(const PreparedModel& prepared, int count);
+/// The principal shapes of such loads: with independent coefficients of variance 1 their sum is distributed as they
+/// are, as nearly as so many shapes can be (Karhunen and Loève, of 256 draws).
+struct PrincipalLoads {
+    Eigen::MatrixXd loads;  ///< 3N × count, mN
+    Eigen::MatrixXd axes;   ///< 256 × count: the shares of the draws in them
+};
+PrincipalLoads principal_loads(const PreparedModel& prepared, int count);
+
+/// The same shapes on another mesh of the organ, 3N × count, mN. Shapes that are found on it anew would have other
+/// signs and, where two are about as large, another order.
+Eigen::MatrixXd loads_along(const PreparedModel& prepared, const Eigen::MatrixXd& axes);
 
 }  // namespace tissuewarp::registration::detail

@@ -280,6 +280,12 @@ json data_view(const json& report) {
         lines.push_back("Pairs of points: " + number(at(points, "used"), 0) + " in the model, " +
                         number(at(points, "outliers"), 0) + " of them do not fit, the others by " +
                         number(at(points, "residual_mm"), 2) + " mm (root mean square).");
+    if (const json& curves = at(report, "curves"); curves.is_object())
+        lines.push_back("Points along vessels: " + percent(at(curves, "inlier_share")) + " of " +
+                        number(at(curves, "points"), 0) + " lie on the preoperative lines where these were carried, " +
+                        number(at(curves, "residual_mm"), 2) + " mm beside them (root mean square); half of all were " +
+                        number(at(curves, "to_lines", "before", "median"), 2) + " mm away or more before, and " +
+                        number(at(curves, "to_lines", "after", "median"), 2) + " mm after.");
     if (const json& expected = at(report, "expected_error"); expected.is_object())
         lines.push_back("By their deviations and the prior of the tissue alone, tissue is expected to lie " +
                         number(at(expected, "mean_mm"), 1) + " mm off, and " + number(at(expected, "worst_mm"), 1) +

@@ -247,6 +247,57 @@ class SmallVerbs(PhantomTest):
         self.assertAlmostEqual(values["held_out_surface"]["distance_mm"]["mean"], 1.2, delta=0.15)
         self.assertAlmostEqual(values["held_out_surface"]["mean_signed_mm"], 1.2, delta=0.15)
 
+    def evaluate_curves(self, fixed, *more):
+        """A line along y through the middle, in three points, as XML polydata; the field carries it 3 mm to the left."""
+        self.evaluate_places()
+        folder = self.phantom.folder
+        (folder / "scores.json").unlink(missing_ok=True)
+        line = CENTRE_LPS + numpy.array([[0, -8, 0], [0, 0, 0], [0, 8, 0]])
+        array = '<DataArray type="{}" Name="{}" NumberOfComponents="{}" format="ascii">{}</DataArray>\n'
+        (folder / "vessels.vtp").write_text(
+            '<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian">\n<PolyData>\n'
+            '<Piece NumberOfPoints="3" NumberOfLines="1">\n<Points>\n'
+            + array.format("Float64", "Points", 3, " ".join(map(str, line.ravel()))) + "</Points>\n<Lines>\n"
+            + array.format("Int64", "connectivity", 1, "0 1 2") + array.format("Int64", "offsets", 1, "3")
+            + "</Lines>\n</Piece>\n</PolyData>\n</VTKFile>\n")
+        rows = "".join(",".join(map(str, row)) + "\n" for row in fixed)
+        (folder / "seen.csv").write_text("x,y,z,line\n" + rows)
+        scores = folder / "scores.json"
+        result = run("evaluate", "--moving-curves", folder / "vessels.vtp", "--fixed-curves", folder / "seen.csv",
+                     "--json", scores, *more)
+        return result, json.loads(scores.read_text())["curves"] if scores.exists() else None
+
+    def test_evaluate_curves(self):
+        fixed = [[*(CENTRE_LPS + [3, y, 1]), "a"] for y in numpy.arange(-3, 4)]
+        result, curves = self.evaluate_curves(fixed, "--displacement", self.phantom.folder / "field.nii.gz")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(curves["to_lines"]["after"]["count"], 7)
+        for way, count in (("to_lines", 7), ("from_lines", 7)):
+            self.assertEqual(curves[way]["after"]["count"], count)
+            for key in ("mean", "median", "percentile_95", "maximum"):
+                self.assertAlmostEqual(curves[way]["before"][key], 10 ** 0.5, delta=1e-4)
+                self.assertAlmostEqual(curves[way]["after"][key], 1, delta=1e-4)
+        self.assertAlmostEqual(curves["shown_mm"]["after"], 6, delta=1e-4)
+        self.assertRegex(result.stdout, r"points to lines, before +7 +3\.162")
+        self.assertRegex(result.stdout, r"lines to points, after +7 +1\.000")
+
+    def test_evaluate_curves_without_field_and_without_lines(self):
+        loose = [[*(CENTRE_LPS + [3, y, 0]), ""] for y in numpy.arange(-3, 4)]
+        result, curves = self.evaluate_curves(loose)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertAlmostEqual(curves["to_lines"]["before"]["maximum"], 3, delta=1e-6)
+        self.assertNotIn("after", curves["to_lines"])
+        self.assertNotIn("from_lines", curves)
+        self.assertNotIn("lines to points", result.stdout)
+
+    def test_evaluate_curves_refuses_what_cannot_be(self):
+        good = [[*(CENTRE_LPS + [3, y, 0]), "a"] for y in numpy.arange(-3, 4)]
+        far = [[*(CENTRE_LPS + [203, y, 0]), "a"] for y in numpy.arange(-3, 4)]
+        self.assert_refused(self.evaluate_curves(far)[0], 2, "seen.csv", "vessels.vtp", "RAS")
+        self.assert_refused(self.evaluate_curves(good[:3])[0], 2, "seen.csv", "at least 5")
+        self.assert_refused(run("evaluate", "--moving-curves", self.phantom.folder / "vessels.vtp"), 2, "--fixed-curves")
+        self.assert_refused(run("evaluate", "--json", "a.json"), 2, "--moving-curves")
+
     def test_evaluate_refuses_data_in_other_frames_and_units(self):
         folder, labels = self.phantom.folder, self.phantom.moving_labels
         _, _ = self.evaluate_places()

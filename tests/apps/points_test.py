@@ -178,6 +178,12 @@ class FromCurves(PhantomTest):
         self.assertGreater(report["curves"]["inlier_share"], 0.9)
         self.assertLess(report["curves"]["residual_mm"], 0.5)
         self.assertEqual(report["parameters"]["curves-sd"], 0.3)
+        distances = report["curves"]["to_lines"]
+        self.assertEqual(distances["after"]["count"], 60)
+        self.assertGreater(distances["before"]["median"], 1)
+        self.assertLess(distances["after"]["median"], 0.6)
+        self.assertIn("curves to lines (mm)", result.stdout)
+        self.assertIn("Points along vessels: ", (self.phantom.output / "report.html").read_text())
         self.assertEqual(len(report["inputs"]["moving-curves"]["sha256"]), 64)
         error = report["target_registration_error"]["all"]
         self.assertGreater(error["before"]["mean"], 2.5)

@@ -28,9 +28,9 @@ double enclosed_volume(const SurfaceMesh& surface) {
     return volume;
 }
 
-TEST_F(SurfaceIo, PlyObjAndVtkRoundTripExactly) {
+TEST_F(SurfaceIo, PlyObjVtkAndVtpRoundTripExactly) {
     const SurfaceMesh surface = box_surface();
-    for (const char* name : {"box.ply", "box.obj", "box.vtk"}) {
+    for (const char* name : {"box.ply", "box.obj", "box.vtk", "box.vtp"}) {
         write_surface(surface, file(name));
         const Surface again = read_surface(file(name));
         EXPECT_EQ(again.mesh.nodes, surface.nodes) << name;

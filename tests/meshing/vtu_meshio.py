@@ -5,7 +5,8 @@ import meshio
 
 mesh = meshio.read(sys.argv[1])
 if len(sys.argv) > 2:
-    mesh.write(sys.argv[2], binary=sys.argv[3] == "binary", **({"compression": None} if sys.argv[3] == "binary" else {}))
+    ways = {"ascii": {"binary": False}, "binary": {"compression": None}, "zlib": {"compression": "zlib"}}
+    mesh.write(sys.argv[2], **ways[sys.argv[3]])
     sys.exit()
 tets = mesh.cells_dict["tetra"]
 print(len(mesh.points), len(tets), repr(float(mesh.points.sum())), int(tets[-1].sum()),

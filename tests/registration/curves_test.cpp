@@ -79,6 +79,16 @@ TEST_F(CurveFiles, PolydataOfBothVersions) {
     }
 }
 
+TEST_F(CurveFiles, XmlPolydataAsVtkWritesIt) {
+    const fs::path path = fs::path(TISSUEWARP_SOURCE_DIR) / "tests/meshing/vtp/raw-zlib-32.vtp";
+    const Curves curves = read_curves(path, path);
+    ASSERT_EQ(curves.moving.size(), 2u);
+    EXPECT_EQ(curves.moving[1].col(1), Vector3d(10, 10, -0.125));
+    EXPECT_EQ(curves.fixed.cols(), 6);
+    EXPECT_GT(curves.tangents.col(1)[0], 0.999);
+    EXPECT_EQ(curves.tangents.col(5).norm(), 0);  // on no line
+}
+
 TEST_F(CurveFiles, CurvesOfSlicerInTheSystemThatTheySay) {
     const auto list = [](const std::string& type, const std::vector<std::string>& positions) {
         std::string text =
@@ -118,6 +128,10 @@ TEST_F(CurveFiles, HostileFilesAreRefusedByName) {
         {written("index.vtk", vtk_header + points + "LINES 1 3\n2 0 2\n"), "uses point 2"},
         {written("count.vtk", vtk_header + points + "LINES 99999999 3\n2 0 1\n"), "more than the file can hold"},
         {written("one.vtk", vtk_header + points + "LINES 1 2\n1 0\n"), "fewer than two points"},
+        {written("index.vtp",
+                 "<VTKFile type='PolyData'><Piece NumberOfPoints='1'><Points><DataArray format='ascii'>0 0"
+                 "</DataArray></Points></Piece></VTKFile>"),
+         "index.vtp' has 2 values in Points/; 3 are needed"},
         {written("ras.vtk", "# vtk DataFile Version 3.0\nSPACE=RAS\nASCII\nDATASET POLYDATA\n" + points), "RAS"},
     };
     for (const auto& [path, words] : bad)

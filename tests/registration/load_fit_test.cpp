@@ -7,10 +7,12 @@
 #include "registration/warp.hpp"
 #include "tests/support/label_shapes.hpp"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 #include <Eigen/Cholesky>
 
 #include <cmath>
+#include <string>
+#include <vector>
 
 namespace tissuewarp::registration {
 namespace {
@@ -90,11 +92,12 @@ TEST(LoadFit, IsTheMeanUnderThePriorOfSmoothLoads) {
         units.block<3, 3>(3 * held[k], 3 * Eigen::Index(k)).setIdentity();
     }
     const detail::Posterior with(prepared, seen), without(prepared, unseen);
-    const detail::LoadShapes shapes(detail::principal_loads(prepared, 8), without, energy);
+    const detail::LoadShapes shapes(detail::principal_loads(prepared, 8).loads, without, energy);
     const detail::LoadFit fit(shapes, with);
     const VectorXd shown = with.inverse(pulls), found = shown + fit.answers(fit.coefficients(shown, size));
 
-    const MatrixXd answers = without.inverse(units), loads = shapes.scale() * detail::principal_loads(prepared, 8);
+    const MatrixXd answers = without.inverse(units),
+                   loads = shapes.scale() * detail::principal_loads(prepared, 8).loads;
     const MatrixXd covariance =
         energy * answers + size * size * without.inverse(loads) * (loads.transpose() * answers);  // with the held nodes
     const MatrixXd between =
@@ -120,7 +123,7 @@ TEST(LoadFit, LoadsOfSizeOneHaveTheStrainEnergyOfOneDeviation) {
     const PreparedModel prepared = organ(12);
     const double energy = 60;
     const detail::Posterior unseen(prepared, prior(prepared, energy));
-    const MatrixXd drawn = detail::principal_loads(prepared, 16);
+    const MatrixXd drawn = detail::principal_loads(prepared, 16).loads;
     const MatrixXd loads = detail::LoadShapes(drawn, unseen, energy).scale() * drawn;
     EXPECT_NEAR(0.5 * loads.cwiseProduct(unseen.inverse(loads)).sum() / energy, 1, 1e-9);
 }
@@ -128,9 +131,34 @@ TEST(LoadFit, LoadsOfSizeOneHaveTheStrainEnergyOfOneDeviation) {
 // A fifth as many shapes are most of all: they are the principal ones.
 TEST(PrincipalLoads, AreMostOfTheVariance) {
     const PreparedModel prepared = organ(12);
-    const double all = detail::principal_loads(prepared, 256).squaredNorm();
+    const double all = detail::principal_loads(prepared, 256).loads.squaredNorm();
     EXPECT_NEAR(detail::unknown_loads(prepared, 256, 7).squaredNorm() / 256 / all, 1, 0.1);
-    EXPECT_GT(detail::principal_loads(prepared, 48).squaredNorm(), 0.8 * all);
+    EXPECT_GT(detail::principal_loads(prepared, 48).loads.squaredNorm(), 0.8 * all);
+}
+
+/// What each of the loads does to smooth fields of displacement that no mesh knows, one column per load.
+MatrixXd works(const PreparedModel& prepared, const MatrixXd& loads) {
+    const Matrix3Xd& nodes = prepared.model.mesh.nodes;
+    MatrixXd result(60, loads.cols());
+    for (int wave = 0; wave < 20; ++wave) {
+        const Vector3d direction(std::sin(wave), std::cos(1.7 * wave), std::sin(2.3 * wave + 1));
+        const VectorXd phases = nodes.transpose() * direction / 15;  // rad, over 15 mm
+        for (Eigen::Index k = 0; k < loads.cols(); ++k) {
+            const Eigen::Map<const Matrix3Xd> forces(loads.col(k).data(), 3, nodes.cols());
+            result.block<3, 1>(3 * wave, k) = forces * (phases.array() + wave).cos().matrix();
+        }
+    }
+    return result;
+}
+
+// What is fitted on a coarse mesh acts on a fine one: shape by shape it must be the same.
+TEST(PrincipalLoads, AreTheSameOnAnotherMesh) {
+    const PreparedModel coarse = organ(12), fine = organ(6.5);
+    const detail::PrincipalLoads found = detail::principal_loads(coarse, 48);
+    EXPECT_EQ(detail::loads_along(coarse, found.axes), found.loads);
+    const MatrixXd here = works(coarse, found.loads), there = works(fine, detail::loads_along(fine, found.axes));
+    for (Eigen::Index k = 0; k < 48; ++k)
+        EXPECT_GT(here.col(k).dot(there.col(k)) / here.col(k).norm() / there.col(k).norm(), 0.5) << k;
 }
 
 // Tissue that no pair shows is where smooth loads put it that bend what pairs show; strain energy alone lets it go.
@@ -222,9 +250,16 @@ TEST(UnknownLoads, DoNotDependOnTheUpdateBefore) {
               used.update({.points = pairs}).deformation.displacement);
 }
 
-// Found on a coarser mesh of the organ, they do the same.
+/// The names of stages, as they come.
+struct Stages : Observer {
+    std::vector<std::string> names;
+    void progress(std::string_view stage, double) override { names.emplace_back(stage); }
+};
+
+// Found on a coarser mesh of the organ, they do the same; and where that one was made beforehand, exactly the same.
 TEST(UnknownLoads, OfALargeModelAreThoseOfASmallOne) {
-    const PreparedModel small = organ(6.5), large = organ(3.6);
+    const PreparedModel small = organ(6.5);
+    PreparedModel large = organ(3.6);
     ASSERT_GT(large.rest.node_count, 6000);
     ASSERT_LT(small.rest.node_count, 6000);
     const Matrix3Xd truth = bent(large);
@@ -234,6 +269,31 @@ TEST(UnknownLoads, OfALargeModelAreThoseOfASmallOne) {
                        without = update(large, {.points = pairs}, with_shapes(0));
     EXPECT_NEAR(std::log2(of_large.pulls.load_size / of_small.pulls.load_size), 0, 1);
     EXPECT_LT(error_on_the_right(large, of_large, truth), 0.7 * error_on_the_right(large, without, truth));
+
+    prepare_loads(large);
+    ASSERT_TRUE(large.coarse);
+    EXPECT_EQ(large.times.back().stage, "coarse model");
+    Stages stages;
+    const UpdateResult of_prepared = update(large, {.points = pairs}, with_shapes(48), stages);
+    EXPECT_EQ(of_prepared.deformation.displacement, of_large.deformation.displacement);
+    EXPECT_THAT(stages.names, ::testing::Not(::testing::Contains("relaxing the mesh")));
+
+    const tled::MaterialTable softer{{1, tled::neo_hookean_lnj(2, 0.4)}, {2, tled::neo_hookean_lnj(5, 0.3)}};
+    large = with_materials(std::move(large), softer);
+    EXPECT_EQ(large.coarse->model.materials, softer);
+}
+
+TEST(UnknownLoads, TakeACoarserModelOfALargeFreeOneAlone) {
+    PreparedModel small = organ(12);
+    prepare_loads(small);
+    EXPECT_FALSE(small.coarse);
+    PrepareOptions held;
+    held.meshing.edge_length = 3.6;
+    held.anchors = {2};
+    PreparedModel large = prepare(shapes::organ_labels({}), held);
+    ASSERT_GT(large.rest.node_count, 6000);
+    prepare_loads(large);
+    EXPECT_FALSE(large.coarse);
 }
 
 }  // namespace

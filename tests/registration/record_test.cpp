@@ -327,6 +327,24 @@ TEST_F(Records, PreparedModelsComeBack) {
     EXPECT_LT((here - there).cwiseAbs().maxCoeff(), 1e-9 * here.cwiseAbs().maxCoeff());
 }
 
+TEST_F(Records, PreparedModelsComeBackWithTheirCoarserOnes) {
+    PreparedModel model = prepared_box();
+    write_prepared(model, path);
+    EXPECT_FALSE(read_prepared(path).coarse);
+    model.coarse = std::make_unique<PreparedModel>(
+        prepare(test::box_at({-15, -10, -10}, {30, 20, 20}, {3, 2, 2}, 0.1), model.labels, model.options));
+    write_prepared(model, path);
+    const PreparedModel back = read_prepared(path);
+    ASSERT_TRUE(back.coarse);
+    EXPECT_EQ(back.coarse->model.mesh.nodes, model.coarse->model.mesh.nodes);
+    EXPECT_EQ(back.coarse->model.mesh.tets, model.coarse->model.mesh.tets);
+    EXPECT_EQ(back.coarse->model.mesh.labels, model.coarse->model.mesh.labels);
+    EXPECT_EQ(tled::shear_modulus(back.coarse->model.materials.at(1)),
+              tled::shear_modulus(model.model.materials.at(1)));
+    poke<int>("coarse_mesh/tetrahedra", 0, 1000000);
+    EXPECT_THAT([&] { read_prepared(path); }, ThrowsMessage<InvalidInput>(HasSubstr("coarse_mesh")));
+}
+
 TEST_F(Records, PreparedModelsWithAWrongGridAreRefused) {
     write_prepared(prepared(), path);
     poke<int>("moving_labels/grid/size", 0, 1000000);
