@@ -3,10 +3,14 @@
 
 #include "shaders/buffer.hpp"
 
+#include <memory>
 #include <span>
 #include <vector>
 
 namespace tissuewarp::shaders {
+namespace detail {
+class MappedBuffer;
+}
 
 /// Bytes of the host that a device copies its buffers into. fetch() needs the device's context current; construction
 /// and destruction make it so.
@@ -33,11 +37,7 @@ public:
     [[nodiscard]] static std::size_t bytes_of(std::span<const Piece> pieces);
 
 private:
-    const Device& device_;
-    std::size_t bytes_;
-    std::string what_;
-    unsigned id_ = 0;
-    const std::byte* mapped_ = nullptr;
+    std::unique_ptr<detail::MappedBuffer> memory_;
 };
 
 }  // namespace tissuewarp::shaders

@@ -3,10 +3,14 @@
 
 #include "shaders/buffer.hpp"
 
+#include <memory>
 #include <span>
 #include <string>
 
 namespace tissuewarp::shaders {
+namespace detail {
+class MappedBuffer;
+}
 
 /// Memory of the host that the device reads, mapped for as long as it lives. Members need the context current.
 class Upload {
@@ -22,14 +26,10 @@ public:
     /// The first bytes of what room() gave become those of `target`, for all that the context is told from now on.
     void send(const StorageBuffer& target, std::size_t bytes);
 
-    [[nodiscard]] std::size_t bytes() const { return bytes_; }
+    [[nodiscard]] std::size_t bytes() const;
 
 private:
-    const Device& device_;
-    std::size_t bytes_;
-    std::string what_;
-    unsigned id_ = 0;
-    std::byte* mapped_ = nullptr;
+    std::unique_ptr<detail::MappedBuffer> memory_;
     void* sent_ = nullptr;  // a fence behind the last send
 };
 
