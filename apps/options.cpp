@@ -3,159 +3,17 @@
 #include "apps/options.hpp"
 
 #include "apps/config_file.hpp"
+#include "apps/option_values.hpp"
+#include "apps/verb.hpp"
 #include "apps/versions.hpp"
 #include "core/errors.hpp"
 
-#include <CLI/CLI.hpp>
-
-#include <charconv>
-#include <cmath>
+#include <algorithm>
 #include <deque>
 
 namespace tissuewarp::apps {
 
 namespace {
-
-using Kind = Parameter::Kind;
-
-/// Declares the options of one verb and remembers of which kind each is.
-class Verb {
-public:
-    Verb(CLI::App& parent, const char* name, const char* what) : app_(*parent.add_subcommand(name, what)) {
-        app_.set_help_flag("-h,--help", "Print this text and exit");
-    }
-    CLI::App& app() { return app_; }
-
-    CLI::Option* path(const std::string& names, std::filesystem::path& target, const char* what) {
-        return keep(Kind::Text, app_.add_option_function<std::string>(
-                                        names, [&target](const std::string& value) { target = value; }, what)
-                                    ->type_name("FILE")
-                                    ->take_last());
-    }
-    CLI::Option* text(const std::string& names, std::string& target, const char* what) {
-        return keep(Kind::Text, app_.add_option(names, target, what)->capture_default_str()->take_last());
-    }
-    /// A number within [least, most], of the unit that `unit` names.
-    template <class T>
-    CLI::Option* number(const std::string& names, T& target, const char* unit, T least, T most, const char* what) {
-        return keep(Kind::Number, app_.add_option(names, target, what)
-                                      ->type_name(unit)
-                                      ->check(CLI::Range(least, most).description(""))
-                                      ->capture_default_str()
-                                      ->take_last());
-    }
-    CLI::Option* flag(const std::string& names, bool& target, const char* what) {
-        return keep(Kind::Switch, app_.add_flag(names, target, what)->take_last());
-    }
-    CLI::Option* list(const std::string& names, std::vector<std::string>& target, const char* unit, const char* what) {
-        return keep(Kind::TextList, app_.add_option(names, target, what)->type_name(unit)->allow_extra_args(false));
-    }
-    void common(CommonOptions& target) {
-        number("--threads", target.threads, "COUNT", 0, 4096, "Cores to use; 0: all");
-        flag("--quiet", target.quiet, "Print errors only");
-    }
-    void landmarks(LandmarkFiles& target) {
-        CLI::Option* csv =
-            path("--landmarks", target.csv,
-                 "Corresponding points for scoring only: CSV pre_x,pre_y,pre_z,intra_x,intra_y,intra_z (mm, LPS)");
-        CLI::Option* moving = path("--landmarks-moving", target.moving,
-                                   "points of the moving image: elastix or 3D Slicer (.mrk.json, .fcsv)");
-        CLI::Option* fixed = path("--landmarks-fixed", target.fixed, "points of the fixed image, likewise");
-        moving->needs(fixed)->excludes(csv);
-        fixed->needs(moving)->excludes(csv);
-    }
-
-    [[nodiscard]] KnownOptions known() const {
-        KnownOptions result;
-        for (const auto& [option, kind] : options_) {
-            result.names.push_back(name_of(option));
-            if (kind == Kind::Switch) result.switches.push_back(name_of(option));
-        }
-        return result;
-    }
-    /// Present values, defaults included; options without a value are left out.
-    [[nodiscard]] std::vector<Parameter> parameters(const std::vector<std::string>& except) const {
-        std::vector<Parameter> result;
-        for (const auto& [option, kind] : options_) {
-            Parameter parameter{name_of(option), kind, {}};
-            if (std::find(except.begin(), except.end(), parameter.name) != except.end()) continue;
-            if (option->count() > 0)
-                parameter.values = option->results();
-            else if (kind == Kind::Switch)
-                parameter.values = {"false"};
-            else if (!option->get_default_str().empty() && kind != Kind::TextList)
-                parameter.values = {option->get_default_str()};
-            if (parameter.values.empty()) continue;
-            if (kind != Kind::TextList) parameter.values = {parameter.values.back()};
-            result.push_back(parameter);
-        }
-        return result;
-    }
-
-private:
-    CLI::Option* keep(Kind kind, CLI::Option* option) {
-        options_.emplace_back(option, kind);
-        return option;
-    }
-    static std::string name_of(const CLI::Option* option) { return option->get_lnames().front(); }
-
-    CLI::App& app_;
-    std::vector<std::pair<CLI::Option*, Kind>> options_;
-};
-
-std::string check_device(std::string& value) {
-    int index = 0;
-    const char* end = value.data() + value.size();
-    if (value == "auto" || value == "cpu" || value == "gpu") return {};
-    if (value.starts_with("gpu:") && std::from_chars(value.data() + 4, end, index).ptr == end && value.size() > 4)
-        return {};
-    return "'" + value + "' is no device; give auto, cpu, gpu or gpu:<index> (see 'tissuewarp info --devices')";
-}
-
-std::map<int, double> label_lengths(const std::vector<std::string>& entries) {
-    std::map<int, double> lengths;
-    for (const std::string& entry : entries) {
-        int label = 0;
-        double length = 0;
-        const char* end = entry.data() + entry.size();
-        const auto first = std::from_chars(entry.data(), end, label);
-        const bool equals = first.ptr != end && *first.ptr == '=';
-        const auto second = equals ? std::from_chars(first.ptr + 1, end, length) : first;
-        if (!equals || second.ptr != end || second.ec != std::errc() || label <= 0 || !(length > 0))
-            throw InvalidInput("--label-edge-length '" + entry +
-                               "' is not LABEL=MM with both above 0; write for instance 2=3.5");
-        lengths[label] = length;
-    }
-    return lengths;
-}
-
-/// "0.5mm", "0.5 mm" or "0.5", in the first of the units; nothing where there is no text.
-std::optional<double> quantity(const std::string& option, const std::string& text,
-                               const std::vector<std::pair<std::string, double>>& units) {
-    if (text.empty()) return std::nullopt;
-    double value = 0;
-    const char* end = text.data() + text.size();
-    const auto [stop, error] = std::from_chars(text.data(), end, value);
-    std::string unit(stop, end);
-    unit.erase(0, unit.find_first_not_of(' '));
-    if (unit.empty()) unit = units.front().first;
-    for (const auto& [name, factor] : units)
-        if (error == std::errc() && name == unit && value > 0 && std::isfinite(value)) return value * factor;
-    throw InvalidInput(option + " '" + text + "' is no quantity above 0; write for instance 2" + units.front().first);
-}
-
-std::vector<int> label_list(const std::string& option, const std::vector<std::string>& entries) {
-    std::vector<int> labels;
-    for (const std::string& entry : entries) {
-        int label = 0;
-        const char* end = entry.data() + entry.size();
-        const auto [stop, error] = std::from_chars(entry.data(), end, label);
-        if (stop != end || error != std::errc() || label <= 0)
-            throw InvalidInput(option + " '" + entry + "' is no label; give whole numbers above 0, for instance 3,4");
-        labels.push_back(label);
-    }
-    return labels;
-}
 
 /// All verbs with the structs that they fill.
 struct Parser {
