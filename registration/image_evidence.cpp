@@ -219,7 +219,9 @@ const std::vector<tled::Spring>& ImageEvidence::ground(const Eigen::Isometry3d& 
         ground_at_ = placement;
         const std::vector<char> shown = surface_in_view(placement);
         ground_ = ground_springs(prepared_, energy_, [&](const InterfaceNode& node) {
-            return shown[static_cast<std::size_t>(node.node)] ? options_.expected_motion_mm : options_.unseen_motion_mm;
+            return shown[static_cast<std::size_t>(node.node)]
+                       ? ExpectedMotion(options_.expected_motion_mm)
+                       : ExpectedMotion(options_.unseen_motion_mm, options_.unseen_slide_mm);
         });
     }
     return ground_;
