@@ -56,9 +56,12 @@ void ImageEvidence::search(const State& state, Observer& observer) {
         blocks_ = located(consistent_matches(block_search(state, observer), options_.consistency));
         use(blocks_);
     } else {
-        const int coarsening = options_.dense_coarsening.at(static_cast<std::size_t>(searches_done_ - 1));
+        const std::vector<int>& grids = options_.dense_coarsening;
+        const int coarsening = grids.at(std::min(static_cast<std::size_t>(searches_done_), grids.size()) - 1);
         DenseMatches dense = dense_->matches(state, coarsening, blocks_, locator_);
         use(std::move(dense.found));
+        if (coarsening == last_coarsening_) gain_ = dense.agreement - *agreement_;
+        last_coarsening_ = coarsening;
         agreement_ = dense.agreement;
     }
     ++searches_done_;
