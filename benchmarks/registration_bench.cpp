@@ -178,6 +178,7 @@ std::map<std::string, Setter> setters() {
             {"search-mm", [](UpdateOptions& o, double v) { o.image.matching.search_mm = v; }},
             {"tolerance", [](UpdateOptions& o, double v) { o.equilibrium.tolerance_mm = v; }},
             {"unseen-motion", [](UpdateOptions& o, double v) { o.image.unseen_motion_mm = v; }},
+            {"unseen-slide", [](UpdateOptions& o, double v) { o.image.unseen_slide_mm = v; }},
             {"least-confidence", [](UpdateOptions& o, double v) { o.image.consistency.least_confidence = v; }},
             {"consistent-mm", [](UpdateOptions& o, double v) { o.image.consistency.most_residual_mm = v; }}};
 }

@@ -18,14 +18,17 @@ double strain_energy_unit(const PreparedModel& prepared, const TissuePrior& tiss
 }
 
 std::vector<tled::Spring> ground_springs(const PreparedModel& prepared, double energy,
-                                         const std::function<double(const InterfaceNode&)>& expected_mm) {
+                                         const std::function<ExpectedMotion(const InterfaceNode&)>& expected) {
     constexpr double independent_area = 100.0;  // mm², that moves on its own
     std::vector<tled::Spring> springs;
     for (const InterfaceNode& node : prepared.interfaces.nodes()) {
         if (node.outer != 0) continue;
-        const double deviation = expected_mm(node);
-        const double stiffness = energy / (deviation * deviation) * node.area / independent_area;
-        springs.push_back({node.node, stiffness * Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero()});
+        const ExpectedMotion motion = expected(node);
+        const Eigen::Matrix3d across = node.normal * node.normal.transpose(),
+                              along = Eigen::Matrix3d::Identity() - across,
+                              information = across / (motion.across_mm * motion.across_mm) +
+                                            along / (motion.along_mm * motion.along_mm);
+        springs.push_back({node.node, energy * node.area / independent_area * information, Eigen::Vector3d::Zero()});
     }
     return springs;
 }

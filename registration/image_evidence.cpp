@@ -56,9 +56,12 @@ void ImageEvidence::search(const State& state, Observer& observer) {
         blocks_ = located(consistent_matches(block_search(state, observer), options_.consistency));
         use(blocks_);
     } else {
-        const int coarsening = options_.dense_coarsening.at(static_cast<std::size_t>(searches_done_ - 1));
+        const std::vector<int>& grids = options_.dense_coarsening;
+        const int coarsening = grids.at(std::min(static_cast<std::size_t>(searches_done_), grids.size()) - 1);
         DenseMatches dense = dense_->matches(state, coarsening, blocks_, locator_);
         use(std::move(dense.found));
+        if (coarsening == last_coarsening_) gain_ = dense.agreement - *agreement_;
+        last_coarsening_ = coarsening;
         agreement_ = dense.agreement;
     }
     ++searches_done_;
@@ -219,7 +222,9 @@ const std::vector<tled::Spring>& ImageEvidence::ground(const Eigen::Isometry3d& 
         ground_at_ = placement;
         const std::vector<char> shown = surface_in_view(placement);
         ground_ = ground_springs(prepared_, energy_, [&](const InterfaceNode& node) {
-            return shown[static_cast<std::size_t>(node.node)] ? options_.expected_motion_mm : options_.unseen_motion_mm;
+            return shown[static_cast<std::size_t>(node.node)]
+                       ? ExpectedMotion(options_.expected_motion_mm)
+                       : ExpectedMotion(options_.unseen_motion_mm, options_.unseen_slide_mm);
         });
     }
     return ground_;

@@ -125,7 +125,8 @@ struct ImageOptions {
     /// grey values have none.
     std::vector<int> dense_coarsening{1, 1, 0};
     double expected_motion_mm = 100;  ///< of the organ's surface in the field of view of the intraoperative image
-    double unseen_motion_mm = 1;      ///< and out of it
+    double unseen_motion_mm = 0.8;    ///< and out of it, along its normal: what is around holds it there, …
+    double unseen_slide_mm = 4;       ///< … and lets it slide along itself
     double headers_within_mm = 15;    ///< the headers place an organ, part of which is out of view, closer than this
 };
 

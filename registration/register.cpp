@@ -76,6 +76,7 @@ public:
                 record.largest_change_mm < (searches_left() ? settled_for_search_mm() : options_.settled_mm);
             round = settled ? std::max(round + 1, next_milestone(round)) : round + 1;
         }
+        search_on();
         explain_by_loads();
         settle_contact();
         result_.times.push_back({"correspondence", matching_seconds_});
@@ -131,6 +132,18 @@ private:
         const int last = options_.rematches - 1;
         if (searches_left()) return std::min(last, round_of_search(evidence_.image->searches_done()));
         return round < last ? last : options_.rematches;
+    }
+
+    /// Tissue that blocks misplaced comes nearer by a voxel and a half with each dense search: searches go on while
+    /// they bring the images into better agreement, each with two rounds that weigh what it found.
+    void search_on() {
+        constexpr int most_searches = 4;
+        for (int done = 0; evidence_.image && evidence_.image->gains() && done < most_searches; ++done) {
+            if (result_.cut_short || !pace_.room_for(2)) return;
+            search();
+            for (int round = 0; round < 2; ++round) solve(options_.rematches - 1);
+            pace_.lap();
+        }
     }
 
     /// What data show was done by loads that nobody stated; these also move what they do not show. A second time, since
@@ -194,7 +207,10 @@ private:
     }
 
     void search_image(int round) {
-        if (!searches_left() || round < round_of_search(evidence_.image->searches_done())) return;
+        if (searches_left() && round >= round_of_search(evidence_.image->searches_done())) search();
+    }
+
+    void search() {
         detail::Stopwatch stopwatch;
         evidence_.image->search(state_, observer_);
         metric_is_current_ = false;

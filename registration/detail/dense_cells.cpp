@@ -19,8 +19,11 @@ constexpr double most_shift = 1.5;         // voxels
 
 Spread spread_of(const CellSums& sums) {
     const auto& A = sums.normal;
+    const ContrastSums& contrast = sums.contrast;
     Spread result;
-    result << A(0, 0), A(1, 1), A(2, 2), A(0, 1), A(0, 2), A(1, 2), sums.right, sums.squares, sums.voxels;
+    result << A(0, 0), A(1, 1), A(2, 2), A(0, 1), A(0, 2), A(1, 2), sums.right, sums.squares, sums.voxels,
+        contrast.of_gradients.col(0), contrast.of_gradients.col(1), contrast.of_residuals, contrast.squares,
+        contrast.sum;
     return result;
 }
 
@@ -30,6 +33,10 @@ CellSums sums_of(const Spread& s) {
     result.right = s.segment<3>(6);
     result.squares = s[9];
     result.voxels = s[10];
+    result.contrast.of_gradients << s.segment<3>(11), s.segment<3>(14);
+    result.contrast.of_residuals = s.segment<2>(17);
+    result.contrast.squares = s[19];
+    result.contrast.sum = s[20];
     return result;
 }
 
@@ -124,6 +131,19 @@ private:
     std::size_t counted_ = 0;
 };
 
+/// Takes out of A, b and the squares what D₂ = D₁ − (D₁, 1) c explains of them, c the same for all channels.
+CellSums without_contrast(CellSums window) {
+    const ContrastSums& contrast = window.contrast;
+    const double samples = descriptor_channels * window.voxels;
+    Eigen::Matrix2d common;
+    common << contrast.squares + least_square * samples, contrast.sum, contrast.sum, samples;
+    const Eigen::Matrix2d inverse = common.inverse();
+    window.normal -= contrast.of_gradients * inverse * contrast.of_gradients.transpose();
+    window.right -= contrast.of_gradients * inverse * contrast.of_residuals;
+    window.squares -= contrast.of_residuals.dot(inverse * contrast.of_residuals);
+    return window;
+}
+
 /// Shift and information along the axes of A, voxels.
 std::optional<DenseForce> solved(const CellSums& window, const Eigen::Vector3d& place, const imaging::Geometry& grid) {
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
@@ -163,7 +183,8 @@ Voxel CellGrid::first_voxel(std::size_t n) const {
 }
 
 CellSums cell_sums(const DescriptorProducts& products, double voxels, const Eigen::Vector3d& index) {
-    const auto& [diagonal, mixed, right, structure, squares] = products;
+    const auto& [diagonal, mixed, right, structure, squares, slopes, ends, first_squares, first, first_residual,
+                 residual] = products;
     CellSums sums;
     const Eigen::Matrix3d twice{{2.0 * diagonal[0], 1.0 * mixed[0], 1.0 * mixed[1]},
                                 {1.0 * mixed[0], 2.0 * diagonal[1], 1.0 * mixed[2]},
@@ -173,6 +194,11 @@ CellSums cell_sums(const DescriptorProducts& products, double voxels, const Eige
     sums.squares = squares;
     sums.structure = structure / 8.0;
     sums.voxels = voxels;
+    sums.contrast.of_gradients << slopes[0], ends[0], slopes[1], ends[1], slopes[2], ends[2];
+    sums.contrast.of_gradients /= 4;
+    sums.contrast.of_residuals << first_residual, residual;
+    sums.contrast.squares = first_squares;
+    sums.contrast.sum = first;
     sums.index = index;
     return sums;
 }
@@ -185,7 +211,7 @@ DenseForces forces_of(const std::vector<CellSums>& own, const CellGrid& cells, c
                        rows.agreement()};
     rows.for_each_counted([&](std::size_t n, std::size_t place) {
         const Eigen::Vector3d centre = grid.point(own[n].index / own[n].voxels);
-        const std::optional<DenseForce> force = solved(sums_of(windows[n]), centre, grid);
+        const std::optional<DenseForce> force = solved(without_contrast(sums_of(windows[n])), centre, grid);
         if (!force) return;
         result.forces[place] = *force;
         result.said[n] = 1;

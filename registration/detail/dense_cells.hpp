@@ -26,6 +26,14 @@ private:
     std::array<std::ptrdiff_t, 3> stride_{};
 };
 
+/// With s = (D₁, 1), what a change of contrast would look like: sums over voxels and channels.
+struct ContrastSums {
+    Eigen::Matrix<double, 3, 2> of_gradients = Eigen::Matrix<double, 3, 2>::Zero();  ///< Σ ½ (∇D₁ + ∇D₂) sᵀ
+    Eigen::Vector2d of_residuals = Eigen::Vector2d::Zero();                          ///< Σ (D₁ − D₂) s
+    double squares = 0;                                                              ///< Σ D₁²
+    double sum = 0;                                                                  ///< Σ D₁
+};
+
 /// Sums over voxels, in voxels and steps of the descriptors' eight bits.
 struct CellSums {
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();  ///< A
@@ -33,14 +41,15 @@ struct CellSums {
     double squares = 0;                                ///< Σ (D₁ − D₂)²
     double structure = 0;                              ///< Σ ½ (|∇D₁|² + |∇D₂|²)
     double voxels = 0;
+    ContrastSums contrast;
     Eigen::Vector3d index = Eigen::Vector3d::Zero();  ///< Σ x
 };
 
 /// `index` is the sum of the voxels' own.
 CellSums cell_sums(const DescriptorProducts& products, double voxels, const Eigen::Vector3d& index);
 
-/// What of sums is spread: A (00, 11, 22, 01, 02, 12), b, squares and voxels.
-using Spread = Eigen::Array<double, 11, 1>;
+/// What of sums is spread: A (00, 11, 22, 01, 02, 12), b, squares, voxels and those of contrast.
+using Spread = Eigen::Array<double, 21, 1>;
 
 /// Of forces_of(), kept from one call to the next: fresh memory costs more than what is computed in it.
 struct WindowMemory {

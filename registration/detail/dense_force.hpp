@@ -27,10 +27,11 @@ struct DenseForces {
 
 /// One Gauss–Newton step of D₂(x + δ) = D₁(x) for the descriptors D of both images (of self-similarity, on one grid), δ
 /// the same in the window of a cell: δ = A⁻¹ b with A = Σ (∇D₁ ∇D₂ᵀ + ∇D₂ ∇D₁ᵀ)/2, in which the noise of one image
-/// does not meet itself, and b = Σ (∇D₁ + ∇D₂)/2 (D₁ − D₂), of second order in δ (Malis, ICRA 2004). Counted are voxels
-/// that `counts` names (one byte each) and that both images show with their six neighbours; cells without any and
-/// directions without information have no force. Shifts are bounded to a voxel and a half. Formulas: docs/method.md,
-/// section 11. Threads do not change the result.
+/// does not meet itself, and b = Σ (∇D₁ + ∇D₂)/2 (D₁ − D₂), of second order in δ (Malis, ICRA 2004); a difference D₁ −
+/// D₂ = c D₁ + d, as noise and blur make it, is solved for with δ and is no motion. Counted are voxels that `counts`
+/// names (one byte each) and that both images show with their six neighbours; cells without any and directions without
+/// information have no force. Shifts are bounded to a voxel and a half. Formulas: docs/method.md, section 11. Threads
+/// do not change the result.
 DenseForces dense_forces(const MatchingImage& first, const MatchingImage& second,
                          const std::vector<std::uint8_t>& counts);
 

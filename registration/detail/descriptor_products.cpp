@@ -61,13 +61,17 @@ DescriptorProducts products(const std::uint8_t* first, const std::uint8_t* secon
                             const std::array<std::ptrdiff_t, 3>& stride, std::span<const std::ptrdiff_t> voxels) {
     const std::array<std::ptrdiff_t, 3> bytes{descriptor_channels * stride[0], descriptor_channels * stride[1],
                                               descriptor_channels * stride[2]};
+    const Words one = hn::Set(Tag16(), 1);
     ProductSum ii, jj, kk, ij, ik, jk, ri, rj, rk, structure, squares;
+    ProductSum slope_i, slope_j, slope_k, end_i, end_j, end_k, first_squares, first_sum, first_residual, residual_sum;
     for (std::size_t channel = 0; channel < descriptor_channels; channel += hn::Lanes(Tag16())) {
         const Channels channels = hn::FirstN(Tag16(), descriptor_channels - channel);
         for (const std::ptrdiff_t voxel : voxels) {
             const std::ptrdiff_t at = descriptor_channels * voxel + static_cast<std::ptrdiff_t>(channel);
             const Differences a(first + at, bytes, channels), b(second + at, bytes, channels);
-            const Words residual = hn::IfThenElseZero(channels, hn::Sub(load(first + at), load(second + at)));
+            const Words value = hn::IfThenElseZero(channels, load(first + at)),
+                        residual = hn::Sub(value, hn::IfThenElseZero(channels, load(second + at))),
+                        sum_i = hn::Add(a.i, b.i), sum_j = hn::Add(a.j, b.j), sum_k = hn::Add(a.k, b.k);
             ii.add(a.i, b.i);
             jj.add(a.j, b.j);
             kk.add(a.k, b.k);
@@ -77,9 +81,9 @@ DescriptorProducts products(const std::uint8_t* first, const std::uint8_t* secon
             ik.add(a.k, b.i);
             jk.add(a.j, b.k);
             jk.add(a.k, b.j);
-            ri.add(hn::Add(a.i, b.i), residual);
-            rj.add(hn::Add(a.j, b.j), residual);
-            rk.add(hn::Add(a.k, b.k), residual);
+            ri.add(sum_i, residual);
+            rj.add(sum_j, residual);
+            rk.add(sum_k, residual);
             structure.add(a.i, a.i);
             structure.add(a.j, a.j);
             structure.add(a.k, a.k);
@@ -87,13 +91,29 @@ DescriptorProducts products(const std::uint8_t* first, const std::uint8_t* secon
             structure.add(b.j, b.j);
             structure.add(b.k, b.k);
             squares.add(residual, residual);
+            slope_i.add(sum_i, value);
+            slope_j.add(sum_j, value);
+            slope_k.add(sum_k, value);
+            end_i.add(sum_i, one);
+            end_j.add(sum_j, one);
+            end_k.add(sum_k, one);
+            first_squares.add(value, value);
+            first_sum.add(value, one);
+            first_residual.add(value, residual);
+            residual_sum.add(residual, one);
         }
     }
     return {{ii.total(), jj.total(), kk.total()},
             {ij.total(), ik.total(), jk.total()},
             {ri.total(), rj.total(), rk.total()},
             structure.total(),
-            squares.total()};
+            squares.total(),
+            {slope_i.total(), slope_j.total(), slope_k.total()},
+            {end_i.total(), end_j.total(), end_k.total()},
+            first_squares.total(),
+            first_sum.total(),
+            first_residual.total(),
+            residual_sum.total()};
 }
 
 }  // namespace HWY_NAMESPACE

@@ -18,6 +18,12 @@ struct DescriptorProducts {
     std::array<std::int32_t, 3> right{};     ///< Σ (g₁a + g₂a) r
     std::int32_t structure = 0;              ///< Σ |g₁|² + |g₂|²
     std::int32_t squares = 0;                ///< Σ r²
+    std::array<std::int32_t, 3> slopes{};    ///< Σ (g₁a + g₂a) D₁
+    std::array<std::int32_t, 3> ends{};      ///< Σ g₁a + g₂a
+    std::int32_t first_squares = 0;          ///< Σ D₁²
+    std::int32_t first = 0;                  ///< Σ D₁
+    std::int32_t first_residual = 0;         ///< Σ D₁ r
+    std::int32_t residual = 0;               ///< Σ r
 };
 
 /// Of `voxels` (offsets in voxels, most_product_voxels at most), whose neighbours lie ± `stride` away. Descriptors have

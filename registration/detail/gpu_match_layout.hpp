@@ -35,9 +35,8 @@ struct MatchCell {
     DescriptorProducts products;
     std::int32_t voxels;
     std::array<std::int32_t, 3> places;
-    std::int32_t unused;
 };
-static_assert(sizeof(MatchCell) == 64);
+static_assert(sizeof(MatchCell) == 100);
 /// `first` is the voxel of the grid that the cell begins with.
 CellSums sums_of(const MatchCell& cell, const Voxel& first);
 

@@ -16,7 +16,8 @@ public:
     ImageEvidence(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
                   ImageTools& tools, double energy);
 
-    /// Finds the blocks about where the model is; the later times, how all of the image is to shift there.
+    /// Finds the blocks about where the model is; the later times, how all of the image is to shift there. After the
+    /// last of searches() the last grid is searched again.
     void search(const State& state, Observer& observer);
     /// The rigid motion that most matches agree on, the rest of them is for the tissue. Where part of the organ is out
     /// of view, a deformation of the part in view would turn it as a whole: then none, unless the headers are far off.
@@ -30,6 +31,9 @@ public:
     [[nodiscard]] int searches_done() const { return searches_done_; }
     /// How many there are to be.
     [[nodiscard]] int searches() const;
+    /// Whether another dense search on the last grid may bring the images nearer: the last search on a grid that had
+    /// been searched before found them to agree better by a hundredth or more.
+    [[nodiscard]] bool gains() const { return gain_ >= 0.01; }
 
 private:
     const PreparedModel& prepared_;
@@ -46,6 +50,8 @@ private:
     std::vector<double> strongest_;    // of each of `matches_`: the largest eigenvalue of its information
     NodalShares shares_;               // of the nodes in `matches_`
     std::optional<double> agreement_;  // of both images, in the last dense search
+    int last_coarsening_ = -1;         // of its grid
+    double gain_ = 0;                  // in agreement, see gains()
     std::vector<tled::Spring> ground_;
     Eigen::Isometry3d ground_at_ = Eigen::Isometry3d::Identity();
 

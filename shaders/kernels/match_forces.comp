@@ -12,20 +12,21 @@ layout(std430, binding = BINDING_MATCH_MOVING) readonly buffer MatchMoving { uin
 /// Voxels in the mesh that the first image shows with their six neighbours.
 layout(std430, binding = BINDING_MATCH_COUNTS) readonly buffer MatchCounts { uint counts[]; };
 /// CELL_SUMS a cell, with g twice the central difference and r = D1 - D2: 3 of g1a g2a, 3 of g1a g2b + g1b g2a (ab = 01,
-/// 02, 12), 3 of (g1a + g2a) r, |g1|² + |g2|², r², voxels, 3 of the voxels' places in the cell, one unused.
+/// 02, 12), 3 of (g1a + g2a) r, |g1|² + |g2|², r², 3 of (g1a + g2a) D1, 3 of g1a + g2a, D1², D1, D1 r, r, voxels, 3 of the
+/// voxels' places in the cell.
 layout(std430, binding = BINDING_MATCH_CELLS) writeonly buffer MatchCells { int cell_sum[]; };
 
-#define CELL_SUMS 16u
+#define CELL_SUMS 25u
+#define VOXELS 21u
 
 shared int lane[CELL_SUMS][WORKGROUP_SIZE];
 shared uint counted;  // whether any voxel of the cell is
 
 ivec4 channels(uint word) { return ivec4(uvec4(word, word >> 8, word >> 16, word >> 24) & 0xffu); }
 
-int product(ivec4 a, ivec4 b) {
-    ivec4 p = a * b;
-    return p.x + p.y + p.z + p.w;
-}
+int total(ivec4 a) { return a.x + a.y + a.z + a.w; }
+
+int product(ivec4 a, ivec4 b) { return total(a * b); }
 
 /// Four channels of a voxel and twice their central differences.
 struct Described {
@@ -62,14 +63,21 @@ int mixed(Described a, Described b, int p, int q) {
 void add(Described a, Described b, inout int sums[CELL_SUMS]) {
     ivec4 residual = a.value - b.value;
     for (int p = 0; p < 3; ++p) {
+        ivec4 both = a.gradient[p] + b.gradient[p];
         sums[p] += product(a.gradient[p], b.gradient[p]);
-        sums[6 + p] += product(a.gradient[p] + b.gradient[p], residual);
+        sums[6 + p] += product(both, residual);
         sums[9] += product(a.gradient[p], a.gradient[p]) + product(b.gradient[p], b.gradient[p]);
+        sums[11 + p] += product(both, a.value);
+        sums[14 + p] += total(both);
     }
     sums[3] += mixed(a, b, 0, 1);
     sums[4] += mixed(a, b, 0, 2);
     sums[5] += mixed(a, b, 1, 2);
     sums[10] += product(residual, residual);
+    sums[17] += product(a.value, a.value);
+    sums[18] += total(a.value);
+    sums[19] += product(a.value, residual);
+    sums[20] += total(residual);
 }
 
 uvec3 cell_of(uint n) {
@@ -88,14 +96,14 @@ void main() {
         uvec3 stride = uvec3(1u, size.x, size.x * size.y);
         if (counts[n] != 0u && is_shown(n, stride)) {
             for (uint part = 0u; part < 3u; ++part) add(first_at(n, part, stride), second_at(n, part, stride), sums);
-            sums[11] = 1;
-            for (int axis = 0; axis < 3; ++axis) sums[12 + axis] = int(place[axis]);
+            sums[VOXELS] = 1;
+            for (int axis = 0; axis < 3; ++axis) sums[VOXELS + 1u + uint(axis)] = int(place[axis]);
         }
     }
     for (uint m = 0u; m < CELL_SUMS; ++m) lane[m][local] = sums[m];
     if (local == 0u) counted = 0u;
     barrier();
-    if (sums[11] != 0) counted = 1u;
+    if (sums[VOXELS] != 0) counted = 1u;
     barrier();
     if (counted == 0u) {  // outside of the organ, as most are
         if (cell < cells && local < CELL_SUMS) cell_sum[CELL_SUMS * cell + local] = 0;

@@ -10,6 +10,7 @@
 
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -130,6 +131,19 @@ TEST(DenseForce, FindsItInAnotherContrast) {
     const Tone inverted = [](double v) { return 3 - 2 * v; }, bent = [](double v) { return std::exp(-1.5 * v); };
     EXPECT_LT(summarise(errors_of_two_steps({0.3, -0.2, 0.25}, inverted)).mean, 0.05);
     EXPECT_LT(summarise(errors_of_two_steps({0.3, -0.2, 0.25}, bent)).mean, 0.1);  // the descriptors themselves differ
+}
+
+// Noise and blur flatten descriptors: taken for motion, that moves each cell to where its window is flatter by chance.
+TEST(DenseForce, TakesFlatterDescriptorsForNoMotion) {
+    const MatchingImage moving = described(texture(still));
+    MatchingImage flat = described(texture(still));
+    const auto bytes = static_cast<std::size_t>(grid.voxel_count()) * descriptor_channels;
+    std::transform(flat.descriptors.get(), flat.descriptors.get() + bytes, flat.descriptors.get(),
+                   [](std::uint8_t level) { return static_cast<std::uint8_t>(80 + level / 2); });
+    const auto error =
+        errors(dense_forces(moving, flat, all_voxels()), [](const auto&) { return Eigen::Vector3d(0, 0, 0); });
+    ASSERT_GT(error.size(), 200U);
+    EXPECT_LT(summarise(error).mean, 0.01);
 }
 
 // The forces point down the cost, by finite differences of it, and one step goes most of the way. A sign or a factor of

@@ -34,8 +34,8 @@ std::vector<std::ptrdiff_t> inner_voxels() {
 
 /// The definition, in 64 bits.
 void expect_definition(const Bytes& first, const Bytes& second, const std::vector<std::ptrdiff_t>& voxels) {
-    std::array<std::int64_t, 3> diagonal{}, mixed{}, right{};
-    std::int64_t structure = 0, squares = 0;
+    std::array<std::int64_t, 3> diagonal{}, mixed{}, right{}, slopes{}, ends{};
+    std::int64_t structure = 0, squares = 0, first_squares = 0, first_sum = 0, first_residual = 0, residual_sum = 0;
     for (const std::ptrdiff_t voxel : voxels)
         for (int channel = 0; channel < descriptor_channels; ++channel) {
             const auto at = [&](const Bytes& bytes, std::ptrdiff_t n) {
@@ -46,24 +46,36 @@ void expect_definition(const Bytes& first, const Bytes& second, const std::vecto
                 a[axis] = at(first, voxel + stride[axis]) - at(first, voxel - stride[axis]);
                 b[axis] = at(second, voxel + stride[axis]) - at(second, voxel - stride[axis]);
             }
-            const std::int64_t residual = at(first, voxel) - at(second, voxel);
+            const std::int64_t value = at(first, voxel), residual = value - at(second, voxel);
             const std::array<std::array<std::size_t, 2>, 3> pairs{{{0, 1}, {0, 2}, {1, 2}}};
             for (std::size_t axis = 0; axis < 3; ++axis) {
                 diagonal[axis] += a[axis] * b[axis];
                 mixed[axis] += a[pairs[axis][0]] * b[pairs[axis][1]] + a[pairs[axis][1]] * b[pairs[axis][0]];
                 right[axis] += (a[axis] + b[axis]) * residual;
+                slopes[axis] += (a[axis] + b[axis]) * value;
+                ends[axis] += a[axis] + b[axis];
                 structure += a[axis] * a[axis] + b[axis] * b[axis];
             }
             squares += residual * residual;
+            first_squares += value * value;
+            first_sum += value;
+            first_residual += value * residual;
+            residual_sum += residual;
         }
     const DescriptorProducts found = descriptor_products(first.data(), second.data(), stride, voxels);
     for (std::size_t axis = 0; axis < 3; ++axis) {
         EXPECT_EQ(found.diagonal[axis], diagonal[axis]) << axis;
         EXPECT_EQ(found.mixed[axis], mixed[axis]) << axis;
         EXPECT_EQ(found.right[axis], right[axis]) << axis;
+        EXPECT_EQ(found.slopes[axis], slopes[axis]) << axis;
+        EXPECT_EQ(found.ends[axis], ends[axis]) << axis;
     }
     EXPECT_EQ(found.structure, structure);
     EXPECT_EQ(found.squares, squares);
+    EXPECT_EQ(found.first_squares, first_squares);
+    EXPECT_EQ(found.first, first_sum);
+    EXPECT_EQ(found.first_residual, first_residual);
+    EXPECT_EQ(found.residual, residual_sum);
 }
 
 // Channels of the next voxel that a wide load takes in, swapped axes or words that saturate change integers.

@@ -77,6 +77,19 @@ TEST(ImageUpdate, FindsTheRigidMotionFirst) {
     EXPECT_LT(summarise(node_errors(result, pose)).mean, 0.4);
 }
 
+// Without blocks tissue comes nearer by a voxel and a half at most with each search: two of them leave 0.47 mm.
+TEST(ImageUpdate, SearchesOnWhileTheImagesComeNearer) {
+    const PreparedModel prepared = textured_model();
+    const auto still = Eigen::Isometry3d::Identity();
+    UpdateOptions options = quick();
+    options.align = false;
+    options.image.consistency.least_confidence = 2;
+    options.image.dense_coarsening = {0, 0};
+    const auto result = update(prepared, {.image = after(prepared, still)}, options);
+    EXPECT_GT(static_cast<int>(result.rounds.size()), options.rematches);
+    EXPECT_LT(summarise(node_errors(result, still)).mean, 0.25);
+}
+
 TEST(ImageUpdate, RefusesWhatItCannotUse) {
     PreparedModel prepared = textured_model();
     const Volume fixed = after(prepared, Eigen::Isometry3d::Identity());
