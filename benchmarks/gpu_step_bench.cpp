@@ -189,9 +189,10 @@ void measure_tissue(const meshing::TetMesh& mesh, const std::string& mesh_name, 
     for (const char* element : {"t4", "averaged"}) {
         if (!options.element.empty() && options.element != element) continue;
         std::vector<Variant> variants = tissues(scene, element);
-        variants.erase(std::remove_if(variants.begin() + 1, variants.end(),
-                                      [&](const Variant& each) { return each.name.find(options.only) == each.name.npos; }),
-                       variants.end());
+        variants.erase(
+            std::remove_if(variants.begin() + 1, variants.end(),
+                           [&](const Variant& each) { return each.name.find(options.only) == each.name.npos; }),
+            variants.end());
         std::fprintf(stderr, "%s: time step %.1f us\n", element, 1e6 * coefficients(variants.front().rest).time_step);
         for (const tled::GpuStepShape& shape : tissue_shapes(variants.front().rest, options)) try {
                 report_tissues(variants, scene, shape, std::string(element) + " " + mesh_name, options);
