@@ -37,7 +37,7 @@ std::string kinematics_chunk(Cell cell) {
 ProgramSource law_program(std::string kernel, Cell cell, const ElementForces& forces) {
     ProgramSource source{std::move(kernel),
                          {"index", "bindings", "numbers", "deformation", kinematics_chunk(cell), "material",
-                          "isochoric", "isochoric.first"},
+                          "isochoric.first", "isochoric"},
                          {},
                          {}};
     if (has_fibres(forces.law)) source.chunks.emplace_back("element.fibre");
@@ -86,11 +86,10 @@ bool moves_stresses(const PatchTissue& tissue, const PatchStages& stages) {
     return tissue.prony_terms > 0 && !stages.rests;
 }
 
-/// Whether patches take S from the law: viscous stresses are of it, and these laws make theirs of
-/// stretch_difference.
-bool gives_second(const PatchTissue& tissue) {
+/// Whether patches take S from the law: these make theirs of stretch_difference.
+bool gives_second(Law law) {
     constexpr std::array laws{Law::NeoHookeanIso, Law::NeoHookeanLnJ, Law::ArrudaBoyce, Law::TransverselyIsotropic};
-    return tissue.prony_terms > 0 && std::find(laws.begin(), laws.end(), tissue.law) != laws.end();
+    return std::find(laws.begin(), laws.end(), law) != laws.end();
 }
 
 std::string unsigned_number(int number) {
@@ -120,7 +119,7 @@ void add_patch_forces(ProgramSource& source, const PatchTissue& tissue, const Pa
     }
     if (viscous) source.defines["PRONY_TERMS"] = unsigned_number(tissue.prony_terms);
     if (places > 0) source.defines["PLACES"] = unsigned_number(places);
-    if (fibres || viscous) source.defines["LAW_GIVES_SECOND"] = flag(gives_second(tissue));
+    if (viscous) source.defines["LAW_GIVES_SECOND"] = flag(gives_second(tissue.law));
     source.chunks.emplace_back("patch.forces");
     source.defines["HAS_FIBRES"] = flag(fibres);
     source.defines["HAS_VISCOSITY"] = flag(viscous);
@@ -227,7 +226,7 @@ ProgramSource patch_step_program(const PatchTissue& tissue, const NodeEffects& e
     const auto define = [&](const char* name, const std::string& value) { source.defines[name] = value; };
     if (stages.forces)
         for (const char* chunk :
-             {"deformation", "material", "isochoric", gives_second(tissue) ? "isochoric.second" : "isochoric.first"})
+             {"deformation", "material", gives_second(tissue.law) ? "isochoric.second" : "isochoric.first", "isochoric"})
             add(chunk);
     if (stages.forces || stages.averages) {
         add_law(source, tissue.law);
@@ -366,7 +365,7 @@ ProgramSource full_screen_vertices() {
 ProgramSource element_forces_pass(Law law) {
     ProgramSource source{
         "element_forces",
-        {"numbers", "texels", "deformation", "element.textures", "material.textures", "isochoric", "isochoric.first"},
+        {"numbers", "texels", "deformation", "element.textures", "material.textures", "isochoric.first", "isochoric"},
         {{"USES_SHEAR", "1"}},
         {},
         ShaderStage::Fragment};

@@ -6,8 +6,8 @@
 //! define USES_SHEAR
 
 #if USES_SHEAR
-mat3 stress(uint e, Deformation d, Parameters p, float pressure) {
-    if (!(d.volume_change > -1.0)) return mat3(not_a_number());
+Stress stress(uint e, Deformation d, Parameters p, float pressure) {
+    if (!(d.volume_change > -1.0)) return not_a_stress();
     float j = isochoric_factor(d);
     float I1 = j * (3.0 + trace_excess(d));
     float psi_1 = p.a.x + I1 * (p.a.y + I1 * (p.a.z + I1 * (p.a.w + I1 * p.b.x)));

@@ -6,11 +6,11 @@
 #if USES_SHEAR
 /// P = mu' (1 - 1/(tr C + 1)) F - 3/4 mu' cof F; with tr C + 1 = 4 + x the factor of F is 3/4 + x / (4 (4 + x)).
 /// With cof F = (1 + tr H) I - Q the terms of F - cof F that cancel are left out.
-mat3 stress(uint e, Deformation d, Parameters p, float pressure) {
+Stress stress(uint e, Deformation d, Parameters p, float pressure) {
     float x = trace_excess(d);
     float y = x / (4.0 * (4.0 + x));
     float mu = p.a.x;
     float of_I = mu * (y - 0.75 * d.trace_H) + pressure * (1.0 + d.trace_H);
-    return mat3(of_I) + (mu * (0.75 + y)) * d.H + (0.75 * mu - pressure) * d.Q;
+    return Stress(mat3(of_I) + (mu * (0.75 + y)) * d.H + (0.75 * mu - pressure) * d.Q);
 }
 #endif

@@ -34,10 +34,10 @@ vec3 ogden_term(float modulus, float exponent, vec3 log_stretch) {
 }
 
 /// S = sum T_i / c_i n_i n_iᵀ, P = F S + pressure cof F; c_i = 1 + the eigenvalues of C - I, by cyclic Jacobi rotations.
-mat3 stress(uint e, Deformation d, Parameters p, float pressure) {
-    if (!(d.volume_change > -1.0)) return mat3(not_a_number());
-    mat3 E = strain_excess(d);
-    float xx = E[0][0], yy = E[1][1], zz = E[2][2], xy = E[0][1], yz = E[1][2], zx = E[2][0];
+Stress stress(uint e, Deformation d, Parameters p, float pressure) {
+    if (!(d.volume_change > -1.0)) return not_a_stress();
+    float xx = d.E.diagonal.x, yy = d.E.diagonal.y, zz = d.E.diagonal.z;
+    float xy = d.E.others.x, yz = d.E.others.y, zx = d.E.others.z;
     vec3 n0 = vec3(1.0, 0.0, 0.0), n1 = vec3(0.0, 1.0, 0.0), n2 = vec3(0.0, 0.0, 1.0);
     for (int sweep = 0; sweep < 4; ++sweep) {
         jacobi_rotation(xx, yy, xy, zx, yz, n0, n1);
@@ -51,8 +51,8 @@ mat3 stress(uint e, Deformation d, Parameters p, float pressure) {
     if (p.a.z != 0.0) T += ogden_term(p.a.z, p.a.w, log_stretch);
     if (p.b.x != 0.0) T += ogden_term(p.b.x, p.b.y, log_stretch);
     vec3 S = T / (1.0 + value);
-    return (mat3(1.0) + d.H) *
-               (S.x * outerProduct(n0, n0) + S.y * outerProduct(n1, n1) + S.z * outerProduct(n2, n2)) +
-           pressure * cofactor_F(d);
+    return Stress((mat3(1.0) + d.H) *
+                      (S.x * outerProduct(n0, n0) + S.y * outerProduct(n1, n1) + S.z * outerProduct(n2, n2)) +
+                  pressure * cofactor_F(d));
 }
 #endif

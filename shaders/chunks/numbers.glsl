@@ -6,6 +6,9 @@ bool is_finite(vec3 x) { return is_finite(x.x) && is_finite(x.y) && is_finite(x.
 
 float not_a_number() { return uintBitsToFloat(0x7fc00000u); }
 
+/// b + A x, in multiply-adds alone.
+vec3 multiply_add(mat3 A, vec3 x, vec3 b) { return b + x.x * A[0] + x.y * A[1] + x.z * A[2]; }
+
 /// 1 / x to the last place or so: a device's own may be off by 2.5, always to one side, which adds up over many steps.
 float reciprocal(float x) {
     float inverse = 1.0 / x;

@@ -1,7 +1,5 @@
-// Needs: patch.tissue.
-// Gives: fibre_of, unit vector of the tetrahedron in hand, once fetch_fibre has been called, and fibre_stress: where LAW_GIVES_SECOND is
-// 1, F⁻¹ f aᵀ.
-//! define LAW_GIVES_SECOND
+// Needs: isochoric.second, patch.tissue.
+// Gives: fibre_of, unit vector of the tetrahedron in hand, once fetch_fibre has been called, and with_fibre.
 
 vec2 fibre_in_hand;
 
@@ -14,4 +12,7 @@ vec3 fibre_of(uint e) {
     return a * inversesqrt(dot(a, a));
 }
 
-mat3 fibre_stress(vec3 a, vec3 f) { return outerProduct(LAW_GIVES_SECOND == 1 ? a : f, a); }
+/// F⁻¹ f aᵀ = a aᵀ.
+Stress with_fibre(Deformation d, Stress S, float c, vec3 a) {
+    return Stress(S.diagonal + c * (a * a), S.others + c * (a * a.yzx));
+}

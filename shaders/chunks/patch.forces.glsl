@@ -62,7 +62,7 @@ mat3 stress_of_tetrahedron(Edges t, Parameters parameters, Pressure pressure) {
 #elif HAS_VISCOSITY
     return rested_stress(d, stress(0u, d, parameters, p));
 #else
-    return stress(0u, d, parameters, p);
+    return first_piola_kirchhoff(d, stress(0u, d, parameters, p));
 #endif
 }
 
@@ -82,8 +82,8 @@ void add_fan(uvec4 fan, Parameters parameters, Patch here, inout Tally tally) {
         t = next_edges(t, node_of_a, node(ring.next));
         take_next_node(pressure, ring.next);
         mat3 P = stress_of_tetrahedron(t, parameters, pressure);
-        force_b += P * t.normal_b;
-        leave_force(c, force_c + P * t.normal_c, tally);
+        force_b = multiply_add(P, t.normal_b, force_b);
+        leave_force(c, multiply_add(P, t.normal_c, force_c), tally);
         force_c = P * t.normal_d;
         c = ring.next;
     }

@@ -18,10 +18,10 @@ SecondStress resting_stress() {
 }
 
 #if LAW_GIVES_SECOND
-mat3 rested_stress(Deformation d, mat3 S) {
-    mat3 total = S - full(resting_stress());
-    return total + d.H * total;
+mat3 rested_stress(Deformation d, Stress S) {
+    SecondStress q = resting_stress();
+    return first_piola_kirchhoff(d, Stress(S.diagonal - q.diagonal, S.others - q.others.zxy));
 }
 #else
-mat3 rested_stress(Deformation d, mat3 P) { return P - first_stress(d, resting_stress()); }
+mat3 rested_stress(Deformation d, Stress stress) { return stress.P - first_stress(d, resting_stress()); }
 #endif

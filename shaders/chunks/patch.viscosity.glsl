@@ -45,14 +45,15 @@ SecondStress viscous_stress(SecondStress S) {
 
 /// From what the law gives of the shear part, and the pressure.
 #if LAW_GIVES_SECOND
-mat3 relaxed_stress(Deformation d, mat3 S, float pressure) {
-    mat3 q = full(viscous_stress(SecondStress(vec3(S[0][0], S[1][1], S[2][2]), vec3(S[1][2], S[0][2], S[0][1]))));
-    mat3 total = S - q + stretch_difference(d, 0.0, pressure);
-    return total + d.H * total;
+mat3 relaxed_stress(Deformation d, Stress S, float pressure) {
+    SecondStress q = viscous_stress(SecondStress(S.diagonal, S.others.yzx));
+    Stress volumetric = stretch_difference(d, 0.0, pressure);
+    return first_piola_kirchhoff(d, Stress(S.diagonal - q.diagonal + volumetric.diagonal,
+                                           S.others - q.others.zxy + volumetric.others));
 }
 #else
-mat3 relaxed_stress(Deformation d, mat3 P, float pressure) {
-    mat3 viscous = first_stress(d, viscous_stress(second_stress(d, P)));  // not in `P -= …`: README, traps
-    return P - viscous + pressure * cofactor_F(d);
+mat3 relaxed_stress(Deformation d, Stress stress, float pressure) {
+    mat3 viscous = first_stress(d, viscous_stress(second_stress(d, stress.P)));  // not in `P -= …`: README, traps
+    return stress.P - viscous + pressure * cofactor_F(d);
 }
 #endif

@@ -1,5 +1,5 @@
 // Effect: viscous stresses of a Prony series, S = S_elastic - sum q with q⁺ = a S_shear + b q at the end of the time step
-// (backward Euler). Needs: deformation.
+// (backward Euler). Needs: numbers, deformation.
 // Gives: the symmetric second Piola-Kirchhoff stress of a first one, and back.
 
 struct SecondStress {
@@ -23,5 +23,6 @@ SecondStress second_stress(Deformation d, mat3 P) {
 /// F S.
 mat3 first_stress(Deformation d, SecondStress S) {
     mat3 whole = full(S);
-    return whole + d.H * whole;
+    return mat3(multiply_add(d.H, whole[0], whole[0]), multiply_add(d.H, whole[1], whole[1]),
+                multiply_add(d.H, whole[2], whole[2]));
 }

@@ -13,11 +13,11 @@ void main() {
     float p = pressure_of_element(e, d.volume_change, rest.volumetric_modulus);
     uint material = uint(rest.material);
 #if HAS_VISCOSITY
-    mat3 P = stress(e, d, parameters_of(material), 0.0);
+    mat3 P = first_piola_kirchhoff(d, stress(e, d, parameters_of(material), 0.0));
     mat3 viscous_stress = viscous_stress_of(e, material, d, P);  // not in `P -= …`: README, traps
     P = P - viscous_stress + p * cofactor_F(d);
 #else
-    mat3 P = stress(e, d, parameters_of(material), p);
+    mat3 P = first_piola_kirchhoff(d, stress(e, d, parameters_of(material), p));
 #endif
     mat3 scaled_stress = rest.volume * P;
     vec3 f1 = scaled_stress * rest.gradient_1;

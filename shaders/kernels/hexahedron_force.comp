@@ -16,12 +16,12 @@ void main() {
     uint material = uint(rest.material);
     float p = pressure_of_element(e, d.volume_change, rest.volumetric_modulus);
 #if HAS_VISCOSITY
-    mat3 P = stress(tetrahedron_count + e, d, parameters_of(material), 0.0);
+    mat3 P = first_piola_kirchhoff(d, stress(tetrahedron_count + e, d, parameters_of(material), 0.0));
     // Not in `P -= …`: README, traps.
     mat3 viscous_stress = viscous_stress_of(2u * PRONY_TERMS * tetrahedron_count + e, material, d, P);
     P = P - viscous_stress + p * cofactor_F(d);
 #else
-    mat3 P = stress(tetrahedron_count + e, d, parameters_of(material), p);
+    mat3 P = first_piola_kirchhoff(d, stress(tetrahedron_count + e, d, parameters_of(material), p));
 #endif
     mat3 scaled_stress = rest.volume * P;
     mat3x4 q = rest.hourglass_stiffness * hourglass_displacements(m, H, rest);

@@ -14,7 +14,7 @@ void main() {
     RestElement rest = rest_element(e);
     Deformation d = deformation(displacement_gradient(e, rest));
     float p = pressure_of_element(e, d.volume_change, rest.volumetric_modulus);
-    mat3 P = stress(e, d, parameters_of(uint(rest.material)), p);
+    mat3 P = first_piola_kirchhoff(d, stress(e, d, parameters_of(uint(rest.material)), p));
     mat3 scaled_stress = rest.volume * P;
     vec3 f1 = scaled_stress * rest.gradient_1;
     vec3 f2 = scaled_stress * rest.gradient_2;
