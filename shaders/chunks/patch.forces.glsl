@@ -14,10 +14,12 @@ void clear_force(uint i) {
     force_z[i] = 0;
 }
 
+int sums_before;  // see no_sum
+
 void add_force(uint i, ivec3 f) {
-    atomicAdd(force_x[i], f.x);
-    atomicAdd(force_y[i], f.y);
-    atomicAdd(force_z[i], f.z);
+    sums_before |= atomicAdd(force_x[i], f.x);
+    sums_before |= atomicAdd(force_y[i], f.y);
+    sums_before |= atomicAdd(force_z[i], f.z);
 }
 
 /// mN; `unit` is force_unit of the scale.
@@ -101,6 +103,7 @@ bool compute_forces(Patch here, uvec4 first, Parameters parameters, inout float 
 #endif
     for (;;) {
         Tally tally = Tally(scale, 0u, ivec3(0));
+        sums_before = 0;
         uvec4 fan = first;
         for (uint f = lane; f < here.fans; f += WORKGROUP_SIZE) {
             uvec4 next = fan_of(here, f + WORKGROUP_SIZE);
@@ -110,7 +113,7 @@ bool compute_forces(Patch here, uvec4 first, Parameters parameters, inout float 
             add_fan(fan, parameters, here, tally);
             fan = next;
         }
-        atomicMax(largest_of_patch, tally.largest);
+        atomicMax(largest_of_patch, tally.largest | no_sum(sums_before));
         barrier();
         largest = largest_of_patch;
         if (!countable(largest)) return false;

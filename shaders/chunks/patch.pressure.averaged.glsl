@@ -32,9 +32,11 @@ float six_volume_change(Edges t) {
     return linear + (quadratic + dot(t.moved_d, bc));
 }
 
+int volumes_before;  // see no_sum
+
 void leave_volume(uint i, float v, float scale, inout uint largest) {
     largest = max(largest, floatBitsToUint(abs(v)));
-    atomicAdd(node_volume[i], int(roundEven(v * scale)));
+    volumes_before |= atomicAdd(node_volume[i], int(roundEven(v * scale)));
 }
 
 void add_fan_volumes(uvec4 fan, float scale, inout uint largest) {
@@ -60,13 +62,14 @@ bool compute_volumes(Patch here, uvec4 first, inout float scale, out uint larges
     uint lane = gl_LocalInvocationID.x;
     for (;;) {
         uint largest_here = 0u;
+        volumes_before = 0;
         uvec4 fan = first;
         for (uint f = lane; f < here.fans; f += WORKGROUP_SIZE) {
             uvec4 next = fan_of(here, f + WORKGROUP_SIZE);
             add_fan_volumes(fan, scale, largest_here);
             fan = next;
         }
-        atomicMax(largest_of_patch, largest_here);
+        atomicMax(largest_of_patch, largest_here | no_sum(volumes_before));
         barrier();
         largest = largest_of_patch;
         if (!countable(largest)) return false;

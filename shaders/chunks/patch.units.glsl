@@ -14,5 +14,10 @@ float scale_for(uint largest) {
 
 bool fits(uint largest, float scale) { return (uintBitsToFloat(largest) * contributions) * scale < 2.1e9; }
 
+/// 0, of the bits of all sums that an invocation found before its additions: -2³¹ alone is none that fits. Something has to look at what
+/// atomicAdd returns: else NVIDIA's compiler (driver 580) sums within a warp first, comparing all addresses and branching at
+/// each addition, which costs a twentieth of a step.
+uint no_sum(int before) { return before == int(0x80000000u) ? 1u : 0u; }
+
 /// Summands beyond are as good as infinite: their sums would not fit whatever the unit.
 bool countable(uint largest) { return largest < floatBitsToUint(1e30); }
