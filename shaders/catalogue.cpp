@@ -225,8 +225,8 @@ ProgramSource patch_step_program(const PatchTissue& tissue, const NodeEffects& e
     const auto add = [&](const char* chunk) { source.chunks.emplace_back(chunk); };
     const auto define = [&](const char* name, const std::string& value) { source.defines[name] = value; };
     if (stages.forces)
-        for (const char* chunk :
-             {"deformation", "material", gives_second(tissue.law) ? "isochoric.second" : "isochoric.first", "isochoric"})
+        for (const char* chunk : {"deformation", "material",
+                                  gives_second(tissue.law) ? "isochoric.second" : "isochoric.first", "isochoric"})
             add(chunk);
     if (stages.forces || stages.averages) {
         add_law(source, tissue.law);

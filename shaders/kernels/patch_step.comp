@@ -35,8 +35,11 @@ Patch begin_patch(uint p, out uvec4 fan, out uvec2 largest) {
     Patch here = patch_of(p);
     fan = fan_of(here, gl_LocalInvocationID.x);
     largest = patch_largest[p];
-    for (uint i = gl_LocalInvocationID.x; i < here.slots; i += WORKGROUP_SIZE) load_node(p * SLOTS + i, i);
     return here;
+}
+
+void load_nodes(Patch here) {
+    for (uint i = gl_LocalInvocationID.x; i < here.slots; i += WORKGROUP_SIZE) load_node(here.index * SLOTS + i, i);
 }
 
 #if ADVANCES
@@ -134,7 +137,7 @@ void end_patch(Patch here) {
 }
 
 #if !STAYS
-/// There and back: what one sweep ends with the next begins with, while a cache that is too small for all patches still has it.
+/// There and back: the patch that one sweep ends with is the next one's first, and its nodes are still in shared memory.
 uint patch_in_turn(uint first, uint turn, uint turns, uint sweep) {
     return first + ((sweep & 1u) == 0u ? turn : turns - 1u - turn) * workgroup_count;
 }
@@ -148,6 +151,7 @@ bool run_steps(uint first) {
     uint step = first_step;
 #if STAYS
     Patch here = begin_patch(first, fan, largest);
+    load_nodes(here);
 #if STRESSES_STAY
     take_stresses(here);
 #endif
@@ -161,6 +165,7 @@ bool run_steps(uint first) {
     for (; step != first_step + steps && good; ++step) {
         for (uint turn = 0u; turn < turns && good; ++turn) {
             Patch here = begin_patch(patch_in_turn(first, turn, turns, (1u + AVERAGES) * step), fan, largest);
+            if (turn > 0u || step == first_step) load_nodes(here);
             good = begin_step(here, fan, largest, step);
 #if !AVERAGES
             if (good) good = end_step(here, fan, largest, step);
@@ -171,6 +176,7 @@ bool run_steps(uint first) {
         // Not before all patches of the workgroup have left what the others, and each other, need for the second part.
         for (uint turn = 0u; turn < turns && good; ++turn) {
             Patch here = begin_patch(patch_in_turn(first, turn, turns, 2u * step + 1u), fan, largest);
+            if (turn > 0u) load_nodes(here);
             good = end_step(here, fan, largest, step);
             end_patch(here);
         }
@@ -191,6 +197,7 @@ void main() {
     uvec4 fan;
     uvec2 largest;
     Patch here = begin_patch(first, fan, largest);
+    load_nodes(here);
     begin_step(here, fan, largest, first_step);
     end_step(here, fan, largest, first_step);
 #endif

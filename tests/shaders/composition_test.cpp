@@ -206,5 +206,21 @@ TEST(Composition, ALawIsCalledOutsideOfArithmetic) {
     EXPECT_GT(calls, 100);
 }
 
+// It sums within a warp before every addition whose result nothing takes (shaders/README.md, traps), which again only
+// time shows.
+TEST(Composition, AdditionsToSumsOfAPatchReturnThem) {
+    const std::regex addition(R"((\S)\s*\batomicAdd\()");
+    int additions = 0;
+    for (const ProgramSource& source : every_stage()) {
+        if (source.kernel != "patch_step") continue;
+        const std::string text = compose(source).text;
+        for (std::sregex_iterator each(text.begin(), text.end(), addition), end; each != end; ++each) {
+            EXPECT_EQ((*each)[1].str(), "=") << text.substr(static_cast<std::size_t>(each->position()), 80);
+            ++additions;
+        }
+    }
+    EXPECT_GT(additions, 100);
+}
+
 }  // namespace
 }  // namespace tissuewarp::shaders
