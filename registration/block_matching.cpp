@@ -90,7 +90,7 @@ std::optional<Minimum> minimum_of(const CostLattice& near) {
 /// Error (voxels) of the way back, along what the block shows: it should lead to where the first block lay.
 double back_error(const Minimum& back, const Voxel& block, const Minimum& forward) {
     const Eigen::Vector3d error = back.index() - as_vector(block) + forward.fit.minimum;
-    return std::sqrt(error.dot(forward.fit.hessian * error) / forward.fit.hessian.operatorNorm());
+    return std::sqrt(error.dot(forward.fit.hessian * error) / forward.fit.largest_curvature);
 }
 
 /// Inverse covariance of a match, 1/mm²: least squares of N independent residuals of variance c about the minimum has

@@ -1,12 +1,10 @@
 // Dense forces on a device: displacement of the working grid's voxels, the fixed image read where they go, its
-// descriptors, products summed in cells; and blocks, in the same image.
+// descriptors, products summed in cells, forces from them; and blocks, in the same image.
 
-#include "registration/detail/dense_cells.hpp"
 #include "registration/detail/gpu_block_engine.hpp"
 #include "registration/detail/image_engine.hpp"
+#include "registration/detail/rows_of_cells.hpp"
 #include "registration/detail/template_images.hpp"
-
-#include <tbb/parallel_for.h>
 
 #include <cstring>
 
@@ -65,6 +63,8 @@ struct Memory {
     std::array<GpuFloats, 3> field;
     GpuWords descriptors, shown;
     Buffer<MatchCell> cells;
+    std::array<GpuFloats, 2> spread;  // of their sums
+    Buffer<MatchForce> forces;
 
     Memory(const shaders::Device& device, std::size_t node_count, const Level& finest)
         : nodes(device, node_count, "displacements"),
@@ -72,7 +72,10 @@ struct Memory {
                 GpuFloats(device, finest.wide_voxels(), "field")},
           descriptors(device, 3 * finest.voxels(), "descriptors of the pulled-back image"),
           shown(device, finest.voxels(), "where they count"),
-          cells(device, finest.cells.count(), "products in cells") {}
+          cells(device, finest.cells.count(), "products in cells"),
+          spread{GpuFloats(device, spread_sums * finest.cells.count(), "products in windows"),
+                 GpuFloats(device, spread_sums * finest.cells.count(), "products in windows")},
+          forces(device, finest.cells.count(), "forces of cells") {}
 };
 
 class GpuImageEngine : public ImageEngine {
@@ -98,7 +101,9 @@ public:
         const shaders::CurrentContext current = matching_.device().make_current();
         pull_back(level, state);
         matching_.describe(level.wide, memory_.descriptors, memory_.shown);
-        return forces_of(products(level), level.cells, level.moving.grid, windows_);
+        sum_products(level);
+        solve(level);
+        return listed(level);
     }
 
 private:
@@ -106,8 +111,6 @@ private:
     std::vector<Level> levels_;
     Memory memory_;
     GpuBlockEngine blocks_;
-    std::vector<CellSums> sums_;  // of the cells of the level looked at last
-    WindowMemory windows_;
 
     /// Leaves values and what is seen on the wide grid.
     void pull_back(const Level& level, const State& state) {
@@ -133,24 +136,52 @@ private:
         matching_.run(MatchPass::Sample, level.wide_voxels(), {&fixed, &own, &samples});
     }
 
-    const std::vector<CellSums>& products(const Level& level) {
-        const std::size_t count = level.cells.count();
+    /// Leaves the products of the level's cells.
+    void sum_products(const Level& level) {
         const GpuBlocks own{{"MatchDescriptors", &memory_.descriptors},
                             {"MatchShown", &memory_.shown},
                             {"MatchMoving", &level.descriptors},
                             {"MatchCounts", &level.counts},
                             {"MatchCells", &memory_.cells}};
-        const auto& program = matching_.program(MatchPass::Forces);
-        program.set(0, static_cast<std::uint32_t>(count));
-        matching_.run(MatchPass::Forces, count * static_cast<std::size_t>(program.workgroup_size()), {&own});
-        const auto bytes = matching_.fetch(memory_.cells, count * sizeof(MatchCell));
-        sums_.resize(count);
-        tbb::parallel_for(std::size_t{0}, count, [&](std::size_t n) {
-            MatchCell cell;
-            std::memcpy(&cell, bytes.data() + n * sizeof cell, sizeof cell);
-            sums_[n] = cell.voxels > 0 ? sums_of(cell, level.cells.first_voxel(n)) : CellSums{};
-        });
-        return sums_;
+        const auto workgroup = static_cast<std::size_t>(matching_.program(MatchPass::Forces).workgroup_size());
+        matching_.run(MatchPass::Forces, level.cells.count() * workgroup, {&own});
+    }
+
+    /// Leaves their forces.
+    void solve(const Level& level) {
+        spread(level, 0, memory_.spread[1], memory_.spread[0]);
+        spread(level, 1, memory_.spread[0], memory_.spread[1]);
+        spread(level, 2, memory_.spread[1], memory_.spread[0]);
+        using Rules = DenseForceRules;
+        constexpr std::array rules{Rules::independent_share, Rules::least_square, Rules::least_deviation,
+                                   Rules::leakage, Rules::most_shift};
+        for (std::size_t n = 0; n < rules.size(); ++n)
+            matching_.program(MatchPass::Solve).set(static_cast<int>(n), static_cast<float>(rules[n]));
+        const GpuBlocks own{
+            {"MatchCells", &memory_.cells}, {"MatchWindows", &memory_.spread[0]}, {"MatchForces", &memory_.forces}};
+        matching_.run(MatchPass::Solve, level.cells.count(), {&own});
+    }
+
+    void spread(const Level& level, std::uint32_t axis, const GpuFloats& from, const GpuFloats& to) {
+        const GpuBlocks own{{"MatchCells", &memory_.cells}, {"MatchSpreadSource", &from}, {"MatchSpreadTarget", &to}};
+        matching_.program(MatchPass::Window).set(0, axis);
+        matching_.run(MatchPass::Window, spread_sums * level.cells.count(), {&own});
+    }
+
+    DenseForces listed(const Level& level) {
+        const auto bytes = matching_.fetch(memory_.forces, level.cells.count() * sizeof(MatchForce));
+        const auto cell = [&](std::size_t n) {
+            MatchForce force;
+            std::memcpy(&force, bytes.data() + n * sizeof force, sizeof force);
+            return force;
+        };
+        return listed_forces(
+            level.cells,
+            [&](std::size_t n) {
+                const MatchForce force = cell(n);
+                return CellCount{double(force.voxels), 2.0 * force.alike, double(force.structure)};
+            },
+            [&](std::size_t n) { return force_of(cell(n), level.cells.first_voxel(n), level.moving.grid); });
     }
 };
 

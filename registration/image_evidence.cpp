@@ -77,6 +77,7 @@ std::vector<BlockMatch> ImageEvidence::block_search(const State& state, Observer
 }
 
 Eigen::Matrix3Xd ImageEvidence::deformed(const Eigen::Matrix3Xd& points, const State& state) const {
+    if (state.displacement.isZero(0)) return state.placement * points;
     Eigen::Matrix3Xd result = points;
     tbb::parallel_for(Eigen::Index{0}, points.cols(), [&](Eigen::Index n) {
         if (const auto at = locate_near(locator_, points.col(n)))

@@ -157,7 +157,9 @@ const std::array<MatchKernel, match_pass_count> match_kernels{{
     {"match_smooth", {"match.patch", "match.distance", "match.smoothed"}},
     {"match_erode", {}},
     {"match_describe", {"match.octahedron", "match.distance"}},
-    {"match_forces", {}},
+    {"match_forces", {"match.cells"}},
+    {"match_window", {"match.cells"}},
+    {"match_solve", {"match.cells"}},
     {"match_look", {"match.block"}},
     {"match_walk", {"match.block"}},
 }};

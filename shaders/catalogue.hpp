@@ -139,10 +139,12 @@ enum class MatchPass {
     Erode,
     Describe,
     Forces,
+    Window,
+    Solve,
     Look,
     Walk
 };
-inline constexpr int match_pass_count = 14;
+inline constexpr int match_pass_count = 16;
 /// Steps downhill of MatchPass::Walk, at most.
 inline constexpr int match_walk_steps = 8;
 /// Candidates from which it begins, at most; they are among one of so many places of a first look, the lowest.

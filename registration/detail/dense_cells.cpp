@@ -1,5 +1,7 @@
 #include "registration/detail/dense_cells.hpp"
 
+#include "registration/detail/rows_of_cells.hpp"
+
 #include <Eigen/Eigenvalues>
 
 #include <tbb/parallel_for.h>
@@ -11,11 +13,7 @@ namespace tissuewarp::registration::detail {
 
 namespace {
 
-constexpr double independent_share = 0.2;  // of the voxels: descriptors and what they miss agree with those beside them
-constexpr double least_square = 1.0;       // of a channel's residual, steps of its eight bits
-constexpr double least_deviation = 0.05;   // voxels
-constexpr double leakage = 0.05;           // of the strongest axis: what a plane edge seems to show along itself
-constexpr double most_shift = 1.5;         // voxels
+using Rules = DenseForceRules;
 
 Spread spread_of(const CellSums& sums) {
     const auto& A = sums.normal;
@@ -69,74 +67,12 @@ const std::vector<Spread>& windowed(const std::vector<CellSums>& sums, const Cel
     return from;
 }
 
-/// Cells with voxels that count, row by row along i.
-class RowsOfCells {
-public:
-    RowsOfCells(const std::vector<CellSums>& own, const CellGrid& cells)
-        : own_(own), length_(static_cast<std::size_t>(cells.stride(1))), rows_(own.size() / length_) {
-        tbb::parallel_for(std::size_t{0}, rows_.size(), [&](std::size_t row) {
-            Row& sum = rows_[row];
-            for (std::size_t n = row * length_; n < (row + 1) * length_; ++n) {
-                if (own[n].voxels < 1) continue;
-                ++sum.counted;
-                sum.common += own[n].normal.trace();
-                sum.structure += own[n].structure;
-            }
-        });
-        for (Row& row : rows_) {
-            row.first = counted_;
-            counted_ += row.counted;
-        }
-    }
-
-    [[nodiscard]] std::size_t counted() const { return counted_; }
-
-    [[nodiscard]] double agreement() const {
-        double common = 0, structure = 0;
-        for (const Row& row : rows_) {
-            common += row.common;
-            structure += row.structure;
-        }
-        return structure > 0 ? common / structure : 0;
-    }
-
-    /// visit(cell, its place among those that count), from any thread.
-    template <class Visit>
-    void for_each_counted(const Visit& visit) const {
-        tbb::parallel_for(std::size_t{0}, rows_.size(), [&](std::size_t row) {
-            std::size_t place = rows_[row].first;
-            for (std::size_t n = row * length_; n < (row + 1) * length_; ++n)
-                if (own_[n].voxels >= 1) visit(n, place++);
-        });
-    }
-
-    /// Those without a force leave the list, which is that of all that count.
-    void drop_silent(DenseForces& forces) const {
-        std::vector<char> silent(counted_);
-        for_each_counted([&](std::size_t n, std::size_t place) { silent[place] = !forces.said[n]; });
-        if (std::find(silent.begin(), silent.end(), char{1}) == silent.end()) return;
-        std::size_t place = 0;
-        std::erase_if(forces.forces, [&](const DenseForce&) { return silent[place++] != 0; });
-    }
-
-private:
-    struct Row {
-        std::size_t counted = 0, first = 0;
-        double common = 0, structure = 0;  // CellSums: Σ tr A, Σ structure
-    };
-
-    const std::vector<CellSums>& own_;
-    std::size_t length_;
-    std::vector<Row> rows_;
-    std::size_t counted_ = 0;
-};
-
 /// Takes out of A, b and the squares what D₂ = D₁ − (D₁, 1) c explains of them, c the same for all channels.
 CellSums without_contrast(CellSums window) {
     const ContrastSums& contrast = window.contrast;
     const double samples = descriptor_channels * window.voxels;
     Eigen::Matrix2d common;
-    common << contrast.squares + least_square * samples, contrast.sum, contrast.sum, samples;
+    common << contrast.squares + Rules::least_square * samples, contrast.sum, contrast.sum, samples;
     const Eigen::Matrix2d inverse = common.inverse();
     window.normal -= contrast.of_gradients * inverse * contrast.of_gradients.transpose();
     window.right -= contrast.of_gradients * inverse * contrast.of_residuals;
@@ -149,13 +85,14 @@ std::optional<DenseForce> solved(const CellSums& window, const Eigen::Vector3d& 
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
     axes.computeDirect(window.normal);
     const Eigen::Array3d strength = axes.eigenvalues();
-    const double variance = std::max(window.squares / window.voxels, descriptor_channels * least_square);
-    const Eigen::Array3d raw = (independent_share / variance * (strength - leakage * strength[2])).max(0.0);
+    const double variance = std::max(window.squares / window.voxels, descriptor_channels * Rules::least_square);
+    const Eigen::Array3d raw =
+        (Rules::independent_share / variance * (strength - Rules::leakage * strength[2])).max(0.0);
     if (!(raw[2] > 0)) return std::nullopt;
     const Eigen::Array3d along = axes.eigenvectors().transpose() * window.right;
     Eigen::Vector3d shift = (raw > 0).select(along / strength, 0.0);
-    if (const double length = shift.norm(); length > most_shift) shift *= most_shift / length;
-    const Eigen::Vector3d information = raw / (1 + raw * least_deviation * least_deviation);
+    if (const double length = shift.norm(); length > Rules::most_shift) shift *= Rules::most_shift / length;
+    const Eigen::Vector3d information = raw / (1 + raw * Rules::least_deviation * Rules::least_deviation);
     const double h = grid.spacing[0];
     const Eigen::Matrix3d turn = grid.direction * axes.eigenvectors();
     return DenseForce{place, turn * shift * h, turn * (information / (h * h)).asDiagonal() * turn.transpose()};
@@ -206,18 +143,15 @@ CellSums cell_sums(const DescriptorProducts& products, double voxels, const Eige
 DenseForces forces_of(const std::vector<CellSums>& own, const CellGrid& cells, const imaging::Geometry& grid,
                       WindowMemory& memory) {
     const std::vector<Spread>& windows = windowed(own, cells, memory);
-    const RowsOfCells rows(own, cells);
-    DenseForces result{std::vector<DenseForce>(rows.counted()), cells.centres(), std::vector<std::uint8_t>(own.size()),
-                       rows.agreement()};
-    rows.for_each_counted([&](std::size_t n, std::size_t place) {
-        const Eigen::Vector3d centre = grid.point(own[n].index / own[n].voxels);
-        const std::optional<DenseForce> force = solved(without_contrast(sums_of(windows[n])), centre, grid);
-        if (!force) return;
-        result.forces[place] = *force;
-        result.said[n] = 1;
-    });
-    rows.drop_silent(result);
-    return result;
+    return listed_forces(
+        cells,
+        [&](std::size_t n) {
+            return CellCount{own[n].voxels, own[n].normal.trace(), own[n].structure};
+        },
+        [&](std::size_t n) {
+            const Eigen::Vector3d centre = grid.point(own[n].index / own[n].voxels);
+            return solved(without_contrast(sums_of(windows[n])), centre, grid);
+        });
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -6,6 +6,16 @@
 
 namespace tissuewarp::registration::detail {
 
+struct DenseForceRules {
+    static constexpr double independent_share = 0.2;  ///< of the voxels: descriptors and what they miss agree with
+                                                      ///< those beside them
+    static constexpr double least_square = 1.0;       ///< of a channel's residual, steps of its eight bits
+    static constexpr double least_deviation = 0.05;   ///< voxels
+    static constexpr double leakage = 0.05;           ///< of the strongest axis: what a plane edge seems to show along
+                                                      ///< itself
+    static constexpr double most_shift = 1.5;         ///< voxels
+};
+
 /// Cells of a grid: the voxels that have neighbours on all sides, by cubes.
 class CellGrid {
 public:

@@ -78,9 +78,14 @@ std::vector<MatchElement> elements_of(const meshing::TetMesh& mesh, const imagin
     return elements;
 }
 
-CellSums sums_of(const MatchCell& cell, const Voxel& first) {
+std::optional<DenseForce> force_of(const MatchForce& cell, const Voxel& first, const imaging::Geometry& grid) {
+    if (cell.said == 0) return std::nullopt;
     const Eigen::Vector3d begin(first[0], first[1], first[2]), places(cell.places[0], cell.places[1], cell.places[2]);
-    return cell_sums(cell.products, cell.voxels, cell.voxels * begin + places);
+    const Eigen::Vector3d shift = Eigen::Vector3f(cell.shift.data()).cast<double>();
+    const Eigen::Matrix3d root = grid.direction * Eigen::Matrix3f(cell.root.data()).cast<double>();
+    const double h = grid.spacing[0];
+    return DenseForce{grid.point(begin + places / cell.voxels), h * grid.direction * shift,
+                      root * root.transpose() / (h * h)};
 }
 
 MatchLayout match_layout(const meshing::TetMesh& mesh, const MatchingImage& moving) {

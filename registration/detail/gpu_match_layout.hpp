@@ -10,6 +10,7 @@
 
 #include <Eigen/Geometry>
 
+#include <optional>
 #include <span>
 
 namespace tissuewarp::registration::detail {
@@ -31,14 +32,22 @@ struct MatchElement {
 std::vector<MatchElement> elements_of(const meshing::TetMesh& mesh, const imaging::Geometry& wide);
 
 /// An entry of the storage block MatchCells: DescriptorProducts, voxels, their places in the cell.
-struct MatchCell {
-    DescriptorProducts products;
-    std::int32_t voxels;
-    std::array<std::int32_t, 3> places;
+using MatchCell = std::array<std::int32_t, 25>;
+/// Of a cell's sums, those that are spread: all but the places.
+constexpr std::size_t spread_sums = 22;
+
+/// An entry of the storage block MatchForces, along the axes of the grid.
+struct MatchForce {
+    std::int32_t voxels;                 ///< that count; where there are none the rest says nothing
+    std::array<std::int32_t, 3> places;  ///< their sum, in the cell
+    std::int32_t alike, structure;       ///< Σ g₁·g₂ and Σ |g₁|² + |g₂|², g twice the central differences
+    std::uint32_t said;                  ///< 1 where there is a force
+    std::array<float, 3> shift;          ///< voxels
+    std::array<float, 9> root;           ///< 1/voxel: three vectors r, the information is Σ r rᵀ
 };
-static_assert(sizeof(MatchCell) == 100);
+static_assert(sizeof(MatchForce) == 76);
 /// `first` is the voxel of the grid that the cell begins with.
-CellSums sums_of(const MatchCell& cell, const Voxel& first);
+std::optional<DenseForce> force_of(const MatchForce& cell, const Voxel& first, const imaging::Geometry& grid);
 
 /// What does not change with the state, of a mesh at rest on a working grid and its rim.
 struct MatchLayout {

@@ -37,7 +37,7 @@ std::optional<Quadratic> fit_quadratic(const std::array<double, 27>& costs) {
     axes.computeDirect(moments.hessian);
     const double largest = axes.eigenvalues()[2];
     if (!(largest > 1e-12 * size)) return std::nullopt;  // rounding
-    Quadratic result{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()};
+    Quadratic result{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero(), largest};
     for (int a = 0; a < 3; ++a) {
         const double curvature = axes.eigenvalues()[a];
         const Eigen::Vector3d axis = axes.eigenvectors().col(a);

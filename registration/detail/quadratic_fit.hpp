@@ -9,8 +9,9 @@
 namespace tissuewarp::registration::detail {
 
 struct Quadratic {
-    Eigen::Vector3d minimum;  ///< lattice steps from the centre, at most 1 along each principal axis
-    Eigen::Matrix3d hessian;  ///< positive semidefinite, cost per lattice step²
+    Eigen::Vector3d minimum;       ///< lattice steps from the centre, at most 1 along each principal axis
+    Eigen::Matrix3d hessian;       ///< positive semidefinite, cost per lattice step²
+    double largest_curvature = 0;  ///< eigenvalue of the hessian
 };
 
 /// Least-squares fit of c + gᵀx + ½ xᵀHx to the 27 costs about a lattice point (i fastest). Directions in which the

@@ -1,24 +1,14 @@
 // One workgroup per cell of CELL_SIDE voxels, one invocation per voxel: the products of a Gauss-Newton step of
 // D2(x + shift) = D1(x) (docs/method.md, section 11), summed over the voxels that count and that the second image shows
 // with their six neighbours. Integers, so that the order of the sums does not matter.
-// Needs: index, match. WORKGROUP_SIZE is CELL_SIDE cubed.
+// Needs: index, match, match.cells. WORKGROUP_SIZE is CELL_SIDE cubed.
 //! define CELL_SIDE
-
-layout(location = 0) uniform uint cells;
 
 layout(std430, binding = BINDING_MATCH_DESCRIPTORS) readonly buffer MatchDescriptors { uint second[]; };
 layout(std430, binding = BINDING_MATCH_SHOWN) readonly buffer MatchShown { uint shown[]; };
 layout(std430, binding = BINDING_MATCH_MOVING) readonly buffer MatchMoving { uint first[]; };
 /// Voxels in the mesh that the first image shows with their six neighbours.
 layout(std430, binding = BINDING_MATCH_COUNTS) readonly buffer MatchCounts { uint counts[]; };
-/// CELL_SUMS a cell, with g twice the central difference and r = D1 - D2: 3 of g1a g2a, 3 of g1a g2b + g1b g2a (ab = 01,
-/// 02, 12), 3 of (g1a + g2a) r, |g1|² + |g2|², r², 3 of (g1a + g2a) D1, 3 of g1a + g2a, D1², D1, D1 r, r, voxels, 3 of the
-/// voxels' places in the cell.
-layout(std430, binding = BINDING_MATCH_CELLS) writeonly buffer MatchCells { int cell_sum[]; };
-
-#define CELL_SUMS 25u
-#define VOXELS 21u
-
 shared int lane[CELL_SUMS][WORKGROUP_SIZE];
 shared uint counted;  // whether any voxel of the cell is
 
@@ -80,18 +70,13 @@ void add(Described a, Described b, inout int sums[CELL_SUMS]) {
     sums[20] += total(residual);
 }
 
-uvec3 cell_of(uint n) {
-    uint row = n / cell_count.x;
-    return uvec3(n - row * cell_count.x, row % cell_count.y, row / cell_count.y);
-}
-
 void main() {
     uint cell = invocation_index() / WORKGROUP_SIZE, local = gl_LocalInvocationID.x;
     int sums[CELL_SUMS];
     for (uint m = 0u; m < CELL_SUMS; ++m) sums[m] = 0;
     uvec3 place = uvec3(local % CELL_SIDE, local / CELL_SIDE % CELL_SIDE, local / (CELL_SIDE * CELL_SIDE));
     uvec3 voxel = 1u + CELL_SIDE * cell_of(cell) + place, size = grid_size();
-    if (cell < cells && all(lessThan(voxel + 1u, size))) {
+    if (cell < cell_total() && all(lessThan(voxel + 1u, size))) {
         uint n = grid_offset(voxel);
         uvec3 stride = uvec3(1u, size.x, size.x * size.y);
         if (counts[n] != 0u && is_shown(n, stride)) {
@@ -106,7 +91,7 @@ void main() {
     if (sums[VOXELS] != 0) counted = 1u;
     barrier();
     if (counted == 0u) {  // outside of the organ, as most are
-        if (cell < cells && local < CELL_SUMS) cell_sum[CELL_SUMS * cell + local] = 0;
+        if (cell < cell_total() && local < CELL_SUMS) cell_sum[CELL_SUMS * cell + local] = 0;
         return;
     }
     for (uint half_size = WORKGROUP_SIZE / 2u; half_size > 0u; half_size /= 2u) {
@@ -114,5 +99,5 @@ void main() {
             for (uint m = 0u; m < CELL_SUMS; ++m) lane[m][local] += lane[m][local + half_size];
         barrier();
     }
-    if (cell < cells && local < CELL_SUMS) cell_sum[CELL_SUMS * cell + local] = lane[local][0];
+    if (cell < cell_total() && local < CELL_SUMS) cell_sum[CELL_SUMS * cell + local] = lane[local][0];
 }

@@ -4,6 +4,8 @@
 
 #include "tests/registration/textured_phantom.hpp"
 
+#include <Eigen/Eigenvalues>
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -117,6 +119,7 @@ TEST(QuadraticFit, IsExactOnAParabola) {
     ASSERT_TRUE(fit);
     EXPECT_LT((fit->minimum - minimum).norm(), 1e-12);
     EXPECT_LT((fit->hessian - hessian).norm(), 1e-12);
+    EXPECT_NEAR(fit->largest_curvature, hessian.operatorNorm(), 1e-12);
 }
 
 // Without curvature there is no minimum to report, and an unseen neighbour leaves none to trust.

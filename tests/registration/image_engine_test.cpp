@@ -4,10 +4,13 @@
 #include "core/errors.hpp"
 #include "imaging/filters.hpp"
 #include "registration/detail/block_search.hpp"
+#include "registration/detail/gpu_match_layout.hpp"
 #include "registration/detail/growth.hpp"
 #include "registration/evaluation.hpp"
 #include "tests/registration/textured_phantom.hpp"
 #include "tests/support/label_shapes.hpp"
+
+#include <Eigen/Eigenvalues>
 
 #include <gtest/gtest.h>
 
@@ -84,6 +87,22 @@ TEST(ImageEngine, TheDeviceSaysWhatTheProcessorSays) {
         EXPECT_LT(summarise(distances).mean, 2e-3);
         EXPECT_LT(summarise(distances).percentile_95, 1e-2);
     }
+}
+
+/// Springs with a negative eigenvalue are refused: what a plane edge shows, along one axis, has none in spite of
+/// floats.
+TEST(ImageEngine, InformationAlongOneAxisHasNoNegativeEigenvalue) {
+    const Eigen::Vector3f edge(0.3F, -1.7F, 0.9F);
+    imaging::Geometry grid;
+    grid.direction = motion(20, {1, 2, -1}, {0, 0, 0}).linear();
+    MatchForce cell{};
+    cell.voxels = cell.said = 1;
+    std::copy(edge.begin(), edge.end(), cell.root.begin());
+    const auto force = force_of(cell, {0, 0, 0}, grid);
+    ASSERT_TRUE(force);
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(force->information);
+    EXPECT_NEAR(axes.eigenvalues()[2], edge.cast<double>().squaredNorm(), 1e-12);
+    EXPECT_GT(axes.eigenvalues()[0], -1e-14);
 }
 
 // What an image leaves behind must not reach the next one.
