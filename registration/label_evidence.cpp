@@ -26,6 +26,7 @@ Contribution LabelEvidence::contribution(const RoundPlan& plan, const State& sta
     const Interfaces& interfaces = prepared_.interfaces;
     const Eigen::Matrix3Xd normals = interfaces.normals(prepared_.model.mesh.nodes + state.displacement);
     std::vector<Match> matches = match_interfaces(prepared_, fixed_, state, normals, plan, options_.max_angle_deg);
+    leave_out_strays(matches, interfaces, neighbours_, prepared_.model.mesh.nodes, state.displacement, normals);
     weigh(matches, neighbours_, plan.scale_mm);
     bound(matches, plan.most_step_mm);
     Contribution result{matched_springs(interfaces, matches, normals, state.displacement, prepared_.options),

@@ -29,6 +29,33 @@ std::vector<Match> match_interfaces(const PreparedModel& prepared, const LabelBo
     return matches;
 }
 
+void leave_out_strays(std::vector<Match>& matches, const Interfaces& interfaces,
+                      const std::vector<std::vector<int>>& neighbours, const Eigen::Matrix3Xd& nodes,
+                      const Eigen::Matrix3Xd& displacement, const Eigen::Matrix3Xd& normals) {
+    constexpr double steepest = 0.5;  // change of displacement per distance
+    std::vector<char> stray(matches.size(), 0);
+    tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t i) {
+        if (!matches[i].found) return;
+        const int node = interfaces.nodes()[i].node;
+        const Eigen::Vector3d normal = normals.col(static_cast<Eigen::Index>(i));
+        std::vector<double> moves;
+        double distances = 0;
+        for (const int n : neighbours[i]) {
+            const auto near = static_cast<std::size_t>(n);
+            if (!matches[near].found) continue;
+            const int other = interfaces.nodes()[near].node;
+            moves.push_back(normal.dot(displacement.col(other)) + matches[near].distance_mm);
+            distances += (nodes.col(other) - nodes.col(node)).norm();
+        }
+        if (moves.empty()) return;
+        const double limit = steepest * distances / static_cast<double>(moves.size());
+        const double move = normal.dot(displacement.col(node)) + matches[i].distance_mm;
+        stray[i] = std::abs(move - percentile(moves, 50)) > limit;
+    });
+    for (std::size_t i = 0; i < matches.size(); ++i)
+        if (stray[i]) matches[i] = {};
+}
+
 void weigh(std::vector<Match>& matches, const std::vector<std::vector<int>>& neighbours, double scale_mm) {
     tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t i) {
         if (!matches[i].found) return;

@@ -11,6 +11,14 @@ namespace tissuewarp::registration::detail {
 std::vector<Match> match_interfaces(const PreparedModel& prepared, const LabelBoundaryField& fixed, const State& state,
                                     const Eigen::Matrix3Xd& normals, const RoundPlan& plan, double max_angle_deg);
 
+/// Leaves out each match that would part its node from those about it (Interfaces::neighbours): along its normal the
+/// node would lie further on than the median of them, by more than half of their mean distance at rest. Tissue is
+/// hardly strained so within two edges; a search that runs into the next fold of the surface asks for it. `nodes` of
+/// the mesh at rest and `displacement`: 3 × N; `normals`: one column per interface node, moving frame.
+void leave_out_strays(std::vector<Match>& matches, const Interfaces& interfaces,
+                      const std::vector<std::vector<int>>& neighbours, const Eigen::Matrix3Xd& nodes,
+                      const Eigen::Matrix3Xd& displacement, const Eigen::Matrix3Xd& normals);
+
 /// Weighs each match by how far its distance is from the median of its neighbours' (Interfaces::neighbours), by Huber's
 /// function: 1 up to the scale, then the scale over that deviation (Huber, Ann Math Statist 35 (1964) 73). Where tissue
 /// resists, matches are off together with those about them; where a label map is wrong, alone.

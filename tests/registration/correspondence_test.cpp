@@ -151,5 +151,66 @@ TEST(Weigh, AMatchWithoutNeighboursIsJudgedByItsDistance) {
     EXPECT_NEAR(matches[0].weight, 0.5, 1e-12);
 }
 
+/// A plate of squares of 1 mm whose upper side is to follow `wanted`, and has moved by `displacement` already.
+struct Plate {
+    meshing::TetMesh mesh = meshing::box_mesh({8, 8, 2}, {8, 8, 2});
+    Interfaces interfaces{mesh};
+    Eigen::Matrix3Xd displacement = Eigen::Matrix3Xd::Zero(3, mesh.node_count());
+    std::vector<Match> matches{interfaces.nodes().size()};
+
+    template <class Wanted>
+    explicit Plate(const Wanted& wanted) {
+        for (std::size_t i = 0; i < matches.size(); ++i)
+            if (is_above(i)) matches[i] = {true, false, wanted(place(i)), 1.0};
+    }
+    [[nodiscard]] Vector3d place(std::size_t entry) const {
+        return mesh.nodes.col(interfaces.nodes()[entry].node) - mesh.nodes.rowwise().minCoeff();
+    }
+    [[nodiscard]] bool is_above(std::size_t entry) const {
+        return std::abs(interfaces.nodes()[entry].normal[2] - 1) < 1e-9;
+    }
+    [[nodiscard]] static bool is_centre(const Vector3d& place) { return (place - Vector3d(4, 4, 2)).norm() < 1e-9; }
+
+    void leave_out_strays() {
+        detail::leave_out_strays(matches, interfaces, interfaces.neighbours(), mesh.nodes, displacement,
+                                 interfaces.normals(mesh.nodes + displacement));
+    }
+};
+
+// The next fold of a surface, 3 mm further on, draws one node; what the others are to do stays.
+TEST(LeaveOutStrays, AMatchThatPartsANodeFromItsNeighboursGoes) {
+    Plate plate([](const Vector3d& place) { return Plate::is_centre(place) ? 4.0 : 1.0; });
+    plate.leave_out_strays();
+    for (std::size_t i = 0; i < plate.matches.size(); ++i)
+        EXPECT_EQ(plate.matches[i].found, plate.is_above(i) && !Plate::is_centre(plate.place(i))) << i;
+}
+
+// A slope of 0.3, however far it has moved as a whole.
+TEST(LeaveOutStrays, MatchesThatAgreeWithTheirNeighboursStay) {
+    Plate plate([](const Vector3d& place) { return 9 + 0.3 * place[0]; });
+    plate.leave_out_strays();
+    for (std::size_t i = 0; i < plate.matches.size(); ++i) EXPECT_EQ(plate.matches[i].found, plate.is_above(i)) << i;
+}
+
+// It followed a stray match by 3 mm and has found the boundary there; its neighbours have stayed.
+TEST(LeaveOutStrays, AMatchThatKeepsANodeApartGoes) {
+    Plate plate([](const Vector3d&) { return 0.0; });
+    for (std::size_t i = 0; i < plate.matches.size(); ++i)
+        if (plate.is_above(i) && Plate::is_centre(plate.place(i)))
+            plate.displacement(2, plate.interfaces.nodes()[i].node) = 3;
+    plate.leave_out_strays();
+    for (std::size_t i = 0; i < plate.matches.size(); ++i)
+        EXPECT_EQ(plate.matches[i].found, plate.is_above(i) && !Plate::is_centre(plate.place(i))) << i;
+}
+
+// On its way back to them it is no stray, wherever it is now.
+TEST(LeaveOutStrays, AMatchThatBringsANodeBackStays) {
+    Plate plate([](const Vector3d& place) { return Plate::is_centre(place) ? -3.0 : 0.0; });
+    for (std::size_t i = 0; i < plate.matches.size(); ++i)
+        if (Plate::is_centre(plate.place(i))) plate.displacement(2, plate.interfaces.nodes()[i].node) = 3;
+    plate.leave_out_strays();
+    for (std::size_t i = 0; i < plate.matches.size(); ++i) EXPECT_EQ(plate.matches[i].found, plate.is_above(i)) << i;
+}
+
 }  // namespace
 }  // namespace tissuewarp::registration
