@@ -324,6 +324,31 @@ struct Continuation::Impl {
         const Vec4 value = near + f[2] * (along_j(v + slice) - near);
         return value.head<3>().matrix().cast<double>();
     }
+
+    /// What the grid misses of the surface's displacement at a point of it.
+    [[nodiscard]] Eigen::Vector3d missing(const SurfaceProximity::Hit& hit) const {
+        return hit.value - interpolated(hit.point);
+    }
+
+    /// What is missing at the closest point of the surface, fading over the layer; in a narrow gap with that of the
+    /// other side, each by the inverse of its distance, so that nothing jumps halfway.
+    [[nodiscard]] Eigen::Vector3d correction(const Eigen::Vector3d& point) const {
+        const auto near = surface.closest(point);
+        if (!near) return Eigen::Vector3d::Zero();
+        const auto fading = [&](const SurfaceProximity::Hit& hit) {
+            const double t = hit.distance / surface.reach();
+            return (1.0 - t) * (1.0 - t) * (1.0 + 2.0 * t);  // 1 at the surface, slope 0 at both ends
+        };
+        const double near_fading = fading(*near);
+        const Eigen::Vector3d of_near = near_fading * missing(*near);
+        const auto opposite = surface.closest_opposite(point, *near);
+        if (!opposite) return of_near;
+        const double opposite_fading = fading(*opposite);
+        const double near_share = near_fading * opposite->distance, opposite_share = opposite_fading * near->distance;
+        const double sum = near_share + opposite_share;
+        if (!(sum > 0.0)) return of_near;
+        return (near_share * of_near + opposite_share * opposite_fading * missing(*opposite)) / sum;
+    }
 };
 
 Continuation::Continuation(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tets,
@@ -334,13 +359,7 @@ Continuation::Continuation(Continuation&&) noexcept = default;
 Continuation& Continuation::operator=(Continuation&&) noexcept = default;
 
 Eigen::Vector3d Continuation::operator()(const Eigen::Vector3d& point) const {
-    Eigen::Vector3d value = impl_->interpolated(point);
-    if (const auto hit = impl_->surface.closest(point)) {
-        const double t = hit->distance / impl_->surface.reach();
-        const double weight = (1.0 - t) * (1.0 - t) * (1.0 + 2.0 * t);  // 1 at the surface, slope 0 at both ends
-        value += weight * (hit->value - impl_->interpolated(hit->point));
-    }
-    return value;
+    return impl_->interpolated(point) + impl_->correction(point);
 }
 
 }  // namespace tissuewarp::registration::detail

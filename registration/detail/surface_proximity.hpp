@@ -69,26 +69,13 @@ public:
 
     /// The closest point, when it lies within reach. Thread-safe.
     [[nodiscard]] std::optional<Hit> closest(const Eigen::Vector3d& point) const {
-        const Eigen::Array3d position = (point - lower_).array() / side_;
-        const Eigen::Array3d end(cells_[0], cells_[1], cells_[2]);
-        if (!((position >= 0.0).all() && (position < end).all())) return std::nullopt;
-        const std::size_t cell = cell_at(position.cast<int>());
-        double best = reach_ * reach_;
-        const Triangle* nearest = nullptr;
-        Eigen::Vector3d weights;
-        for (int e = offset_[cell]; e < offset_[cell + 1]; ++e) {
-            const Triangle& t = triangles_[static_cast<std::size_t>(entry_[static_cast<std::size_t>(e)])];
-            const double bound = std::sqrt(best) + t.radius;
-            if ((point - t.centre).squaredNorm() > bound * bound) continue;
-            const Eigen::Vector3d lambda = t.closest(point);
-            const double squared = (t.corner * lambda - point).squaredNorm();
-            if (!(squared < best)) continue;
-            best = squared;
-            nearest = &t;
-            weights = lambda;
-        }
-        if (!nearest) return std::nullopt;
-        return Hit{std::sqrt(best), nearest->corner * weights, nearest->value * weights};
+        return closest_of(point, [](const Eigen::Vector3d&) { return true; });
+    }
+
+    /// The closest point on the other side of `point` than `near`, across a gap of the surface; when within reach.
+    [[nodiscard]] std::optional<Hit> closest_opposite(const Eigen::Vector3d& point, const Hit& near) const {
+        const Eigen::Vector3d to_near = near.point - point;
+        return closest_of(point, [&](const Eigen::Vector3d& to_other) { return to_near.dot(to_other) < 0.0; });
     }
 
 private:
@@ -107,6 +94,30 @@ private:
                static_cast<std::size_t>(cells_[0]) *
                    (static_cast<std::size_t>(cell[1]) +
                     static_cast<std::size_t>(cells_[1]) * static_cast<std::size_t>(cell[2]));
+    }
+
+    /// Among the triangles whose closest point, seen from `point`, is admitted.
+    template <class Admits>
+    [[nodiscard]] std::optional<Hit> closest_of(const Eigen::Vector3d& point, const Admits& admits) const {
+        const Eigen::Array3d position = (point - lower_).array() / side_;
+        const Eigen::Array3d end(cells_[0], cells_[1], cells_[2]);
+        if (!((position >= 0.0).all() && (position < end).all())) return std::nullopt;
+        const std::size_t cell = cell_at(position.cast<int>());
+        double best = reach_ * reach_;
+        const Triangle* nearest = nullptr;
+        Eigen::Vector3d weights;
+        for (int e = offset_[cell]; e < offset_[cell + 1]; ++e) {
+            const Triangle& t = triangles_[static_cast<std::size_t>(entry_[static_cast<std::size_t>(e)])];
+            const double bound = std::sqrt(best) + t.radius;
+            if ((point - t.centre).squaredNorm() > bound * bound) continue;
+            const Eigen::Vector3d lambda = t.closest(point), to_closest = t.corner * lambda - point;
+            if (!(to_closest.squaredNorm() < best) || !admits(to_closest)) continue;
+            best = to_closest.squaredNorm();
+            nearest = &t;
+            weights = lambda;
+        }
+        if (!nearest) return std::nullopt;
+        return Hit{std::sqrt(best), nearest->corner * weights, nearest->value * weights};
     }
 
     void fill_cells() {

@@ -313,6 +313,39 @@ TEST(Continuation, HoldsTheSurfaceOfASheetThinnerThanItsGrid) {
     EXPECT_NEAR((transform(Eigen::Vector3d(20, 20, 8.0)).col(0)[2]), 11.5, 0.5);  // still most of it 7 mm away
 }
 
+/// Two blocks, `gap` mm apart along x, the second moved by `second`.
+Deformation blocks_across_a_gap(double gap, double lower, const Eigen::Vector3d& second) {
+    const meshing::TetMesh a = test::box_at({lower - 12, 0, 0}, {12, 24, 24}, {3, 6, 6});
+    const meshing::TetMesh b = test::box_at({lower + gap, 0, 0}, {12, 24, 24}, {3, 6, 6});
+    meshing::TetMesh both = a;
+    both.nodes.conservativeResize(3, a.node_count() + b.node_count());
+    both.nodes.rightCols(b.node_count()) = b.nodes;
+    both.tets.conservativeResize(4, a.tet_count() + b.tet_count());
+    both.tets.rightCols(b.tet_count()) = b.tets.array() + a.node_count();
+    both.labels = Eigen::VectorXi::Ones(both.tet_count());
+    return test::deformed_by(both, [&](const Eigen::Vector3d& X) -> Eigen::Vector3d {
+        return X[0] > lower + 0.5 * gap ? second : Eigen::Vector3d::Zero();
+    });
+}
+
+TEST(Continuation, DoesNotJumpHalfwayAcrossANarrowGap) {
+    constexpr double gap = 3.0, step = 0.05;
+    const Eigen::Vector3d second(-1.2, 0.8, 0);  // nearer and beside
+    for (const double lower : {0.0, 0.6, 1.2, 1.8}) {  // wherever the grid lies
+        const PointTransform transform(blocks_across_a_gap(gap, lower, second));
+        const auto displacement = [&](double s) {
+            const Eigen::Vector3d X(lower + s, 11.3, 12.7);
+            return Eigen::Vector3d(transform(X).col(0) - X);
+        };
+        double steepest = 0;
+        for (double s = step; s < gap - step; s += step)
+            steepest = std::max(steepest, (displacement(s + step) - displacement(s)).norm() / step);
+        EXPECT_LT(steepest, 2.5 * second.norm() / gap) << lower;
+        EXPECT_LT((displacement(1e-3)).norm(), 5e-3) << lower;
+        EXPECT_LT((displacement(gap - 1e-3) - second).norm(), 5e-3) << lower;
+    }
+}
+
 TEST(PointTransform, AgreesWithTheFieldInsideAndOutside) {
     Deformation deformation =
         test::deformed_by(test::ball({0, 0, 0}, 40.0, 10), [](const auto& X) { return bump(X, -9.0); });
