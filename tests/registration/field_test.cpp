@@ -330,7 +330,7 @@ Deformation blocks_across_a_gap(double gap, double lower, const Eigen::Vector3d&
 
 TEST(Continuation, DoesNotJumpHalfwayAcrossANarrowGap) {
     constexpr double gap = 3.0, step = 0.05;
-    const Eigen::Vector3d second(-1.2, 0.8, 0);  // nearer and beside
+    const Eigen::Vector3d second(-1.2, 0.8, 0);        // nearer and beside
     for (const double lower : {0.0, 0.6, 1.2, 1.8}) {  // wherever the grid lies
         const PointTransform transform(blocks_across_a_gap(gap, lower, second));
         const auto displacement = [&](double s) {
