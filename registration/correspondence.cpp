@@ -69,7 +69,23 @@ std::vector<std::vector<int>> Interfaces::neighbours() const {
     return result;
 }
 
+std::map<int, double> Interfaces::thickness(const meshing::TetMesh& mesh) const {
+    std::map<int, double> volume, area;
+    const Eigen::VectorXd volumes = meshing::tet_volumes(mesh);
+    for (int t = 0; t < mesh.tet_count(); ++t) volume[mesh.labels[t]] += volumes[t];
+    for (const InterfaceNode& node : nodes_) {
+        area[node.inner] += node.area;
+        area[node.outer] += node.area;
+    }
+    std::map<int, double> result;
+    for (const auto& [label, of_label] : volume) result[label] = 2 * of_label / area.at(label);
+    return result;
+}
+
 namespace {
+
+constexpr double most_smoothing = 1.0, least_smoothing = 0.5;  // voxels
+constexpr double smoothing_share = 0.25;                       // of a label's thickness
 
 /// A smoothed indicator on the bounding box of its label: zero outside, which clamped sampling gives for nothing
 /// because the box has a margin wider than the Gaussian.
@@ -79,6 +95,7 @@ struct Indicator {
     explicit Indicator(Volume smoothed) : volume(std::move(smoothed)), sampler(volume) {}
 };
 
+/// `smoothing` in voxels.
 std::unique_ptr<Indicator> indicator(const Volume& mask, const imaging::LabelStatistics& box, double smoothing) {
     const int margin = static_cast<int>(std::ceil(4 * smoothing)) + 2;
     std::array<int, 3> lower{}, upper{};
@@ -122,9 +139,10 @@ struct LabelBoundaryField::Impl {
     }
 };
 
-LabelBoundaryField::LabelBoundaryField(const Volume& label_map, const std::vector<int>& labels, double smoothing)
+LabelBoundaryField::LabelBoundaryField(const Volume& label_map, const std::map<int, double>& thickness_mm)
     : impl_(std::make_unique<Impl>()) {
     const Volume map = label_map.as(CV_32S);
+    const double voxel_mm = map.geometry.spacing.minCoeff();
     const auto statistics = imaging::label_statistics(map);
     imaging::LabelStatistics everything;
     everything.lower = map.geometry.size;
@@ -133,12 +151,15 @@ LabelBoundaryField::LabelBoundaryField(const Volume& label_map, const std::vecto
             everything.lower[axis] = std::min(everything.lower[axis], box.lower[axis]);
             everything.upper[axis] = std::max(everything.upper[axis], box.upper[axis]);
         }
-        if (std::find(labels.begin(), labels.end(), label) == labels.end()) continue;
+        const auto thickness = thickness_mm.find(label);
+        if (thickness == thickness_mm.end()) continue;
+        const double bearable = smoothing_share * thickness->second / voxel_mm;
+        const double smoothing = std::clamp(bearable, least_smoothing, most_smoothing);
         impl_->of_label[label] = indicator(imaging::mask_of(map, label), box, smoothing);
     }
     if (statistics.empty()) throw InvalidInput("the label map is empty: there is no boundary to match");
-    impl_->of_all = indicator(imaging::mask_of_all(map), everything, smoothing);
-    impl_->step = 0.5 * map.geometry.spacing.minCoeff();
+    impl_->of_all = indicator(imaging::mask_of_all(map), everything, most_smoothing);
+    impl_->step = 0.5 * voxel_mm;
 }
 
 LabelBoundaryField::~LabelBoundaryField() = default;

@@ -31,6 +31,9 @@ public:
     [[nodiscard]] Eigen::Matrix3Xd normals(const Eigen::Matrix3Xd& positions) const;
     /// Positions in nodes() of those that two edges or fewer along the same interface lead to, without the node itself.
     [[nodiscard]] std::vector<std::vector<int>> neighbours() const;
+    /// Mean thickness of every label of the mesh that these are the interfaces of, mm: twice its volume over the area
+    /// around it, which is the thickness of a plate and 2/3 of a ball's radius.
+    [[nodiscard]] std::map<int, double> thickness(const meshing::TetMesh& mesh) const;
 
 private:
     std::vector<InterfaceNode> nodes_;
@@ -41,8 +44,11 @@ private:
 /// Smoothed label indicators of an image, sampled anywhere: a sub-voxel boundary from voxel labels.
 class LabelBoundaryField {
 public:
-    /// `labels` to prepare (0 is the background); Gaussian with `smoothing` voxels standard deviation.
-    LabelBoundaryField(const imaging::Volume& label_map, const std::vector<int>& labels, double smoothing = 1.0);
+    /// Smooths each label of `thickness_mm` (Interfaces::thickness) by a Gaussian of one voxel, which takes the steps
+    /// off its boundary, or of a quarter of its thickness, where that is less, but half a voxel at least: a plate
+    /// thinner than 1.35 standard deviations is nowhere half there, and has no boundary left. Throws InvalidInput for
+    /// an empty map.
+    LabelBoundaryField(const imaging::Volume& label_map, const std::map<int, double>& thickness_mm);
     ~LabelBoundaryField();
     LabelBoundaryField(LabelBoundaryField&&) noexcept;
     LabelBoundaryField& operator=(LabelBoundaryField&&) noexcept;

@@ -5,21 +5,11 @@
 
 namespace tissuewarp::registration::detail {
 
-namespace {
-
-std::vector<int> labels_of(const PreparedModel& prepared) {
-    std::vector<int> labels;
-    for (const auto& [label, material] : prepared.model.materials) labels.push_back(label);
-    return labels;
-}
-
-}  // namespace
-
 LabelEvidence::LabelEvidence(const PreparedModel& prepared, const imaging::Volume& fixed_labels,
                              const UpdateOptions& options)
     : prepared_(prepared),
       options_(options),
-      fixed_(fixed_labels, labels_of(prepared)),
+      fixed_(fixed_labels, prepared.interfaces.thickness(prepared.model.mesh)),
       neighbours_(prepared.interfaces.neighbours()) {}
 
 Contribution LabelEvidence::contribution(const RoundPlan& plan, const State& state) const {

@@ -9,7 +9,6 @@
 #include "imaging/labels.hpp"
 
 #include <cmath>
-#include <set>
 
 namespace tissuewarp::registration {
 
@@ -77,9 +76,8 @@ PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_label
     std::optional<RigidNeighbours> neighbours = detail::rigid_neighbours(moving_labels, options.rigid_neighbours);
     tled::Model model = model_of(std::move(mesh), options);
     tled::RestState rest = tled::rest_state(model);
-    const std::set<int> labels(model.mesh.labels.begin(), model.mesh.labels.end());
     Interfaces interfaces(model.mesh);
-    measure_offsets(interfaces, model.mesh, LabelBoundaryField(organ, {labels.begin(), labels.end()}));
+    measure_offsets(interfaces, model.mesh, LabelBoundaryField(organ, interfaces.thickness(model.mesh)));
     times.push_back(stopwatch.lap("rest state"));
     observer.checkpoint("rest stiffness", 0.0);
     const auto springs = tled::nodal_conditions(detail::full_weight_springs(interfaces, options), rest.node_count);
