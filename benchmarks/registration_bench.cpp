@@ -152,11 +152,16 @@ std::vector<std::function<Case()>> cases(const fs::path& data, const std::string
         study.targets = field_targets(sag / "truth_forward.nii.gz", sag / "preop_mask.nii.gz");
         return study;
     });
-    add("lung masks", [lung_case] {
-        Case study = lung_case(true)();
-        study.seen.image.reset();
-        return study;
-    });
+    const auto lung_masks_case = [lung_case](double poissons_ratio) {
+        return [lung_case, poissons_ratio] {
+            Case study = lung_case(true)();
+            study.seen.image.reset();
+            study.poissons_ratio = poissons_ratio;
+            return study;
+        };
+    };
+    add("lung masks", lung_masks_case(0.3));
+    add("lung masks, default tissue", lung_masks_case(0.45));
     return result;
 }
 

@@ -12,7 +12,7 @@ std::vector<Match> match_interfaces(const PreparedModel& prepared, const LabelBo
                                     const Eigen::Matrix3Xd& normals, const RoundPlan& plan, double max_angle_deg);
 
 /// Leaves out each match that would part its node from those about it (Interfaces::neighbours): along its normal the
-/// node would lie further on than the median of them, by more than half of their mean distance at rest. Tissue is
+/// node would lie further on than the median of them, by more than three quarters of their mean distance at rest. Tissue is
 /// hardly strained so within two edges; a search that runs into the next fold of the surface asks for it. `nodes` of
 /// the mesh at rest and `displacement`: 3 × N; `normals`: one column per interface node, moving frame.
 void leave_out_strays(std::vector<Match>& matches, const Interfaces& interfaces,
