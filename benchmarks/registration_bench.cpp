@@ -327,11 +327,11 @@ void time_updates(const std::string& name, const PreparedModel& prepared, const 
         for (const StageTime& time : result.times) stages[time.stage].push_back(time.seconds);
     }
     std::printf(
-        "%s, %d updates, s: least %.2f, median %.2f, 90th %.2f, most %.2f; processor: least %.2f, median %.2f\n",
-        name.c_str(), repeats, percentile(wall, 0), percentile(wall, 0.5), percentile(wall, 0.9), percentile(wall, 1),
-        percentile(processor, 0), percentile(processor, 0.5));
-    std::printf("  medians of stages, s:");
-    for (const auto& [stage, seconds] : stages) std::printf("  %s %.2f", stage.c_str(), percentile(seconds, 0.5));
+        "%s, %d updates, ms: least %.0f, median %.0f, 90th %.0f, 95th %.0f, most %.0f; processor: median %.0f\n",
+        name.c_str(), repeats, 1e3 * percentile(wall, 0), 1e3 * percentile(wall, 0.5), 1e3 * percentile(wall, 0.9),
+        1e3 * percentile(wall, 0.95), 1e3 * percentile(wall, 1), 1e3 * percentile(processor, 0.5));
+    std::printf("  medians of stages, ms:");
+    for (const auto& [stage, seconds] : stages) std::printf("  %s %.0f", stage.c_str(), 1e3 * percentile(seconds, 0.5));
     std::printf("\n");
     std::fflush(stdout);
 }
