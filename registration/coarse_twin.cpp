@@ -1,5 +1,6 @@
 #include "registration/detail/coarse_twin.hpp"
 
+#include "registration/detail/point_tree.hpp"
 #include "registration/detail/pull.hpp"
 
 #include <utility>
@@ -51,14 +52,13 @@ double total(const std::vector<tled::Spring>& springs) {
 std::vector<tled::Spring> sampled(const std::vector<tled::Spring>& springs, const Eigen::Matrix3Xd& from,
                                   const PreparedModel& to) {
     if (springs.empty()) return {};
-    Eigen::Matrix3Xd places(3, static_cast<Eigen::Index>(springs.size()));
-    for (std::size_t s = 0; s < springs.size(); ++s)
-        places.col(static_cast<Eigen::Index>(s)) = from.col(springs[s].node);
+    std::vector<Eigen::Vector3d> places;
+    places.reserve(springs.size());
+    for (const tled::Spring& spring : springs) places.emplace_back(from.col(spring.node));
+    const PointTree tree(places);
     std::vector<tled::Spring> result;
     for (const InterfaceNode& node : to.interfaces.nodes()) {
-        Eigen::Index nearest = 0;
-        (places.colwise() - to.model.mesh.nodes.col(node.node)).colwise().squaredNorm().minCoeff(&nearest);
-        const tled::Spring& spring = springs[static_cast<std::size_t>(nearest)];
+        const tled::Spring& spring = springs[tree.nearest(to.model.mesh.nodes.col(node.node)).index];
         result.push_back({node.node, spring.stiffness, spring.target});
     }
     const double share = total(springs) / total(result);
@@ -70,15 +70,14 @@ std::vector<tled::Spring> sampled(const std::vector<tled::Spring>& springs, cons
 
 Eigen::MatrixXd carried(const meshing::TetMesh& from, const Eigen::MatrixXd& nodal, const Eigen::Matrix3Xd& to) {
     const meshing::PointLocator locator(from);
+    const PointTree tree({from.nodes.colwise().begin(), from.nodes.colwise().end()});
     Eigen::MatrixXd result(nodal.rows(), to.cols());
     for (Eigen::Index p = 0; p < to.cols(); ++p) {
         if (const auto at = place_of(locator, to.col(p))) {
             result.col(p) = meshing::interpolate(from, nodal, *at);
             continue;
         }
-        Eigen::Index nearest = 0;
-        (from.nodes.colwise() - to.col(p)).colwise().squaredNorm().minCoeff(&nearest);
-        result.col(p) = nodal.col(nearest);
+        result.col(p) = nodal.col(static_cast<Eigen::Index>(tree.nearest(to.col(p)).index));
     }
     return result;
 }

@@ -63,7 +63,7 @@ Eigen::VectorXd distance_to_data(const Eigen::Matrix3Xd& points, const Eigen::Ma
                            " data points; at least one is needed, all of them finite");
     std::vector<Eigen::Vector3d> places(static_cast<std::size_t>(data.cols()));
     for (std::size_t n = 0; n < places.size(); ++n) places[n] = data.col(static_cast<Eigen::Index>(n));
-    const detail::PointTree tree(std::move(places));
+    const detail::PointTree tree(places);
     Eigen::VectorXd distances(points.cols());
     for (Eigen::Index p = 0; p < points.cols(); ++p) distances[p] = tree.distance(points.col(p));
     return distances;

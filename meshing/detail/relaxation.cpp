@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
+#include <span>
 #include <utility>
 
 namespace tissuewarp::meshing::detail {
@@ -57,42 +59,77 @@ private:
                 tets_[static_cast<std::size_t>(next[static_cast<std::size_t>(node)]++)] = t;
     }
 
-    void measure(int t, Worst& worst) const {
-        Eigen::Matrix<double, 3, 4> areas;
+    /// Of one tetrahedron; a step of 0 where it is inverted.
+    struct Shape {
+        Eigen::Matrix<double, 3, 4> areas;  ///< outward, of the face opposite each corner
+        double step = 0.0;
+
+        [[nodiscard]] double largest_cosine() const {
+            const Eigen::RowVector4d norms = areas.colwise().norm();
+            double result = -1.0;
+            for (const auto& [i, j] : edge_corners)
+                result = std::max(result, -areas.col(i).dot(areas.col(j)) / (norms[i] * norms[j]));
+            return result;
+        }
+    };
+
+    [[nodiscard]] Shape shape(int t) const {
+        Shape result;
         const auto nodes = mesh_.tets.col(t);
         for (int corner = 0; corner < 4; ++corner) {
             const auto& c = face_corners[corner];
             const Eigen::Vector3d origin = mesh_.nodes.col(nodes[c[0]]);
             const Eigen::Vector3d a = mesh_.nodes.col(nodes[c[1]]) - origin, b = mesh_.nodes.col(nodes[c[2]]) - origin;
-            areas.col(corner) = 0.5 * a.cross(b);
+            result.areas.col(corner) = 0.5 * a.cross(b);
         }
         const Eigen::Vector3d edge = mesh_.nodes.col(nodes[0]) - mesh_.nodes.col(nodes[1]);
-        const double volume = areas.col(0).dot(-edge) / 3.0;  // outward area times height of corner 0, below its face
-        if (!(volume > 0.0)) {
-            worst = {0.0, 1.0, t};
-            return;
-        }
-        const double step = 3.0 * volume / areas.norm() / input_.edge_length[static_cast<std::size_t>(mesh_.labels[t])];
-        if (step < worst.step) {
-            worst.step = step;
-            worst.tet = t;
-        }
-        for (const auto& [i, j] : edge_corners)
-            worst.cosine =
-                std::max(worst.cosine, -areas.col(i).dot(areas.col(j)) / (areas.col(i).norm() * areas.col(j).norm()));
+        const double volume = result.areas.col(0).dot(-edge) / 3.0;  // outward area times height of corner 0, below it
+        if (volume > 0.0)
+            result.step =
+                3.0 * volume / result.areas.norm() / input_.edge_length[static_cast<std::size_t>(mesh_.labels[t])];
+        return result;
     }
 
     [[nodiscard]] Worst around(int node) const {
         Worst worst{1e300, -1.0, -1};
-        for (int e = start_[static_cast<std::size_t>(node)]; e < start_[static_cast<std::size_t>(node) + 1]; ++e) {
-            measure(tets_[static_cast<std::size_t>(e)], worst);
-            if (worst.step == 0.0) return worst;
+        for (const int t : tets_around(node)) {
+            const Shape of_tet = shape(t);
+            if (!(of_tet.step > 0.0)) return {0.0, 1.0, t};
+            if (of_tet.step < worst.step) {
+                worst.step = of_tet.step;
+                worst.tet = t;
+            }
+            worst.cosine = std::max(worst.cosine, of_tet.largest_cosine());
         }
         return worst;
     }
 
-    [[nodiscard]] bool angles_kept(const Worst& before, const Worst& after) const {
-        return after.step > 0.0 && after.cosine <= std::max(before.cosine, largest_cosine_);
+    /// What is around a node if no element there has a smaller step than `least` and none a sharper angle than the
+    /// sharpest was before, or than is allowed. Most places fail at once, by the element that is to be improved.
+    [[nodiscard]] std::optional<Worst> around_if_kept(int node, const Worst& before, double least,
+                                                      int to_improve) const {
+        const auto long_enough = [&](const Shape& of_tet) { return of_tet.step > 0.0 && of_tet.step >= least; };
+        if (!long_enough(shape(to_improve))) return std::nullopt;
+        const double allowed = std::max(before.cosine, largest_cosine_);
+        Worst worst{1e300, -1.0, -1};
+        for (const int t : tets_around(node)) {
+            const Shape of_tet = shape(t);
+            if (!long_enough(of_tet)) return std::nullopt;
+            const double cosine = of_tet.largest_cosine();
+            if (!(cosine <= allowed)) return std::nullopt;
+            if (of_tet.step < worst.step) {
+                worst.step = of_tet.step;
+                worst.tet = t;
+            }
+            worst.cosine = std::max(worst.cosine, cosine);
+        }
+        return worst;
+    }
+
+    [[nodiscard]] std::span<const int> tets_around(int node) const {
+        const auto n = static_cast<std::size_t>(node);
+        return std::span(tets_).subspan(static_cast<std::size_t>(start_[n]),
+                                        static_cast<std::size_t>(start_[n + 1] - start_[n]));
     }
 
     /// Signed distance along `normal` from a point of a face to where its inner label ends; 0 when it is not near.
@@ -138,8 +175,7 @@ private:
             bool moved = false;
             for (double part : {1.0, 0.5, 0.25}) {
                 mesh_.nodes.col(node) = home + part * full;
-                const Worst after = around(node);
-                moved = angles_kept(before, after) && after.step >= std::min(before.step, least_step);
+                moved = around_if_kept(node, before, std::min(before.step, least_step), before.tet).has_value();
                 if (moved) break;
             }
             if (!moved) mesh_.nodes.col(node) = home;
@@ -196,18 +232,17 @@ private:
                 along.normalize();
                 for (double length : {0.16, 0.08, 0.04, 0.02}) {
                     mesh_.nodes.col(node) = home + length * edge * along;
-                    const Worst after = around(node);
-                    if (after.step <= best.step || !angles_kept(before, after)) continue;
-                    best = after;
+                    const std::optional<Worst> after = around_if_kept(node, before, best.step, best.tet);
+                    if (!after || !(after->step > best.step)) continue;
+                    best = *after;
                     place = mesh_.nodes.col(node);
                 }
             }
             mesh_.nodes.col(node) = place;
             if (place == home) continue;
             ++moved;
-            for (int e = start_[static_cast<std::size_t>(node)]; e < start_[static_cast<std::size_t>(node) + 1]; ++e)
-                for (int neighbour : mesh_.tets.col(tets_[static_cast<std::size_t>(e)]))
-                    active_[static_cast<std::size_t>(neighbour)] = true;
+            for (const int t : tets_around(node))
+                for (int neighbour : mesh_.tets.col(t)) active_[static_cast<std::size_t>(neighbour)] = true;
         }
         return moved;
     }
@@ -215,9 +250,9 @@ private:
     /// Towards the centroid of the neighbours, both ways across each edge's plane of the worst element, along the axes.
     [[nodiscard]] std::array<Eigen::Vector3d, 10> directions(int node, int worst) const {
         Eigen::Vector3d centroid = Eigen::Vector3d::Zero();
-        for (int e = start_[static_cast<std::size_t>(node)]; e < start_[static_cast<std::size_t>(node) + 1]; ++e)
-            centroid += mesh_.nodes(Eigen::all, mesh_.tets.col(tets_[static_cast<std::size_t>(e)])).rowwise().mean();
-        centroid /= start_[static_cast<std::size_t>(node) + 1] - start_[static_cast<std::size_t>(node)];
+        const std::span<const int> tets = tets_around(node);
+        for (const int t : tets) centroid += mesh_.nodes(Eigen::all, mesh_.tets.col(t)).rowwise().mean();
+        centroid /= static_cast<double>(tets.size());
         std::array<Eigen::Vector3d, 10> result;
         result[0] = centroid - mesh_.nodes.col(node);
         const auto nodes = mesh_.tets.col(worst);
