@@ -1,6 +1,7 @@
 // The program: picks the verb, turns exceptions into one line and an exit code.
 //   0 done, 1 unexpected, 2 wrong input or usage, 3 file, 4 numerics, 5 no GPU, 130 interrupted
 
+#include "apps/blas.hpp"
 #include "apps/options.hpp"
 #include "apps/progress.hpp"
 #include "apps/threads.hpp"
@@ -41,6 +42,7 @@ int report(const std::vector<std::string>& arguments, int code, std::string mess
 }  // namespace
 
 int main(int argc, char** argv) {
+    apps::start_again_if_blas_mistook_the_processor(argv);
     spdlog::set_default_logger(spdlog::stderr_logger_st("tissuewarp"));
     spdlog::set_pattern("%v");
     const std::vector<std::string> arguments(argv + 1, argv + argc);

@@ -1,5 +1,7 @@
 #include "apps/versions.hpp"
 
+#include "apps/blas.hpp"
+
 #include <sys/resource.h>
 
 #include <tbb/version.h>
@@ -20,6 +22,7 @@ std::map<std::string, std::string> versions() {
     };
     return {{"tissuewarp", TISSUEWARP_VERSION},
             {"compiler", __VERSION__},
+            {"BLAS", blas_name()},
             {"Eigen", dotted(EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
             {"OpenCV", CV_VERSION},
             {"oneTBB", TBB_VERSION_STRING},

@@ -1,7 +1,10 @@
 """One registration from end to end, its files read by other software."""
 
 import json
+import os
+import pathlib
 import unittest
+import unittest.mock
 
 import h5py
 import nibabel
@@ -135,6 +138,18 @@ class Register(unittest.TestCase):
                 self.assertEqual(roles[role]["sha256"], hashlib.sha256(file.read()).hexdigest())
         with h5py.File(self.phantom.output / "record.h5") as record:
             self.assertGreater(len(record.keys()), 0)
+
+    @unittest.skipUnless("avx2" in pathlib.Path("/proc/cpuinfo").read_text(), "a processor without AVX2")
+    def test_blas_knows_the_processor_unless_told_another(self):
+        blas = self.report["versions"]["BLAS"]
+        if not blas.startswith("OpenBLAS"):
+            self.skipTest(blas)
+        self.assertNotIn("Prescott", blas)
+        told = self.phantom.folder / "told"
+        with unittest.mock.patch.dict(os.environ, OPENBLAS_CORETYPE="Prescott"):
+            result = self.phantom.register("--edge-length", 8, output=told)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("Prescott", json.loads((told / "report.json").read_text())["versions"]["BLAS"])
 
     def test_mesh_carries_displacement_and_jacobian(self):
         text = (self.phantom.output / "mesh.vtu").read_bytes()[:4000].decode("latin-1")
