@@ -145,20 +145,10 @@ public:
     }
 
     Point measure(const Setting& setting, int runs, Observer& observer) override {
-        Point point;
-        point.problem = name();
-        point.setting = setting;
-        try {
+        return attempted(name(), setting, [&](Point& point) {
             prepare(setting, observer);
             solve(setting, runs, point, observer);
-        } catch (const SolverFailure& failure) {
-            Point failed;
-            failed.problem = name();
-            failed.setting = setting;
-            failed.failure = failure.what();
-            return failed;
-        }
-        return point;
+        });
     }
 
 private:

@@ -1,5 +1,7 @@
 #include "study/point.hpp"
 
+#include "core/errors.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -17,6 +19,19 @@ double percentile(std::vector<double> values, double share) {
 Distance length_of(const Eigen::Matrix3Xd& differences) {
     const Eigen::VectorXd length = differences.colwise().norm();
     return {std::sqrt(length.squaredNorm() / double(length.size())), length.maxCoeff()};
+}
+
+Point attempted(const std::string& problem, const Setting& setting, const std::function<void(Point&)>& work) {
+    Point point, failed;
+    point.problem = failed.problem = problem;
+    point.setting = failed.setting = setting;
+    try {
+        work(point);
+    } catch (const SolverFailure& failure) {
+        failed.failure = failure.what();
+        return failed;
+    }
+    return point;
 }
 
 double Point::median_seconds() const {

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -62,6 +63,9 @@ struct Point {
     /// error, root mean square, as if independent: no wrong law gains by a coarse mesh that errs the other way.
     [[nodiscard]] double error_mm() const;
 };
+
+/// What `work` makes of the point of a problem in a setting; where its solver fails, the failure and nothing else.
+Point attempted(const std::string& problem, const Setting& setting, const std::function<void(Point&)>& work);
 
 /// Of at least one value; between neighbours linear.
 double percentile(std::vector<double> values, double share);
