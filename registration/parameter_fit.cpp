@@ -121,6 +121,14 @@ ParameterFit fit_parameters(const PreparedModel& prepared, const UpdateResult& r
     return fit;
 }
 
+namespace {
+
+bool any(const TissueLoads& loads) {
+    return loads.pressure_kpa != 0 || !loads.body_force.isZero(0);
+}
+
+}  // namespace
+
 FittedUpdate update_and_fit(PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options,
                             const FitOptions& fit_options, Observer& observer) {
     static_cast<void>(detail::fit_scalars(prepared, options.loads, fit_options));  // throws before the work
@@ -129,9 +137,13 @@ FittedUpdate update_and_fit(PreparedModel& prepared, const Intraoperative& seen,
     if (!fitted.fit.any_identified()) return fitted;
     UpdateOptions with_loads = options;
     with_loads.loads = fitted.fit.loads;
-    if (fitted.fit.materials != prepared.model.materials)
-        prepared = with_materials(std::move(prepared), fitted.fit.materials);
+    const bool other_tissue = fitted.fit.materials != prepared.model.materials;
+    if (other_tissue) prepared = with_materials(std::move(prepared), fitted.fit.materials);
     fitted.result = update(prepared, seen, with_loads, observer);
+    if (other_tissue && !any(with_loads.loads))
+        fitted.result.doubts.emplace_back(
+            "tissue was fitted while no load is known: a load that acts between the data passes for other tissue, and "
+            "the stated deviation does not hold that; compare targets that nothing used with and without the fit");
     return fitted;
 }
 

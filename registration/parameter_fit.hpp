@@ -81,7 +81,7 @@ struct FittedUpdate {
 };
 
 /// update, fit_parameters, and where these identified something update once more with it; `prepared` then holds the
-/// fitted materials. Throws what these do.
+/// fitted materials. A result of fitted tissue is doubted where no load is known. Throws what these do.
 FittedUpdate update_and_fit(PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& update,
                             const FitOptions& options, Observer& observer = silent_observer());
 

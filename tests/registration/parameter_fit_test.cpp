@@ -6,7 +6,9 @@
 #include "tled/equilibrium.hpp"
 
 #include <gtest/gtest.h>
+
 #include <tbb/global_control.h>
+#include <algorithm>
 
 #include <functional>
 #include <random>
@@ -107,6 +109,12 @@ bool left_alone(const PreparedModel& prepared, const ParameterFit& fit) {
            fit.loads.body_force.isZero(0);
 }
 
+bool doubts_the_tissue(const UpdateResult& result) {
+    return std::any_of(result.doubts.begin(), result.doubts.end(), [](const std::string& doubt) {
+        return doubt.find("tissue was fitted while no load is known") != std::string::npos;
+    });
+}
+
 // Judged by the data that pull, the fit would run to the softest tissue, 0.05.
 TEST(ParameterFit, PoissonsRatioIsFoundFromDataAllOver) {
     const auto truly = prepare(labels(), coarse(0.3));
@@ -119,6 +127,7 @@ TEST(ParameterFit, PoissonsRatioIsFoundFromDataAllOver) {
     EXPECT_NEAR(nu.fitted, 0.3, std::max(0.01, 2 * nu.deviation));
     EXPECT_LT(fitted.fit.misfit_ratio, 0.8);
     EXPECT_NEAR(tled::poisson_ratio(prepared.model.materials.at(2)), nu.fitted, 1e-9);  // the result is of it
+    EXPECT_TRUE(doubts_the_tissue(fitted.result));
 }
 
 TEST(ParameterFit, WhatAPatchCannotTellIsLeftAloneAndNamed) {
@@ -132,6 +141,7 @@ TEST(ParameterFit, WhatAPatchCannotTellIsLeftAloneAndNamed) {
     EXPECT_FALSE(fitted.fit.parameters.at(0).identified());
     EXPECT_FALSE(fitted.fit.parameters.at(0).reason.empty());
     EXPECT_TRUE(left_alone(prepared, fitted.fit));
+    EXPECT_FALSE(doubts_the_tissue(fitted.result));
     EXPECT_EQ(fitted.result.deformation.displacement, plain);
 }
 
