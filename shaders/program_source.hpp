@@ -32,8 +32,7 @@ struct ComposedSource {
 };
 
 /// `#version 450 core`, extensions, `#define`s, chunks, kernel. Line N of file K is numbered K·10000 + N of source K by
-/// a
-/// `#line` before each file: Mesa forgets the source in many messages, so the line alone tells the file. Throws
+/// a `#line` before each file: Mesa forgets the source in many messages, so the line alone tells the file. Throws
 /// InvalidInput for an unknown file, a declared name without a value, and a value for a name that no file declares:
 /// flags are always given both ways.
 ComposedSource compose(const ProgramSource& source, const SourceLibrary& library = embedded_sources());

@@ -29,6 +29,14 @@ struct Worst {
     double step = 0.0;    ///< smallest 1/√(Σ|∇N|²) over target edge; 0 when one is inverted
     double cosine = 1.0;  ///< of the smallest dihedral angle
     int tet = -1;
+
+    void include(int t, double its_step, double its_cosine) {
+        if (its_step < step) {
+            step = its_step;
+            tet = t;
+        }
+        cosine = std::max(cosine, its_cosine);
+    }
 };
 
 class Relaxation {
@@ -95,11 +103,7 @@ private:
         for (const int t : tets_around(node)) {
             const Shape of_tet = shape(t);
             if (!(of_tet.step > 0.0)) return {0.0, 1.0, t};
-            if (of_tet.step < worst.step) {
-                worst.step = of_tet.step;
-                worst.tet = t;
-            }
-            worst.cosine = std::max(worst.cosine, of_tet.largest_cosine());
+            worst.include(t, of_tet.step, of_tet.largest_cosine());
         }
         return worst;
     }
@@ -117,11 +121,7 @@ private:
             if (!long_enough(of_tet)) return std::nullopt;
             const double cosine = of_tet.largest_cosine();
             if (!(cosine <= allowed)) return std::nullopt;
-            if (of_tet.step < worst.step) {
-                worst.step = of_tet.step;
-                worst.tet = t;
-            }
-            worst.cosine = std::max(worst.cosine, cosine);
+            worst.include(t, of_tet.step, cosine);
         }
         return worst;
     }

@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 
 #include <tbb/global_control.h>
-#include <algorithm>
 
+#include <algorithm>
 #include <functional>
 #include <random>
 
