@@ -6,7 +6,7 @@
 #include "apps/verbs.hpp"
 #include "core/atomic_file.hpp"
 #include "core/errors.hpp"
-#include "registration/fronts_io.hpp"
+#include "registration/dial/fronts_io.hpp"
 #include "study/calibration.hpp"
 
 #include <fmt/format.h>

@@ -2,7 +2,7 @@
 
 #include "core/errors.hpp"
 #include "imaging/labels.hpp"
-#include "registration/fronts_io.hpp"
+#include "registration/dial/fronts_io.hpp"
 
 #include <fmt/format.h>
 

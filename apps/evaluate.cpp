@@ -10,9 +10,9 @@
 #include "apps/verbs.hpp"
 #include "core/errors.hpp"
 #include "imaging/labels.hpp"
-#include "registration/curves.hpp"
-#include "registration/label_surface.hpp"
-#include "registration/surface_points.hpp"
+#include "registration/boundary/label_surface.hpp"
+#include "registration/io/curves.hpp"
+#include "registration/io/surface_points.hpp"
 
 #include <fmt/format.h>
 

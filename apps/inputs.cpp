@@ -4,9 +4,9 @@
 #include "core/sha256.hpp"
 #include "imaging/filters.hpp"
 #include "imaging/labels.hpp"
-#include "registration/curves.hpp"
+#include "registration/io/curves.hpp"
+#include "registration/io/surface_points.hpp"
 #include "registration/pipeline.hpp"
-#include "registration/surface_points.hpp"
 
 #include <fmt/format.h>
 #include <tbb/task_group.h>

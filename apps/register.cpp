@@ -12,9 +12,9 @@
 #include "imaging/filters.hpp"
 #include "imaging/labels.hpp"
 #include "meshing/mesh_io.hpp"
-#include "registration/curve_residual.hpp"
-#include "registration/curves.hpp"
+#include "registration/evaluation/curve_residual.hpp"
 #include "registration/field.hpp"
+#include "registration/io/curves.hpp"
 #include "registration/warp.hpp"
 
 #include <fmt/format.h>

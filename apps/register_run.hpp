@@ -3,7 +3,7 @@
 
 #include "apps/inputs.hpp"
 #include "meshing/quality.hpp"
-#include "registration/dial.hpp"
+#include "registration/dial/dial.hpp"
 #include "registration/parameter_fit.hpp"
 #include "registration/uncertainty.hpp"
 

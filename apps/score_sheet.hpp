@@ -1,10 +1,10 @@
 #pragma once
 /// What `evaluate` found, as a table to read and as JSON.
 
-#include "registration/curve_residual.hpp"
-#include "registration/inverse_consistency.hpp"
-#include "registration/surface_residual.hpp"
-#include "registration/target_bins.hpp"
+#include "registration/evaluation/curve_residual.hpp"
+#include "registration/evaluation/inverse_consistency.hpp"
+#include "registration/evaluation/surface_residual.hpp"
+#include "registration/evaluation/target_bins.hpp"
 
 #include <nlohmann/json.hpp>
 

@@ -4,7 +4,7 @@
 #include "apps/study.hpp"
 #include "apps/update_device.hpp"
 #include "core/errors.hpp"
-#include "registration/fronts_io.hpp"
+#include "registration/dial/fronts_io.hpp"
 #include "study/dial_trial.hpp"
 
 #include <fmt/format.h>

@@ -9,9 +9,9 @@
 #include "imaging/image_io.hpp"
 #include "imaging/labels.hpp"
 #include "imaging/sampling.hpp"
-#include "registration/alignment.hpp"
 #include "registration/evaluation.hpp"
-#include "registration/image_matching.hpp"
+#include "registration/matching/image_matching.hpp"
+#include "registration/pose/alignment.hpp"
 
 #include <Eigen/Eigenvalues>
 

@@ -14,8 +14,8 @@
 #include "registration/evaluation.hpp"
 #include "registration/field.hpp"
 #include "registration/gpu_warp.hpp"
+#include "registration/io/surface_points.hpp"
 #include "registration/pipeline.hpp"
-#include "registration/surface_points.hpp"
 #include "registration/warp.hpp"
 
 #include <algorithm>

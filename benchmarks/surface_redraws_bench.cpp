@@ -9,9 +9,9 @@
 #include "imaging/image_io.hpp"
 #include "meshing/mesher.hpp"
 #include "registration/evaluation.hpp"
-#include "registration/expected_error.hpp"
 #include "registration/field.hpp"
 #include "registration/pipeline.hpp"
+#include "registration/uncertainty/expected_error.hpp"
 
 #include <algorithm>
 #include <chrono>

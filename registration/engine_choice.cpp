@@ -1,4 +1,4 @@
-#include "registration/detail/engine_choice.hpp"
+#include "registration/engine_choice.hpp"
 
 #include "tled/engine_choice.hpp"
 

@@ -1,7 +1,7 @@
 #include "registration/evaluation.hpp"
 
 #include "core/errors.hpp"
-#include "registration/detail/percentile.hpp"
+#include "registration/evaluation/percentile.hpp"
 
 #include <algorithm>
 #include <cmath>

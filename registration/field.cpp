@@ -2,11 +2,11 @@
 
 #include "core/errors.hpp"
 #include "meshing/point_location.hpp"
-#include "registration/detail/continuation.hpp"
-#include "registration/detail/growth.hpp"
-#include "registration/detail/rasterisation.hpp"
-#include "registration/detail/row_inverse.hpp"
-#include "registration/detail/uninitialised.hpp"
+#include "registration/field/continuation.hpp"
+#include "registration/field/growth.hpp"
+#include "registration/field/rasterisation.hpp"
+#include "registration/field/row_inverse.hpp"
+#include "registration/field/uninitialised.hpp"
 
 #include <tbb/parallel_for.h>
 

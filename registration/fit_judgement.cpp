@@ -1,6 +1,6 @@
 #include "registration/detail/fit_judgement.hpp"
 
-#include "registration/detail/doubts.hpp"
+#include "registration/uncertainty/doubts.hpp"
 
 #include <Eigen/Cholesky>
 

@@ -1,6 +1,6 @@
 #include "registration/detail/fit_scalars.hpp"
 
-#include "registration/detail/doubts.hpp"
+#include "registration/uncertainty/doubts.hpp"
 
 #include <array>
 #include <cmath>

@@ -1,6 +1,6 @@
 #include "registration/detail/fit_search.hpp"
 
-#include "registration/detail/evidence.hpp"
+#include "registration/terms/term.hpp"
 
 #include <Eigen/LU>
 #include <nlopt.hpp>

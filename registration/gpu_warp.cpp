@@ -4,9 +4,9 @@
 #include "registration/gpu_warp.hpp"
 
 #include "core/errors.hpp"
-#include "registration/detail/gpu_warp_check.hpp"
-#include "registration/detail/gpu_warp_layout.hpp"
-#include "registration/detail/uninitialised.hpp"
+#include "registration/field/gpu_warp_check.hpp"
+#include "registration/field/gpu_warp_layout.hpp"
+#include "registration/field/uninitialised.hpp"
 #include "shaders/buffer.hpp"
 #include "shaders/catalogue.hpp"
 #include "shaders/program.hpp"

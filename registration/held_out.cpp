@@ -1,6 +1,6 @@
 #include "registration/detail/held_out.hpp"
 
-#include "registration/detail/loads.hpp"
+#include "registration/terms/stated_loads.hpp"
 
 #include <Eigen/Eigenvalues>
 

@@ -3,7 +3,7 @@
 #include "registration/parameter_fit.hpp"
 
 #include "registration/detail/fit_judgement.hpp"
-#include "registration/detail/stopwatch.hpp"
+#include "registration/stopwatch.hpp"
 
 #include <algorithm>
 #include <charconv>

@@ -1,10 +1,10 @@
 // Before the operation: label map → mesh → rest state → rest stiffness.
 
-#include "registration/detail/coarse_twin.hpp"
-#include "registration/detail/stopwatch.hpp"
-#include "registration/detail/surface_springs.hpp"
-#include "registration/detail/surroundings.hpp"
+#include "registration/loads/coarse_twin.hpp"
 #include "registration/pipeline.hpp"
+#include "registration/stopwatch.hpp"
+#include "registration/terms/anchors.hpp"
+#include "registration/terms/label_springs.hpp"
 
 #include "imaging/labels.hpp"
 

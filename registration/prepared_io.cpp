@@ -1,8 +1,8 @@
 #include "registration/prepared_io.hpp"
 
-#include "registration/detail/coarse_twin.hpp"
-#include "registration/detail/stored_model.hpp"
-#include "registration/detail/surroundings.hpp"
+#include "registration/io/stored_model.hpp"
+#include "registration/loads/coarse_twin.hpp"
+#include "registration/terms/anchors.hpp"
 
 #include "core/atomic_file.hpp"
 

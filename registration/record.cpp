@@ -1,6 +1,6 @@
 #include "registration/record.hpp"
 
-#include "registration/detail/stored_model.hpp"
+#include "registration/io/stored_model.hpp"
 
 #include "core/atomic_file.hpp"
 

@@ -3,16 +3,16 @@
 
 #include "registration/pipeline.hpp"
 
-#include "registration/detail/doubts.hpp"
-#include "registration/detail/engine_choice.hpp"
-#include "registration/detail/evidence_set.hpp"
-#include "registration/detail/ground.hpp"
-#include "registration/detail/load_finder.hpp"
-#include "registration/detail/loads.hpp"
-#include "registration/detail/pace.hpp"
-#include "registration/detail/rigid_part.hpp"
-#include "registration/detail/stopwatch.hpp"
-#include "registration/detail/surroundings.hpp"
+#include "registration/engine_choice.hpp"
+#include "registration/loads/load_finder.hpp"
+#include "registration/pace.hpp"
+#include "registration/pose/rigid_part.hpp"
+#include "registration/stopwatch.hpp"
+#include "registration/terms/anchors.hpp"
+#include "registration/terms/ground.hpp"
+#include "registration/terms/stated_loads.hpp"
+#include "registration/terms/terms.hpp"
+#include "registration/uncertainty/doubts.hpp"
 
 #include <algorithm>
 #include <cmath>

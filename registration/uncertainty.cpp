@@ -1,9 +1,9 @@
 #include "registration/uncertainty.hpp"
 
 #include "core/errors.hpp"
-#include "registration/detail/coarse_twin.hpp"
-#include "registration/detail/data_uncertainty.hpp"
-#include "registration/detail/pull.hpp"
+#include "registration/loads/coarse_twin.hpp"
+#include "registration/terms/pull.hpp"
+#include "registration/uncertainty/data_uncertainty.hpp"
 #include "tled/lifted_residual.hpp"
 
 #include <algorithm>

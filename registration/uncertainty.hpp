@@ -5,8 +5,8 @@
 #include "core/observer.hpp"
 #include "imaging/volume.hpp"
 #include "meshing/point_location.hpp"
-#include "registration/expected_error.hpp"
 #include "registration/pipeline.hpp"
+#include "registration/uncertainty/expected_error.hpp"
 #include "tled/discretisation_error.hpp"
 
 #include <Eigen/Core>

@@ -1,7 +1,7 @@
 #include "registration/warp.hpp"
 
 #include "core/errors.hpp"
-#include "registration/detail/uninitialised.hpp"
+#include "registration/field/uninitialised.hpp"
 
 #include <tbb/parallel_for.h>
 

@@ -2,7 +2,7 @@
 """Merges files that `tissuewarp calibrate` wrote of different phantoms, on machines of one kind, into one.
 
     scripts/merge_fronts.py --output fronts.json A.json B.json ...
-    scripts/merge_fronts.py --output registration/shipped_fronts.cpp A.json B.json ...   # the program's own figures
+    scripts/merge_fronts.py --output registration/dial/shipped_fronts.cpp A.json B.json ...   # the program's own figures
 
 So many calibrations can share a machine with many cores, each of one phantom on cores of its own. Medians are of the
 files' medians, 95th percentiles of all files; given one phantom each, that is what one calibration of all would write.
@@ -13,7 +13,7 @@ import statistics
 import sys
 from pathlib import Path
 
-CPP = '''#include "registration/detail/shipped_fronts.hpp"
+CPP = '''#include "registration/dial/shipped_fronts.hpp"
 
 namespace tissuewarp::registration::detail {
 

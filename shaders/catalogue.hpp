@@ -124,7 +124,7 @@ ProgramSource warp_rasterise_program();
 ProgramSource warp_image_program(WarpContinuation continuation, WarpTakes takes);
 ProgramSource warp_field_program(WarpContinuation continuation);
 
-/// Image matching (registration/detail/match_device.hpp), in the order of its passes: kernels match_*.comp.
+/// Image matching (registration/matching/gpu/match_device.hpp), in the order of its passes: kernels match_*.comp.
 /// SampleStill reads the fixed image where it lies.
 enum class MatchPass {
     Blur,

@@ -2,7 +2,7 @@
 /// Measuring what meshes cost and give on this machine.
 
 #include "core/observer.hpp"
-#include "registration/dial.hpp"
+#include "registration/dial/dial.hpp"
 #include "registration/pipeline.hpp"
 
 #include <cstdint>

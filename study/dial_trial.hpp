@@ -3,7 +3,7 @@
 /// budget and with an accuracy.
 
 #include "core/observer.hpp"
-#include "registration/dial.hpp"
+#include "registration/dial/dial.hpp"
 #include "registration/pipeline.hpp"
 
 #include <cstdint>

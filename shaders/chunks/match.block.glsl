@@ -1,4 +1,4 @@
-// Gives: blocks of one described image compared with places of another (registration/detail/block_cost.hpp).
+// Gives: blocks of one described image compared with places of another (registration/matching/blocks/block_cost.hpp).
 // Needs: match.
 
 /// A cost where too little is seen; costs are 0 to 1.

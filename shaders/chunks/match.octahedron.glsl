@@ -1,5 +1,5 @@
 // Gives: the six pairs of patches that hold all twelve edges of the octahedron of a voxel's neighbours: opposite edges
-// share a step (registration/detail/brick_descriptors.hpp, octahedron_edges()).
+// share a step (registration/matching/descriptors/brick_descriptors.hpp, octahedron_edges()).
 // Needs: match.
 
 /// The axes of a pair, and the direction along the second.

@@ -1,8 +1,8 @@
 // One invocation per cell: shift and information from the sums of its window (docs/method.md, section 11), the same as
-// forces_of() finds with double precision (registration/detail/dense_cells.cpp), along the axes of the grid.
+// forces_of() finds with double precision (registration/matching/dense/dense_cells.cpp), along the axes of the grid.
 // Needs: index, match, match.cells.
 
-// DenseForceRules of registration/detail/dense_cells.hpp.
+// DenseForceRules of registration/matching/dense/dense_cells.hpp.
 layout(location = 0) uniform float independent_share;
 layout(location = 1) uniform float least_square;
 layout(location = 2) uniform float least_deviation;
@@ -11,7 +11,7 @@ layout(location = 4) uniform float most_shift;
 
 layout(std430, binding = BINDING_MATCH_SOURCE) readonly buffer MatchWindows { float spread[]; };
 
-/// As registration/detail/gpu_match_layout.hpp has it: MatchForce.
+/// As registration/matching/gpu/gpu_match_layout.hpp has it: MatchForce.
 struct Force {
     int voxels, place[3];    // of the cell that count, and the sum of their places in it
     int alike, structure;   // Σ g1·g2 and Σ |g1|² + |g2|² over them

@@ -1,6 +1,6 @@
 // One workgroup per block: from the lowest of its candidates, by all rows, downhill to the lowest of 27 places until that
 // is the place itself; and the costs about it. Candidates are places that a first look puts lowest
-// (registration/detail/block_engine.hpp); of a way back there is one, where the block is expected.
+// (registration/matching/blocks/block_engine.hpp); of a way back there is one, where the block is expected.
 // Needs: index, match, match.block.
 //! define MOST_STEPS
 //! define MOST_CANDIDATES

@@ -2,7 +2,7 @@
 /// What calibration and trials of the dial do with a phantom alike.
 
 #include "registration/deformation.hpp"
-#include "registration/dial.hpp"
+#include "registration/dial/dial.hpp"
 #include "registration/evaluation.hpp"
 #include "registration/intraoperative.hpp"
 #include "study/phantom.hpp"

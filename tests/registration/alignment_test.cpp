@@ -1,5 +1,5 @@
 /// Rigid alignment of labels to known motions.
-#include "registration/alignment.hpp"
+#include "registration/pose/alignment.hpp"
 
 #include "imaging/filters.hpp"
 #include "tests/support/label_shapes.hpp"

@@ -1,6 +1,6 @@
 /// The cost of a block, row by row, against its plain definition; the parabola through its minimum.
-#include "registration/detail/block_cost.hpp"
-#include "registration/detail/quadratic_fit.hpp"
+#include "registration/matching/blocks/block_cost.hpp"
+#include "registration/matching/blocks/quadratic_fit.hpp"
 
 #include "tests/registration/textured_phantom.hpp"
 

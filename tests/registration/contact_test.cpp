@@ -1,9 +1,9 @@
 /// Rigid neighbours that the organ does not enter, and tissue that stays.
+#include "registration/terms/contact.hpp"
 #include "core/errors.hpp"
-#include "registration/detail/contact_evidence.hpp"
-#include "registration/detail/ground.hpp"
-#include "registration/detail/surroundings.hpp"
 #include "registration/prepared_io.hpp"
+#include "registration/terms/anchors.hpp"
+#include "registration/terms/ground.hpp"
 #include "tests/registration/shapes.hpp"
 #include "tests/support/temporary_folder.hpp"
 

@@ -1,10 +1,10 @@
 /// Sub-voxel boundaries from voxel labels, and interface nodes with their normals.
-#include "registration/correspondence.hpp"
+#include "registration/boundary/interfaces.hpp"
 
 #include "core/errors.hpp"
 
 #include "meshing/primitives.hpp"
-#include "registration/detail/matching.hpp"
+#include "registration/terms/label_matches.hpp"
 #include "tests/support/label_shapes.hpp"
 
 #include <gtest/gtest.h>

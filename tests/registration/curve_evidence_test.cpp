@@ -1,10 +1,10 @@
 /// Points along vessels as data: the pull across a line, the pose, the tissue that follows, and what says so.
-#include "registration/detail/curve_evidence.hpp"
+#include "registration/terms/curves.hpp"
 
 #include "core/errors.hpp"
-#include "registration/detail/curve_pose.hpp"
-#include "registration/expected_error.hpp"
 #include "registration/field.hpp"
+#include "registration/pose/curve_pose.hpp"
+#include "registration/uncertainty/expected_error.hpp"
 #include "tests/registration/numbers.hpp"
 #include "tests/registration/shapes.hpp"
 #include "tests/support/label_shapes.hpp"

@@ -1,5 +1,5 @@
 /// Distances between points along vessels and preoperative lines, both ways.
-#include "registration/curve_residual.hpp"
+#include "registration/evaluation/curve_residual.hpp"
 
 #include "core/errors.hpp"
 

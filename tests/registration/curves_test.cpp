@@ -1,8 +1,8 @@
 /// Files of centre lines, tangents along them, the nearest place on them, and curves that cannot be used.
-#include "registration/curves.hpp"
+#include "registration/io/curves.hpp"
 
 #include "core/errors.hpp"
-#include "registration/detail/curve_tree.hpp"
+#include "registration/search/curve_tree.hpp"
 #include "tests/registration/numbers.hpp"
 #include "tests/support/temporary_folder.hpp"
 

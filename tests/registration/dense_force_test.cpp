@@ -1,5 +1,5 @@
 /// Dense forces between a textured volume and what a known motion and another scanner make of it.
-#include "registration/detail/dense_force.hpp"
+#include "registration/matching/dense/dense_force.hpp"
 
 #include "registration/evaluation.hpp"
 #include "tests/registration/textured_phantom.hpp"

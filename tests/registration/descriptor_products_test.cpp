@@ -1,7 +1,7 @@
 /// Products of descriptors in vectors against plain loops.
-#include "registration/detail/descriptor_products.hpp"
+#include "registration/matching/dense/descriptor_products.hpp"
 
-#include "registration/detail/self_similarity.hpp"
+#include "registration/matching/descriptors/self_similarity.hpp"
 
 #include <gtest/gtest.h>
 

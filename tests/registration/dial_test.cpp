@@ -1,7 +1,7 @@
 /// Choosing a mesh by what was measured, and keeping a time.
-#include "registration/dial.hpp"
+#include "registration/dial/dial.hpp"
 #include "core/errors.hpp"
-#include "registration/fronts_io.hpp"
+#include "registration/dial/fronts_io.hpp"
 #include "registration/pipeline.hpp"
 #include "tests/support/label_shapes.hpp"
 

@@ -1,8 +1,8 @@
 // Scores by place: errors by depth and by distance to data, inverse consistency, and the residual of held-out data.
-#include "registration/inverse_consistency.hpp"
-#include "registration/label_surface.hpp"
-#include "registration/surface_residual.hpp"
-#include "registration/target_bins.hpp"
+#include "registration/boundary/label_surface.hpp"
+#include "registration/evaluation/inverse_consistency.hpp"
+#include "registration/evaluation/surface_residual.hpp"
+#include "registration/evaluation/target_bins.hpp"
 
 #include "core/errors.hpp"
 #include "shapes.hpp"

@@ -1,5 +1,5 @@
 #include "registration/evaluation.hpp"
-#include "registration/slicer_markups.hpp"
+#include "registration/io/slicer_markups.hpp"
 
 #include "core/errors.hpp"
 #include "shapes.hpp"

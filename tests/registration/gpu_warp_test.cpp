@@ -4,8 +4,8 @@
 #include "core/errors.hpp"
 #include "imaging/image_io.hpp"
 #include "meshing/mesher.hpp"
-#include "registration/detail/gpu_warp_check.hpp"
 #include "registration/field.hpp"
+#include "registration/field/gpu_warp_check.hpp"
 #include "registration/warp.hpp"
 #include "shapes.hpp"
 

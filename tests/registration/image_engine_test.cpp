@@ -1,12 +1,12 @@
 /// Dense forces on a device (Mesa's llvmpipe where there is no GPU) against their twin on the processor.
-#include "registration/detail/image_engine.hpp"
+#include "registration/matching/dense/image_engine.hpp"
 
 #include "core/errors.hpp"
 #include "imaging/filters.hpp"
-#include "registration/detail/block_search.hpp"
-#include "registration/detail/gpu_match_layout.hpp"
-#include "registration/detail/growth.hpp"
 #include "registration/evaluation.hpp"
+#include "registration/field/growth.hpp"
+#include "registration/matching/blocks/block_search.hpp"
+#include "registration/matching/gpu/gpu_match_layout.hpp"
 #include "tests/registration/textured_phantom.hpp"
 #include "tests/support/label_shapes.hpp"
 

@@ -1,5 +1,5 @@
 /// Blocks of a generated phantom found where a known deformation brought them.
-#include "registration/image_matching.hpp"
+#include "registration/matching/image_matching.hpp"
 
 #include "core/errors.hpp"
 #include "tests/registration/textured_phantom.hpp"

@@ -1,9 +1,9 @@
 /// Loads found by what data show of them.
-#include "registration/detail/ground.hpp"
-#include "registration/detail/load_finder.hpp"
-#include "registration/detail/rigid_part.hpp"
-#include "registration/detail/unknown_loads.hpp"
 #include "registration/field.hpp"
+#include "registration/loads/load_finder.hpp"
+#include "registration/loads/unknown_loads.hpp"
+#include "registration/pose/rigid_part.hpp"
+#include "registration/terms/ground.hpp"
 #include "registration/warp.hpp"
 #include "tests/support/label_shapes.hpp"
 

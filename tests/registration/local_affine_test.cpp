@@ -1,5 +1,5 @@
 /// Local fits in the lanes of vectors against one after the other.
-#include "registration/detail/local_affine.hpp"
+#include "registration/matching/consistency/local_affine.hpp"
 
 #include <Eigen/Cholesky>
 

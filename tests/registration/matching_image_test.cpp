@@ -1,7 +1,7 @@
 /// What block matching makes of an image, against plain definitions.
-#include "registration/detail/matching_image.hpp"
-#include "registration/detail/field_of_view.hpp"
-#include "registration/detail/local_affine.hpp"
+#include "registration/matching/descriptors/matching_image.hpp"
+#include "registration/matching/consistency/local_affine.hpp"
+#include "registration/matching/points/field_of_view.hpp"
 
 #include "tests/registration/textured_phantom.hpp"
 

@@ -1,5 +1,5 @@
 /// Points by cubes against a search through all of them.
-#include "registration/detail/near_points.hpp"
+#include "registration/search/near_points.hpp"
 
 #include <gtest/gtest.h>
 

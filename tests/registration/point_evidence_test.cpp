@@ -1,9 +1,9 @@
 /// Pairs of points as data, and what is expected of tissue that few data show.
-#include "registration/detail/point_evidence.hpp"
 #include "core/errors.hpp"
-#include "registration/detail/expected_error.hpp"
-#include "registration/detail/ground.hpp"
 #include "registration/field.hpp"
+#include "registration/terms/ground.hpp"
+#include "registration/terms/points.hpp"
+#include "registration/uncertainty/posterior_error.hpp"
 #include "tests/registration/shapes.hpp"
 #include "tests/support/label_shapes.hpp"
 

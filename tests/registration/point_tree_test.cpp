@@ -1,5 +1,5 @@
 /// The nearest of many points, beside a search of all of them.
-#include "registration/detail/point_tree.hpp"
+#include "registration/search/point_tree.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 /// Data inside elements against the same energy minimised as a dense system.
-#include "registration/detail/pull.hpp"
+#include "registration/terms/pull.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Dense>

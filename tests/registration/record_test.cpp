@@ -1,6 +1,6 @@
 /// Records and prepared models survive the disk bit by bit, and what is damaged or foreign is refused in words.
 #include "registration/record.hpp"
-#include "registration/detail/stored_model.hpp"
+#include "registration/io/stored_model.hpp"
 #include "registration/prepared_io.hpp"
 #include "tests/registration/shapes.hpp"
 

@@ -1,5 +1,5 @@
 /// Files of surface points, and points that cannot be used.
-#include "registration/surface_points.hpp"
+#include "registration/io/surface_points.hpp"
 
 #include "core/errors.hpp"
 #include "meshing/mesh_io.hpp"

@@ -1,12 +1,12 @@
 /// The posterior, and what is made of it.
 #include "registration/uncertainty.hpp"
 #include "core/errors.hpp"
-#include "registration/detail/coarse_twin.hpp"
-#include "registration/detail/data_uncertainty.hpp"
-#include "registration/detail/ground.hpp"
-#include "registration/detail/posterior.hpp"
-#include "registration/detail/unknown_loads.hpp"
 #include "registration/field.hpp"
+#include "registration/loads/coarse_twin.hpp"
+#include "registration/loads/unknown_loads.hpp"
+#include "registration/terms/ground.hpp"
+#include "registration/uncertainty/data_uncertainty.hpp"
+#include "registration/uncertainty/posterior.hpp"
 #include "tests/registration/shapes.hpp"
 #include "tests/support/label_shapes.hpp"
 

@@ -1,0 +1,124 @@
+#include "registration/loads/coarse_twin.hpp"
+
+#include "registration/search/point_tree.hpp"
+#include "registration/terms/pull.hpp"
+
+#include <utility>
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+constexpr int most_nodes_for_loads = 6000;
+
+PrepareOptions coarse_options(const PreparedModel& prepared, double edge_length) {
+    PrepareOptions options = prepared.options;
+    options.meshing.edge_length = edge_length;
+    options.meshing.label_edge_length.clear();
+    options.anchors.clear();  // among the springs
+    options.rigid_neighbours.clear();
+    return options;
+}
+
+/// Near, or as far outside as coarse meshes cut corners off.
+std::optional<meshing::Location> place_of(const meshing::PointLocator& locator, const Eigen::Vector3d& point) {
+    for (const double tolerance : {0.5, 1.0, 2.0, 4.0}) {
+        auto found = tolerance > 0.5 ? locator.find(point, tolerance) : locate_near(locator, point);
+        if (!found) continue;
+        found->barycentric = found->barycentric.cwiseMax(0.0);
+        found->barycentric /= found->barycentric.sum();
+        return found;
+    }
+    return std::nullopt;
+}
+
+std::vector<tled::Spring> moved(const std::vector<tled::Spring>& springs, const Eigen::Matrix3Xd& from,
+                                const meshing::TetMesh& to, const meshing::PointLocator& locator) {
+    std::vector<Pull> pulls;
+    for (const tled::Spring& spring : springs)
+        if (const auto at = place_of(locator, from.col(spring.node)))
+            pulls.push_back({*at, spring.target, spring.stiffness});
+    return lumped_springs(to, pulls, Eigen::Matrix3Xd::Zero(3, to.nodes.cols()));
+}
+
+double total(const std::vector<tled::Spring>& springs) {
+    double sum = 0;
+    for (const tled::Spring& spring : springs) sum += spring.stiffness.trace();
+    return sum;
+}
+
+/// On every interface node that of the nearest, all together as stiff as they were. Summed up, springs along normals
+/// that differ would hold a coarse mesh along its surface too.
+std::vector<tled::Spring> sampled(const std::vector<tled::Spring>& springs, const Eigen::Matrix3Xd& from,
+                                  const PreparedModel& to) {
+    if (springs.empty()) return {};
+    std::vector<Eigen::Vector3d> places;
+    places.reserve(springs.size());
+    for (const tled::Spring& spring : springs) places.emplace_back(from.col(spring.node));
+    const PointTree tree(places);
+    std::vector<tled::Spring> result;
+    for (const InterfaceNode& node : to.interfaces.nodes()) {
+        const tled::Spring& spring = springs[tree.nearest(to.model.mesh.nodes.col(node.node)).index];
+        result.push_back({node.node, spring.stiffness, spring.target});
+    }
+    const double share = total(springs) / total(result);
+    for (tled::Spring& spring : result) spring.stiffness *= share;
+    return result;
+}
+
+}  // namespace
+
+Eigen::MatrixXd carried(const meshing::TetMesh& from, const Eigen::MatrixXd& nodal, const Eigen::Matrix3Xd& to) {
+    const meshing::PointLocator locator(from);
+    const PointTree tree({from.nodes.colwise().begin(), from.nodes.colwise().end()});
+    Eigen::MatrixXd result(nodal.rows(), to.cols());
+    for (Eigen::Index p = 0; p < to.cols(); ++p) {
+        if (const auto at = place_of(locator, to.col(p))) {
+            result.col(p) = meshing::interpolate(from, nodal, *at);
+            continue;
+        }
+        result.col(p) = nodal.col(static_cast<Eigen::Index>(tree.nearest(to.col(p)).index));
+    }
+    return result;
+}
+
+PreparedModel coarse_model(const PreparedModel& prepared, double edge_length, Observer& observer) {
+    return prepare(prepared.labels, coarse_options(prepared, edge_length), observer);
+}
+
+bool loads_take_coarse_model(const PreparedModel& prepared) {
+    return prepared.rest.node_count > most_nodes_for_loads;
+}
+
+PreparedModel coarse_model_for_loads(const PreparedModel& prepared, Observer& observer) {
+    return coarse_model(prepared, suggested_edge_length_without_labels(prepared.labels), observer);
+}
+
+PreparedModel coarse_model_for_loads(const PreparedModel& prepared, meshing::TetMesh mesh, Observer& observer) {
+    const double edge_length = suggested_edge_length_without_labels(prepared.labels);
+    return prepare(std::move(mesh), prepared.labels, coarse_options(prepared, edge_length), observer);
+}
+
+LastPulls pulls_on(const PreparedModel& coarse, const PreparedModel& prepared, const LastPulls& given) {
+    const meshing::TetMesh& mesh = coarse.model.mesh;
+    const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
+    const meshing::PointLocator locator(mesh);
+    LastPulls pulls;
+    const bool labels = !given.holds.empty();
+    pulls.data = labels ? sampled(given.data, nodes, coarse) : moved(given.data, nodes, mesh, locator);
+    pulls.ground = moved(given.ground, nodes, mesh, locator);
+    pulls.supports = moved(given.supports, nodes, mesh, locator);
+    pulls.energy = given.energy;
+    pulls.free_placement = given.free_placement;
+    return pulls;
+}
+
+CoarseTwin coarse_twin(const PreparedModel& prepared, const UpdateResult& result, Observer& observer) {
+    PreparedModel coarse = coarse_model(prepared, suggested_edge_length(prepared.labels), observer);
+    LastPulls pulls = pulls_on(coarse, prepared, result.pulls);
+    Eigen::Matrix3Xd displacement =
+        carried(prepared.model.mesh, result.deformation.displacement, coarse.model.mesh.nodes);
+    return {std::move(coarse), std::move(pulls), std::move(displacement)};
+}
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,66 @@
+#include "registration/loads/load_finder.hpp"
+
+#include "registration/loads/coarse_twin.hpp"
+#include "registration/loads/unknown_loads.hpp"
+
+#include <utility>
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+Eigen::VectorXd forces_of(const std::vector<tled::Spring>& springs, Eigen::Index rows) {
+    Eigen::VectorXd forces = Eigen::VectorXd::Zero(rows);
+    for (const tled::Spring& spring : springs) forces.segment<3>(3 * spring.node) += spring.stiffness * spring.target;
+    return forces;
+}
+
+}  // namespace
+
+FoundLoads LoadFinder::find(LoadKind kind, const LastPulls& pulls, Observer& observer) {
+    if (!loads_take_coarse_model(prepared_)) return found(kind, prepared_, pulls);
+    const PreparedModel& coarse = twin(observer);
+    return found(kind, coarse, pulls_on(coarse, prepared_, pulls));
+}
+
+const PreparedModel& LoadFinder::twin(Observer& observer) {
+    if (prepared_.coarse) return *prepared_.coarse;
+    if (!twin_) twin_ = coarse_model_for_loads(prepared_, observer);
+    return *twin_;
+}
+
+std::pair<Eigen::MatrixXd, Eigen::MatrixXd> LoadFinder::loads(LoadKind kind, const PreparedModel& model) const {
+    const bool same = &model == &prepared_;
+    if (kind == LoadKind::Weight) {
+        Eigen::MatrixXd weights = unknown_weights(model);
+        return {weights, same ? weights : unknown_weights(prepared_)};
+    }
+    const PrincipalLoads principal = principal_loads(model, count_);
+    return {principal.loads, same ? principal.loads : loads_along(prepared_, principal.axes)};
+}
+
+const LoadFinder::Shapes& LoadFinder::shapes(LoadKind kind, const PreparedModel& model, const WeighedSprings& unseen) {
+    std::optional<Shapes>& shapes = shapes_[static_cast<std::size_t>(kind)];
+    if (!shapes) {
+        auto [fitted, applied] = loads(kind, model);
+        LoadShapes known(std::move(fitted), Posterior(model, unseen), unseen.energy);
+        Eigen::MatrixXd forces = known.scale() * applied;
+        shapes.emplace(Shapes{std::move(known), std::move(forces)});
+    }
+    return *shapes;
+}
+
+FoundLoads LoadFinder::found(LoadKind kind, const PreparedModel& model, const LastPulls& pulls) {
+    const WeighedSprings unseen{pulls.supports, pulls.ground, pulls.energy, pulls.free_placement};
+    WeighedSprings seen = unseen;
+    seen.data.insert(seen.data.end(), pulls.data.begin(), pulls.data.end());
+    const Shapes& of_kind = shapes(kind, model, unseen);
+    const Posterior posterior(model, seen);
+    const LoadFit fit(of_kind.known, posterior);
+    const Eigen::VectorXd shown = posterior.inverse(forces_of(pulls.data, 3 * Eigen::Index{model.rest.node_count}));
+    const double size = fit.likeliest_size(shown);
+    const Eigen::VectorXd forces = of_kind.forces * fit.coefficients(shown, size);
+    return {Eigen::Map<const Eigen::Matrix3Xd>(forces.data(), 3, forces.size() / 3), size};
+}
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,50 @@
+#pragma once
+/// The unknown loads of one model, kept ready from one update to the next.
+
+#include "registration/loads/load_fit.hpp"
+
+#include <array>
+#include <optional>
+#include <utility>
+
+namespace tissuewarp::registration::detail {
+
+struct FoundLoads {
+    Eigen::Matrix3Xd forces;  ///< on the model's nodes, 3 × N, mN
+    double size = 0;          ///< s of load_fit.hpp
+};
+
+/// What may act on the tissue.
+enum class LoadKind {
+    Smooth,  ///< body force, and tractions smooth over half the organ's radius
+    Weight   ///< body force alone
+};
+
+class LoadFinder {
+public:
+    /// `shapes` of smooth loads. The model outlives this.
+    LoadFinder(const PreparedModel& prepared, int shapes) : prepared_(prepared), count_(shapes) {}
+
+    /// The loads of this kind that data pulling like `pulls` tell. The prior's springs are the same in every call.
+    /// Those of a large model are found on its coarser one, which is made where prepare_loads did not. Throws
+    /// InvalidInput where the springs do not hold the tissue, Cancelled.
+    FoundLoads find(LoadKind kind, const LastPulls& pulls, Observer& observer);
+
+private:
+    const PreparedModel& prepared_;
+    int count_;
+    std::optional<PreparedModel> twin_;  // where it was not prepared
+    struct Shapes {
+        LoadShapes known;        // of the twin, or of the model
+        Eigen::MatrixXd forces;  // theirs on the model's nodes
+    };
+    std::array<std::optional<Shapes>, 2> shapes_;  // of each kind
+
+    [[nodiscard]] const PreparedModel& twin(Observer& observer);
+    /// On the model that they are found on, and the same on the model itself.
+    [[nodiscard]] std::pair<Eigen::MatrixXd, Eigen::MatrixXd> loads(LoadKind kind, const PreparedModel& model) const;
+    [[nodiscard]] const Shapes& shapes(LoadKind kind, const PreparedModel& model, const WeighedSprings& unseen);
+    [[nodiscard]] FoundLoads found(LoadKind kind, const PreparedModel& model, const LastPulls& pulls);
+};
+
+}  // namespace tissuewarp::registration::detail

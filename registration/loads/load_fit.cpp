@@ -1,0 +1,48 @@
+#include "registration/loads/load_fit.hpp"
+
+#include <Eigen/Eigenvalues>
+
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace tissuewarp::registration::detail {
+
+LoadShapes::LoadShapes(Eigen::MatrixXd loads, const Posterior& unseen, double energy)
+    : forces_(std::move(loads)), answers_(unseen.inverse(forces_)), energy_(energy) {
+    const double drawn = 0.5 * answers_.cwiseProduct(forces_).sum();
+    scale_ = std::sqrt(energy / drawn);
+    forces_ *= scale_;
+    answers_ *= scale_;
+}
+
+LoadFit::LoadFit(const LoadShapes& shapes, const Posterior& seen)
+    : shapes_(shapes), answers_(seen.inverse(shapes.forces_)) {
+    const Eigen::MatrixXd product = shapes.forces_.transpose() * (shapes.answers_ - answers_) / shapes.energy_;
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(0.5 * (product + product.transpose()));
+    axes_ = modes.eigenvectors();
+    information_ = modes.eigenvalues().cwiseMax(0.0);
+}
+
+double LoadFit::likeliest_size(const Eigen::VectorXd& shown) const {
+    constexpr int least = -6, most = 15;  // powers of √2: loads that strain tissue by nothing, and by far too much
+    const Eigen::ArrayXd b = axes_.transpose() * (shapes_.forces_.transpose() * shown) / shapes_.energy_;
+    double best = -std::numeric_limits<double>::infinity(), size = 0;
+    for (int power = least; power <= most; ++power) {
+        const double squared = std::pow(2.0, power);
+        const double evidence =
+            0.5 * (b.square() / (information_ + 1 / squared) - (1 + squared * information_).log()).sum();
+        if (evidence <= best) continue;
+        best = evidence;
+        size = std::sqrt(squared);
+    }
+    return size;
+}
+
+Eigen::MatrixXd LoadFit::coefficients(const Eigen::MatrixXd& shown, double size) const {
+    const Eigen::VectorXd variances = (information_ + 1 / (size * size)).inverse();
+    return axes_ *
+           (variances.asDiagonal() * (axes_.transpose() * (shapes_.forces_.transpose() * shown) / shapes_.energy_));
+}
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,54 @@
+#pragma once
+/// Loads that nobody stated, found by what they did to the tissue that data show: they move what no datum shows.
+///
+/// Loads f = B a are of smooth shapes B (unknown_loads), a of variance s²; beside what they do, tissue moves as strain
+/// energy lets it: u has the covariance ε K⁻¹ + s² K⁻¹ B Bᵀ K⁻¹, K the stiffness of tissue and prior. Data pull by
+/// springs K_d to where they show it, u₀ = (K + K_d)⁻¹ K_d t without loads. With u integrated out, a has the
+/// information M = Bᵀ (K⁻¹ − (K + K_d)⁻¹) B/ε and, of b = Bᵀ u₀/ε, the mean (M + s⁻²)⁻¹ b. s is the likeliest one: it
+/// maximises the evidence ½ bᵀ (M + s⁻²)⁻¹ b − ½ log det(1 + s² M) (MacKay, Neural Comput 4 (1992) 415). That unknown
+/// boundary loads reconstruct an organ from a part of its surface: Rucker et al., IEEE TMI 33 (2014) 147; Heiselman et
+/// al., IEEE TMI 39 (2020) 2223.
+
+#include "registration/uncertainty/posterior.hpp"
+
+#include <Eigen/Core>
+
+namespace tissuewarp::registration::detail {
+
+/// Shapes of loads and what they do to tissue that no data hold.
+class LoadShapes {
+public:
+    /// `loads` on the nodes, 3N × count, mN; `unseen` is of the prior's springs alone, `energy` is ε (mN mm).
+    LoadShapes(Eigen::MatrixXd loads, const Posterior& unseen, double energy);
+
+    /// B over the loads given, so that loads a of size s have the mean strain energy s² ε.
+    [[nodiscard]] double scale() const { return scale_; }
+
+private:
+    friend class LoadFit;
+    Eigen::MatrixXd forces_, answers_;  // B and K⁻¹ B, 3N × count, mN and mm
+    double energy_, scale_ = 1;         // ε, and B over what was given
+};
+
+class LoadFit {
+public:
+    /// `seen` is of the data's and the prior's springs; both outlive this.
+    LoadFit(const LoadShapes& shapes, const Posterior& seen);
+
+    /// The likeliest s where the data show the displacement u₀ (3N, mm).
+    [[nodiscard]] double likeliest_size(const Eigen::VectorXd& shown) const;
+
+    /// The mean of a under loads of size s, for each u₀ (3N × k, mm): count × k.
+    [[nodiscard]] Eigen::MatrixXd coefficients(const Eigen::MatrixXd& shown, double size) const;
+
+    /// What loads of these coefficients do to tissue that data hold, (K + K_d)⁻¹ B a, 3N × k, mm.
+    [[nodiscard]] Eigen::MatrixXd answers(const Eigen::MatrixXd& coefficients) const { return answers_ * coefficients; }
+
+private:
+    const LoadShapes& shapes_;
+    Eigen::MatrixXd answers_;     // (K + K_d)⁻¹ B
+    Eigen::MatrixXd axes_;        // eigenvectors of M
+    Eigen::ArrayXd information_;  // its eigenvalues
+};
+
+}  // namespace tissuewarp::registration::detail

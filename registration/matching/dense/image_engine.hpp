@@ -1,0 +1,48 @@
+#pragma once
+/// Where an intraoperative image is compared with the preoperative one: on the processor, or in shaders on a device.
+
+#include "meshing/point_location.hpp"
+#include "registration/matching/blocks/block_engine.hpp"
+#include "registration/matching/dense/dense_force.hpp"
+#include "registration/terms/term.hpp"
+
+#include <memory>
+
+namespace tissuewarp::registration::detail {
+
+/// What the fixed image says of a model in some state, asked again and again.
+class ImageEngine {
+public:
+    virtual ~ImageEngine() = default;
+
+    /// The intraoperative image of the calls that follow.
+    void set_fixed(const SeenImage& fixed) {
+        begin_fixed(fixed.image);
+        finish_fixed(fixed);
+    }
+    /// The same in two steps: what needs the image alone is begun before what it shows is known.
+    virtual void begin_fixed(const imaging::Volume& image) = 0;
+    virtual void finish_fixed(const SeenImage& fixed) = 0;
+    /// Forces on the moving grid of a level of the template, from the fixed image pulled back by the model's map
+    /// φ(X) = placement · (X + u(X)). Within eight voxels outside the mesh φ continues what lies next to it.
+    virtual DenseForces forces(const State& state, std::size_t level) = 0;
+    /// Looks for blocks in the fixed image.
+    virtual BlockEngine& blocks() = 0;
+};
+
+/// `prepared.image` is there, its template made of self-similarity descriptors; `prepared` outlives the engine.
+std::unique_ptr<ImageEngine> make_cpu_image_engine(const PreparedModel& prepared);
+
+/// The same in shaders; `gpu_index` as for shaders::Device. The descriptors differ from the processor's by rounding: by
+/// one of 255 steps in few channels. Throws GpuUnavailable when there is no device, the images do not fit onto it, or
+/// blocks are too large for its sums.
+std::unique_ptr<ImageEngine> make_gpu_image_engine(const PreparedModel& prepared, int gpu_index = -1);
+
+/// What updates from images share, one after the other: nothing that an image says.
+struct ImageTools {
+    std::unique_ptr<ImageEngine> engine;  ///< null where the template has no descriptors
+    meshing::PointLocator locator;        ///< in the model at rest
+    SeenMemory memory;                    ///< of the image in hand
+};
+
+}  // namespace tissuewarp::registration::detail

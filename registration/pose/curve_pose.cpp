@@ -1,0 +1,105 @@
+#include "registration/pose/curve_pose.hpp"
+
+#include <Eigen/Cholesky>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+constexpr double everywhere = std::numeric_limits<double>::infinity();
+
+Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
+    Eigen::Matrix3d matrix;
+    matrix << 0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0;
+    return matrix;
+}
+
+/// What one step sees of the lines: weights of the matches, and the middle and the radius of the places.
+struct Weighed {
+    std::vector<double> weights;
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+    double radius = 1;  // mm, so that turns count in mm
+    double mean_distance = 0;
+};
+
+Weighed weigh(const std::vector<CurveMatch>& matches, const CurvePoints& points, double scale) {
+    Weighed result;
+    double sum = 0, squared = 0;
+    for (std::size_t n = 0; n < matches.size(); ++n) {
+        const CurveMatch& match = matches[n];
+        const double weight =
+            match.found ? points.shares[static_cast<Eigen::Index>(n)] * robust_weight(match.hit.distance, scale) : 0.0;
+        result.weights.push_back(weight);
+        result.centre += weight * match.hit.point;
+        squared += weight * match.hit.point.squaredNorm();
+        result.mean_distance += weight * match.hit.distance;
+        sum += weight;
+    }
+    if (sum <= 0) return result;
+    result.centre /= sum;
+    result.mean_distance /= sum;
+    result.radius = std::sqrt(std::max(1.0, squared / sum - result.centre.squaredNorm()));
+    return result;
+}
+
+/// The small motion of the lines, in the moving frame: δ = (shift, turn · radius) of
+/// (Σ w JᵀJ + λ) δ = Σ w Jᵀ across with J = P [1, −[q − c]×/radius], P the projection across the line.
+Eigen::Isometry3d step(const std::vector<CurveMatch>& matches, const Weighed& weighed) {
+    constexpr double damping = 1e-4;  // of the mean eigenvalue: what the points do not tell does not move
+    Matrix6d normal = Matrix6d::Zero();
+    Vector6d right = Vector6d::Zero();
+    for (std::size_t n = 0; n < matches.size(); ++n) {
+        if (weighed.weights[n] <= 0) continue;
+        const CurveTree::Hit& hit = matches[n].hit;
+        const Eigen::Matrix3d projection = Eigen::Matrix3d::Identity() - hit.tangent * hit.tangent.transpose();
+        Eigen::Matrix<double, 3, 6> jacobian;
+        jacobian << projection, -projection * cross_matrix((hit.point - weighed.centre) / weighed.radius);
+        normal += weighed.weights[n] * jacobian.transpose() * jacobian;
+        right += weighed.weights[n] * jacobian.transpose() * matches[n].across;
+    }
+    normal.diagonal().array() += damping * normal.trace() / 6 + std::numeric_limits<double>::min();
+    const Vector6d delta = normal.ldlt().solve(right);
+    const Eigen::Vector3d turn = delta.tail<3>() / weighed.radius;
+    const Eigen::Vector3d shift = delta.head<3>();
+    const Eigen::AngleAxisd rotation(turn.norm(), turn.stableNormalized());
+    return Eigen::Translation3d(weighed.centre + shift) * rotation * Eigen::Translation3d(-weighed.centre);
+}
+
+}  // namespace
+
+double median_distance(const std::vector<CurveMatch>& matches) {
+    std::vector<double> distances;
+    for (const CurveMatch& match : matches)
+        if (match.found) distances.push_back(match.hit.distance);
+    if (distances.empty()) return everywhere;
+    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+    std::nth_element(distances.begin(), middle, distances.end());
+    return *middle;
+}
+
+Alignment closest_curve_pose(const CurveTree& lines, const CurvePoints& points, const Eigen::Isometry3d& start,
+                             double last_scale_mm, double max_angle_deg) {
+    constexpr int passes = 60;
+    constexpr double scale_ratio = 0.9;
+    Alignment result{start, 0};
+    double scale = 0;
+    for (int pass = 0; pass < passes; ++pass) {
+        const auto matches = match_curves(lines, points, result.placement, everywhere, max_angle_deg);
+        scale = pass == 0 ? 3 * median_distance(matches) : scale_ratio * scale;
+        scale = std::max(scale, last_scale_mm);
+        if (!std::isfinite(scale)) return result;
+        const Weighed weighed = weigh(matches, points, scale);
+        result.mean_distance_mm = weighed.mean_distance;
+        result.placement = result.placement * step(matches, weighed);
+    }
+    return result;
+}
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,19 @@
+#pragma once
+/// Where lines go through points when nothing bends.
+
+#include "registration/terms/curves.hpp"
+
+namespace tissuewarp::registration::detail {
+
+/// The rigid motion moving → fixed that minimises Σ share w ‖across‖², w = (s²/(s² + d²))² of the distance d of a point
+/// to its nearest line, by Gauss–Newton with the lines matched anew in every step (iterative closest points: Besl and
+/// McKay 1992, the distance to the line in place of that to a point). s falls to `last_scale_mm` from three times the
+/// median distance at `start`. What the points do not tell, such as a shift along a single straight line, stays as
+/// `start` has it.
+Alignment closest_curve_pose(const CurveTree& lines, const CurvePoints& points, const Eigen::Isometry3d& start,
+                             double last_scale_mm, double max_angle_deg);
+
+/// Median distance of the points that have a match; infinity where none has.
+double median_distance(const std::vector<CurveMatch>& matches);
+
+}  // namespace tissuewarp::registration::detail

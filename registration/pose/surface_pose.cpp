@@ -1,0 +1,235 @@
+#include "registration/pose/surface_pose.hpp"
+
+#include "registration/terms/term.hpp"
+
+#include <tbb/parallel_for.h>
+#include <Eigen/Cholesky>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+constexpr double least_cosine = 0.5;   // between the normals of a point and its triangle
+constexpr double same_pose_mm = 8;     // mean over the surface: poses closer than this are one
+constexpr double start_rotation = 25;  // degrees
+constexpr int start_places = 40;       // on the surface
+constexpr int coarse_points = 150, fine_points = 800;
+constexpr std::size_t finalists = 12;
+
+struct Pose {
+    Eigen::Isometry3d placement;
+    double cost = 1;
+};
+
+/// How one descent goes.
+struct Descent {
+    int points, steps;
+    double first_scale_mm, last_scale_mm;
+};
+
+class PoseSearch {
+public:
+    PoseSearch(const SurfaceTree& model, const meshing::SurfaceMesh& surface, const SurfaceData& data, double scale_mm)
+        : model_(model), surface_(surface), data_(data), scale_mm_(scale_mm) {
+        centre_ = surface.nodes.rowwise().mean();
+        radius_ = std::sqrt((surface.nodes.colwise() - centre_).colwise().squaredNorm().mean());
+    }
+
+    /// The headers' placement first.
+    [[nodiscard]] std::vector<Pose> starts() const {
+        std::vector<Pose> result{{Eigen::Isometry3d::Identity()}};
+        const Eigen::Index middle = middle_point();
+        const std::vector<int> places = spread_nodes();
+        const Eigen::Matrix3Xd normals = meshing::node_normals(surface_);
+        for (const Eigen::Matrix3d& rotation : start_rotations()) {
+            const Eigen::Vector3d facing = rotation.transpose() * mean_normal(middle);
+            for (const int place : places) {
+                const double cosine = facing.dot(normals.col(place));
+                if ((data_.oriented ? cosine : std::abs(cosine)) < least_cosine) continue;
+                Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();
+                placement.linear() = rotation;
+                placement.translation() = data_.points.col(middle) - rotation * surface_.nodes.col(place);
+                result.push_back({placement});
+            }
+        }
+        return result;
+    }
+
+    [[nodiscard]] Pose descend(Pose pose, const Descent& descent) const {
+        for (int step = 0; step < descent.steps; ++step) {
+            const double t = double(step) / std::max(1, descent.steps - 1);
+            const double scale = descent.first_scale_mm * std::pow(descent.last_scale_mm / descent.first_scale_mm, t);
+            if (!improve(pose.placement, scale, stride(descent.points))) break;
+        }
+        pose.cost = cost(pose.placement, stride(descent.points));
+        return pose;
+    }
+
+    /// Mean distance between two placements over the nodes, mm.
+    [[nodiscard]] double distance(const Pose& a, const Pose& b) const {
+        return ((a.placement * surface_.nodes) - (b.placement * surface_.nodes)).colwise().norm().mean();
+    }
+
+private:
+    const SurfaceTree& model_;
+    const meshing::SurfaceMesh& surface_;
+    const SurfaceData& data_;
+    double scale_mm_, radius_;
+    Eigen::Vector3d centre_;
+
+    [[nodiscard]] Eigen::Index stride(int points) const { return std::max<Eigen::Index>(1, data_.count() / points); }
+
+    [[nodiscard]] std::optional<SurfaceTree::Hit> match(const Eigen::Vector3d& point, const Eigen::Vector3d& normal,
+                                                        double scale) const {
+        return model_.closest(point, 4 * scale, {normal, least_cosine, data_.oriented});
+    }
+
+    [[nodiscard]] double cost(const Eigen::Isometry3d& placement, Eigen::Index stride) const {
+        const Eigen::Isometry3d back = placement.inverse();
+        double sum = 0, areas = 0;
+        for (Eigen::Index n = 0; n < data_.count(); n += stride) {
+            const auto hit = match(back * data_.points.col(n), back.linear() * data_.normals.col(n), scale_mm_);
+            const double squared = hit ? hit->distance * hit->distance : 0;
+            sum += data_.areas[n] * (hit ? squared / (squared + scale_mm_ * scale_mm_) : 1);
+            areas += data_.areas[n];
+        }
+        return sum / areas;
+    }
+
+    /// One Gauss–Newton step in the moving frame; false when it changes nothing any more or nothing is near.
+    bool improve(Eigen::Isometry3d& placement, double scale, Eigen::Index stride) const {
+        const Eigen::Isometry3d back = placement.inverse();
+        Eigen::Matrix<double, 6, 6> matrix = Eigen::Matrix<double, 6, 6>::Zero();
+        Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
+        double weights = 0;
+        for (Eigen::Index n = 0; n < data_.count(); n += stride) {
+            const Eigen::Vector3d point = back * data_.points.col(n), normal = back.linear() * data_.normals.col(n);
+            const auto hit = match(point, normal, scale);
+            if (!hit) continue;
+            const double sign = normal.dot(hit->normal) < 0 ? -1 : 1;
+            const Eigen::Vector3d between = (hit->normal + sign * normal).normalized();
+            const Eigen::Vector3d arm = 0.5 * (hit->point + point) - centre_;
+            Eigen::Matrix<double, 6, 1> row;
+            row << between, arm.cross(between) / radius_;
+            const double weight = data_.areas[n] * robust_weight(hit->distance, scale);
+            matrix += weight * row * row.transpose();
+            right += weight * between.dot(point - hit->point) * row;
+            weights += weight;
+        }
+        if (weights <= 0) return false;
+        constexpr double damping = 1e-3;  // of what the points do not show
+        matrix.diagonal().array() += damping * weights;
+        const Eigen::Matrix<double, 6, 1> step = matrix.ldlt().solve(right);
+        const Eigen::Vector3d rotation = step.tail<3>() / radius_;
+        Eigen::Isometry3d moved = Eigen::Isometry3d::Identity();
+        if (rotation.norm() > 0)
+            moved.linear() = Eigen::AngleAxisd(rotation.norm(), rotation.normalized()).toRotationMatrix();
+        moved.translation() = centre_ + step.head<3>() - moved.linear() * centre_;
+        placement = placement * moved;
+        placement.linear() = Eigen::Quaterniond(placement.linear()).normalized().toRotationMatrix();
+        return step.norm() > 1e-3;
+    }
+
+    /// The point closest to the coordinates' medians.
+    [[nodiscard]] Eigen::Index middle_point() const {
+        Eigen::Vector3d median;
+        for (int axis = 0; axis < 3; ++axis) {
+            const Eigen::RowVectorXd row = data_.points.row(axis);
+            std::vector<double> values(row.begin(), row.end());
+            const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+            std::nth_element(values.begin(), middle, values.end());
+            median[axis] = *middle;
+        }
+        Eigen::Index closest = 0;
+        (data_.points.colwise() - median).colwise().squaredNorm().minCoeff(&closest);
+        return closest;
+    }
+
+    /// Of the tenth of the points nearest to one, with the signs of its own normal.
+    [[nodiscard]] Eigen::Vector3d mean_normal(Eigen::Index middle) const {
+        const Eigen::RowVectorXd squared = (data_.points.colwise() - data_.points.col(middle)).colwise().squaredNorm();
+        std::vector<double> sorted(squared.begin(), squared.end());
+        const auto tenth = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 10);
+        std::nth_element(sorted.begin(), tenth, sorted.end());
+        Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+        for (Eigen::Index n = 0; n < data_.count(); ++n)
+            if (squared[n] <= *tenth) {
+                const double sign = data_.normals.col(n).dot(data_.normals.col(middle)) < 0 ? -1 : 1;
+                sum += data_.areas[n] * (data_.oriented ? 1 : sign) * data_.normals.col(n);
+            }
+        return sum.normalized();
+    }
+
+    /// Nodes far from each other: each the farthest from all before (Gonzalez 1985).
+    [[nodiscard]] std::vector<int> spread_nodes() const {
+        Eigen::Index node = 0;
+        std::vector<int> chosen;
+        Eigen::RowVectorXd nearest = Eigen::RowVectorXd::Constant(surface_.node_count(), 1e30);
+        for (int n = 0; n < std::min(start_places, surface_.node_count()); ++n) {
+            chosen.push_back(static_cast<int>(node));
+            nearest = nearest.cwiseMin((surface_.nodes.colwise() - surface_.nodes.col(node)).colwise().squaredNorm());
+            nearest.maxCoeff(&node);
+        }
+        return chosen;
+    }
+
+    /// None, and turns about the corners of an icosahedron.
+    [[nodiscard]] static std::vector<Eigen::Matrix3d> start_rotations() {
+        std::vector<Eigen::Matrix3d> rotations{Eigen::Matrix3d::Identity()};
+        const double golden = 0.5 * (1 + std::sqrt(5.0));
+        for (int axis = 0; axis < 3; ++axis)
+            for (const double a : {-1.0, 1.0})
+                for (const double b : {-golden, golden}) {
+                    Eigen::Vector3d corner = Eigen::Vector3d::Zero();
+                    corner[(axis + 1) % 3] = a;
+                    corner[(axis + 2) % 3] = b;
+                    rotations.emplace_back(
+                        Eigen::AngleAxisd(start_rotation * EIGEN_PI / 180, corner.normalized()).toRotationMatrix());
+                }
+        return rotations;
+    }
+};
+
+void descend_all(const PoseSearch& search, std::vector<Pose>& poses, const Descent& descent) {
+    tbb::parallel_for(std::size_t{0}, poses.size(),
+                      [&](std::size_t i) { poses[i] = search.descend(poses[i], descent); });
+    std::stable_sort(poses.begin(), poses.end(), [](const Pose& a, const Pose& b) { return a.cost < b.cost; });
+}
+
+/// The best ones, no two of them nearly the same.
+std::vector<Pose> distinct(const PoseSearch& search, const std::vector<Pose>& poses, std::size_t most) {
+    std::vector<Pose> kept;
+    for (const Pose& pose : poses) {
+        if (kept.size() == most) break;
+        const auto same = [&](const Pose& other) { return search.distance(pose, other) < same_pose_mm; };
+        if (std::none_of(kept.begin(), kept.end(), same)) kept.push_back(pose);
+    }
+    return kept;
+}
+
+}  // namespace
+
+SurfacePose search_surface_pose(const SurfaceTree& model, const meshing::SurfaceMesh& surface, const SurfaceData& data,
+                                const AlignmentOptions& options, Observer& observer) {
+    const double scale = std::max(options.trim_mm / 2, 3 * data.deviation_mm);
+    const PoseSearch search(model, surface, data, scale);
+    std::vector<Pose> poses = search.starts();
+    descend_all(search, poses, {coarse_points, 15, 6 * scale, 1.5 * scale});
+    observer.checkpoint("rigid alignment", 0.6);
+    poses = distinct(search, poses, finalists);
+    descend_all(search, poses, {fine_points, 40, 2 * scale, scale});
+    poses = distinct(search, poses, 2);
+    observer.checkpoint("rigid alignment", 1.0);
+    SurfacePose result{poses[0].placement, poses[0].cost, scale};
+    if (poses.size() > 1) {
+        result.rival_cost = poses[1].cost;
+        result.rival_mm = search.distance(poses[0], poses[1]);
+    }
+    return result;
+}
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,75 @@
+#include "registration/terms/contact.hpp"
+
+#include <algorithm>
+#include <map>
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+constexpr double tolerance_mm = 0.05;  // of a gap
+
+}  // namespace
+
+ContactEvidence::ContactEvidence(const PreparedModel& prepared, double energy)
+    : prepared_(prepared), distance_(prepared.neighbours->distance) {
+    constexpr double deviation_mm = 0.1, independent_area = 100.0;  // mm², as of the ground
+    stiffness_ = energy / (deviation_mm * deviation_mm) / independent_area;
+    std::map<int, double> areas;
+    for (const InterfaceNode& node : prepared.interfaces.nodes())
+        if (node.outer == 0) areas[node.node] += node.area;
+    for (const auto& [node, area] : areas) {
+        const double depth = -distance_.value(prepared.model.mesh.nodes.col(node));
+        nodes_.push_back({node, area, std::max(0.0, depth)});
+    }
+}
+
+ContactEvidence::Gap ContactEvidence::gap(const SurfaceNode& node, const State& state) const {
+    const Eigen::Vector3d place = prepared_.model.mesh.nodes.col(node.node) + state.displacement.col(node.node);
+    const auto [distance, gradient] = distance_.value_and_gradient(place);
+    return {distance + node.rest_depth, gradient.normalized()};
+}
+
+Contribution ContactEvidence::contribution(const RoundPlan& plan, const State& state) const {
+    Contribution result;
+    for (const SurfaceNode& node : nodes_) {
+        if (!node.touches) continue;
+        const Gap here = gap(node, state);
+        const double step = std::clamp(node.push - here.distance, -plan.most_step_mm, plan.most_step_mm);
+        result.conditions.springs.push_back({node.node, stiffness_ * node.area * here.normal * here.normal.transpose(),
+                                             state.displacement.col(node.node) + step * here.normal});
+    }
+    return result;
+}
+
+bool ContactEvidence::follow(const State& solved) {
+    bool entered = false;
+    for (SurfaceNode& node : nodes_) {
+        const double distance = gap(node, solved).distance;
+        if (node.touches) {
+            node.push = std::max(0.0, node.push - distance);
+            node.touches = node.push > 0;
+        } else if (distance < -tolerance_mm) {
+            node.touches = entered = true;
+        }
+    }
+    return entered;
+}
+
+bool ContactEvidence::settled(const State& state) const {
+    return std::all_of(nodes_.begin(), nodes_.end(), [&](const SurfaceNode& node) {
+        const double distance = gap(node, state).distance;
+        return distance > -tolerance_mm && (!node.touches || distance < tolerance_mm);
+    });
+}
+
+ContactFit ContactEvidence::fit(const State& state) const {
+    ContactFit fit;
+    for (const SurfaceNode& node : nodes_) {
+        fit.touching += node.touches;
+        fit.deepest_mm = std::max(fit.deepest_mm, -gap(node, state).distance);
+    }
+    return fit;
+}
+
+}  // namespace tissuewarp::registration::detail

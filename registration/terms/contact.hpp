@@ -1,0 +1,56 @@
+#pragma once
+/// Rigid neighbours that the organ's surface does not enter.
+
+#include "registration/terms/term.hpp"
+
+#include "imaging/sampling.hpp"
+
+#include <vector>
+
+namespace tissuewarp::registration::detail {
+
+/// Unilateral contact of surface nodes without friction, by the augmented Lagrangian with an active set [Simo and
+/// Laursen 1992]. The gap g of a node is its distance to the neighbours, plus how deep it lay in them at rest, so that
+/// nothing moves an organ that did not move. Where a node touches, a spring of stiffness k along the normal alone draws
+/// g to the push s, and s becomes max(0, s − g) after every equilibrium: k s is the pressure that then holds with g =
+/// 0, whatever k is. A node comes off where its spring would have to hold it back.
+class ContactEvidence {
+public:
+    /// `energy` is the strain energy (mN mm) that weighs as much as one standard deviation. Precondition: the model has
+    /// neighbours.
+    ContactEvidence(const PreparedModel& prepared, double energy);
+
+    /// Springs on the nodes that touch, from where they are.
+    [[nodiscard]] Contribution contribution(const RoundPlan& plan, const State& state) const;
+
+    /// Takes note of an equilibrium under the springs of `contribution`: pushes, nodes that came off, and nodes that
+    /// entered a neighbour. Whether there are such: then the equilibrium is to be sought again from where it started.
+    bool follow(const State& solved);
+
+    /// Whether contact is in balance: no node lies deeper than 0.05 mm in a neighbour, and none is held back.
+    [[nodiscard]] bool settled(const State& state) const;
+
+    [[nodiscard]] ContactFit fit(const State& state) const;
+
+private:
+    struct SurfaceNode {
+        int node = -1;
+        double area = 0;        // mm²
+        double rest_depth = 0;  // mm
+        bool touches = false;
+        double push = 0;  // mm
+    };
+    struct Gap {
+        double distance = 0;                               // mm, negative within a neighbour
+        Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // unit, away from it
+    };
+
+    const PreparedModel& prepared_;
+    imaging::LinearSampler distance_;
+    double stiffness_;  // kPa/mm
+    std::vector<SurfaceNode> nodes_;
+
+    [[nodiscard]] Gap gap(const SurfaceNode& node, const State& state) const;
+};
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,207 @@
+#include "registration/terms/curves.hpp"
+
+#include "registration/io/curves.hpp"
+#include "registration/pose/curve_pose.hpp"
+#include "registration/uncertainty/doubts.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+constexpr Eigen::Index most_points = 20000;
+constexpr int chord_reach = 2;  // samples to either side of a segment
+
+/// Every k-th, so that no more than `most_points` are left.
+std::vector<Eigen::Index> thinned(Eigen::Index count) {
+    const Eigen::Index stride = (count + most_points - 1) / most_points;
+    std::vector<Eigen::Index> kept;
+    for (Eigen::Index n = 0; n < count; n += stride) kept.push_back(n);
+    return kept;
+}
+
+using Cell = std::array<long long, 3>;
+
+Cell cell_of(const Eigen::Vector3d& point, double side) {
+    const Eigen::Array3d cell = (point / side).array().floor();
+    return {static_cast<long long>(cell[0]), static_cast<long long>(cell[1]), static_cast<long long>(cell[2])};
+}
+
+/// One over the number of points within half a piece, themselves included.
+Eigen::VectorXd shares(const Eigen::Matrix3Xd& points, double piece_mm) {
+    const double reach = piece_mm / 2;
+    std::map<Cell, std::vector<Eigen::Index>> cells;
+    for (Eigen::Index n = 0; n < points.cols(); ++n) cells[cell_of(points.col(n), reach)].push_back(n);
+    Eigen::VectorXd result(points.cols());
+    for (Eigen::Index n = 0; n < points.cols(); ++n) {
+        const Cell at = cell_of(points.col(n), reach);
+        int together = 0;
+        for (int k = 0; k < 27; ++k) {
+            const auto found = cells.find({at[0] + k % 3 - 1, at[1] + k / 3 % 3 - 1, at[2] + k / 9 - 1});
+            if (found == cells.end()) continue;
+            for (const Eigen::Index other : found->second)
+                together += (points.col(other) - points.col(n)).norm() <= reach;
+        }
+        result[n] = 1.0 / together;
+    }
+    return result;
+}
+
+CurvePoints made_ready(const Curves& curves, const CurveOptions& options) {
+    require_usable(curves);
+    const std::vector<Eigen::Index> kept = thinned(curves.fixed.cols());
+    CurvePoints data;
+    data.points = curves.fixed(Eigen::all, kept);
+    data.tangents = Eigen::Matrix3Xd::Zero(3, data.count());
+    if (curves.tangents.cols() > 0) data.tangents = curves.tangents(Eigen::all, kept);
+    data.shares = shares(data.points, options.piece_mm);
+    data.deviation_mm = curves.deviation_mm;
+    return data;
+}
+
+}  // namespace
+
+std::vector<CurveMatch> match_curves(const CurveTree& lines, const CurvePoints& points,
+                                     const Eigen::Isometry3d& placement, double reach_mm, double max_angle_deg) {
+    const Eigen::Isometry3d back = placement.inverse();
+    const double least_cosine = std::cos(max_angle_deg * EIGEN_PI / 180);
+    std::vector<CurveMatch> result(static_cast<std::size_t>(points.count()));
+    tbb::parallel_for(std::size_t{0}, result.size(), [&](std::size_t n) {
+        const auto column = static_cast<Eigen::Index>(n);
+        const Eigen::Vector3d point = back * points.points.col(column);
+        const auto hit = lines.nearest(point, reach_mm, {back.linear() * points.tangents.col(column), least_cosine});
+        if (!hit) return;
+        const Eigen::Vector3d away = point - hit->point;
+        result[n] = {true, *hit, away - hit->tangent * hit->tangent.dot(away)};
+    });
+    return result;
+}
+
+CurveEvidence::CurveEvidence(const PreparedModel& prepared, const Curves& curves, const CurveOptions& options,
+                             double energy)
+    : prepared_(prepared), options_(options), energy_(energy), data_(made_ready(curves, options)) {
+    take_lines(curves.moving);
+}
+
+void CurveEvidence::take_lines(const std::vector<Eigen::Matrix3Xd>& lines) {
+    const meshing::PointLocator locator(prepared_.model.mesh);
+    std::vector<Eigen::Vector3d> samples;
+    for (const Eigen::Matrix3Xd& line : lines) {
+        int first = static_cast<int>(samples.size());
+        const Eigen::Matrix3Xd places = evenly_along(line, options_.step_mm);
+        for (const auto& place : places.colwise()) {
+            if (const auto at = locate_near(locator, place)) {
+                samples.emplace_back(place);
+                places_.push_back(*at);
+                continue;
+            }
+            join_samples(first, static_cast<int>(samples.size()));
+            first = static_cast<int>(samples.size());
+        }
+        join_samples(first, static_cast<int>(samples.size()));
+    }
+    if (segments_.empty())
+        throw InvalidInput("none of the " + std::to_string(lines.size()) +
+                           " moving curves to register to lies in the model; coordinates must be LPS mm of the moving "
+                           "image: for RAS, negate x and y");
+    samples_.resize(3, static_cast<Eigen::Index>(samples.size()));
+    for (std::size_t s = 0; s < samples.size(); ++s) samples_.col(static_cast<Eigen::Index>(s)) = samples[s];
+}
+
+/// Segments of the run of samples from `first` to before `last`.
+void CurveEvidence::join_samples(int first, int last) {
+    for (int n = first; n + 1 < last; ++n)
+        segments_.push_back({{n, n + 1}, {std::max(first, n - chord_reach), std::min(last - 1, n + 1 + chord_reach)}});
+}
+
+CurveTree CurveEvidence::deformed_lines(const State& state) const {
+    Eigen::Matrix3Xd places = samples_;
+    for (std::size_t s = 0; s < places_.size(); ++s)
+        places.col(static_cast<Eigen::Index>(s)) +=
+            displacement_at(prepared_.model.mesh, state.displacement, places_[s]);
+    return {std::move(places), segments_};
+}
+
+std::vector<CurveMatch> CurveEvidence::matches(const State& state, double reach_mm) const {
+    return match_curves(deformed_lines(state), data_, state.placement, reach_mm, options_.max_angle_deg);
+}
+
+Alignment CurveEvidence::align(const Eigen::Isometry3d& start) const {
+    constexpr double bending_mm = 5;  // what a rigid motion does not follow
+    return closest_curve_pose({samples_, segments_}, data_, start, bending_mm + final_scale_mm(),
+                              options_.max_angle_deg);
+}
+
+/// A place (1 − α) a + α b on a segment moves with both ends: K (1 − α) at a and K α at b, each drawn by the same way,
+/// have its force, and a stiffness not below its (Jensen's inequality, as in lumped_springs).
+void CurveEvidence::add_pulls(const CurveMatch& match, double stiffness, const State& state, double most_step_mm,
+                              std::vector<Pull>& pulls) const {
+    const Eigen::Vector3d& tangent = match.hit.tangent;
+    const Eigen::Matrix3d across = stiffness * (Eigen::Matrix3d::Identity() - tangent * tangent.transpose());
+    const double step = std::min(1.0, most_step_mm / std::max(match.across.norm(), 1e-9));
+    const Segment& segment = segments_[static_cast<std::size_t>(match.hit.segment)];
+    const std::array<double, 2> parts{1 - match.hit.along, match.hit.along};
+    for (std::size_t end = 0; end < 2; ++end) {
+        if (parts[end] <= 0) continue;
+        const meshing::Location& at = places_[static_cast<std::size_t>(segment.ends[end])];
+        const Eigen::Vector3d now = displacement_at(prepared_.model.mesh, state.displacement, at);
+        pulls.push_back({at, now + step * match.across, parts[end] * across});
+    }
+}
+
+/// No match counts as held back by the step bound, for which the round would be repeated: among few points outliers
+/// alone would repeat it for ever. The inlier share says in the end what was not reached.
+Contribution CurveEvidence::contribution(const RoundPlan& plan, const State& state) {
+    constexpr double scale_ratio = 0.6;  // from round to round
+    const double reach = std::max(4 * final_scale_mm(), 3 * plan.range_mm);
+    const std::vector<CurveMatch> found = matches(state, reach);
+    if (plan.number == 0) first_scale_mm_ = 3 * median_distance(found);
+    if (!std::isfinite(first_scale_mm_))
+        throw InvalidInput("no intraoperative point along vessels lies within " + to_text(reach) +
+                           " mm of the preoperative curves; check the frame and the unit of the points");
+    const double scale =
+        plan.last ? final_scale_mm() : std::max(final_scale_mm(), first_scale_mm_ * std::pow(scale_ratio, plan.number));
+    const double stiffness = energy_ / (data_.deviation_mm * data_.deviation_mm);
+    Contribution result;
+    std::vector<Pull> pulls;
+    double weights = 0;
+    for (std::size_t n = 0; n < found.size(); ++n) {
+        const CurveMatch& match = found[n];
+        if (!match.found) continue;
+        ++result.matched;
+        const double share = data_.shares[static_cast<Eigen::Index>(n)];
+        const double weight = share * robust_weight(match.hit.distance, scale);
+        add_pulls(match, weight * stiffness, state, plan.most_step_mm, pulls);
+        result.mean_residual_mm += weight * match.across.norm();
+        weights += weight;
+    }
+    if (weights > 0) result.mean_residual_mm /= weights;
+    result.candidates = static_cast<int>(found.size());
+    result.conditions.springs = lumped_springs(prepared_.model.mesh, pulls, state.displacement);
+    return result;
+}
+
+CurveFit CurveEvidence::fit(const State& state) const {
+    CurveFit fit;
+    fit.points = static_cast<int>(data_.count());
+    double squared = 0;
+    int inliers = 0;
+    for (const CurveMatch& match : matches(state, final_scale_mm())) {
+        if (!match.found) continue;
+        ++inliers;
+        squared += match.across.squaredNorm();
+    }
+    fit.inlier_share = inliers / double(fit.points);
+    fit.residual_mm = inliers > 0 ? std::sqrt(squared / inliers) : final_scale_mm();
+    for (const Segment& segment : segments_)
+        fit.length_mm += (samples_.col(segment.ends[1]) - samples_.col(segment.ends[0])).norm();
+    return fit;
+}
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,67 @@
+#pragma once
+/// Points along vessels: the preoperative centre lines go through them, at a place along the line that is left open.
+
+#include "registration/search/curve_tree.hpp"
+#include "registration/terms/pull.hpp"
+#include "registration/terms/term.hpp"
+
+#include <vector>
+
+namespace tissuewarp::registration::detail {
+
+/// A point of the fixed frame and the nearest place on the lines, as the model has them.
+struct CurveMatch {
+    bool found = false;
+    CurveTree::Hit hit;                                ///< moving frame
+    Eigen::Vector3d across = Eigen::Vector3d::Zero();  ///< from the line to the point, normal to the line, mm
+};
+
+/// The points made ready, fixed frame.
+struct CurvePoints {
+    Eigen::Matrix3Xd points, tangents;  ///< 3 × P, LPS mm; unit, or 0 where not known
+    Eigen::VectorXd shares;             ///< P: 1 over the number of points that say one thing together
+    double deviation_mm = 1;
+
+    [[nodiscard]] Eigen::Index count() const { return points.cols(); }
+};
+
+/// Every point with its nearest place within `reach_mm`, where the tangents agree within an angle.
+std::vector<CurveMatch> match_curves(const CurveTree& lines, const CurvePoints& points,
+                                     const Eigen::Isometry3d& placement, double reach_mm, double max_angle_deg);
+
+class CurveEvidence {
+public:
+    /// `energy` is the strain energy (mN mm) that weighs as much as one standard deviation. Throws InvalidInput for
+    /// curves that cannot be used, and where no line lies in the model.
+    CurveEvidence(const PreparedModel& prepared, const Curves& curves, const CurveOptions& options, double energy);
+
+    /// The rigid placement that brings most points to the lines at rest, the nearest to `start`.
+    [[nodiscard]] Alignment align(const Eigen::Isometry3d& start) const;
+
+    /// Pulls on the tissue of the lines, across them alone. The scale of the robust weights falls from three times the
+    /// median distance in the first round. Throws InvalidInput when no point lies near a line.
+    [[nodiscard]] Contribution contribution(const RoundPlan& plan, const State& state);
+
+    /// How the lines of the model go through the points.
+    [[nodiscard]] CurveFit fit(const State& state) const;
+
+private:
+    const PreparedModel& prepared_;
+    const CurveOptions& options_;
+    double energy_;  // mN mm
+    CurvePoints data_;
+    Eigen::Matrix3Xd samples_;               // of the lines, those in the model, moving frame
+    std::vector<meshing::Location> places_;  // of the samples
+    std::vector<Segment> segments_;          // between them
+    double first_scale_mm_ = 0;              // of the robust weights
+
+    void take_lines(const std::vector<Eigen::Matrix3Xd>& lines);
+    void join_samples(int first, int last);
+    [[nodiscard]] double final_scale_mm() const { return options_.outlier_deviations * data_.deviation_mm; }
+    [[nodiscard]] CurveTree deformed_lines(const State& state) const;
+    [[nodiscard]] std::vector<CurveMatch> matches(const State& state, double reach_mm) const;
+    void add_pulls(const CurveMatch& match, double stiffness, const State& state, double most_step_mm,
+                   std::vector<Pull>& pulls) const;
+};
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,21 @@
+#include "registration/terms/stated_loads.hpp"
+
+namespace tissuewarp::registration::detail {
+
+Eigen::Matrix3Xd nodal_forces(const PreparedModel& prepared, const TissueLoads& loads) {
+    if (!loads.body_force.allFinite() || !std::isfinite(loads.pressure_kpa))
+        throw InvalidInput("the loads on the tissue are not finite; give numbers of kPa/mm and kPa");
+    const meshing::TetMesh& mesh = prepared.model.mesh;
+    Eigen::Matrix3Xd forces = loads.body_force * (prepared.rest.lumped_mass / prepared.model.density).transpose();
+    if (loads.pressure_kpa == 0) return forces;
+    for (const meshing::InterfaceFace& face : meshing::interface_faces(mesh)) {
+        if (face.outer != 0) continue;
+        const Eigen::Vector3d a = mesh.nodes.col(face.nodes[0]), b = mesh.nodes.col(face.nodes[1]),
+                              c = mesh.nodes.col(face.nodes[2]);
+        const Eigen::Vector3d outward = 0.5 * (b - a).cross(c - a);  // mm²
+        for (const int node : face.nodes) forces.col(node) -= loads.pressure_kpa / 3 * outward;
+    }
+    return forces;
+}
+
+}  // namespace tissuewarp::registration::detail

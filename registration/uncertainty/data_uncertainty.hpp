@@ -1,0 +1,39 @@
+#pragma once
+/// What data and tissue leave open: part of the error estimate.
+
+#include "registration/uncertainty/expected_error.hpp"
+#include "registration/uncertainty/posterior.hpp"
+
+#include <Eigen/Core>
+
+#include <cstdint>
+#include <optional>
+
+namespace tissuewarp::registration::detail {
+
+/// Where the data left more than this share of the bending that unknown loads make they say next to nothing.
+constexpr double shown_below = 0.9;
+
+/// With the springs of the last round, and with those of the prior alone.
+struct Posteriors {
+    WeighedSprings springs;
+    Posterior seen, unseen;
+    bool points_alone = false;  ///< neither labels nor an image show the organ as a whole
+};
+
+/// Throws InvalidInput where the springs do not hold the tissue, SolverFailure without memory for the factors.
+Posteriors posteriors_of(const PreparedModel& prepared, const LastPulls& pulls);
+
+/// At the nodes.
+struct DataUncertainty {
+    Eigen::Matrix<double, 6, Eigen::Dynamic> covariance;  ///< 6 × N mm²: xx, yy, zz, xy, xz, yz
+    Eigen::VectorXd unexplained;  ///< N: part of the variance of bending under unknown loads that the data leave
+    std::optional<ExpectedError> expected;  ///< where points alone show the organ
+};
+
+/// Of `samples` unknown loads as large as `displacement` (3 × N, mm) tells, and of the noise of the data. The same seed
+/// gives the same.
+DataUncertainty data_uncertainty(const PreparedModel& prepared, const Posteriors& posteriors,
+                                 const Eigen::Matrix3Xd& displacement, int samples, std::uint64_t seed);
+
+}  // namespace tissuewarp::registration::detail

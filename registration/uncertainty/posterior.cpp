@@ -1,0 +1,90 @@
+#include "registration/uncertainty/posterior.hpp"
+
+#include "registration/pose/rigid_part.hpp"
+
+#include <Eigen/Eigenvalues>
+
+#include <cmath>
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+/// Motions of the organ as a whole that no datum shows, such as one along a straight vessel, are known no worse: their
+/// variance stays finite.
+constexpr double least_known_mm = 100;
+
+using Columns = Eigen::MatrixXd;  // 3N × k, nodes' vectors one after the other
+
+tled::RestStiffness stiffness_with(const PreparedModel& prepared, const WeighedSprings& springs) {
+    tled::Conditions all;
+    all.springs = springs.data;
+    all.springs.insert(all.springs.end(), springs.ground.begin(), springs.ground.end());
+    return {prepared.rest, tled::nodal_conditions(all, prepared.rest.node_count), prepared.stiffness};
+}
+
+Columns times(const std::vector<tled::Spring>& springs, const Columns& vectors) {
+    Columns result = Columns::Zero(vectors.rows(), vectors.cols());
+    for (const tled::Spring& spring : springs)
+        result.middleRows<3>(3 * spring.node) += spring.stiffness * vectors.middleRows<3>(3 * spring.node);
+    return result;
+}
+
+/// Unit forces at nodes along the axes, 3N × 3 per node.
+Columns unit_forces(const std::vector<int>& nodes, Eigen::Index rows) {
+    Columns forces = Columns::Zero(rows, 3 * static_cast<Eigen::Index>(nodes.size()));
+    for (Eigen::Index k = 0; k < forces.cols(); ++k) forces(3 * nodes[static_cast<std::size_t>(k / 3)] + k % 3, k) = 1;
+    return forces;
+}
+
+/// Of a symmetric matrix whose eigenvalues are to be no smaller than `least`.
+Columns bounded_inverse(const Columns& matrix, double least) {
+    const Eigen::SelfAdjointEigenSolver<Columns> modes(matrix);
+    return modes.eigenvectors() * modes.eigenvalues().cwiseMax(least).cwiseInverse().asDiagonal() *
+           modes.eigenvectors().transpose();
+}
+
+}  // namespace
+
+Posterior::Posterior(const PreparedModel& prepared, const WeighedSprings& springs)
+    : Posterior(prepared, springs, stiffness_with(prepared, springs)) {}
+
+std::pair<Posterior, Posterior> Posterior::both(const PreparedModel& prepared, const WeighedSprings& first,
+                                                const WeighedSprings& second) {
+    tled::RestStiffness one = stiffness_with(prepared, first), other = stiffness_with(prepared, second);
+    tled::factorise_together(one, other);
+    return {Posterior(prepared, first, std::move(one)), Posterior(prepared, second, std::move(other))};
+}
+
+Posterior::Posterior(const PreparedModel& prepared, const WeighedSprings& springs, tled::RestStiffness stiffness)
+    : stiffness_(std::move(stiffness)),
+      rows_(3 * Eigen::Index(prepared.rest.node_count)),
+      energy_(springs.energy),
+      freed_(rows_, 0) {
+    if (!springs.free_placement) return;
+    const Columns motions = rigid_motions(prepared.model.mesh.nodes), held = times(springs.ground, motions);
+    freed_ = stiffness_.solve_columns(held);
+    middle_ = bounded_inverse(motions.transpose() * held - held.transpose() * freed_,
+                              energy_ / (least_known_mm * least_known_mm));
+}
+
+std::vector<Eigen::Matrix3d> Posterior::covariances(const std::vector<int>& nodes) const {
+    const Columns answers = stiffness_.solve_columns(unit_forces(nodes, rows_));
+    std::vector<Eigen::Matrix3d> result;
+    for (std::size_t n = 0; n < nodes.size(); ++n) {
+        const Eigen::Index row = 3 * Eigen::Index(nodes[n]);
+        result.emplace_back(energy_ * answers.block<3, 3>(row, 3 * Eigen::Index(n)));
+        if (freed_.cols() == 0) continue;
+        const Eigen::Matrix<double, 3, Eigen::Dynamic> share = freed_.middleRows<3>(row);
+        result.back() += energy_ * share * middle_ * share.transpose();
+    }
+    return result;
+}
+
+Eigen::MatrixXd Posterior::inverse(const Eigen::MatrixXd& forces) const {
+    Columns result = stiffness_.solve_columns(forces);
+    if (freed_.cols() > 0) result += freed_ * (middle_ * (freed_.transpose() * forces));
+    return result;
+}
+
+}  // namespace tissuewarp::registration::detail

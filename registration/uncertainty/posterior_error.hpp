@@ -1,0 +1,15 @@
+#pragma once
+/// How far off tissue is expected to lie, by a posterior that is already there.
+
+#include "registration/uncertainty/expected_error.hpp"
+#include "registration/uncertainty/posterior.hpp"
+
+namespace tissuewarp::registration::detail {
+
+/// At 16 of the nodes (3 × N, mm), each the farthest from those before.
+ExpectedError expected_error(const Eigen::Matrix3Xd& nodes, const Posterior& posterior);
+
+/// Springs of the last round as data, anchors and touching neighbours among them, and as prior.
+WeighedSprings weighed(const LastPulls& pulls);
+
+}  // namespace tissuewarp::registration::detail
