@@ -6,7 +6,7 @@
 #include "imaging/labels.hpp"
 #include "registration/io/curves.hpp"
 #include "registration/io/surface_points.hpp"
-#include "registration/pipeline.hpp"
+#include "registration/update.hpp"
 
 #include <fmt/format.h>
 #include <tbb/task_group.h>

@@ -2,7 +2,7 @@
 /// --device for registrations.
 
 #include "apps/options.hpp"
-#include "registration/pipeline.hpp"
+#include "registration/update.hpp"
 
 namespace tissuewarp::apps {
 

@@ -15,7 +15,7 @@
 #include "registration/field.hpp"
 #include "registration/gpu_warp.hpp"
 #include "registration/io/surface_points.hpp"
-#include "registration/pipeline.hpp"
+#include "registration/update.hpp"
 #include "registration/warp.hpp"
 
 #include <algorithm>

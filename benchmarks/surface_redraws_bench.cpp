@@ -10,7 +10,7 @@
 #include "meshing/mesher.hpp"
 #include "registration/evaluation.hpp"
 #include "registration/field.hpp"
-#include "registration/pipeline.hpp"
+#include "registration/update.hpp"
 #include "registration/uncertainty/expected_error.hpp"
 
 #include <algorithm>

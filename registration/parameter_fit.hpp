@@ -1,7 +1,7 @@
 #pragma once
 /// Fits of the few numbers about the tissue that intraoperative data can tell, and the word on those that they cannot.
 
-#include "registration/pipeline.hpp"
+#include "registration/update.hpp"
 
 #include <string>
 #include <vector>

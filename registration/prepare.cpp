@@ -1,7 +1,7 @@
 // Before the operation: label map → mesh → rest state → rest stiffness.
 
+#include "registration/prepare.hpp"
 #include "registration/loads/coarse_twin.hpp"
-#include "registration/pipeline.hpp"
 #include "registration/stopwatch.hpp"
 #include "registration/terms/anchors.hpp"
 #include "registration/terms/label_springs.hpp"
@@ -33,6 +33,12 @@ void measure_offsets(Interfaces& interfaces, const meshing::TetMesh& mesh, const
             moving.crossing(mesh.nodes.col(node.node), node.normal, node.inner, node.outer, range_mm, max_angle_deg);
 }
 
+tled::NodalConditions label_conditions(const Interfaces& interfaces, const PrepareOptions& options, int nodes) {
+    tled::Conditions conditions;
+    conditions.springs = detail::full_weight_springs(interfaces, options);
+    return tled::nodal_conditions(conditions, nodes);
+}
+
 /// Numbers of a factor depend on what pulls at the tissue, and relaxation needs none.
 void make_ready(const tled::RestStiffness& stiffness) {
     if (!stiffness.is_large()) stiffness.analyse();
@@ -61,7 +67,7 @@ PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions
     if (options.meshing.edge_length == 0) options.meshing.edge_length = suggested_edge_length(organ);
     detail::Stopwatch stopwatch;
     meshing::TetMesh mesh = meshing::mesh_labels(organ, options.meshing, observer);
-    const StageTime meshing_time = stopwatch.lap("meshing");
+    const StageTime meshing_time{"meshing", stopwatch.lap()};
     PreparedModel prepared = prepare(std::move(mesh), moving_labels, options, observer);
     prepared.times.insert(prepared.times.begin(), meshing_time);
     return prepared;
@@ -78,12 +84,12 @@ PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_label
     tled::RestState rest = tled::rest_state(model);
     Interfaces interfaces(model.mesh);
     measure_offsets(interfaces, model.mesh, LabelBoundaryField(organ, interfaces.thickness(model.mesh)));
-    times.push_back(stopwatch.lap("rest state"));
+    times.push_back({"rest state", stopwatch.lap()});
     observer.checkpoint("rest stiffness", 0.0);
-    const auto springs = tled::nodal_conditions(detail::full_weight_springs(interfaces, options), rest.node_count);
+    const auto springs = label_conditions(interfaces, options, rest.node_count);
     tled::RestStiffness stiffness(rest, springs);
     make_ready(stiffness);
-    times.push_back(stopwatch.lap("rest stiffness"));
+    times.push_back({"rest stiffness", stopwatch.lap()});
     return {std::move(model),     std::move(organ), options,      std::move(interfaces), std::move(rest),
             std::move(stiffness), std::move(times), std::nullopt, std::move(neighbours), nullptr};
 }
@@ -91,8 +97,8 @@ PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_label
 PreparedModel with_materials(PreparedModel prepared, const tled::MaterialTable& materials) {
     prepared.model.materials = prepared.options.materials = materials;
     prepared.rest = tled::rest_state(prepared.model);
-    const auto springs = detail::full_weight_springs(prepared.interfaces, prepared.options);
-    prepared.stiffness = tled::RestStiffness(prepared.rest, tled::nodal_conditions(springs, prepared.rest.node_count));
+    prepared.stiffness = tled::RestStiffness(
+        prepared.rest, label_conditions(prepared.interfaces, prepared.options, prepared.rest.node_count));
     make_ready(prepared.stiffness);
     if (prepared.coarse) *prepared.coarse = with_materials(std::move(*prepared.coarse), materials);
     return prepared;
@@ -105,7 +111,7 @@ void prepare_image(PreparedModel& prepared, const imaging::Volume& moving, const
     const FeaturePoints features =
         select_feature_points(moving, imaging::mask_of_all(prepared.labels), options.features);
     prepared.image = ImageModel{moving, MatchingTemplate(moving, features.points, options.blocks)};
-    prepared.times.push_back(stopwatch.lap("feature points"));
+    prepared.times.push_back({"feature points", stopwatch.lap()});
 }
 
 void prepare_loads(PreparedModel& prepared, Observer& observer) {
@@ -113,7 +119,7 @@ void prepare_loads(PreparedModel& prepared, Observer& observer) {
     detail::Stopwatch stopwatch;
     observer.checkpoint("coarse model", 0.0);
     prepared.coarse = std::make_unique<PreparedModel>(detail::coarse_model_for_loads(prepared, observer));
-    prepared.times.push_back(stopwatch.lap("coarse model"));
+    prepared.times.push_back({"coarse model", stopwatch.lap()});
 }
 
 }  // namespace tissuewarp::registration

@@ -1,7 +1,7 @@
 #pragma once
 /// Prepared models as files, so that the preparation happens before the operation (HDF5, docs/record.md).
 
-#include "registration/pipeline.hpp"
+#include "registration/prepare.hpp"
 
 #include <filesystem>
 

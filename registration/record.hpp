@@ -2,7 +2,8 @@
 /// The record of a run: everything that is needed to apply, judge and repeat a registration, in one HDF5 file whose
 /// layout is in docs/record.md.
 
-#include "registration/pipeline.hpp"
+#include "registration/prepare.hpp"
+#include "registration/result.hpp"
 
 #include <filesystem>
 #include <map>

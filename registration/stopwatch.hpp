@@ -1,7 +1,5 @@
 #pragma once
-/// Wall-clock times of stages.
-
-#include "registration/pipeline.hpp"
+/// Wall-clock seconds.
 
 #include <chrono>
 
@@ -9,12 +7,12 @@ namespace tissuewarp::registration::detail {
 
 class Stopwatch {
 public:
-    /// Seconds since the last lap, under a name.
-    StageTime lap(std::string stage) {
+    /// Seconds since the last lap.
+    double lap() {
         const auto now = std::chrono::steady_clock::now();
         const double seconds = std::chrono::duration<double>(now - last_).count();
         last_ = now;
-        return {std::move(stage), seconds};
+        return seconds;
     }
 
 private:

@@ -22,10 +22,6 @@ using Covariances = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 /// variance is from so many numbers.
 constexpr double freedom_of_size = 6;
 
-void append(std::vector<tled::Spring>& springs, const std::vector<tled::Spring>& others) {
-    springs.insert(springs.end(), others.begin(), others.end());
-}
-
 void require_related(const PreparedModel& prepared, const UpdateResult& result) {
     const Eigen::Index nodes = prepared.model.mesh.nodes.cols();
     if (result.deformation.displacement.cols() != nodes || result.pulls.loads.cols() != nodes)
@@ -46,8 +42,7 @@ Eigen::Matrix3Xd displacement_under_pulls(const UpdateResult& result) {
 /// What the last round's equilibrium was under.
 tled::NodalConditions conditions_of(const PreparedModel& prepared, const LastPulls& pulls) {
     tled::Conditions conditions;
-    for (const auto* springs : {&pulls.data, &pulls.holds, &pulls.ground, &pulls.supports})
-        append(conditions.springs, *springs);
+    for (const PulledNode& pulled : pulls.springs) conditions.springs.push_back(pulled.spring);
     conditions.external_force = pulls.loads;
     return tled::nodal_conditions(conditions, prepared.rest.node_count);
 }

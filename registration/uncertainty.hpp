@@ -5,7 +5,8 @@
 #include "core/observer.hpp"
 #include "imaging/volume.hpp"
 #include "meshing/point_location.hpp"
-#include "registration/pipeline.hpp"
+#include "registration/prepare.hpp"
+#include "registration/result.hpp"
 #include "registration/uncertainty/expected_error.hpp"
 #include "tled/discretisation_error.hpp"
 

@@ -3,7 +3,7 @@
 
 #include "core/observer.hpp"
 #include "registration/dial/dial.hpp"
-#include "registration/pipeline.hpp"
+#include "registration/update.hpp"
 
 #include <cstdint>
 #include <vector>

@@ -4,7 +4,7 @@
 #include "imaging/image_io.hpp"
 #include "imaging/labels.hpp"
 #include "registration/field.hpp"
-#include "registration/pipeline.hpp"
+#include "registration/update.hpp"
 #include "registration/warp.hpp"
 #include "study/detail/clock.hpp"
 #include "study/label_mesh.hpp"

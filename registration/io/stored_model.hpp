@@ -3,7 +3,9 @@
 
 #include "core/detail/hdf5.hpp"
 #include "imaging/geometry.hpp"
-#include "registration/pipeline.hpp"
+#include "imaging/volume.hpp"
+#include "registration/stage_time.hpp"
+#include "tled/model.hpp"
 
 namespace tissuewarp::registration::detail {
 

@@ -66,6 +66,10 @@ std::vector<tled::Spring> sampled(const std::vector<tled::Spring>& springs, cons
     return result;
 }
 
+void add(LastPulls& pulls, Origin origin, const std::vector<tled::Spring>& springs) {
+    for (const tled::Spring& spring : springs) pulls.springs.push_back({spring, origin});
+}
+
 }  // namespace
 
 Eigen::MatrixXd carried(const meshing::TetMesh& from, const Eigen::MatrixXd& nodal, const Eigen::Matrix3Xd& to) {
@@ -104,12 +108,14 @@ LastPulls pulls_on(const PreparedModel& coarse, const PreparedModel& prepared, c
     const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
     const meshing::PointLocator locator(mesh);
     LastPulls pulls;
-    const bool labels = !given.holds.empty();
-    pulls.data = labels ? sampled(given.data, nodes, coarse) : moved(given.data, nodes, mesh, locator);
-    pulls.ground = moved(given.ground, nodes, mesh, locator);
-    pulls.supports = moved(given.supports, nodes, mesh, locator);
+    const std::vector<tled::Spring> data = given.of(Origin::Datum);
+    const bool labels = !given.of(Origin::Hold).empty();
+    add(pulls, Origin::Datum, labels ? sampled(data, nodes, coarse) : moved(data, nodes, mesh, locator));
+    for (const Origin origin : {Origin::Prior, Origin::Support})
+        add(pulls, origin, moved(given.of(origin), nodes, mesh, locator));
     pulls.energy = given.energy;
     pulls.free_placement = given.free_placement;
+    pulls.parts_alone = given.parts_alone;
     return pulls;
 }
 

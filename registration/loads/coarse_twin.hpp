@@ -1,7 +1,8 @@
 #pragma once
 /// The same registration on a coarser mesh, for what varies smoothly and asks for a factor.
 
-#include "registration/pipeline.hpp"
+#include "registration/prepare.hpp"
+#include "registration/result.hpp"
 
 #include <Eigen/Core>
 

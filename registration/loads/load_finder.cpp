@@ -2,6 +2,7 @@
 
 #include "registration/loads/coarse_twin.hpp"
 #include "registration/loads/unknown_loads.hpp"
+#include "registration/terms/ground.hpp"
 
 #include <utility>
 
@@ -17,7 +18,9 @@ Eigen::VectorXd forces_of(const std::vector<tled::Spring>& springs, Eigen::Index
 
 }  // namespace
 
-FoundLoads LoadFinder::find(LoadKind kind, const LastPulls& pulls, Observer& observer) {
+FoundLoads LoadFinder::find(LoadKind kind, const LastPulls& given, Observer& observer) {
+    LastPulls pulls = given;
+    if (kind == LoadKind::Weight) expect_free_motion(pulls, prepared_, tissue_.free_motion_mm);
     if (!loads_take_coarse_model(prepared_)) return found(kind, prepared_, pulls);
     const PreparedModel& coarse = twin(observer);
     return found(kind, coarse, pulls_on(coarse, prepared_, pulls));
@@ -35,7 +38,7 @@ std::pair<Eigen::MatrixXd, Eigen::MatrixXd> LoadFinder::loads(LoadKind kind, con
         Eigen::MatrixXd weights = unknown_weights(model);
         return {weights, same ? weights : unknown_weights(prepared_)};
     }
-    const PrincipalLoads principal = principal_loads(model, count_);
+    const PrincipalLoads principal = principal_loads(model, tissue_.load_shapes);
     return {principal.loads, same ? principal.loads : loads_along(prepared_, principal.axes)};
 }
 
@@ -51,13 +54,12 @@ const LoadFinder::Shapes& LoadFinder::shapes(LoadKind kind, const PreparedModel&
 }
 
 FoundLoads LoadFinder::found(LoadKind kind, const PreparedModel& model, const LastPulls& pulls) {
-    const WeighedSprings unseen{pulls.supports, pulls.ground, pulls.energy, pulls.free_placement};
-    WeighedSprings seen = unseen;
-    seen.data.insert(seen.data.end(), pulls.data.begin(), pulls.data.end());
+    const WeighedSprings unseen = without_data(pulls), seen = with_data(pulls);
     const Shapes& of_kind = shapes(kind, model, unseen);
     const Posterior posterior(model, seen);
     const LoadFit fit(of_kind.known, posterior);
-    const Eigen::VectorXd shown = posterior.inverse(forces_of(pulls.data, 3 * Eigen::Index{model.rest.node_count}));
+    const Eigen::VectorXd shown =
+        posterior.inverse(forces_of(pulls.of(Origin::Datum), 3 * Eigen::Index{model.rest.node_count}));
     const double size = fit.likeliest_size(shown);
     const Eigen::VectorXd forces = of_kind.forces * fit.coefficients(shown, size);
     return {Eigen::Map<const Eigen::Matrix3Xd>(forces.data(), 3, forces.size() / 3), size};

@@ -2,6 +2,7 @@
 /// The unknown loads of one model, kept ready from one update to the next.
 
 #include "registration/loads/load_fit.hpp"
+#include "registration/options.hpp"
 
 #include <array>
 #include <optional>
@@ -22,17 +23,25 @@ enum class LoadKind {
 
 class LoadFinder {
 public:
-    /// `shapes` of smooth loads. The model outlives this.
-    LoadFinder(const PreparedModel& prepared, int shapes) : prepared_(prepared), count_(shapes) {}
+    /// The model outlives this.
+    LoadFinder(const PreparedModel& prepared, const TissuePrior& tissue) : prepared_(prepared), tissue_(tissue) {}
 
-    /// The loads of this kind that data pulling like `pulls` tell. The prior's springs are the same in every call.
+    /// Whether loads of this kind are to be looked for, with so much of the time budget left. Half of it is kept for
+    /// what follows; nine tenths for weight, since the rounds of the large models that labels go with, begun again, are
+    /// as long as those before.
+    [[nodiscard]] bool worth_while(LoadKind kind, double budget_left) const {
+        return tissue_.load_shapes > 0 && budget_left > (kind == LoadKind::Weight ? 0.9 : 0.5);
+    }
+
+    /// The loads of this kind that data pulling like `pulls` tell. Weight is that of a free organ, whatever prior the
+    /// pulls hold; otherwise the prior's springs are the same in every call.
     /// Those of a large model are found on its coarser one, which is made where prepare_loads did not. Throws
     /// InvalidInput where the springs do not hold the tissue, Cancelled.
     FoundLoads find(LoadKind kind, const LastPulls& pulls, Observer& observer);
 
 private:
     const PreparedModel& prepared_;
-    int count_;
+    TissuePrior tissue_;
     std::optional<PreparedModel> twin_;  // where it was not prepared
     struct Shapes {
         LoadShapes known;        // of the twin, or of the model

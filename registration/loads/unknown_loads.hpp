@@ -1,7 +1,7 @@
 #pragma once
 /// Loads that act on the tissue and that no registration knows: what they would do to the displacement.
 
-#include "registration/pipeline.hpp"
+#include "registration/prepare.hpp"
 
 #include <Eigen/Core>
 

@@ -1,79 +1,19 @@
 #include "registration/terms/anchors.hpp"
 
-#include "imaging/filters.hpp"
-#include "imaging/labels.hpp"
-#include "tled/conditions.hpp"
+#include "registration/uncertainty/doubts.hpp"
 
 #include <algorithm>
 #include <set>
 
-namespace tissuewarp::registration {
-
-namespace {
-
-bool is_one_of(int label, const std::vector<int>& labels) {
-    return std::find(labels.begin(), labels.end(), label) != labels.end();
-}
-
-/// The distance to midpoints between voxels is rough where the boundary is oblique to the grid: normals would be, too.
-imaging::Volume smooth_distance(const imaging::Volume& neighbours) {
-    constexpr double smoothing_voxels = 0.7;
-    imaging::Volume distance = imaging::signed_distance(imaging::mask_of_all(neighbours));
-    distance.geometry.spacing.setOnes();
-    distance = imaging::smooth(distance, smoothing_voxels);
-    distance.geometry = neighbours.geometry;
-    return distance;
-}
-
-}  // namespace
-
-void require_surroundings(const imaging::Volume& moving_labels, const PrepareOptions& options) {
-    const std::vector<int>&anchors = options.anchors, &neighbours = options.rigid_neighbours;
-    if (anchors.empty() && neighbours.empty()) return;
-    for (const std::vector<int>* list : {&anchors, &neighbours})
-        imaging::require_labels(moving_labels, *list, list == &anchors ? "anchors" : "rigid neighbours");
-    for (const int label : anchors)
-        if (is_one_of(label, neighbours))
-            throw InvalidInput("label " + std::to_string(label) +
-                               " is given both as anchor and as rigid neighbour; an anchor is tissue that the model "
-                               "holds, a neighbour is not in the model: choose one");
-    const std::vector<int> present = imaging::labels_in(moving_labels);
-    const auto is_tissue = [&](int label) { return !is_one_of(label, anchors) && !is_one_of(label, neighbours); };
-    if (std::none_of(present.begin(), present.end(), is_tissue))
-        throw InvalidInput(
-            "every label is an anchor or a rigid neighbour: nothing is left to register; name fewer of them");
-}
-
-namespace detail {
-
-std::optional<RigidNeighbours> rigid_neighbours(const imaging::Volume& map, const std::vector<int>& labels) {
-    if (labels.empty()) return std::nullopt;
-    std::vector<int> others;
-    for (const int label : imaging::labels_in(map))
-        if (!is_one_of(label, labels)) others.push_back(label);
-    RigidNeighbours result{imaging::without_labels(map, others), {}};
-    result.distance = smooth_distance(result.labels);
-    return result;
-}
-
-imaging::Volume with_neighbours(const PreparedModel& prepared) {
-    if (!prepared.neighbours) return prepared.labels;
-    imaging::Volume map = prepared.labels.as(CV_32S).clone();
-    map.voxels += prepared.neighbours->labels.as(CV_32S).voxels;
-    return map;
-}
-
-Intraoperative without_neighbours(const Intraoperative& seen, const std::vector<int>& labels) {
-    Intraoperative result = seen;
-    if (result.labels) result.labels = imaging::without_labels(*result.labels, labels);
-    return result;
-}
+namespace tissuewarp::registration::detail {
 
 std::vector<int> anchored_nodes(const PreparedModel& prepared) {
     const meshing::TetMesh& mesh = prepared.model.mesh;
+    const std::vector<int>& anchors = prepared.options.anchors;
+    const auto is_anchor = [&](int label) { return std::find(anchors.begin(), anchors.end(), label) != anchors.end(); };
     std::set<int> nodes;
     for (int tet = 0; tet < mesh.tet_count(); ++tet)
-        if (is_one_of(mesh.labels[tet], prepared.options.anchors))
+        if (is_anchor(mesh.labels[tet]))
             for (const int node : mesh.tets.col(tet)) nodes.insert(node);
     return {nodes.begin(), nodes.end()};
 }
@@ -82,23 +22,29 @@ bool is_held(const PreparedModel& prepared) {
     return prepared.neighbours || !anchored_nodes(prepared).empty();
 }
 
-std::vector<tled::Spring> anchor_springs(const PreparedModel& prepared, double energy) {
+AnchorTerm::AnchorTerm(const PreparedModel& prepared, double energy) {
     constexpr double deviation_mm = 0.1;
     const Eigen::Matrix3d stiffness = energy / (deviation_mm * deviation_mm) * Eigen::Matrix3d::Identity();
-    std::vector<tled::Spring> springs;
-    for (const int node : anchored_nodes(prepared)) springs.push_back({node, stiffness, Eigen::Vector3d::Zero()});
-    return springs;
+    for (const int node : anchored_nodes(prepared))
+        springs_.push_back({{node, stiffness, Eigen::Vector3d::Zero()}, Origin::Support});
 }
 
-AnchorFit anchor_fit(const PreparedModel& prepared, const State& state) {
+Contribution AnchorTerm::linearise(const RoundPlan& /*plan*/, const State& /*state*/, Observer& /*observer*/) {
+    return {springs_};
+}
+
+void AnchorTerm::judge(const State& state, UpdateResult& result) {
+    constexpr double most_mm = 0.5;
     AnchorFit fit;
-    for (const int node : anchored_nodes(prepared)) {
+    for (const PulledNode& pulled : springs_) {
         ++fit.nodes;
-        fit.largest_mm = std::max(fit.largest_mm, state.displacement.col(node).norm());
+        fit.largest_mm = std::max(fit.largest_mm, state.displacement.col(pulled.spring.node).norm());
     }
-    return fit;
+    result.anchors = fit;
+    if (fit.largest_mm > most_mm)
+        result.doubts.push_back({"anchors.pulled", fit.largest_mm, most_mm,
+                                 "anchored tissue was pulled by up to " + to_text(fit.largest_mm) +
+                                     " mm; check which tissue stays, and the rigid placement"});
 }
 
-}  // namespace detail
-
-}  // namespace tissuewarp::registration
+}  // namespace tissuewarp::registration::detail

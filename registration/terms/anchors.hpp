@@ -1,19 +1,12 @@
 #pragma once
-/// Labels of a preoperative map that are no tissue to deform, or tissue that stays.
+/// Tissue that stays where the rigid placement has it.
 
+#include "registration/prepare.hpp"
 #include "registration/terms/term.hpp"
 
+#include <vector>
+
 namespace tissuewarp::registration::detail {
-
-/// The bodies of these labels, none where no label is given. Precondition: require_surroundings.
-std::optional<RigidNeighbours> rigid_neighbours(const imaging::Volume& map, const std::vector<int>& labels);
-
-/// Both kinds of labels in one map again, as `prepare` takes it.
-imaging::Volume with_neighbours(const PreparedModel& prepared);
-
-/// What was seen with the rigid neighbours taken out of its labels, if it has any: they are background there as they
-/// are in the model.
-Intraoperative without_neighbours(const Intraoperative& seen, const std::vector<int>& labels);
 
 /// Nodes of the mesh that belong to a tetrahedron of an anchor, ascending.
 std::vector<int> anchored_nodes(const PreparedModel& prepared);
@@ -21,11 +14,19 @@ std::vector<int> anchored_nodes(const PreparedModel& prepared);
 /// Anchors or rigid neighbours say where the organ lies as a whole.
 bool is_held(const PreparedModel& prepared);
 
-/// Springs that hold every anchored node where the rigid placement has it, to 0.1 mm: `energy` (mN mm) is the strain
-/// energy that weighs as much as one standard deviation.
-std::vector<tled::Spring> anchor_springs(const PreparedModel& prepared, double energy);
+class AnchorTerm : public Term {
+public:
+    /// Springs hold every anchored node to 0.1 mm: `energy` (mN mm) is the strain energy that weighs as much as one
+    /// standard deviation.
+    AnchorTerm(const PreparedModel& prepared, double energy);
 
-/// How far they moved nevertheless.
-AnchorFit anchor_fit(const PreparedModel& prepared, const State& state);
+    [[nodiscard]] Shows shows() const override { return springs_.empty() ? Shows::Nothing : Shows::Place; }
+    [[nodiscard]] Contribution linearise(const RoundPlan& plan, const State& state, Observer& observer) override;
+    /// How far they moved nevertheless.
+    void judge(const State& state, UpdateResult& result) override;
+
+private:
+    std::vector<PulledNode> springs_;
+};
 
 }  // namespace tissuewarp::registration::detail

@@ -1,5 +1,7 @@
 #include "registration/terms/contact.hpp"
 
+#include "registration/uncertainty/doubts.hpp"
+
 #include <algorithm>
 #include <map>
 
@@ -11,7 +13,7 @@ constexpr double tolerance_mm = 0.05;  // of a gap
 
 }  // namespace
 
-ContactEvidence::ContactEvidence(const PreparedModel& prepared, double energy)
+ContactTerm::ContactTerm(const PreparedModel& prepared, double energy)
     : prepared_(prepared), distance_(prepared.neighbours->distance) {
     constexpr double deviation_mm = 0.1, independent_area = 100.0;  // mm², as of the ground
     stiffness_ = energy / (deviation_mm * deviation_mm) / independent_area;
@@ -24,25 +26,26 @@ ContactEvidence::ContactEvidence(const PreparedModel& prepared, double energy)
     }
 }
 
-ContactEvidence::Gap ContactEvidence::gap(const SurfaceNode& node, const State& state) const {
+ContactTerm::Gap ContactTerm::gap(const SurfaceNode& node, const State& state) const {
     const Eigen::Vector3d place = prepared_.model.mesh.nodes.col(node.node) + state.displacement.col(node.node);
     const auto [distance, gradient] = distance_.value_and_gradient(place);
     return {distance + node.rest_depth, gradient.normalized()};
 }
 
-Contribution ContactEvidence::contribution(const RoundPlan& plan, const State& state) const {
+Contribution ContactTerm::linearise(const RoundPlan& plan, const State& state, Observer& /*observer*/) {
     Contribution result;
     for (const SurfaceNode& node : nodes_) {
         if (!node.touches) continue;
         const Gap here = gap(node, state);
         const double step = std::clamp(node.push - here.distance, -plan.most_step_mm, plan.most_step_mm);
-        result.conditions.springs.push_back({node.node, stiffness_ * node.area * here.normal * here.normal.transpose(),
-                                             state.displacement.col(node.node) + step * here.normal});
+        result.springs.push_back({{node.node, stiffness_ * node.area * here.normal * here.normal.transpose(),
+                                   state.displacement.col(node.node) + step * here.normal},
+                                  Origin::Support});
     }
     return result;
 }
 
-bool ContactEvidence::follow(const State& solved) {
+bool ContactTerm::follow(const State& solved) {
     bool entered = false;
     for (SurfaceNode& node : nodes_) {
         const double distance = gap(node, solved).distance;
@@ -56,20 +59,29 @@ bool ContactEvidence::follow(const State& solved) {
     return entered;
 }
 
-bool ContactEvidence::settled(const State& state) const {
+bool ContactTerm::settled(const State& state) const {
     return std::all_of(nodes_.begin(), nodes_.end(), [&](const SurfaceNode& node) {
         const double distance = gap(node, state).distance;
         return distance > -tolerance_mm && (!node.touches || distance < tolerance_mm);
     });
 }
 
-ContactFit ContactEvidence::fit(const State& state) const {
+ContactFit ContactTerm::fit(const State& state) const {
     ContactFit fit;
     for (const SurfaceNode& node : nodes_) {
         fit.touching += node.touches;
         fit.deepest_mm = std::max(fit.deepest_mm, -gap(node, state).distance);
     }
     return fit;
+}
+
+void ContactTerm::judge(const State& state, UpdateResult& result) {
+    constexpr double most_mm = 0.5;
+    result.contact = fit(state);
+    if (result.contact->deepest_mm > most_mm)
+        result.doubts.push_back({"contact.entered", result.contact->deepest_mm, most_mm,
+                                 "the organ lies up to " + to_text(result.contact->deepest_mm) +
+                                     " mm in a rigid neighbour; check its label and the rigid placement"});
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -4,6 +4,7 @@
 #include "registration/terms/term.hpp"
 
 #include "imaging/sampling.hpp"
+#include "registration/prepare.hpp"
 
 #include <vector>
 
@@ -14,23 +15,24 @@ namespace tissuewarp::registration::detail {
 /// nothing moves an organ that did not move. Where a node touches, a spring of stiffness k along the normal alone draws
 /// g to the push s, and s becomes max(0, s − g) after every equilibrium: k s is the pressure that then holds with g =
 /// 0, whatever k is. A node comes off where its spring would have to hold it back.
-class ContactEvidence {
+class ContactTerm : public Term {
 public:
     /// `energy` is the strain energy (mN mm) that weighs as much as one standard deviation. Precondition: the model has
     /// neighbours.
-    ContactEvidence(const PreparedModel& prepared, double energy);
+    ContactTerm(const PreparedModel& prepared, double energy);
 
+    [[nodiscard]] Shows shows() const override { return Shows::Place; }
     /// Springs on the nodes that touch, from where they are.
-    [[nodiscard]] Contribution contribution(const RoundPlan& plan, const State& state) const;
+    [[nodiscard]] Contribution linearise(const RoundPlan& plan, const State& state, Observer& observer) override;
 
-    /// Takes note of an equilibrium under the springs of `contribution`: pushes, nodes that came off, and nodes that
+    /// Takes note of an equilibrium under these springs: pushes, nodes that came off, and nodes that
     /// entered a neighbour. Whether there are such: then the equilibrium is to be sought again from where it started.
-    bool follow(const State& solved);
+    [[nodiscard]] bool follow(const State& solved) override;
 
     /// Whether contact is in balance: no node lies deeper than 0.05 mm in a neighbour, and none is held back.
-    [[nodiscard]] bool settled(const State& state) const;
+    [[nodiscard]] bool settled(const State& state) const override;
 
-    [[nodiscard]] ContactFit fit(const State& state) const;
+    void judge(const State& state, UpdateResult& result) override;
 
 private:
     struct SurfaceNode {
@@ -50,6 +52,7 @@ private:
     double stiffness_;  // kPa/mm
     std::vector<SurfaceNode> nodes_;
 
+    [[nodiscard]] ContactFit fit(const State& state) const;
     [[nodiscard]] Gap gap(const SurfaceNode& node, const State& state) const;
 };
 

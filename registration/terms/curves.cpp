@@ -65,6 +65,21 @@ CurvePoints made_ready(const Curves& curves, const CurveOptions& options) {
     return data;
 }
 
+/// Across a line an unbiased point lies √2 deviations off in root mean square.
+void doubt(const CurveFit& fit, double deviation_mm, std::vector<Doubt>& doubts) {
+    constexpr double least_inliers = 0.5, most_residual = 1.7;
+    if (fit.inlier_share < least_inliers)
+        doubts.push_back({"curves.outliers", fit.inlier_share, least_inliers,
+                          "only " + percent(fit.inlier_share) +
+                              " of the intraoperative points along vessels came near a preoperative curve; check that "
+                              "both show the same vessels, and that the headers place the images within a centimetre "
+                              "or two"});
+    else if (fit.residual_mm > most_residual * deviation_mm)
+        doubts.push_back({"curves.apart", fit.residual_mm, most_residual * deviation_mm,
+                          "points along vessels lie " + to_text(fit.residual_mm) + " mm across from the curves where " +
+                              to_text(deviation_mm) + " mm along each axis were stated"});
+}
+
 }  // namespace
 
 std::vector<CurveMatch> match_curves(const CurveTree& lines, const CurvePoints& points,
@@ -83,13 +98,12 @@ std::vector<CurveMatch> match_curves(const CurveTree& lines, const CurvePoints& 
     return result;
 }
 
-CurveEvidence::CurveEvidence(const PreparedModel& prepared, const Curves& curves, const CurveOptions& options,
-                             double energy)
+CurveTerm::CurveTerm(const PreparedModel& prepared, const Curves& curves, const CurveOptions& options, double energy)
     : prepared_(prepared), options_(options), energy_(energy), data_(made_ready(curves, options)) {
     take_lines(curves.moving);
 }
 
-void CurveEvidence::take_lines(const std::vector<Eigen::Matrix3Xd>& lines) {
+void CurveTerm::take_lines(const std::vector<Eigen::Matrix3Xd>& lines) {
     const meshing::PointLocator locator(prepared_.model.mesh);
     std::vector<Eigen::Vector3d> samples;
     for (const Eigen::Matrix3Xd& line : lines) {
@@ -115,12 +129,12 @@ void CurveEvidence::take_lines(const std::vector<Eigen::Matrix3Xd>& lines) {
 }
 
 /// Segments of the run of samples from `first` to before `last`.
-void CurveEvidence::join_samples(int first, int last) {
+void CurveTerm::join_samples(int first, int last) {
     for (int n = first; n + 1 < last; ++n)
         segments_.push_back({{n, n + 1}, {std::max(first, n - chord_reach), std::min(last - 1, n + 1 + chord_reach)}});
 }
 
-CurveTree CurveEvidence::deformed_lines(const State& state) const {
+CurveTree CurveTerm::deformed_lines(const State& state) const {
     Eigen::Matrix3Xd places = samples_;
     for (std::size_t s = 0; s < places_.size(); ++s)
         places.col(static_cast<Eigen::Index>(s)) +=
@@ -128,11 +142,11 @@ CurveTree CurveEvidence::deformed_lines(const State& state) const {
     return {std::move(places), segments_};
 }
 
-std::vector<CurveMatch> CurveEvidence::matches(const State& state, double reach_mm) const {
+std::vector<CurveMatch> CurveTerm::matches(const State& state, double reach_mm) const {
     return match_curves(deformed_lines(state), data_, state.placement, reach_mm, options_.max_angle_deg);
 }
 
-Alignment CurveEvidence::align(const Eigen::Isometry3d& start) const {
+Alignment CurveTerm::pose(const Eigen::Isometry3d& start, Observer& /*observer*/) {
     constexpr double bending_mm = 5;  // what a rigid motion does not follow
     return closest_curve_pose({samples_, segments_}, data_, start, bending_mm + final_scale_mm(),
                               options_.max_angle_deg);
@@ -140,8 +154,8 @@ Alignment CurveEvidence::align(const Eigen::Isometry3d& start) const {
 
 /// A place (1 − α) a + α b on a segment moves with both ends: K (1 − α) at a and K α at b, each drawn by the same way,
 /// have its force, and a stiffness not below its (Jensen's inequality, as in lumped_springs).
-void CurveEvidence::add_pulls(const CurveMatch& match, double stiffness, const State& state, double most_step_mm,
-                              std::vector<Pull>& pulls) const {
+void CurveTerm::add_pulls(const CurveMatch& match, double stiffness, const State& state, double most_step_mm,
+                          std::vector<Pull>& pulls) const {
     const Eigen::Vector3d& tangent = match.hit.tangent;
     const Eigen::Matrix3d across = stiffness * (Eigen::Matrix3d::Identity() - tangent * tangent.transpose());
     const double step = std::min(1.0, most_step_mm / std::max(match.across.norm(), 1e-9));
@@ -157,16 +171,15 @@ void CurveEvidence::add_pulls(const CurveMatch& match, double stiffness, const S
 
 /// No match counts as held back by the step bound, for which the round would be repeated: among few points outliers
 /// alone would repeat it for ever. The inlier share says in the end what was not reached.
-Contribution CurveEvidence::contribution(const RoundPlan& plan, const State& state) {
-    constexpr double scale_ratio = 0.6;  // from round to round
+Contribution CurveTerm::linearise(const RoundPlan& plan, const State& state, Observer& /*observer*/) {
     const double reach = std::max(4 * final_scale_mm(), 3 * plan.range_mm);
     const std::vector<CurveMatch> found = matches(state, reach);
-    if (plan.number == 0) first_scale_mm_ = 3 * median_distance(found);
-    if (!std::isfinite(first_scale_mm_))
+    const double typical = median_distance(found);
+    if (plan.number == 0 && !std::isfinite(typical))
         throw InvalidInput("no intraoperative point along vessels lies within " + to_text(reach) +
                            " mm of the preoperative curves; check the frame and the unit of the points");
-    const double scale =
-        plan.last ? final_scale_mm() : std::max(final_scale_mm(), first_scale_mm_ * std::pow(scale_ratio, plan.number));
+    if (plan.number == 0) scale_.begin_at(3 * typical);
+    const double scale = scale_.of(plan, final_scale_mm());
     const double stiffness = energy_ / (data_.deviation_mm * data_.deviation_mm);
     Contribution result;
     std::vector<Pull> pulls;
@@ -183,11 +196,11 @@ Contribution CurveEvidence::contribution(const RoundPlan& plan, const State& sta
     }
     if (weights > 0) result.mean_residual_mm /= weights;
     result.candidates = static_cast<int>(found.size());
-    result.conditions.springs = lumped_springs(prepared_.model.mesh, pulls, state.displacement);
+    result.springs = pulled_by(Origin::Datum, lumped_springs(prepared_.model.mesh, pulls, state.displacement));
     return result;
 }
 
-CurveFit CurveEvidence::fit(const State& state) const {
+CurveFit CurveTerm::fit(const State& state) const {
     CurveFit fit;
     fit.points = static_cast<int>(data_.count());
     double squared = 0;
@@ -202,6 +215,11 @@ CurveFit CurveEvidence::fit(const State& state) const {
     for (const Segment& segment : segments_)
         fit.length_mm += (samples_.col(segment.ends[1]) - samples_.col(segment.ends[0])).norm();
     return fit;
+}
+
+void CurveTerm::judge(const State& state, UpdateResult& result) {
+    result.curves = fit(state);
+    doubt(*result.curves, data_.deviation_mm, result.doubts);
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -1,6 +1,9 @@
 #pragma once
 /// Points along vessels: the preoperative centre lines go through them, at a place along the line that is left open.
 
+#include "registration/intraoperative.hpp"
+#include "registration/options.hpp"
+#include "registration/prepare.hpp"
 #include "registration/search/curve_tree.hpp"
 #include "registration/terms/pull.hpp"
 #include "registration/terms/term.hpp"
@@ -29,21 +32,22 @@ struct CurvePoints {
 std::vector<CurveMatch> match_curves(const CurveTree& lines, const CurvePoints& points,
                                      const Eigen::Isometry3d& placement, double reach_mm, double max_angle_deg);
 
-class CurveEvidence {
+class CurveTerm : public Term {
 public:
     /// `energy` is the strain energy (mN mm) that weighs as much as one standard deviation. Throws InvalidInput for
     /// curves that cannot be used, and where no line lies in the model.
-    CurveEvidence(const PreparedModel& prepared, const Curves& curves, const CurveOptions& options, double energy);
+    CurveTerm(const PreparedModel& prepared, const Curves& curves, const CurveOptions& options, double energy);
 
+    [[nodiscard]] Shows shows() const override { return Shows::Parts; }
+    [[nodiscard]] PoseClaim pose_claim() const override { return PoseClaim::NearStart; }
     /// The rigid placement that brings most points to the lines at rest, the nearest to `start`.
-    [[nodiscard]] Alignment align(const Eigen::Isometry3d& start) const;
+    [[nodiscard]] Alignment pose(const Eigen::Isometry3d& start, Observer& observer) override;
 
     /// Pulls on the tissue of the lines, across them alone. The scale of the robust weights falls from three times the
     /// median distance in the first round. Throws InvalidInput when no point lies near a line.
-    [[nodiscard]] Contribution contribution(const RoundPlan& plan, const State& state);
+    [[nodiscard]] Contribution linearise(const RoundPlan& plan, const State& state, Observer& observer) override;
 
-    /// How the lines of the model go through the points.
-    [[nodiscard]] CurveFit fit(const State& state) const;
+    void judge(const State& state, UpdateResult& result) override;
 
 private:
     const PreparedModel& prepared_;
@@ -53,11 +57,12 @@ private:
     Eigen::Matrix3Xd samples_;               // of the lines, those in the model, moving frame
     std::vector<meshing::Location> places_;  // of the samples
     std::vector<Segment> segments_;          // between them
-    double first_scale_mm_ = 0;              // of the robust weights
+    FallingScale scale_;                     // of the robust weights
 
     void take_lines(const std::vector<Eigen::Matrix3Xd>& lines);
     void join_samples(int first, int last);
     [[nodiscard]] double final_scale_mm() const { return options_.outlier_deviations * data_.deviation_mm; }
+    [[nodiscard]] CurveFit fit(const State& state) const;
     [[nodiscard]] CurveTree deformed_lines(const State& state) const;
     [[nodiscard]] std::vector<CurveMatch> matches(const State& state, double reach_mm) const;
     void add_pulls(const CurveMatch& match, double stiffness, const State& state, double most_step_mm,

@@ -33,4 +33,20 @@ std::vector<tled::Spring> ground_springs(const PreparedModel& prepared, double e
     return springs;
 }
 
+void expect_free_motion(LastPulls& pulls, const PreparedModel& prepared, double motion_mm) {
+    std::erase_if(pulls.springs, [](const PulledNode& pulled) { return pulled.origin == Origin::Prior; });
+    for (const tled::Spring& spring :
+         ground_springs(prepared, pulls.energy, [&](const InterfaceNode&) { return motion_mm; }))
+        pulls.springs.push_back({spring, Origin::Prior});
+    pulls.free_placement = true;
+}
+
+GroundTerm::GroundTerm(const PreparedModel& prepared, double energy, double motion_mm)
+    : springs_(pulled_by(Origin::Prior,
+                         ground_springs(prepared, energy, [&](const InterfaceNode&) { return motion_mm; }))) {}
+
+Contribution GroundTerm::linearise(const RoundPlan& /*plan*/, const State& /*state*/, Observer& /*observer*/) {
+    return {springs_};
+}
+
 }  // namespace tissuewarp::registration::detail

@@ -1,6 +1,8 @@
 #pragma once
 /// What holds tissue of which no datum says where it went.
 
+#include "registration/options.hpp"
+#include "registration/prepare.hpp"
 #include "registration/terms/term.hpp"
 
 #include <functional>
@@ -23,5 +25,20 @@ struct ExpectedMotion {
 /// far as `expected` says of it. `energy` is the strain energy (mN mm) that weighs as much as one standard deviation.
 std::vector<tled::Spring> ground_springs(const PreparedModel& prepared, double energy,
                                          const std::function<ExpectedMotion(const InterfaceNode&)>& expected);
+
+/// Pulls with the prior replaced by ground_springs() of a free organ: what is known without any datum.
+void expect_free_motion(LastPulls& pulls, const PreparedModel& prepared, double motion_mm);
+
+/// The prior where points alone show the organ: its surface lies about where the rigid placement has it. It moves with
+/// the placement.
+class GroundTerm : public Term {
+public:
+    /// `motion_mm` is the standard deviation of the surface's motion, any way.
+    GroundTerm(const PreparedModel& prepared, double energy, double motion_mm);
+    [[nodiscard]] Contribution linearise(const RoundPlan& plan, const State& state, Observer& observer) override;
+
+private:
+    std::vector<PulledNode> springs_;
+};
 
 }  // namespace tissuewarp::registration::detail

@@ -2,7 +2,7 @@
 
 #include "registration/pose/least_trimmed_motion.hpp"
 #include "registration/search/near_points.hpp"
-#include "registration/terms/ground.hpp"
+#include "registration/uncertainty/doubts.hpp"
 
 #include <Eigen/Eigenvalues>
 
@@ -24,70 +24,39 @@ double median_distance(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
     return *middle;
 }
 
+void doubt(const ImageFit& fit, std::vector<Doubt>& doubts) {
+    constexpr double least_matched = 0.1, least_shown = 0.5, most_residual_mm = 1.0, least_agreement = 0.1;
+    if (fit.matched < least_matched * fit.blocks)
+        doubts.push_back({"image.blocks_lost", fit.matched / double(fit.blocks), least_matched,
+                          "only " + std::to_string(fit.matched) + " of " + std::to_string(fit.blocks) +
+                              " blocks of the moving image were found in the fixed one"});
+    if (fit.shown_share < least_shown)
+        doubts.push_back({"image.out_of_view", fit.shown_share, least_shown,
+                          "the fixed image shows only " + percent(fit.shown_share) +
+                              " of the organ; the rest is where mechanics alone put it"});
+    if (fit.agreement && *fit.agreement < least_agreement)
+        doubts.push_back({"image.disagree", *fit.agreement, least_agreement,
+                          "the images agree where the organ lies hardly better than by chance (" +
+                              to_text(*fit.agreement) +
+                              "; 0 is chance, 1 the same image): check that they show the same organ"});
+    if (fit.residual_mm > most_residual_mm)
+        doubts.push_back(
+            {"image.apart", fit.residual_mm, most_residual_mm,
+             "blocks found in the fixed image lie " + to_text(fit.residual_mm) + " mm from where the tissue went"});
+}
+
 }  // namespace
 
-ImageEvidence::ImageEvidence(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
-                             ImageTools& tools, double energy)
+ImageTerm::ImageTerm(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
+                     ImageTools& tools, double energy)
     : prepared_(prepared),
-      fixed_(fixed, tools.memory,
-             [&](const imaging::Volume& image) {
-                 if (tools.engine) tools.engine->begin_fixed(image);
-             }),
       options_(options),
-      view_(fixed_.seen),
-      locator_(tools.locator),
-      energy_(energy) {
-    if (!tools.engine) {
-        own_blocks_ = make_cpu_block_engine(prepared.image->blocks.images(), fixed_);
-        block_engine_ = own_blocks_.get();
-        return;
-    }
-    tools.engine->finish_fixed(fixed_);
-    block_engine_ = &tools.engine->blocks();
-    dense_.emplace(prepared, *tools.engine);
-}
+      energy_(energy),
+      search_(prepared, fixed, options, tools),
+      prior_(prepared, search_.seen(), options, energy) {}
 
-int ImageEvidence::searches() const {
-    return 1 + (dense_ ? static_cast<int>(options_.dense_coarsening.size()) : 0);
-}
-
-void ImageEvidence::search(const State& state, Observer& observer) {
-    if (searches_done_ == 0) {
-        blocks_ = located(consistent_matches(block_search(state, observer), options_.consistency));
-        use(blocks_);
-    } else {
-        const std::vector<int>& grids = options_.dense_coarsening;
-        const int coarsening = grids.at(std::min(static_cast<std::size_t>(searches_done_), grids.size()) - 1);
-        DenseMatches dense = dense_->matches(state, coarsening, blocks_, locator_);
-        use(std::move(dense.found));
-        if (coarsening == last_coarsening_) gain_ = dense.agreement - *agreement_;
-        last_coarsening_ = coarsening;
-        agreement_ = dense.agreement;
-    }
-    ++searches_done_;
-}
-
-std::vector<BlockMatch> ImageEvidence::block_search(const State& state, Observer& observer) const {
-    const MatchingTemplate& blocks = prepared_.image->blocks;
-    BlockMatchingOptions matching = options_.matching;
-    matching.rotation = state.placement.linear();
-    if (dense_) matching.finest = FinestGrid::UndescribedPoints;
-    return search_blocks(blocks, fixed_.image.geometry, *block_engine_, deformed(blocks.points(), state), matching,
-                         observer);
-}
-
-Eigen::Matrix3Xd ImageEvidence::deformed(const Eigen::Matrix3Xd& points, const State& state) const {
-    if (state.displacement.isZero(0)) return state.placement * points;
-    Eigen::Matrix3Xd result = points;
-    tbb::parallel_for(Eigen::Index{0}, points.cols(), [&](Eigen::Index n) {
-        if (const auto at = locate_near(locator_, points.col(n)))
-            result.col(n) += displacement_at(prepared_.model.mesh, state.displacement, *at);
-    });
-    return state.placement * result;
-}
-
-void ImageEvidence::use(LocatedMatches matches) {
-    matches_ = std::move(matches);
+void ImageTerm::search(const State& state, Observer& observer) {
+    matches_ = search_.search(state, observer);
     strongest_.resize(matches_.matches.size());
     tbb::parallel_for(std::size_t{0}, strongest_.size(), [&](std::size_t n) {
         Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
@@ -97,18 +66,12 @@ void ImageEvidence::use(LocatedMatches matches) {
     shares_ = NodalShares(prepared_.model.mesh, matches_.places);
 }
 
-LocatedMatches ImageEvidence::located(const std::vector<BlockMatch>& matches) const {
-    std::vector<std::optional<meshing::Location>> places(matches.size());
-    tbb::parallel_for(std::size_t{0}, matches.size(),
-                      [&](std::size_t n) { places[n] = locate_near(locator_, matches[n].moving); });
-    LocatedMatches result;
-    result.reserve(matches.size());
-    for (std::size_t n = 0; n < matches.size(); ++n)
-        if (places[n]) result.add(matches[n], *places[n]);
-    return result;
+Alignment ImageTerm::pose(const Eigen::Isometry3d& /*start*/, Observer& observer) {
+    search({Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, prepared_.rest.node_count)}, observer);
+    return {rigid_motion(), 0};
 }
 
-Eigen::Isometry3d ImageEvidence::rigid_motion() const {
+Eigen::Isometry3d ImageTerm::rigid_motion() const {
     constexpr std::size_t fewest = 10;
     if (matches_.matches.size() < fewest)
         throw InvalidInput("only " + std::to_string(matches_.matches.size()) +
@@ -120,64 +83,12 @@ Eigen::Isometry3d ImageEvidence::rigid_motion() const {
         moving.col(n) = matches_.matches[static_cast<std::size_t>(n)].moving;
         fixed.col(n) = matches_.matches[static_cast<std::size_t>(n)].fixed;
     }
-    if (view_share() < 0.9 && median_distance(moving, fixed) < options_.headers_within_mm)
+    if (prior_.share_in_view() < 0.9 && median_distance(moving, fixed) < options_.headers_within_mm)
         return Eigen::Isometry3d::Identity();
     return least_trimmed_motion(moving, fixed);
 }
 
-bool ImageEvidence::in_view(const Eigen::Vector3d& point) const {
-    constexpr double margin_mm = 10;  // tissue may have come from outside of what is shown now
-    return view_.distance(point) < margin_mm;
-}
-
-std::vector<char> ImageEvidence::surface_in_view(const Eigen::Isometry3d& placement) const {
-    const std::vector<InterfaceNode>& interfaces = prepared_.interfaces.nodes();
-    std::vector<char> result(static_cast<std::size_t>(prepared_.model.mesh.node_count()));
-    tbb::parallel_for(std::size_t{0}, interfaces.size(), [&](std::size_t n) {
-        const int node = interfaces[n].node;
-        if (interfaces[n].outer != 0) return;
-        result[static_cast<std::size_t>(node)] =
-            in_view(placement * Eigen::Vector3d(prepared_.model.mesh.nodes.col(node)));
-    });
-    return result;
-}
-
-double ImageEvidence::view_share() const {
-    double all = 0, seen = 0;
-    const std::vector<char> shown = surface_in_view(Eigen::Isometry3d::Identity());
-    for (const InterfaceNode& node : prepared_.interfaces.nodes()) {
-        if (node.outer != 0) continue;
-        all += node.area;
-        if (shown[static_cast<std::size_t>(node.node)]) seen += node.area;
-    }
-    return all > 0 ? seen / all : 0;
-}
-
-ImageFit ImageEvidence::fit(const State& state) {
-    constexpr double near_mm = 15;
-    const Eigen::Matrix3Xd& nodes = prepared_.model.mesh.nodes;
-    ImageFit fit;
-    fit.blocks = static_cast<int>(prepared_.image->blocks.points().cols());
-    fit.matched = static_cast<int>(blocks_.matches.size());
-    std::vector<Eigen::Vector3d> places;
-    places.reserve(matches_.matches.size());
-    for (const BlockMatch& match : matches_.matches) places.push_back(match.moving);
-    const NearPoints matched(std::move(places), near_mm);
-    const auto shown = tbb::parallel_reduce(
-        tbb::blocked_range<Eigen::Index>(0, nodes.cols()), Eigen::Index{0},
-        [&](const tbb::blocked_range<Eigen::Index>& range, Eigen::Index count) {
-            for (Eigen::Index node = range.begin(); node < range.end(); ++node)
-                count += matched.any_about(nodes.col(node));
-            return count;
-        },
-        std::plus<>());
-    fit.shown_share = double(shown) / double(nodes.cols());
-    fit.residual_mm = mean_residual(pulled(state));
-    fit.agreement = agreement_;
-    return fit;
-}
-
-const std::vector<ImageEvidence::PulledMatch>& ImageEvidence::pulled(const State& state) {
+const std::vector<ImageTerm::PulledMatch>& ImageTerm::pulled(const State& state) {
     const Eigen::Isometry3d back = state.placement.inverse();
     pulled_.resize(matches_.matches.size());
     tbb::parallel_for(std::size_t{0}, pulled_.size(), [&](std::size_t n) {
@@ -192,7 +103,7 @@ const std::vector<ImageEvidence::PulledMatch>& ImageEvidence::pulled(const State
     return pulled_;
 }
 
-double ImageEvidence::mean_residual(const std::vector<PulledMatch>& matches) {
+double ImageTerm::mean_residual(const std::vector<PulledMatch>& matches) {
     double sum = 0, weights = 0;
     for (const PulledMatch& match : matches) {
         sum += match.confidence * match.residual_mm;
@@ -201,34 +112,55 @@ double ImageEvidence::mean_residual(const std::vector<PulledMatch>& matches) {
     return weights > 0 ? sum / weights : 0;
 }
 
-Contribution ImageEvidence::contribution(const RoundPlan& plan, const State& state) {
+Contribution ImageTerm::linearise(const RoundPlan& plan, const State& state, Observer& observer) {
+    Contribution result;
+    if (search_.done() < plan.searches_due) {
+        search(state, observer);
+        result.pulls_anew = true;
+    }
     const std::vector<PulledMatch>& matches = pulled(state);
     forces_.resize(matches.size());
     tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t n) {
         const double weight = energy_ * matches[n].confidence * robust_weight(matches[n].residual_mm, plan.scale_mm);
         forces_[n] = {weight * matches[n].pull.stiffness, weight * matches[n].pull.force};
     });
-    Contribution result;
     result.candidates =
         std::max(static_cast<int>(prepared_.image->blocks.points().cols()), static_cast<int>(matches.size()));
     result.matched = static_cast<int>(matches.size());
     result.mean_residual_mm = mean_residual(matches);
-    result.conditions.springs = lumped_springs(shares_, forces_, state.displacement);
-    for (const tled::Spring& spring : ground(state.placement)) result.conditions.springs.push_back(spring);
+    result.springs = pulled_by(Origin::Datum, lumped_springs(shares_, forces_, state.displacement));
+    for (const tled::Spring& spring : prior_.springs(state.placement))
+        result.springs.push_back({spring, Origin::Prior});
     return result;
 }
 
-const std::vector<tled::Spring>& ImageEvidence::ground(const Eigen::Isometry3d& placement) {
-    if (ground_.empty() || !ground_at_.isApprox(placement, 0)) {
-        ground_at_ = placement;
-        const std::vector<char> shown = surface_in_view(placement);
-        ground_ = ground_springs(prepared_, energy_, [&](const InterfaceNode& node) {
-            return shown[static_cast<std::size_t>(node.node)]
-                       ? ExpectedMotion(options_.expected_motion_mm)
-                       : ExpectedMotion(options_.unseen_motion_mm, options_.unseen_slide_mm);
-        });
-    }
-    return ground_;
+ImageFit ImageTerm::fit(const State& state) {
+    constexpr double near_mm = 15;
+    const Eigen::Matrix3Xd& nodes = prepared_.model.mesh.nodes;
+    ImageFit fit;
+    fit.blocks = static_cast<int>(prepared_.image->blocks.points().cols());
+    fit.matched = static_cast<int>(search_.blocks_found());
+    std::vector<Eigen::Vector3d> places;
+    places.reserve(matches_.matches.size());
+    for (const BlockMatch& match : matches_.matches) places.push_back(match.moving);
+    const NearPoints matched(std::move(places), near_mm);
+    const auto shown = tbb::parallel_reduce(
+        tbb::blocked_range<Eigen::Index>(0, nodes.cols()), Eigen::Index{0},
+        [&](const tbb::blocked_range<Eigen::Index>& range, Eigen::Index count) {
+            for (Eigen::Index node = range.begin(); node < range.end(); ++node)
+                count += matched.any_about(nodes.col(node));
+            return count;
+        },
+        std::plus<>());
+    fit.shown_share = double(shown) / double(nodes.cols());
+    fit.residual_mm = mean_residual(pulled(state));
+    fit.agreement = search_.agreement();
+    return fit;
+}
+
+void ImageTerm::judge(const State& state, UpdateResult& result) {
+    result.image = fit(state);
+    doubt(*result.image, result.doubts);
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -9,18 +9,17 @@ Eigen::Matrix3d spring_stiffness(const InterfaceNode& node, const Eigen::Vector3
            (along + options.tangential_ratio * (Eigen::Matrix3d::Identity() - along));
 }
 
-tled::Conditions full_weight_springs(const Interfaces& interfaces, const PrepareOptions& options) {
-    tled::Conditions conditions;
+std::vector<tled::Spring> full_weight_springs(const Interfaces& interfaces, const PrepareOptions& options) {
+    std::vector<tled::Spring> springs;
     for (const InterfaceNode& node : interfaces.nodes())
-        conditions.springs.push_back(
-            {node.node, spring_stiffness(node, node.normal, 1.0, options), Eigen::Vector3d::Zero()});
-    return conditions;
+        springs.push_back({node.node, spring_stiffness(node, node.normal, 1.0, options), Eigen::Vector3d::Zero()});
+    return springs;
 }
 
-tled::Conditions matched_springs(const Interfaces& interfaces, const std::vector<Match>& matches,
-                                 const Eigen::Matrix3Xd& normals, const Eigen::Matrix3Xd& displacement,
-                                 const PrepareOptions& options) {
-    tled::Conditions conditions;
+std::vector<tled::Spring> matched_springs(const Interfaces& interfaces, const std::vector<Match>& matches,
+                                          const Eigen::Matrix3Xd& normals, const Eigen::Matrix3Xd& displacement,
+                                          const PrepareOptions& options) {
+    std::vector<tled::Spring> springs;
     for (std::size_t i = 0; i < matches.size(); ++i) {
         const InterfaceNode& node = interfaces.nodes()[i];
         const Eigen::Vector3d normal = normals.col(static_cast<Eigen::Index>(i));
@@ -28,9 +27,9 @@ tled::Conditions matched_springs(const Interfaces& interfaces, const std::vector
         const Match& match = matches[i];
         if (!match.found) continue;
         const Eigen::Matrix3d pull = options.data_stiffness * node.area * match.weight * normal * normal.transpose();
-        conditions.springs.push_back({node.node, pull, here + match.distance_mm * normal});
+        springs.push_back({node.node, pull, here + match.distance_mm * normal});
     }
-    return conditions;
+    return springs;
 }
 
 std::vector<tled::Spring> holding_springs(const Interfaces& interfaces, const Eigen::Matrix3Xd& displacement,

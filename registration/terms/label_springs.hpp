@@ -1,7 +1,7 @@
 #pragma once
 /// Correspondences as springs: stiff along the normal, soft along the surface, so that tissue may slide.
 
-#include "registration/pipeline.hpp"
+#include "registration/prepare.hpp"
 #include "tled/conditions.hpp"
 
 namespace tissuewarp::registration::detail {
@@ -11,7 +11,7 @@ Eigen::Matrix3d spring_stiffness(const InterfaceNode& node, const Eigen::Vector3
                                  const PrepareOptions& options);
 
 /// Springs of every interface node at weight one with target zero: what the factor of K₀ is made with.
-tled::Conditions full_weight_springs(const Interfaces& interfaces, const PrepareOptions& options);
+std::vector<tled::Spring> full_weight_springs(const Interfaces& interfaces, const PrepareOptions& options);
 
 /// Where one interface node is drawn to.
 struct Match {
@@ -22,9 +22,9 @@ struct Match {
 };
 
 /// Springs from `displacement` (3 × N, moving frame) along `normals` (one column per interface node) to the matches.
-tled::Conditions matched_springs(const Interfaces& interfaces, const std::vector<Match>& matches,
-                                 const Eigen::Matrix3Xd& normals, const Eigen::Matrix3Xd& displacement,
-                                 const PrepareOptions& options);
+std::vector<tled::Spring> matched_springs(const Interfaces& interfaces, const std::vector<Match>& matches,
+                                          const Eigen::Matrix3Xd& normals, const Eigen::Matrix3Xd& displacement,
+                                          const PrepareOptions& options);
 
 /// Springs of tangential stiffness of every interface node to where it is, so that no piece of tissue floats and the
 /// system stays definite where robust weights vanish. They slow the rounds down and say nothing of where tissue

@@ -1,38 +1,89 @@
 #include "registration/terms/labels.hpp"
 
+#include "imaging/labels.hpp"
 #include "registration/terms/label_matches.hpp"
 #include "registration/uncertainty/doubts.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
 namespace tissuewarp::registration::detail {
 
-LabelEvidence::LabelEvidence(const PreparedModel& prepared, const imaging::Volume& fixed_labels,
-                             const UpdateOptions& options)
+namespace {
+
+const imaging::Volume& with_common_labels(const imaging::Volume& fixed, const PreparedModel& prepared) {
+    for (const int label : imaging::labels_in(fixed.as(CV_32S)))
+        if (prepared.model.materials.contains(label)) return fixed;
+    throw InvalidInput("the fixed label map holds none of the labels of the model; check the label tables");
+}
+
+double labelled_volume(const imaging::Volume& labels) {
+    return cv::countNonZero(imaging::mask_of_all(labels).voxels.reshape(1, 1)) * labels.geometry.voxel_volume();
+}
+
+double largest_poisson_ratio(const tled::MaterialTable& materials) {
+    double largest = 0;
+    for (const auto& [label, material] : materials) largest = std::max(largest, tled::poisson_ratio(material));
+    return largest;
+}
+
+}  // namespace
+
+LabelTerm::LabelTerm(const PreparedModel& prepared, const imaging::Volume& fixed_labels, const UpdateOptions& options)
     : prepared_(prepared),
+      labels_(with_common_labels(fixed_labels, prepared)),
       options_(options),
-      fixed_(fixed_labels, prepared.interfaces.thickness(prepared.model.mesh)),
+      boundaries_(fixed_labels, prepared.interfaces.thickness(prepared.model.mesh)),
       neighbours_(prepared.interfaces.neighbours()) {}
 
-Contribution LabelEvidence::contribution(const RoundPlan& plan, const State& state) const {
+Alignment LabelTerm::pose(const Eigen::Isometry3d& /*start*/, Observer& observer) {
+    return align_labels(prepared_.labels, labels_, options_.alignment, observer);
+}
+
+Contribution LabelTerm::linearise(const RoundPlan& plan, const State& state, Observer& /*observer*/) {
     const Interfaces& interfaces = prepared_.interfaces;
     const Eigen::Matrix3Xd normals = interfaces.normals(prepared_.model.mesh.nodes + state.displacement);
-    std::vector<Match> matches = match_interfaces(prepared_, fixed_, state, normals, plan, options_.max_angle_deg);
+    std::vector<Match> matches = match_interfaces(prepared_, boundaries_, state, normals, plan, options_.max_angle_deg);
     leave_out_strays(matches, interfaces, neighbours_, prepared_.model.mesh.nodes, state.displacement, normals);
     weigh(matches, neighbours_, plan.scale_mm);
     bound(matches, plan.most_step_mm);
-    Contribution result{matched_springs(interfaces, matches, normals, state.displacement, prepared_.options),
-                        holding_springs(interfaces, state.displacement, prepared_.options),
-                        static_cast<int>(matches.size()),
-                        0,
-                        0,
-                        mean_residual(matches)};
+    last_ = {};
+    last_.candidates = static_cast<int>(matches.size());
+    last_.mean_residual_mm = mean_residual(matches);
     for (const Match& match : matches) {
-        result.matched += match.found;
-        result.held_back += match.held_back;
+        last_.matched += match.found;
+        last_.held_back += match.held_back;
     }
-    if (result.matched == 0)
+    if (last_.matched == 0)
         throw InvalidInput("no boundary of the model was found in the fixed labels within " + to_text(plan.range_mm) +
                            " mm; check that the images show the same organ");
+    Contribution result = last_;
+    result.springs =
+        pulled_by(Origin::Datum, matched_springs(interfaces, matches, normals, state.displacement, prepared_.options));
+    const auto holds = pulled_by(Origin::Hold, holding_springs(interfaces, state.displacement, prepared_.options));
+    std::copy(holds.begin(), holds.end(), std::back_inserter(result.springs));
     return result;
+}
+
+void LabelTerm::judge(const State& /*state*/, UpdateResult& result) {
+    constexpr double least_matched = 0.5, most_growth = 0.1, tissue_resists = 0.4;
+    const double spacing = prepared_.labels.geometry.spacing.maxCoeff();
+    if (2 * last_.matched < last_.candidates)
+        result.doubts.push_back({"labels.unmatched", last_.matched / double(last_.candidates), least_matched,
+                                 "only " + std::to_string(last_.matched) + " of " + std::to_string(last_.candidates) +
+                                     " boundary nodes found their boundary in the fixed labels"});
+    if (last_.mean_residual_mm > spacing)
+        result.doubts.push_back(
+            {"labels.apart", last_.mean_residual_mm, spacing,
+             "the surfaces still differ by " + to_text(last_.mean_residual_mm) + " mm on average, more than a voxel"});
+    const double growth = labelled_volume(labels_) / labelled_volume(prepared_.labels);
+    const double poisson = largest_poisson_ratio(prepared_.model.materials);
+    if (std::abs(growth - 1) > most_growth && poisson > tissue_resists)
+        result.doubts.push_back({"labels.volume_changed", growth, most_growth,
+                                 "the labelled volume changed by the factor " + to_text(growth) +
+                                     ", which tissue of Poisson's ratio " + to_text(poisson) +
+                                     " resists; for lungs and other tissue that changes volume take 0.3 or less"});
 }
 
 }  // namespace tissuewarp::registration::detail

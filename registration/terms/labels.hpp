@@ -1,23 +1,33 @@
 #pragma once
 /// A segmented intraoperative volume: interface nodes of the deformed mesh belong on the boundaries of its labels.
 
+#include "registration/boundary/interfaces.hpp"
+#include "registration/options.hpp"
+#include "registration/prepare.hpp"
 #include "registration/terms/term.hpp"
 
 namespace tissuewarp::registration::detail {
 
-class LabelEvidence {
+class LabelTerm : public Term {
 public:
-    LabelEvidence(const PreparedModel& prepared, const imaging::Volume& fixed_labels, const UpdateOptions& options);
+    /// Model, labels and options outlive this. Throws InvalidInput where the labels hold none of the model's.
+    LabelTerm(const PreparedModel& prepared, const imaging::Volume& fixed_labels, const UpdateOptions& options);
 
+    [[nodiscard]] Shows shows() const override { return Shows::Boundary; }
+    [[nodiscard]] PoseClaim pose_claim() const override { return PoseClaim::WholeSurface; }
+    [[nodiscard]] Alignment pose(const Eigen::Isometry3d& start, Observer& observer) override;
     /// Springs from every interface node along its normal to the boundary in the fixed labels. Throws InvalidInput when
     /// no boundary was found.
-    [[nodiscard]] Contribution contribution(const RoundPlan& plan, const State& state) const;
+    [[nodiscard]] Contribution linearise(const RoundPlan& plan, const State& state, Observer& observer) override;
+    void judge(const State& state, UpdateResult& result) override;
 
 private:
     const PreparedModel& prepared_;
+    const imaging::Volume& labels_;  // fixed
     const UpdateOptions& options_;
-    LabelBoundaryField fixed_;
+    LabelBoundaryField boundaries_;             // of these
     std::vector<std::vector<int>> neighbours_;  // of interface nodes
+    Contribution last_;                         // without its springs
 };
 
 }  // namespace tissuewarp::registration::detail

@@ -38,10 +38,18 @@ double median(const Eigen::RowVectorXd& given) {
     return *middle;
 }
 
+void doubt(const PointFit& fit, std::vector<Doubt>& doubts) {
+    constexpr double most_outliers = 0.2;
+    if (fit.outliers > most_outliers * fit.used)
+        doubts.push_back({"points.outliers", fit.outliers / double(fit.used), most_outliers,
+                          std::to_string(fit.outliers) + " of " + std::to_string(fit.used) +
+                              " pairs of points do not fit the tissue; check that they are the same places in both "
+                              "images"});
+}
+
 }  // namespace
 
-PointEvidence::PointEvidence(const PreparedModel& prepared, const PointPairs& pairs, const PointOptions& options,
-                             double energy)
+PointTerm::PointTerm(const PreparedModel& prepared, const PointPairs& pairs, const PointOptions& options, double energy)
     : prepared_(prepared), options_(options), energy_(energy), deviation_mm_(pairs.deviation_mm) {
     require_usable(pairs);
     const meshing::PointLocator locator(prepared.model.mesh);
@@ -59,11 +67,11 @@ PointEvidence::PointEvidence(const PreparedModel& prepared, const PointPairs& pa
     fixed_ = pairs.fixed(Eigen::all, kept);
 }
 
-bool PointEvidence::show_rotation() const {
+bool PointTerm::show_rotation() const {
     return moving_.cols() >= 3 && width(moving_) > 3 * deviation_mm_;
 }
 
-Alignment PointEvidence::align() const {
+Alignment PointTerm::pose(const Eigen::Isometry3d& /*start*/, Observer& /*observer*/) {
     constexpr int passes = 10;
     constexpr double scale_ratio = 0.6, bending_mm = 10;  // what a rigid motion does not follow
     Eigen::VectorXd weights = Eigen::VectorXd::Ones(moving_.cols());
@@ -83,7 +91,7 @@ Alignment PointEvidence::align() const {
     return {motion, distances.dot(weights.transpose()) / weights.sum()};
 }
 
-Eigen::Matrix3Xd PointEvidence::residuals(const State& state) const {
+Eigen::Matrix3Xd PointTerm::residuals(const State& state) const {
     Eigen::Matrix3Xd result = (state.placement.inverse() * fixed_) - moving_;
     for (std::size_t n = 0; n < places_.size(); ++n)
         result.col(static_cast<Eigen::Index>(n)) -=
@@ -91,12 +99,10 @@ Eigen::Matrix3Xd PointEvidence::residuals(const State& state) const {
     return result;
 }
 
-Contribution PointEvidence::contribution(const RoundPlan& plan, const State& state) {
-    constexpr double scale_ratio = 0.6;  // from round to round
+Contribution PointTerm::linearise(const RoundPlan& plan, const State& state, Observer& /*observer*/) {
     const Eigen::Matrix3Xd away = residuals(state);
-    if (plan.number == 0) first_scale_mm_ = 3 * median(away.colwise().norm());
-    const double scale =
-        plan.last ? final_scale_mm() : std::max(final_scale_mm(), first_scale_mm_ * std::pow(scale_ratio, plan.number));
+    if (plan.number == 0) scale_.begin_at(3 * median(away.colwise().norm()));
+    const double scale = scale_.of(plan, final_scale_mm());
     const double stiffness = energy_ / (deviation_mm_ * deviation_mm_);
     Contribution result;
     std::vector<Pull> pulls;
@@ -113,11 +119,11 @@ Contribution PointEvidence::contribution(const RoundPlan& plan, const State& sta
     }
     if (weights > 0) result.mean_residual_mm /= weights;
     result.candidates = result.matched = static_cast<int>(places_.size());
-    result.conditions.springs = lumped_springs(prepared_.model.mesh, pulls, state.displacement);
+    result.springs = pulled_by(Origin::Datum, lumped_springs(prepared_.model.mesh, pulls, state.displacement));
     return result;
 }
 
-PointFit PointEvidence::fit(const State& state) const {
+PointFit PointTerm::fit(const State& state) const {
     PointFit fit;
     fit.used = static_cast<int>(places_.size());
     double squared = 0;
@@ -130,6 +136,11 @@ PointFit PointEvidence::fit(const State& state) const {
     }
     if (fit.used > fit.outliers) fit.residual_mm = std::sqrt(squared / (fit.used - fit.outliers));
     return fit;
+}
+
+void PointTerm::judge(const State& state, UpdateResult& result) {
+    result.points = fit(state);
+    doubt(*result.points, result.doubts);
 }
 
 }  // namespace tissuewarp::registration::detail

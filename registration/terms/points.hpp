@@ -1,6 +1,9 @@
 #pragma once
 /// Points of the tissue that were found again.
 
+#include "registration/intraoperative.hpp"
+#include "registration/options.hpp"
+#include "registration/prepare.hpp"
 #include "registration/terms/pull.hpp"
 #include "registration/terms/term.hpp"
 
@@ -8,36 +11,39 @@
 
 namespace tissuewarp::registration::detail {
 
-class PointEvidence {
+class PointTerm : public Term {
 public:
     /// `energy` is the strain energy (mN mm) that weighs as much as one standard deviation. Throws InvalidInput for
     /// pairs that cannot be used, and where no moving point lies in the model.
-    PointEvidence(const PreparedModel& prepared, const PointPairs& pairs, const PointOptions& options, double energy);
+    PointTerm(const PreparedModel& prepared, const PointPairs& pairs, const PointOptions& options, double energy);
 
-    /// Whether the pairs say how the organ is turned: three of them at least, not on a line.
-    [[nodiscard]] bool show_rotation() const;
-
+    [[nodiscard]] Shows shows() const override { return Shows::Parts; }
+    [[nodiscard]] PoseClaim pose_claim() const override {
+        return show_rotation() ? PoseClaim::Pairs : PoseClaim::Shift;
+    }
     /// The rigid motion from the moving to the fixed points, outliers weighed down; a shift where they show no
     /// rotation.
-    [[nodiscard]] Alignment align() const;
+    [[nodiscard]] Alignment pose(const Eigen::Isometry3d& start, Observer& observer) override;
 
     /// Pulls on the tissue at the points, the same in all directions. The scale of the robust weights falls from three
     /// times the median distance in the first round.
-    [[nodiscard]] Contribution contribution(const RoundPlan& plan, const State& state);
+    [[nodiscard]] Contribution linearise(const RoundPlan& plan, const State& state, Observer& observer) override;
 
-    /// How the model agrees with the pairs.
-    [[nodiscard]] PointFit fit(const State& state) const;
+    void judge(const State& state, UpdateResult& result) override;
 
 private:
     const PreparedModel& prepared_;
     const PointOptions& options_;
     double energy_;  // mN mm
     double deviation_mm_;
-    double first_scale_mm_ = 0;        // of the robust weights
+    FallingScale scale_;               // of the robust weights
     Eigen::Matrix3Xd moving_, fixed_;  // of the pairs in the model
     std::vector<meshing::Location> places_;
 
     [[nodiscard]] double final_scale_mm() const { return options_.outlier_deviations * deviation_mm_; }
+    /// Whether the pairs say how the organ is turned: three of them at least, not on a line.
+    [[nodiscard]] bool show_rotation() const;
+    [[nodiscard]] PointFit fit(const State& state) const;
     /// From where the model has the points to where they were found, 3 × P, mm, moving frame.
     [[nodiscard]] Eigen::Matrix3Xd residuals(const State& state) const;
 };

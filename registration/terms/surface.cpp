@@ -5,9 +5,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
 
 namespace tissuewarp::registration::detail {
 
@@ -15,81 +13,51 @@ namespace {
 
 constexpr double least_deviation_mm = 0.3;  // the model's own surface is no better
 
-double area_of(const meshing::SurfaceMesh& surface) {
-    double area = 0;
-    for (const auto& triangle : surface.triangles.colwise()) {
-        const Eigen::Vector3d a = surface.nodes.col(triangle[0]), b = surface.nodes.col(triangle[1]),
-                              c = surface.nodes.col(triangle[2]);
-        area += 0.5 * (b - a).cross(c - a).norm();
-    }
-    return area;
-}
-
-std::array<int, 3> sorted(std::array<int, 3> nodes) {
-    std::sort(nodes.begin(), nodes.end());
-    return nodes;
+void doubt(const SurfaceFit& fit, double deviation_mm, std::vector<Doubt>& doubts) {
+    constexpr double least_inliers = 0.5, most_residual = 1.4, most_rival_support = 0.95, least_coverage = 0.25;
+    const double residual_limit = most_residual * std::max(deviation_mm, least_deviation_mm);
+    if (fit.inlier_share < least_inliers)
+        doubts.push_back({"surface.outliers", fit.inlier_share, least_inliers,
+                          "only " + percent(fit.inlier_share) + " of the intraoperative surface lies on the model"});
+    if (fit.residual_mm > residual_limit)
+        doubts.push_back({"surface.apart", fit.residual_mm, residual_limit,
+                          "points of the intraoperative surface lie " + to_text(fit.residual_mm) +
+                              " mm from the model where " + to_text(deviation_mm) + " mm were stated"});
+    if (!fit.pose_searched) return;
+    if (fit.coverage < least_coverage)
+        doubts.push_back(
+            {"surface.too_small", fit.coverage, least_coverage,
+             "the points show " + percent(fit.coverage) +
+                 " of the organ's surface, too little to tell where it lies; show more of it, give pairs of points, or "
+                 "leave it where the headers place it if they are right (--no-align)"});
+    if (fit.rival_support > most_rival_support)
+        doubts.push_back({"surface.two_poses", fit.rival_support, most_rival_support,
+                          "the points fit about as well with the organ placed " + to_text(fit.rival_mm) +
+                              " mm elsewhere; give a wider patch, or landmarks"});
 }
 
 }  // namespace
 
-SurfaceEvidence::SurfaceEvidence(const PreparedModel& prepared, const SurfacePoints& surface,
-                                 const SurfaceOptions& options, double energy)
-    : prepared_(prepared), options_(options), data_(surface_data(surface)), energy_(energy) {
-    take_surface();
-}
+SurfaceTerm::SurfaceTerm(const PreparedModel& prepared, const SurfacePoints& surface, const SurfaceOptions& options,
+                         const AlignmentOptions& alignment, double energy)
+    : prepared_(prepared),
+      options_(options),
+      alignment_(alignment),
+      data_(surface_data(surface)),
+      surface_(prepared),
+      energy_(energy) {}
 
-/// The outer faces that are a boundary of tissue, not a cut by the image's border, moved out to where the labels end.
-void SurfaceEvidence::take_surface() {
-    const meshing::TetMesh& mesh = prepared_.model.mesh;
-    std::map<int, Eigen::Vector3d> places;
-    for (const InterfaceNode& node : prepared_.interfaces.nodes()) {
-        if (node.outer != 0 || std::isnan(node.offset)) continue;
-        places[node.node] = mesh.nodes.col(node.node) + node.offset * node.normal;
-    }
-    std::map<int, int> index;
-    for (const auto& [node, place] : places) {
-        index[node] = static_cast<int>(node_of_.size());
-        node_of_.push_back(node);
-    }
-    std::map<std::array<int, 3>, int> tet_of_face;
-    for (int tet = 0; tet < mesh.tet_count(); ++tet)
-        for (int left_out = 0; left_out < 4; ++left_out) {
-            std::array<int, 3> face{};
-            for (int k = 0; k < 3; ++k) face[static_cast<std::size_t>(k)] = mesh.tets((left_out + 1 + k) % 4, tet);
-            if (places.contains(face[0]) && places.contains(face[1]) && places.contains(face[2]))
-                tet_of_face[sorted(face)] = tet;
-        }
-    std::vector<Eigen::Vector3i> triangles;
-    for (const meshing::InterfaceFace& face : meshing::interface_faces(mesh)) {
-        if (face.outer != 0) continue;
-        const auto [a, b, c] = face.nodes;
-        if (!places.contains(a) || !places.contains(b) || !places.contains(c)) continue;
-        triangles.emplace_back(index[a], index[b], index[c]);
-        tet_of_.push_back(tet_of_face.at(sorted(face.nodes)));
-    }
-    if (triangles.empty()) throw InvalidInput("the model has no outer surface that the image shows");
-    surface_.nodes.resize(3, static_cast<Eigen::Index>(node_of_.size()));
-    for (const auto& [node, place] : places) surface_.nodes.col(index[node]) = place;
-    surface_.triangles.resize(3, static_cast<Eigen::Index>(triangles.size()));
-    for (std::size_t t = 0; t < triangles.size(); ++t)
-        surface_.triangles.col(static_cast<Eigen::Index>(t)) = triangles[t];
-}
-
-meshing::SurfaceMesh SurfaceEvidence::deformed_surface(const Eigen::Matrix3Xd& displacement) const {
-    return {surface_.nodes + displacement(Eigen::all, node_of_), surface_.triangles};
-}
-
-double SurfaceEvidence::final_scale_mm() const {
+double SurfaceTerm::final_scale_mm() const {
     return options_.outlier_deviations * std::max(data_.deviation_mm, least_deviation_mm);
 }
 
-Alignment SurfaceEvidence::align(const AlignmentOptions& options, Observer& observer) {
-    pose_ = search_surface_pose(SurfaceTree(surface_), surface_, data_, options, observer);
+Alignment SurfaceTerm::pose(const Eigen::Isometry3d& /*start*/, Observer& observer) {
+    pose_ = search_surface_pose(SurfaceTree(surface_.at_rest), surface_.at_rest, data_, alignment_, observer);
     return {pose_.placement, pose_.typical_distance_mm()};
 }
 
-std::vector<SurfaceEvidence::Match> SurfaceEvidence::matches(const State& state, double reach_mm) const {
-    const SurfaceTree tree(deformed_surface(state.displacement));
+std::vector<SurfaceTerm::Match> SurfaceTerm::matches(const State& state, double reach_mm) const {
+    const SurfaceTree tree(surface_.deformed(state.displacement));
     const Eigen::Isometry3d back = state.placement.inverse();
     const double least_cosine = std::cos(options_.max_angle_deg * EIGEN_PI / 180);
     std::vector<Match> result(static_cast<std::size_t>(data_.count()));
@@ -110,16 +78,11 @@ std::vector<SurfaceEvidence::Match> SurfaceEvidence::matches(const State& state,
 }
 
 /// K = energy/σ² · area/patch² · weight · n nᵀ, at the point of the surface's triangle.
-Pull SurfaceEvidence::pull_of(const Match& match, double area, double weight, const State& state,
-                              double most_step_mm) const {
+Pull SurfaceTerm::pull_of(const Match& match, double area, double weight, const State& state,
+                          double most_step_mm) const {
     const meshing::TetMesh& mesh = prepared_.model.mesh;
     Pull pull;
-    pull.at.tet = tet_of_[static_cast<std::size_t>(match.hit.triangle)];
-    for (int corner = 0; corner < 3; ++corner) {
-        const int node = node_of_[static_cast<std::size_t>(surface_.triangles(corner, match.hit.triangle))];
-        for (int k = 0; k < 4; ++k)
-            if (mesh.tets(k, pull.at.tet) == node) pull.at.barycentric[k] = match.hit.barycentric[corner];
-    }
+    pull.at = surface_.location(match.hit.triangle, match.hit.barycentric, mesh);
     const double deviation = std::max(data_.deviation_mm, least_deviation_mm);
     const double stiffness =
         weight * energy_ / (deviation * deviation) * area / (options_.patch_mm * options_.patch_mm);
@@ -129,8 +92,7 @@ Pull SurfaceEvidence::pull_of(const Match& match, double area, double weight, co
     return pull;
 }
 
-Contribution SurfaceEvidence::contribution(const RoundPlan& plan, const State& state) {
-    constexpr double scale_ratio = 0.6;  // from round to round
+Contribution SurfaceTerm::linearise(const RoundPlan& plan, const State& state, Observer& /*observer*/) {
     const double reach = std::max(4 * final_scale_mm(), 3 * plan.range_mm);
     const std::vector<Match> found = matches(state, reach);
     if (plan.number == 0) {
@@ -142,10 +104,9 @@ Contribution SurfaceEvidence::contribution(const RoundPlan& plan, const State& s
                                " mm of the model; check the frame and the unit of the points");
         const auto high = distances.begin() + static_cast<std::ptrdiff_t>(double(distances.size() - 1) * 0.9);
         std::nth_element(distances.begin(), high, distances.end());
-        first_scale_mm_ = 2 * *high;
+        scale_.begin_at(2 * *high);
     }
-    const double scale =
-        plan.last ? final_scale_mm() : std::max(final_scale_mm(), first_scale_mm_ * std::pow(scale_ratio, plan.number));
+    const double scale = scale_.of(plan, final_scale_mm());
     Contribution result;
     std::vector<Pull> pulls;
     double weights = 0;
@@ -161,11 +122,11 @@ Contribution SurfaceEvidence::contribution(const RoundPlan& plan, const State& s
     if (weights > 0) result.mean_residual_mm /= weights;
     result.candidates = static_cast<int>(found.size());
     result.matched = static_cast<int>(pulls.size());
-    result.conditions.springs = lumped_springs(prepared_.model.mesh, pulls, state.displacement);
+    result.springs = pulled_by(Origin::Datum, lumped_springs(prepared_.model.mesh, pulls, state.displacement));
     return result;
 }
 
-SurfaceFit SurfaceEvidence::fit(const State& state) const {
+SurfaceFit SurfaceTerm::fit(const State& state) const {
     const double limit = final_scale_mm();
     SurfaceFit fit;
     double area = 0, squared = 0;
@@ -179,11 +140,16 @@ SurfaceFit SurfaceEvidence::fit(const State& state) const {
     }
     fit.inlier_share = inliers / double(found.size());
     fit.residual_mm = inliers > 0 ? std::sqrt(squared / inliers) : limit;
-    fit.coverage = area / area_of(surface_);
+    fit.coverage = area / surface_.area();
     fit.pose_searched = pose_.scale_mm > 0;
     fit.rival_mm = pose_.rival_mm;
     fit.rival_support = pose_.cost < 1 ? (1 - pose_.rival_cost) / (1 - pose_.cost) : 1;
     return fit;
+}
+
+void SurfaceTerm::judge(const State& state, UpdateResult& result) {
+    result.surface = fit(state);
+    doubt(*result.surface, data_.deviation_mm, result.doubts);
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -1,8 +1,10 @@
 #pragma once
 /// Points of a part of the organ's surface: the tissue's surface goes through them.
 
+#include "registration/options.hpp"
 #include "registration/pose/surface_pose.hpp"
 #include "registration/search/surface_tree.hpp"
+#include "registration/terms/organ_surface.hpp"
 #include "registration/terms/pull.hpp"
 #include "registration/terms/surface_data.hpp"
 #include "registration/terms/term.hpp"
@@ -11,22 +13,22 @@
 
 namespace tissuewarp::registration::detail {
 
-class SurfaceEvidence {
+class SurfaceTerm : public Term {
 public:
     /// `energy` is the strain energy (mN mm) that weighs as much as one standard deviation. Throws InvalidInput for
     /// points that cannot be used.
-    SurfaceEvidence(const PreparedModel& prepared, const SurfacePoints& surface, const SurfaceOptions& options,
-                    double energy);
+    SurfaceTerm(const PreparedModel& prepared, const SurfacePoints& surface, const SurfaceOptions& options,
+                const AlignmentOptions& alignment, double energy);
 
+    [[nodiscard]] Shows shows() const override { return Shows::Parts; }
+    [[nodiscard]] PoseClaim pose_claim() const override { return PoseClaim::Anywhere; }
     /// The rigid placement, searched for all over the organ. Throws Cancelled.
-    Alignment align(const AlignmentOptions& options, Observer& observer);
+    [[nodiscard]] Alignment pose(const Eigen::Isometry3d& start, Observer& observer) override;
 
     /// Pulls of the points on the surface of the deformed mesh, along the normals alone. Throws InvalidInput when no
     /// point lies near the model.
-    [[nodiscard]] Contribution contribution(const RoundPlan& plan, const State& state);
-
-    /// How the surface of the model lies to the points.
-    [[nodiscard]] SurfaceFit fit(const State& state) const;
+    [[nodiscard]] Contribution linearise(const RoundPlan& plan, const State& state, Observer& observer) override;
+    void judge(const State& state, UpdateResult& result) override;
 
 private:
     struct Match {
@@ -38,18 +40,16 @@ private:
 
     const PreparedModel& prepared_;
     const SurfaceOptions& options_;
+    const AlignmentOptions& alignment_;
     SurfaceData data_;
-    meshing::SurfaceMesh surface_;  // at rest, on the label boundary
-    std::vector<int> node_of_;      // mesh nodes of its nodes
-    std::vector<int> tet_of_;       // tetrahedra of its triangles
-    double energy_;                 // mN mm that one standard deviation weighs
-    double first_scale_mm_ = 0;     // of the robust weights
+    OrganSurface surface_;
+    double energy_;       // mN mm that one standard deviation weighs
+    FallingScale scale_;  // of the robust weights
     SurfacePose pose_;
 
-    void take_surface();
-    [[nodiscard]] meshing::SurfaceMesh deformed_surface(const Eigen::Matrix3Xd& displacement) const;
     [[nodiscard]] std::vector<Match> matches(const State& state, double reach_mm) const;
     [[nodiscard]] double final_scale_mm() const;
+    [[nodiscard]] SurfaceFit fit(const State& state) const;
     [[nodiscard]] Pull pull_of(const Match& match, double area, double weight, const State& state,
                                double most_step_mm) const;
 };

@@ -1,37 +1,95 @@
 #pragma once
-/// What one round of a registration knows, and what it asks of the solver.
+/// A registration minimises E(u) = W(u) + Σ_terms ½ rᵀ Λ r, W the strain energy (docs/method.md). A term is a kind of
+/// datum, or what is expected where there is none, or what holds the tissue: it says where the organ lies, what it asks
+/// of the solver in a round, and how the result agrees with it. It knows no other term.
 
-#include "registration/pipeline.hpp"
-#include "tled/conditions.hpp"
+#include "core/observer.hpp"
+#include "registration/result.hpp"
+#include "registration/schedule.hpp"
+#include "registration/state.hpp"
+
+#include <optional>
+#include <vector>
 
 namespace tissuewarp::registration::detail {
 
-/// Where the model is.
-struct State {
-    Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();  ///< moving → fixed
-    Eigen::Matrix3Xd displacement;                                ///< 3 × N, mm, moving frame
-};
-
-/// How far this round looks, and how much it trusts what the model did not follow.
-struct RoundPlan {
-    int number = 0;
-    bool last = false;
-    double range_mm = 0;  ///< of the search along normals
-    double scale_mm = 0;  ///< of the Geman–McClure weight (σ²/(σ² + d²))², which lowers what the model did not follow
-    double most_step_mm = 0;  ///< most that a surface node is asked to move, so that elements are not turned over
-};
-
-/// What a datum contributed to a round.
+/// What a term asks of a round: springs and forces on nodes, linearised about where the model is.
 struct Contribution {
-    tled::Conditions conditions;
-    std::vector<tled::Spring> holds;  ///< of labels: pull nodes to where they are, for the sake of the solver
+    std::vector<PulledNode> springs;
+    Eigen::Matrix3Xd forces = {};  ///< on the nodes, 3 × N, mN; 3 × 0: none
+    bool pulls_anew = false;       ///< by other springs than in the round before: what relaxes slowest has changed
     int candidates = 0, matched = 0;
     int held_back = 0;            ///< matches further away than the round's step bound
     double mean_residual_mm = 0;  ///< weighted, before the round's equilibrium
 };
 
-/// Data of two kinds together: springs add up, the residual is the mean over matches.
+/// Terms together: springs and forces add up, the residual is the mean over matches.
 void add(Contribution& sum, Contribution more);
+
+/// Springs with what they stand for.
+std::vector<PulledNode> pulled_by(Origin origin, const std::vector<tled::Spring>& springs);
+
+/// What a term shows of the organ; decides what else a registration needs (terms.hpp).
+enum class Shows {
+    Nothing,   ///< no datum
+    Parts,     ///< points of it: nothing is known of the rest, nor, without alignment data, where it lies
+    Boundary,  ///< all of its surface
+    Volume,    ///< grey values; expects by itself how tissue out of view moved
+    Place      ///< where it lies as a whole, as bone that it touches does
+};
+
+/// What a term says of the rigid placement, from nothing to all of it. The term that says most places the organ.
+enum class PoseClaim {
+    None,
+    Search,       ///< by what a first search from the headers' placement finds
+    Shift,        ///< how far it moved, not how it turned
+    NearStart,    ///< the nearest pose to a start that fits
+    Anywhere,     ///< wherever it lies
+    Pairs,        ///< from corresponding points
+    WholeSurface  ///< from all of its boundary
+};
+
+class Term {
+public:
+    Term() = default;
+    Term(const Term&) = delete;
+    Term& operator=(const Term&) = delete;
+    virtual ~Term() = default;
+
+    [[nodiscard]] virtual Shows shows() const { return Shows::Nothing; }
+
+    [[nodiscard]] virtual PoseClaim pose_claim() const { return PoseClaim::None; }
+    /// The rigid placement, near `start` where the claim is no more than that. Throws InvalidInput, Cancelled.
+    [[nodiscard]] virtual Alignment pose(const Eigen::Isometry3d& start, Observer& observer);
+
+    /// Searches of an image that the rounds are to make room for.
+    [[nodiscard]] virtual int searches() const { return 0; }
+    /// Whether a further search may bring the model nearer.
+    [[nodiscard]] virtual bool gains() const { return false; }
+
+    /// Springs and forces of a round. Throws InvalidInput where the data meet the model nowhere, Cancelled.
+    [[nodiscard]] virtual Contribution linearise(const RoundPlan& plan, const State& state, Observer& observer) = 0;
+
+    /// Takes note of an equilibrium under what linearise() asked for. Whether that changed what the term asks for, so
+    /// that the equilibrium is to be sought again from where it started.
+    [[nodiscard]] virtual bool follow(const State& /*solved*/) { return false; }
+    /// Whether nothing is left to follow.
+    [[nodiscard]] virtual bool settled(const State& /*state*/) const { return true; }
+
+    /// Writes to the result how it agrees with the term, and what the term has against it.
+    virtual void judge(const State& /*state*/, UpdateResult& /*result*/) {}
+};
+
+/// Points after their robust scale: from a wide one in the first round, falling by 0.6 a round to the final one.
+class FallingScale {
+public:
+    /// Precondition: the first round's scale is given before the others are asked for.
+    void begin_at(double scale_mm) { first_mm_ = scale_mm; }
+    [[nodiscard]] double of(const RoundPlan& plan, double final_mm) const;
+
+private:
+    double first_mm_ = 0;
+};
 
 /// (σ²/(σ² + d²))²: the Geman–McClure function's weight in iteratively reweighted least squares.
 inline double robust_weight(double distance_mm, double scale_mm) {

@@ -2,84 +2,109 @@
 
 #include "imaging/labels.hpp"
 #include "registration/terms/anchors.hpp"
+#include "registration/terms/contact.hpp"
+#include "registration/terms/curves.hpp"
 #include "registration/terms/ground.hpp"
+#include "registration/terms/image.hpp"
+#include "registration/terms/labels.hpp"
+#include "registration/terms/loads.hpp"
+#include "registration/terms/points.hpp"
+#include "registration/terms/surface.hpp"
+
+#include <algorithm>
 
 namespace tissuewarp::registration::detail {
 
 namespace {
 
-void require_common_labels(const PreparedModel& prepared, const imaging::Volume& fixed_labels) {
-    for (const int label : imaging::labels_in(fixed_labels.as(CV_32S)))
-        if (prepared.model.materials.contains(label)) return;
-    throw InvalidInput("the fixed label map holds none of the labels of the model; check the label tables");
-}
-
-}  // namespace
-
-void require_usable(const PreparedModel& prepared, const Intraoperative& seen) {
+void require_usable(const PreparedModel& prepared, const Intraoperative& seen, bool has_tools) {
     if (!seen.labels && !seen.image && !seen.surface && !seen.points && !seen.curves)
         throw InvalidInput(
             "nothing to register to; give labels, an image, points of a surface, pairs of points or curves");
     if (seen.image && !prepared.image)
         throw InvalidInput("a bare volume was given, but the model holds no preoperative image; call prepare_image");
-    if (seen.labels) require_common_labels(prepared, *seen.labels);
+    if (seen.image && !has_tools)
+        throw InvalidInput("the model got its image after its updater was made; make the updater after prepare_image");
 }
 
-EvidenceSet::EvidenceSet(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options,
-                         std::optional<ImageTools>& image_tools)
-    : energy(strain_energy_unit(prepared, options.tissue)) {
-    const TissuePrior& tissue = options.tissue;
-    if (seen.image) image.emplace(prepared, *seen.image, options.image, *image_tools, energy);
-    if (seen.surface) surface.emplace(prepared, *seen.surface, options.surface, energy);
-    if (seen.points) points.emplace(prepared, *seen.points, options.points, energy);
-    if (seen.curves) curves.emplace(prepared, *seen.curves, options.curves, energy);
-    if (!seen.labels && !seen.image)
-        ground = ground_springs(prepared, energy, [&](const InterfaceNode&) {
-            return options.align ? tissue.free_motion_mm : tissue.held_motion_mm;
-        });
-    if (prepared.neighbours) contact.emplace(prepared, energy);
-    anchors = anchor_springs(prepared, energy);
-    placed = is_held(prepared);
+}  // namespace
+
+Terms::Terms(std::vector<std::unique_ptr<Term>> terms, double energy, bool align)
+    : terms_(std::move(terms)), energy_(energy) {
+    const bool boundary = any_shows(Shows::Boundary), volume = any_shows(Shows::Volume),
+               placed = any_shows(Shows::Place);
+    parts_alone_ = !boundary && !volume;
+    free_placement_ = parts_alone_ && align && !placed;
+    take_own_metric_ = volume || !boundary || placed;
+    if (free_placement_) unknown_loads_ = LoadKind::Smooth;
+    if (boundary && !volume && !placed) unknown_loads_ = LoadKind::Weight;
 }
 
-Contribution EvidenceSet::contribution(const RoundPlan& plan, const State& state) {
+bool Terms::any_shows(Shows what) const {
+    return std::any_of(terms_.begin(), terms_.end(), [&](const auto& term) { return term->shows() == what; });
+}
+
+Alignment Terms::pose(Observer& observer) {
+    const auto less = [](const auto& a, const auto& b) { return a->pose_claim() < b->pose_claim(); };
+    Term& best = **std::max_element(terms_.begin(), terms_.end(), less);
+    Eigen::Isometry3d start = Eigen::Isometry3d::Identity();
+    for (const auto& term : terms_)
+        if (term->pose_claim() == PoseClaim::Shift) start = term->pose(start, observer).placement;
+    return best.pose(start, observer);
+}
+
+int Terms::searches() const {
+    int most = 0;
+    for (const auto& term : terms_) most = std::max(most, term->searches());
+    return most;
+}
+
+bool Terms::gains() const {
+    return std::any_of(terms_.begin(), terms_.end(), [](const auto& term) { return term->gains(); });
+}
+
+Contribution Terms::linearise(const RoundPlan& plan, const State& state, Observer& observer) {
     Contribution sum;
-    if (labels) add(sum, labels->contribution(plan, state));
-    if (image) add(sum, image->contribution(plan, state));
-    if (surface) add(sum, surface->contribution(plan, state));
-    if (points) add(sum, points->contribution(plan, state));
-    if (curves) add(sum, curves->contribution(plan, state));
+    for (const auto& term : terms_) add(sum, term->linearise(plan, state, observer));
+    std::stable_sort(sum.springs.begin(), sum.springs.end(),
+                     [](const PulledNode& a, const PulledNode& b) { return a.origin < b.origin; });
     return sum;
 }
 
-std::vector<tled::Spring> EvidenceSet::supports(const RoundPlan& plan, const State& state) const {
-    std::vector<tled::Spring> springs = anchors;
-    if (!contact) return springs;
-    const Contribution touching = contact->contribution(plan, state);
-    springs.insert(springs.end(), touching.conditions.springs.begin(), touching.conditions.springs.end());
-    return springs;
+bool Terms::follow(const State& solved) {
+    bool again = false;
+    for (const auto& term : terms_) again |= term->follow(solved);
+    return again;
 }
 
-void EvidenceSet::judge(const State& state, UpdateResult& result) {
-    if (image) result.image = image->fit(state);
-    if (surface) result.surface = surface->fit(state);
-    if (points) result.points = points->fit(state);
-    if (curves) result.curves = curves->fit(state);
-    if (contact) result.contact = contact->fit(state);
+bool Terms::settled(const State& state) const {
+    return std::all_of(terms_.begin(), terms_.end(), [&](const auto& term) { return term->settled(state); });
 }
 
-Alignment align(const PreparedModel& prepared, const Intraoperative& seen, EvidenceSet& evidence,
-                const UpdateOptions& options, Observer& observer) {
-    if (seen.labels) return align_labels(prepared.labels, *seen.labels, options.alignment, observer);
-    if (evidence.points && evidence.points->show_rotation()) return evidence.points->align();
-    if (evidence.surface) return evidence.surface->align(options.alignment, observer);
-    if (evidence.curves)
-        return evidence.curves->align(evidence.points ? evidence.points->align().placement
-                                                      : Eigen::Isometry3d::Identity());
-    if (evidence.points) return evidence.points->align();
-    const State start{Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, prepared.rest.node_count)};
-    evidence.image->search(start, observer);
-    return {evidence.image->rigid_motion(), 0};
+void Terms::judge(const State& state, UpdateResult& result) {
+    for (const auto& term : terms_) term->judge(state, result);
+}
+
+Terms terms_of(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options,
+               std::optional<ImageTools>& image_tools) {
+    require_usable(prepared, seen, image_tools.has_value());
+    const double energy = strain_energy_unit(prepared, options.tissue);
+    std::vector<std::unique_ptr<Term>> terms;
+    if (seen.labels) terms.push_back(std::make_unique<LabelTerm>(prepared, *seen.labels, options));
+    if (seen.image)
+        terms.push_back(std::make_unique<ImageTerm>(prepared, *seen.image, options.image, *image_tools, energy));
+    if (seen.surface)
+        terms.push_back(
+            std::make_unique<SurfaceTerm>(prepared, *seen.surface, options.surface, options.alignment, energy));
+    if (seen.points) terms.push_back(std::make_unique<PointTerm>(prepared, *seen.points, options.points, energy));
+    if (seen.curves) terms.push_back(std::make_unique<CurveTerm>(prepared, *seen.curves, options.curves, energy));
+    if (!prepared.options.anchors.empty()) terms.push_back(std::make_unique<AnchorTerm>(prepared, energy));
+    if (prepared.neighbours) terms.push_back(std::make_unique<ContactTerm>(prepared, energy));
+    if (!seen.labels && !seen.image)
+        terms.push_back(std::make_unique<GroundTerm>(
+            prepared, energy, options.align ? options.tissue.free_motion_mm : options.tissue.held_motion_mm));
+    terms.push_back(std::make_unique<LoadTerm>(prepared, options.loads));
+    return {std::move(terms), energy, options.align};
 }
 
 }  // namespace tissuewarp::registration::detail

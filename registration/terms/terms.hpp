@@ -1,52 +1,60 @@
 #pragma once
-/// All data of one registration together, and what holds tissue that they do not show.
+/// All terms of one registration. A new kind of datum is a pair of files here and a line in terms_of().
 
-#include "registration/terms/contact.hpp"
-#include "registration/terms/curves.hpp"
-#include "registration/terms/image.hpp"
-#include "registration/terms/labels.hpp"
-#include "registration/terms/points.hpp"
-#include "registration/terms/surface.hpp"
+#include "registration/intraoperative.hpp"
+#include "registration/loads/load_finder.hpp"
+#include "registration/matching/dense/image_engine.hpp"
+#include "registration/prepare.hpp"
+#include "registration/terms/term.hpp"
+
+#include <memory>
+#include <optional>
+#include <vector>
 
 namespace tissuewarp::registration::detail {
 
-/// Throws InvalidInput when there is nothing to register to, an image but no model of one, or no label in common.
-void require_usable(const PreparedModel& prepared, const Intraoperative& seen);
+class Terms {
+public:
+    /// `energy` (mN mm) weighs as much as one standard deviation of a datum; without `align` the images are in one
+    /// frame already.
+    Terms(std::vector<std::unique_ptr<Term>> terms, double energy, bool align);
 
-/// The data that are there. The model, what was seen and the options outlive it.
-struct EvidenceSet {
-    std::optional<LabelEvidence> labels;  ///< once the images are aligned
-    std::optional<ImageEvidence> image;
-    std::optional<SurfaceEvidence> surface;
-    std::optional<PointEvidence> points;
-    std::optional<CurveEvidence> curves;
-    std::optional<ContactEvidence> contact;
-    double energy = 0;                 ///< mN mm that weighs as much as one standard deviation of a point
-    std::vector<tled::Spring> ground;  ///< moves with the placement
-    std::vector<tled::Spring> anchors;
-    bool placed = false;  ///< anchors or rigid neighbours say where the organ lies as a whole
+    /// Points alone show the organ.
+    [[nodiscard]] bool parts_alone() const { return parts_alone_; }
+    /// Points show the organ wherever it lies, and nothing says where that is.
+    [[nodiscard]] bool free_placement() const { return free_placement_; }
+    /// Loads that nobody stated and that data may tell: of points of a free organ all, tractions too, since these also
+    /// move what no point shows; of labels, which show the boundary all over, whatever presses on it there, a force
+    /// within. Otherwise none.
+    [[nodiscard]] std::optional<LoadKind> unknown_loads() const { return unknown_loads_; }
+    /// Springs differ from those that the model was prepared with, or few of them are the same.
+    [[nodiscard]] bool take_own_metric() const { return take_own_metric_; }
+    [[nodiscard]] double energy() const { return energy_; }
 
-    /// `image_tools` are there where the model has an image. Throws InvalidInput for data that cannot be used.
-    EvidenceSet(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options,
-                std::optional<ImageTools>& image_tools);
-
-    /// Labels say where every boundary is, and an image holds what it does not show.
-    [[nodiscard]] bool only_points() const { return !labels && !image; }
-
-    /// Springs of all data together.
-    [[nodiscard]] Contribution contribution(const RoundPlan& plan, const State& state);
-
-    /// What holds tissue and is no datum: anchors, and rigid neighbours where tissue touches them.
-    [[nodiscard]] std::vector<tled::Spring> supports(const RoundPlan& plan, const State& state) const;
-
-    /// Writes to the result how each of them agrees with the model.
+    /// The rigid placement by the term that claims most, from where one of a lesser claim shifts the organ.
+    [[nodiscard]] Alignment pose(Observer& observer);
+    [[nodiscard]] int searches() const;
+    [[nodiscard]] bool gains() const;
+    /// The sum, springs in the order of their origins.
+    [[nodiscard]] Contribution linearise(const RoundPlan& plan, const State& state, Observer& observer);
+    [[nodiscard]] bool follow(const State& solved);
+    [[nodiscard]] bool settled(const State& state) const;
     void judge(const State& state, UpdateResult& result);
+
+private:
+    std::vector<std::unique_ptr<Term>> terms_;
+    double energy_;
+    bool parts_alone_, free_placement_, take_own_metric_;
+    std::optional<LoadKind> unknown_loads_;
+
+    [[nodiscard]] bool any_shows(Shows what) const;
 };
 
-/// Where the model starts: by labels; or by pairs of points that show how it is turned; or by points of its surface; or
-/// by curves, from where the headers place the images or what pairs there are shift them; or by these pairs alone; or
-/// by the matches of a first search, from where the headers place the images.
-Alignment align(const PreparedModel& prepared, const Intraoperative& seen, EvidenceSet& evidence,
-                const UpdateOptions& options, Observer& observer);
+/// Terms of what was seen, of what the model has about it and of the loads stated, with what is expected of tissue that
+/// no datum shows. Model, data and options outlive them; `image_tools` are there where the model has an image. Throws
+/// InvalidInput when there is nothing to register to, an image but no model of one, no label in common, or data that
+/// cannot be used.
+Terms terms_of(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options,
+               std::optional<ImageTools>& image_tools);
 
 }  // namespace tissuewarp::registration::detail

@@ -10,6 +10,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <utility>
@@ -74,18 +75,15 @@ Eigen::VectorXd unexplained_share(const Eigen::Matrix3Xd& nodes, const Eigen::Ma
 
 }  // namespace
 
-Posteriors posteriors_of(const PreparedModel& prepared, const LastPulls& pulls) {
-    WeighedSprings unseen{pulls.supports, pulls.ground, pulls.energy, pulls.free_placement};
-    const bool points_alone = !unseen.ground.empty();
-    if (!points_alone) {  // labels show where the organ lies, however it turned
-        unseen.ground =
-            ground_springs(prepared, pulls.energy, [](const InterfaceNode&) { return TissuePrior().free_motion_mm; });
-        unseen.free_placement = true;
-    }
-    WeighedSprings seen = unseen;
-    seen.data.insert(seen.data.end(), pulls.data.begin(), pulls.data.end());
-    auto [with_data, without] = Posterior::both(prepared, seen, unseen);
-    return {std::move(seen), std::move(with_data), std::move(without), points_alone};
+Posteriors posteriors_of(const PreparedModel& prepared, const LastPulls& given) {
+    LastPulls pulls = given;
+    const auto is_prior = [](const PulledNode& pulled) { return pulled.origin == Origin::Prior; };
+    if (std::none_of(pulls.springs.begin(), pulls.springs.end(),
+                     is_prior))                                             // labels show where the organ lies, however
+        expect_free_motion(pulls, prepared, TissuePrior().free_motion_mm);  // it turned
+    WeighedSprings seen = with_data(pulls);
+    auto [with, without] = Posterior::both(prepared, seen, without_data(pulls));
+    return {std::move(seen), std::move(with), std::move(without), pulls.parts_alone};
 }
 
 DataUncertainty data_uncertainty(const PreparedModel& prepared, const Posteriors& posteriors,
@@ -98,7 +96,7 @@ DataUncertainty data_uncertainty(const PreparedModel& prepared, const Posteriors
     result.covariance = load_size(prepared, springs.energy, displacement, free - hidden) * covariances_of(hidden) +
                         noise_share * covariances_of(noise);
     result.unexplained = unexplained_share(prepared.model.mesh.nodes, hidden, free);
-    if (posteriors.points_alone) result.expected = expected_error(prepared.model.mesh.nodes, posteriors.seen);
+    if (posteriors.parts_alone) result.expected = expected_error(prepared.model.mesh.nodes, posteriors.seen);
     return result;
 }
 

@@ -18,7 +18,7 @@ constexpr double shown_below = 0.9;
 struct Posteriors {
     WeighedSprings springs;
     Posterior seen, unseen;
-    bool points_alone = false;  ///< neither labels nor an image show the organ as a whole
+    bool parts_alone = false;  ///< neither labels nor an image show the organ as a whole
 };
 
 /// Throws InvalidInput where the springs do not hold the tissue, SolverFailure without memory for the factors.

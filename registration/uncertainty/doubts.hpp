@@ -1,14 +1,17 @@
 #pragma once
-/// What a registration says against itself.
+/// What a registration says against itself, apart from what each term says (terms/).
 
-#include "registration/pipeline.hpp"
+#include "registration/result.hpp"
 
 namespace tissuewarp::registration::detail {
 
 /// Two decimals, for messages.
 std::string to_text(double value);
 
-/// Reasons not to trust a result, in words that name the remedy; empty when there are none.
-std::vector<std::string> doubts(const PreparedModel& prepared, const Intraoperative& seen, const UpdateResult& result);
+/// "47 %", for messages.
+std::string percent(double share);
+
+/// Doubts about the course of the rounds and the tissue, whatever the data.
+std::vector<Doubt> doubts_of_course(const UpdateResult& result);
 
 }  // namespace tissuewarp::registration::detail

@@ -45,17 +45,11 @@ ExpectedError detail::expected_error(const Eigen::Matrix3Xd& nodes, const Poster
     return result;
 }
 
-detail::WeighedSprings detail::weighed(const LastPulls& pulls) {
-    WeighedSprings springs{pulls.data, pulls.ground, pulls.energy, pulls.free_placement};
-    springs.data.insert(springs.data.end(), pulls.supports.begin(), pulls.supports.end());
-    return springs;
-}
-
 ExpectedError expected_error(const PreparedModel& prepared, const UpdateResult& result) {
-    if (result.pulls.ground.empty())
+    if (!result.pulls.parts_alone)
         throw InvalidInput("labels or an image show the organ as a whole; uncertainty() tells what they leave");
     return detail::expected_error(prepared.model.mesh.nodes,
-                                  detail::Posterior(prepared, detail::weighed(result.pulls)));
+                                  detail::Posterior(prepared, detail::with_data(result.pulls)));
 }
 
 /// Tissue 5 mm off is a registration that failed. The expected error is a root mean square over patients like this one:

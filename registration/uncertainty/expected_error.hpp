@@ -2,7 +2,8 @@
 /// How far off tissue is expected to lie where points alone show the organ, from the deviations of the data and the
 /// prior alone; nothing of what was found enters but where the data pull.
 
-#include "registration/pipeline.hpp"
+#include "registration/prepare.hpp"
+#include "registration/result.hpp"
 
 #include <Eigen/Core>
 

@@ -46,6 +46,17 @@ Columns bounded_inverse(const Columns& matrix, double least) {
 
 }  // namespace
 
+WeighedSprings without_data(const LastPulls& pulls) {
+    return {pulls.of(Origin::Support), pulls.of(Origin::Prior), pulls.energy, pulls.free_placement};
+}
+
+WeighedSprings with_data(const LastPulls& pulls) {
+    WeighedSprings springs = without_data(pulls);
+    const std::vector<tled::Spring> data = pulls.of(Origin::Datum);
+    springs.data.insert(springs.data.end(), data.begin(), data.end());
+    return springs;
+}
+
 Posterior::Posterior(const PreparedModel& prepared, const WeighedSprings& springs)
     : Posterior(prepared, springs, stiffness_with(prepared, springs)) {}
 

@@ -1,7 +1,8 @@
 #pragma once
 /// What data and tissue leave open of a displacement.
 
-#include "registration/pipeline.hpp"
+#include "registration/prepare.hpp"
+#include "registration/result.hpp"
 #include "tled/conditions.hpp"
 
 #include <Eigen/Core>
@@ -17,6 +18,11 @@ struct WeighedSprings {
     double energy = 1;
     bool free_placement = false;  ///< the organ may lie anywhere: the ground moves with it
 };
+
+/// Supports and prior of pulls alone.
+WeighedSprings without_data(const LastPulls& pulls);
+/// The same with the data.
+WeighedSprings with_data(const LastPulls& pulls);
 
 /// exp(−Π/energy) is Gaussian for small displacements, of covariance energy · K⁻¹, K the stiffness at rest with all
 /// springs (Bayes' rule with strain energy as the prior, e.g. Szeliski 1990). Where the placement is free, the ground

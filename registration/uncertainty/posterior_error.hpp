@@ -9,7 +9,4 @@ namespace tissuewarp::registration::detail {
 /// At 16 of the nodes (3 × N, mm), each the farthest from those before.
 ExpectedError expected_error(const Eigen::Matrix3Xd& nodes, const Posterior& posterior);
 
-/// Springs of the last round as data, anchors and touching neighbours among them, and as prior.
-WeighedSprings weighed(const LastPulls& pulls);
-
 }  // namespace tissuewarp::registration::detail

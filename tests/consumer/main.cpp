@@ -1,7 +1,7 @@
 // The shortest use of the library: prepare a model from labels, update it from other labels, move points.
 
 #include <tissuewarp/registration/field.hpp>
-#include <tissuewarp/registration/pipeline.hpp>
+#include <tissuewarp/registration/update.hpp>
 
 #include <cstdio>
 

@@ -3,7 +3,7 @@
 #include "meshing/mesher.hpp"
 #include "registration/evaluation.hpp"
 #include "registration/field.hpp"
-#include "registration/pipeline.hpp"
+#include "registration/update.hpp"
 #include "registration/warp.hpp"
 #include "tests/support/label_shapes.hpp"
 #include "tled/reference.hpp"

@@ -3,7 +3,7 @@
 #include "imaging/image_io.hpp"
 #include "registration/evaluation.hpp"
 #include "registration/field.hpp"
-#include "registration/pipeline.hpp"
+#include "registration/update.hpp"
 
 #include <gtest/gtest.h>
 

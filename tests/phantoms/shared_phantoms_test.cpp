@@ -4,7 +4,7 @@
 #include "imaging/sampling.hpp"
 #include "registration/evaluation.hpp"
 #include "registration/field.hpp"
-#include "registration/pipeline.hpp"
+#include "registration/update.hpp"
 #include "registration/warp.hpp"
 
 #include <gtest/gtest.h>

@@ -2,7 +2,7 @@
 #include "registration/dial/dial.hpp"
 #include "core/errors.hpp"
 #include "registration/dial/fronts_io.hpp"
-#include "registration/pipeline.hpp"
+#include "registration/update.hpp"
 #include "tests/support/label_shapes.hpp"
 
 #include <gmock/gmock.h>

@@ -1,5 +1,5 @@
 /// A model registered to a bare volume of a generated phantom whose deformation is known.
-#include "registration/pipeline.hpp"
+#include "registration/update.hpp"
 
 #include "core/errors.hpp"
 #include "registration/evaluation.hpp"

@@ -1,5 +1,5 @@
 /// The method as a whole on a small organ.
-#include "registration/pipeline.hpp"
+#include "registration/update.hpp"
 
 #include "registration/evaluation.hpp"
 #include "registration/field.hpp"

@@ -1,7 +1,7 @@
 /// Points of a part of a surface: closest triangles, normals, the pose from anywhere, the tissue that follows.
 #include "registration/field.hpp"
 #include "registration/field/surface_proximity.hpp"
-#include "registration/pipeline.hpp"
+#include "registration/update.hpp"
 #include "registration/pose/rigid_part.hpp"
 #include "registration/pose/surface_pose.hpp"
 #include "registration/search/surface_tree.hpp"

@@ -1,5 +1,5 @@
 /// Updates whose device fails on the way.
-#include "registration/pipeline.hpp"
+#include "registration/update.hpp"
 
 #include "core/errors.hpp"
 #include "tests/support/label_shapes.hpp"

@@ -1,4 +1,4 @@
-#include "registration/terms/stated_loads.hpp"
+#include "registration/terms/loads.hpp"
 
 namespace tissuewarp::registration::detail {
 
@@ -16,6 +16,16 @@ Eigen::Matrix3Xd nodal_forces(const PreparedModel& prepared, const TissueLoads& 
         for (const int node : face.nodes) forces.col(node) -= loads.pressure_kpa / 3 * outward;
     }
     return forces;
+}
+
+LoadTerm::LoadTerm(const PreparedModel& prepared, const TissueLoads& stated)
+    : stated_(nodal_forces(prepared, stated)) {}
+
+Contribution LoadTerm::linearise(const RoundPlan& /*plan*/, const State& state, Observer& /*observer*/) {
+    Contribution result;
+    result.forces = stated_;
+    if (state.found_loads.cols() > 0) result.forces += state.found_loads;
+    return result;
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -1,0 +1,22 @@
+#pragma once
+/// Labels of a preoperative map that are no tissue to deform, or tissue that stays.
+
+#include "registration/intraoperative.hpp"
+#include "registration/prepare.hpp"
+
+#include <optional>
+#include <vector>
+
+namespace tissuewarp::registration::detail {
+
+/// The bodies of these labels, none where no label is given. Precondition: require_surroundings.
+std::optional<RigidNeighbours> rigid_neighbours(const imaging::Volume& map, const std::vector<int>& labels);
+
+/// Both kinds of labels in one map again, as `prepare` takes it.
+imaging::Volume with_neighbours(const PreparedModel& prepared);
+
+/// What was seen with the rigid neighbours taken out of its labels, if it has any: they are background there as they
+/// are in the model.
+Intraoperative without_neighbours(const Intraoperative& seen, const std::vector<int>& labels);
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,70 @@
+#include "registration/matching/image_search.hpp"
+
+#include "registration/terms/pull.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+
+namespace tissuewarp::registration::detail {
+
+ImageSearch::ImageSearch(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
+                         ImageTools& tools)
+    : prepared_(prepared),
+      options_(options),
+      locator_(tools.locator),
+      fixed_(fixed, tools.memory, [&](const imaging::Volume& image) { tools.engine->begin_fixed(image); }),
+      engine_(*tools.engine),
+      dense_(prepared, engine_) {
+    engine_.finish_fixed(fixed_);
+}
+
+LocatedMatches ImageSearch::search(const State& state, Observer& observer) {
+    LocatedMatches found = done_ == 0 ? block_search(state, observer) : dense_search(state);
+    if (done_ == 0) blocks_ = found;
+    ++done_;
+    return found;
+}
+
+LocatedMatches ImageSearch::block_search(const State& state, Observer& observer) const {
+    const MatchingTemplate& blocks = prepared_.image->blocks;
+    BlockMatchingOptions matching = options_.matching;
+    matching.rotation = state.placement.linear();
+    matching.finest = FinestGrid::UndescribedPoints;
+    return located(consistent_matches(search_blocks(blocks, fixed_.image.geometry, engine_.blocks(),
+                                                    deformed(blocks.points(), state), matching, observer),
+                                      options_.consistency));
+}
+
+LocatedMatches ImageSearch::dense_search(const State& state) {
+    const std::vector<int>& grids = options_.dense_coarsening;
+    const int coarsening = grids.at(std::min(static_cast<std::size_t>(done_), grids.size()) - 1);
+    DenseMatches dense = dense_.matches(state, coarsening, blocks_, locator_);
+    if (coarsening == last_coarsening_) gain_ = dense.agreement - *agreement_;
+    last_coarsening_ = coarsening;
+    agreement_ = dense.agreement;
+    return std::move(dense.found);
+}
+
+Eigen::Matrix3Xd ImageSearch::deformed(const Eigen::Matrix3Xd& points, const State& state) const {
+    if (state.displacement.isZero(0)) return state.placement * points;
+    Eigen::Matrix3Xd result = points;
+    tbb::parallel_for(Eigen::Index{0}, points.cols(), [&](Eigen::Index n) {
+        if (const auto at = locate_near(locator_, points.col(n)))
+            result.col(n) += displacement_at(prepared_.model.mesh, state.displacement, *at);
+    });
+    return state.placement * result;
+}
+
+LocatedMatches ImageSearch::located(const std::vector<BlockMatch>& matches) const {
+    std::vector<std::optional<meshing::Location>> places(matches.size());
+    tbb::parallel_for(std::size_t{0}, matches.size(),
+                      [&](std::size_t n) { places[n] = locate_near(locator_, matches[n].moving); });
+    LocatedMatches result;
+    result.reserve(matches.size());
+    for (std::size_t n = 0; n < matches.size(); ++n)
+        if (places[n]) result.add(matches[n], *places[n]);
+    return result;
+}
+
+}  // namespace tissuewarp::registration::detail

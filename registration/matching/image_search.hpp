@@ -1,0 +1,58 @@
+#pragma once
+/// The searches of a bare intraoperative volume: first for blocks of the preoperative image, then, with dense forces,
+/// for how all of it is to shift.
+
+#include "registration/matching/blocks/block_search.hpp"
+#include "registration/matching/dense/dense_search.hpp"
+#include "registration/options.hpp"
+#include "registration/prepare.hpp"
+
+#include <optional>
+
+namespace tissuewarp::registration::detail {
+
+class ImageSearch {
+public:
+    /// `prepared.image` is there. Model, options and tools outlive this.
+    ImageSearch(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
+                ImageTools& tools);
+
+    /// What a search about where the model is finds, at places of the mesh. After the last of count() the last grid is
+    /// searched again.
+    [[nodiscard]] LocatedMatches search(const State& state, Observer& observer);
+
+    [[nodiscard]] int done() const { return done_; }
+    /// How many there are to be.
+    [[nodiscard]] int count() const { return 1 + static_cast<int>(options_.dense_coarsening.size()); }
+    /// Whether another dense search on the last grid may bring the images nearer: the last search on a grid that had
+    /// been searched before found them to agree better by a hundredth or more.
+    [[nodiscard]] bool gains() const { return gain_ >= 0.01; }
+    /// Of both images, in the last dense search: DenseForces::agreement.
+    [[nodiscard]] std::optional<double> agreement() const { return agreement_; }
+    /// Blocks that the first search found.
+    [[nodiscard]] std::size_t blocks_found() const { return blocks_.matches.size(); }
+    /// Where the fixed image shows something.
+    [[nodiscard]] const imaging::Volume& seen() const { return fixed_.seen; }
+
+private:
+    const PreparedModel& prepared_;
+    const ImageOptions& options_;
+    const meshing::PointLocator& locator_;
+    SeenImage fixed_;
+    ImageEngine& engine_;
+    DenseSearch dense_;
+    int done_ = 0;
+    LocatedMatches blocks_;  // of the first search
+    std::optional<double> agreement_;
+    int last_coarsening_ = -1;  // of the grid of the last dense search
+    double gain_ = 0;           // in agreement, see gains()
+
+    [[nodiscard]] LocatedMatches block_search(const State& state, Observer& observer) const;
+    [[nodiscard]] LocatedMatches dense_search(const State& state);
+    /// Where points of the moving image are in the fixed one.
+    [[nodiscard]] Eigen::Matrix3Xd deformed(const Eigen::Matrix3Xd& points, const State& state) const;
+    /// Those that lie in the model.
+    [[nodiscard]] LocatedMatches located(const std::vector<BlockMatch>& matches) const;
+};
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,94 @@
+#pragma once
+/// What an update may be told, with the defaults that were chosen on phantoms (docs/method.md).
+
+#include "registration/matching/image_matching.hpp"
+#include "registration/pose/alignment.hpp"
+#include "tled/equilibrium.hpp"
+
+#include <Eigen/Core>
+
+#include <vector>
+
+namespace tissuewarp::registration {
+
+enum class Device { Auto, Cpu, Gpu };
+
+/// How blocks of a bare volume are searched and weighed (docs/method.md, section 8).
+struct ImageOptions {
+    BlockMatchingOptions matching;
+    ConsistencyOptions consistency;
+    /// After the search for blocks, dense searches on grids so many times doubled from the blocks' finest. Templates of
+    /// grey values have none.
+    std::vector<int> dense_coarsening{1, 1, 0};
+    double expected_motion_mm = 100;  ///< of the organ's surface in the field of view of the intraoperative image
+    double unseen_motion_mm = 0.8;    ///< and out of it, along its normal: what is around holds it there, …
+    double unseen_slide_mm = 4;       ///< … and lets it slide along itself
+    double headers_within_mm = 15;    ///< the headers place an organ, part of which is out of view, closer than this
+};
+
+/// What is expected of tissue before anything is seen. It weighs strain energy against matches and points, and holds
+/// what no datum shows.
+struct TissuePrior {
+    double expected_strain = 0.12;  ///< deviation of the strain of pieces of tissue …
+    double strain_length_mm = 10;   ///< … of this size
+    double free_motion_mm = 20;     ///< of the organ's surface, from where the organ lies as a whole
+    double held_motion_mm = 5;      ///< the same where the images are in one frame: what is around holds the organ
+    int load_shapes = 48;  ///< of unknown loads that move what points do not show, where the placement is free; 0:
+                           ///< none, and no unknown weight where labels are seen
+};
+
+/// What acts on the tissue in the operating room and did not when the preoperative image was taken. Only its size
+/// relative to Young's modulus tells in a displacement.
+struct TissueLoads {
+    Eigen::Vector3d body_force =
+        Eigen::Vector3d::Zero();  ///< ρ times the change of gravity, mN/mm³ in the moving frame
+    double pressure_kpa = 0;      ///< on the model's outer surface at rest; above 0 it presses inward
+};
+
+/// How points of a surface are weighed.
+struct SurfaceOptions {
+    double patch_mm = 10;           ///< size of a piece of surface whose points say one thing together
+    double max_angle_deg = 60;      ///< between the normals of a point and of the model
+    double outlier_deviations = 3;  ///< Geman–McClure scale of the last round, in standard deviations of a point
+};
+
+/// How pairs of points are weighed.
+struct PointOptions {
+    double outlier_deviations = 3;  ///< Geman–McClure scale of the last round, in standard deviations of a pair
+};
+
+/// How points along vessels are weighed.
+struct CurveOptions {
+    double step_mm = 1;             ///< between samples of the preoperative lines
+    double piece_mm = 5;            ///< length of a piece of vessel whose points say one thing together: its width
+    double max_angle_deg = 45;      ///< between a point's tangent and the line's, where both are known
+    double outlier_deviations = 3;  ///< Geman–McClure scale of the last round, in standard deviations of a point
+};
+
+struct UpdateOptions {
+    ImageOptions image;
+    TissuePrior tissue;
+    TissueLoads loads;
+    SurfaceOptions surface;
+    PointOptions points;
+    CurveOptions curves;
+    AlignmentOptions alignment;
+    bool align = true;             ///< false: the images are in one frame already
+    int rematches = 8;             ///< rounds of correspondence and equilibrium; up to twice as many when the
+                                   ///< step bound holds the surface back
+    double settled_mm = 0.15;      ///< a round that moves no node further is followed by the last one; before a search
+                                   ///< for blocks, a quarter of its range suffices
+    double most_step_mm = 6.0;     ///< most that one round asks a surface node to move
+    double first_range_mm = 15.0;  ///< correspondence search range of the first round
+    double last_range_mm = 4.0;    ///< and of the last, geometric in between
+    double max_angle_deg = 50.0;   ///< between mesh normal and image boundary normal
+    double residual_scale_mm = 1.0;  ///< of the last round's weights for what a label map or an image shows wrongly
+    /// Seconds that an update may take. When they run short the last round comes early, and where they do not suffice
+    /// for that either, the rounds end: the result then says so. 0: as long as it takes.
+    double time_budget_s = 0;
+    tled::EquilibriumOptions equilibrium;
+    Device device = Device::Auto;
+    int gpu_index = -1;  ///< EGL device, −1: the first with hardware
+};
+
+}  // namespace tissuewarp::registration

@@ -1,0 +1,108 @@
+#pragma once
+/// Before the operation: the patient's model, from a label map.
+
+#include "core/observer.hpp"
+#include "imaging/volume.hpp"
+#include "meshing/mesher.hpp"
+#include "registration/boundary/interfaces.hpp"
+#include "registration/matching/image_matching.hpp"
+#include "registration/stage_time.hpp"
+#include "tled/model.hpp"
+#include "tled/rest_stiffness.hpp"
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+namespace tissuewarp::registration {
+
+/// Edge (mm) of a cube of the labelled voxels' volume.
+double organ_size(const imaging::Volume& labels);
+
+/// Edge length (mm) that cuts an organ of the map's volume into about 50 000 tetrahedra: organ_size over 18. Boundaries
+/// of a label map pull at every node of the surface, which should lie on it.
+double suggested_edge_length(const imaging::Volume& labels);
+
+/// The same into about 15 000, over 12: where an image or points pull, without labels. Finer tetrahedra cost three to
+/// ten times the seconds and are no more accurate (docs/results.md, "How fine a mesh").
+double suggested_edge_length_without_labels(const imaging::Volume& labels);
+
+/// Edge length 0: that of suggested_edge_length. A function, because GCC 12 warns of uninitialised members where a
+/// designated initialiser stands in its place.
+inline meshing::MeshingOptions automatic_edge_length() {
+    meshing::MeshingOptions options;
+    options.edge_length = 0;
+    return options;
+}
+
+struct PrepareOptions {
+    meshing::MeshingOptions meshing = automatic_edge_length();
+    tled::MaterialTable materials;  ///< labels without an entry take `default_material`
+    tled::Material default_material = tled::neo_hookean_lnj(3.0, 0.45);
+    std::optional<tled::Element> element;  ///< default: tled::suggested_element
+    double data_stiffness = 3.0;           ///< kPa/mm along the normal per interface area, at full weight
+    double tangential_ratio = 0.02;        ///< stiffness along the surface over stiffness along the normal
+    std::vector<int> anchors;              ///< labels of tissue that stays where the rigid placement has it
+    std::vector<int> rigid_neighbours;     ///< labels of bodies that move with the placement and are not meshed; the
+                                           ///< organ slides along them and comes off, but does not enter them
+};
+
+/// Throws InvalidInput, naming the label and those present, unless the map holds every anchor and rigid neighbour, none
+/// is both or 0, and something else is left to register.
+void require_surroundings(const imaging::Volume& moving_labels, const PrepareOptions& options);
+
+/// What the preoperative image shows of the tissue, to be found again in a bare intraoperative volume.
+struct ImageModel {
+    imaging::Volume image;
+    MatchingTemplate blocks;
+};
+
+struct ImageModelOptions {
+    FeatureOptions features;
+    TemplateOptions blocks;
+};
+
+/// Bone and the like about the organ, on the grid of the preoperative label map.
+struct RigidNeighbours {
+    imaging::Volume labels;    ///< theirs alone
+    imaging::Volume distance;  ///< mm to the nearest of them, negative within; float32
+};
+
+/// Everything that does not depend on intraoperative data.
+struct PreparedModel {
+    tled::Model model;       ///< mesh in LPS mm of the preoperative image
+    imaging::Volume labels;  ///< the preoperative label map it came from, without rigid neighbours
+    PrepareOptions options;
+    Interfaces interfaces;
+    tled::RestState rest;
+    tled::RestStiffness stiffness;  ///< K₀ with all interface springs at full weight
+    std::vector<StageTime> times;
+    std::optional<ImageModel> image;  ///< see prepare_image
+    std::optional<RigidNeighbours> neighbours;
+    std::unique_ptr<PreparedModel> coarse;  ///< of the same organ, see prepare_loads
+};
+
+/// Label map → mesh → rest state → rest stiffness, its pattern analysed. Throws InvalidInput, Cancelled.
+PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions& options = {},
+                      Observer& observer = silent_observer());
+
+/// The same for a mesh that exists already.
+PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_labels, const PrepareOptions& options = {},
+                      Observer& observer = silent_observer());
+
+/// The same model of other tissue: rest state and stiffness are made anew, its coarser one's too. Throws InvalidInput
+/// for materials that do not fit the model.
+PreparedModel with_materials(PreparedModel prepared, const tled::MaterialTable& materials);
+
+/// Adds what registering to a bare intraoperative volume takes: blocks of the preoperative image about feature points
+/// in and near the labels. Throws InvalidInput, Cancelled.
+void prepare_image(PreparedModel& prepared, const imaging::Volume& moving, const ImageModelOptions& options = {},
+                   Observer& observer = silent_observer());
+
+/// Adds what updates take that look for loads which nobody stated, from labels alone or from points of a free organ: of
+/// a model of more than 6000 nodes a coarser one, with edges of suggested_edge_length_without_labels, on which they are
+/// found. Without it the first such update makes one, in seconds. Adds nothing to a smaller model, nor to one that
+/// anchors or rigid neighbours hold, whose loads are not looked for. Throws InvalidInput, Cancelled.
+void prepare_loads(PreparedModel& prepared, Observer& observer = silent_observer());
+
+}  // namespace tissuewarp::registration

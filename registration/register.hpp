@@ -1,0 +1,16 @@
+#pragma once
+/// The method (docs/method.md).
+
+#include "registration/loads/load_finder.hpp"
+#include "registration/options.hpp"
+#include "registration/terms/terms.hpp"
+#include "tled/engine.hpp"
+
+namespace tissuewarp::registration::detail {
+
+/// Registers a prepared model to what its terms show. `loads` looks for those that nobody stated. Throws as
+/// Updater::update.
+UpdateResult register_model(const PreparedModel& prepared, Terms& terms, LoadFinder& loads, tled::Engine& engine,
+                            const UpdateOptions& options, Observer& observer);
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,47 @@
+#pragma once
+/// The rounds of a registration as data, made before the first of them.
+
+#include "registration/options.hpp"
+#include "registration/result.hpp"
+
+#include <algorithm>
+#include <vector>
+
+namespace tissuewarp::registration::detail {
+
+/// How far a round looks, and how much it trusts what the model did not follow.
+struct RoundPlan {
+    int number = 0;
+    bool last = false;
+    double range_mm = 0;  ///< of the search along normals
+    double scale_mm = 0;  ///< of the Geman–McClure weight (σ²/(σ² + d²))², which lowers what the model did not follow
+    double most_step_mm = 0;  ///< most that a surface node is asked to move, so that elements are not turned over
+    int searches_due = 0;     ///< of an image, this round's included
+};
+
+/// Ranges fall geometrically from the first round's to the last's, scales with them. The searches of an image are
+/// spread over the rounds: those between only weigh the matches anew.
+class Schedule {
+public:
+    /// `searches` of an image, 0 where there is none.
+    Schedule(const UpdateOptions& options, int searches);
+
+    [[nodiscard]] int count() const { return static_cast<int>(rounds_.size()); }
+    [[nodiscard]] const RoundPlan& round(int number) const { return rounds_.at(static_cast<std::size_t>(number)); }
+    [[nodiscard]] const RoundPlan& last() const { return rounds_.back(); }
+    /// The round before it, where there is one.
+    [[nodiscard]] const RoundPlan& last_but_one() const { return round(std::max(0, count() - 2)); }
+    /// The last round's plan, with so many searches more than were planned.
+    [[nodiscard]] RoundPlan last_with_more_searches(int more) const;
+
+    /// The number of the round after one that went so: the same where the step bound held more than 2 % of the matches
+    /// back; where hardly anything moved, the next that searches, or the last; count() after the last.
+    [[nodiscard]] int after(int number, const Round& record) const;
+
+private:
+    std::vector<RoundPlan> rounds_;
+    std::vector<int> searches_;  // the round of each
+    double settled_mm_;
+};
+
+}  // namespace tissuewarp::registration::detail
