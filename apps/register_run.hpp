@@ -4,7 +4,7 @@
 #include "apps/inputs.hpp"
 #include "meshing/quality.hpp"
 #include "registration/dial.hpp"
-#include "registration/parameter_fit.hpp"
+#include "registration/pipeline.hpp"
 #include "registration/uncertainty.hpp"
 
 #include <chrono>
@@ -47,7 +47,6 @@ struct RegistrationRun {
     registration::UpdateResult result;
     std::optional<registration::DialChoice> dial;  ///< where an accuracy or a time was asked for
     double intraoperative_seconds = 0;             ///< from data and model at hand to the warped image
-    registration::ParameterFit fit;                ///< without parameters where none was asked for
     Products products;
     Scores scores;
     std::vector<registration::StageTime> times;
