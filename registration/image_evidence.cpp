@@ -29,26 +29,18 @@ double median_distance(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
 ImageEvidence::ImageEvidence(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
                              ImageTools& tools, double energy)
     : prepared_(prepared),
-      fixed_(fixed, tools.memory,
-             [&](const imaging::Volume& image) {
-                 if (tools.engine) tools.engine->begin_fixed(image);
-             }),
+      fixed_(fixed, tools.memory, [&](const imaging::Volume& image) { tools.engine->begin_fixed(image); }),
       options_(options),
       view_(fixed_.seen),
       locator_(tools.locator),
-      energy_(energy) {
-    if (!tools.engine) {
-        own_blocks_ = make_cpu_block_engine(prepared.image->blocks.images(), fixed_);
-        block_engine_ = own_blocks_.get();
-        return;
-    }
-    tools.engine->finish_fixed(fixed_);
-    block_engine_ = &tools.engine->blocks();
-    dense_.emplace(prepared, *tools.engine);
+      energy_(energy),
+      engine_(*tools.engine),
+      dense_(prepared, engine_) {
+    engine_.finish_fixed(fixed_);
 }
 
 int ImageEvidence::searches() const {
-    return 1 + (dense_ ? static_cast<int>(options_.dense_coarsening.size()) : 0);
+    return 1 + static_cast<int>(options_.dense_coarsening.size());
 }
 
 void ImageEvidence::search(const State& state, Observer& observer) {
@@ -58,7 +50,7 @@ void ImageEvidence::search(const State& state, Observer& observer) {
     } else {
         const std::vector<int>& grids = options_.dense_coarsening;
         const int coarsening = grids.at(std::min(static_cast<std::size_t>(searches_done_), grids.size()) - 1);
-        DenseMatches dense = dense_->matches(state, coarsening, blocks_, locator_);
+        DenseMatches dense = dense_.matches(state, coarsening, blocks_, locator_);
         use(std::move(dense.found));
         if (coarsening == last_coarsening_) gain_ = dense.agreement - *agreement_;
         last_coarsening_ = coarsening;
@@ -71,8 +63,8 @@ std::vector<BlockMatch> ImageEvidence::block_search(const State& state, Observer
     const MatchingTemplate& blocks = prepared_.image->blocks;
     BlockMatchingOptions matching = options_.matching;
     matching.rotation = state.placement.linear();
-    if (dense_) matching.finest = FinestGrid::UndescribedPoints;
-    return search_blocks(blocks, fixed_.image.geometry, *block_engine_, deformed(blocks.points(), state), matching,
+    matching.finest = FinestGrid::UndescribedPoints;
+    return search_blocks(blocks, fixed_.image.geometry, engine_.blocks(), deformed(blocks.points(), state), matching,
                          observer);
 }
 

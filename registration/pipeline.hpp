@@ -121,8 +121,7 @@ enum class Device { Auto, Cpu, Gpu };
 struct ImageOptions {
     BlockMatchingOptions matching;
     ConsistencyOptions consistency;
-    /// After the search for blocks, dense searches on grids so many times doubled from the blocks' finest. Templates of
-    /// grey values have none.
+    /// After the search for blocks, dense searches on grids so many times doubled from the blocks' finest.
     std::vector<int> dense_coarsening{1, 1, 0};
     double expected_motion_mm = 100;  ///< of the organ's surface in the field of view of the intraoperative image
     double unseen_motion_mm = 0.8;    ///< and out of it, along its normal: what is around holds it there, …
@@ -222,7 +221,7 @@ struct ImageFit {
     double residual_mm = 0;  ///< of the last round, weighted by confidence
     double shown_share = 0;  ///< of the model's nodes: no further than 15 mm from a match
     /// Σ ∇D₁·∇D₂ over Σ ½ (|∇D₁|² + |∇D₂|²) of the images' descriptors, before the last rounds: 1 for the same image,
-    /// near 0 for images of different things. Only with descriptors of self-similarity.
+    /// near 0 for images of different things. None where no dense search was made.
     std::optional<double> agreement;
 };
 

@@ -338,10 +338,8 @@ struct Updater::Impl {
          Observer& observer)
         : prepared(model), options(given), solver(std::move(engine)), load_finder(model, given.tissue.load_shapes) {
         if (!model.image) return;
-        const bool described = model.image->blocks.options().similarity == Similarity::SelfSimilarityContext;
-        image_tools.emplace(detail::ImageTools{described ? detail::make_image_engine(model, given, observer) : nullptr,
-                                               meshing::PointLocator(model.model.mesh),
-                                               {}});
+        image_tools.emplace(detail::ImageTools{
+            detail::make_image_engine(model, given, observer), meshing::PointLocator(model.model.mesh), {}});
     }
 
     UpdateResult update(const Intraoperative& given, Observer& observer);

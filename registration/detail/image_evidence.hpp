@@ -11,8 +11,8 @@ namespace tissuewarp::registration::detail {
 
 class ImageEvidence {
 public:
-    /// `prepared.image` is there. The engine finds blocks, and forces after the first search; without it the processor
-    /// finds blocks, and that is all. `energy` (mN mm) weighs as much as one standard deviation of a match.
+    /// `prepared.image` is there. The engine finds blocks, and forces after the first search. `energy` (mN mm) weighs
+    /// as much as one standard deviation of a match.
     ImageEvidence(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
                   ImageTools& tools, double energy);
 
@@ -41,10 +41,9 @@ private:
     const ImageOptions& options_;
     FieldOfView view_;  // of `fixed_`
     const meshing::PointLocator& locator_;
-    double energy_;                            // mN mm that one standard deviation of a match weighs
-    std::unique_ptr<BlockEngine> own_blocks_;  // where no engine was given
-    BlockEngine* block_engine_ = nullptr;
-    std::optional<DenseSearch> dense_;
+    double energy_;  // mN mm that one standard deviation of a match weighs
+    ImageEngine& engine_;
+    DenseSearch dense_;
     int searches_done_ = 0;
     LocatedMatches blocks_, matches_;  // of the first search, and of the last
     std::vector<double> strongest_;    // of each of `matches_`: the largest eigenvalue of its information
