@@ -94,7 +94,7 @@ struct SeriesWriter::Impl {
     /// What of the mesh is left, where that is not all of it.
     void add_stages() {
         for (std::size_t s = 0; s < built.stages.size(); ++s) {
-            if (s == 0 && !built.left_out) {
+            if (s == 0) {
                 frames.stages.push_back({"mesh/tetrahedra", "mesh/labels", built.mesh.tet_count()});
                 continue;
             }
