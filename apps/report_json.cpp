@@ -1,8 +1,8 @@
 #include "apps/report_json.hpp"
 
 #include "apps/register_outputs.hpp"
-#include "apps/text_file.hpp"
 #include "apps/versions.hpp"
+#include "core/atomic_file.hpp"
 
 #include <cmath>
 
@@ -197,7 +197,7 @@ json dial(const RegistrationRun& run) {
 }  // namespace
 
 void write_json(const json& document, const std::filesystem::path& path) {
-    write_text(document.dump(2, ' ', false, json::error_handler_t::replace) + "\n", path);
+    write_file(document.dump(2, ' ', false, json::error_handler_t::replace) + "\n", path);
 }
 
 json to_json(const registration::Summary& s) {

@@ -6,9 +6,9 @@
 #include "apps/report_json.hpp"
 #include "apps/scene_file.hpp"
 #include "apps/scene_templates.hpp"
-#include "apps/text_file.hpp"
 #include "apps/verbs.hpp"
 #include "apps/versions.hpp"
+#include "core/atomic_file.hpp"
 #include "core/sha256.hpp"
 #include "simulation/limits.hpp"
 #include "simulation/series_io.hpp"
@@ -77,9 +77,9 @@ void write_template(const SimulateOptions& options) {
     require_new(file);
     if (!scene.labels.empty()) {
         require_new(labels);
-        write_text(scene.labels, labels);
+        write_file(scene.labels, labels);
     }
-    write_text(scene.text, file);
+    write_file(scene.text, file);
     if (!options.common.quiet)
         fmt::print("{0}; run it with\n    tissuewarp simulate {0} --output {1}\n", file.string(), options.init);
 }
