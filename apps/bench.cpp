@@ -8,6 +8,7 @@
 #include "apps/progress.hpp"
 #include "apps/report_json.hpp"
 #include "apps/verbs.hpp"
+#include "core/atomic_file.hpp"
 #include "core/errors.hpp"
 #include "imaging/image_io.hpp"
 #include "imaging/labels.hpp"
@@ -208,9 +209,9 @@ private:
 
 void write_results(const BenchResults& results, OutputFolder& output) {
     write_json(bench_json(results), output.path("bench.json"));
-    write_text(bench_csv(results), output.path("bench.csv"));
+    write_file(bench_csv(results), output.path("bench.csv"));
     for (const StudyResults& study : results.studies)
-        if (!study.meshes.empty()) write_text(bench_figure(study), output.path(name_of(study.study) + ".svg"));
+        if (!study.meshes.empty()) write_file(bench_figure(study), output.path(name_of(study.study) + ".svg"));
     output.commit();
 }
 

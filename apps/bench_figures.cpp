@@ -15,10 +15,7 @@ namespace {
 
 using report::FigureCurve;
 using report::LineStyle;
-using report::LogPanel;
 using report::Mark;
-
-constexpr double width = 980, height = 430;
 
 const char* colour_of(BenchEngine engine) {
     constexpr const char* colours[] = {"#6b7280", "#1d4ed8", "#c2410c", "#a21caf", "#047857"};
@@ -54,18 +51,13 @@ FigureCurve real_time(const StudyResults& study) {
     return curve;
 }
 
-std::string legend(const StudyResults& study) {
-    std::string svg;
-    double x = 40;
-    const auto entry = [&](const FigureCurve& curve, const std::string& label) {
-        svg += report::svg_legend_entry({x, 26}, curve, label);
-        x += report::legend_width(label);
-    };
+std::vector<report::LegendEntry> legend(const StudyResults& study) {
+    std::vector<report::LegendEntry> entries;
     for (const BenchEngine engine : every_bench_engine)
         if (std::any_of(study.meshes.begin(), study.meshes.end(), [&](const auto& mesh) { return mesh.of(engine); }))
-            entry({colour_of(engine), LineStyle::Solid, Mark::None}, label_of(engine));
-    entry({"#111827", LineStyle::Dashed, Mark::None}, "step simulated");
-    return svg;
+            entries.push_back({{colour_of(engine), LineStyle::Solid, Mark::None}, label_of(engine)});
+    entries.push_back({{"#111827", LineStyle::Dashed, Mark::None}, "step simulated"});
+    return entries;
 }
 
 }  // namespace
@@ -89,12 +81,15 @@ std::string bench_figure(const StudyResults& study) {
                : curves_of(study, [](const MeshTimings& mesh, const EngineTiming& engine) {
                      return engine.median() / mesh.elements * 1e9;
                  });
-    const LogPanel left({.left = 90}, times), right({.left = 570}, beside);
+    const report::FigureAxis elements{"tetrahedra"};
     return report::svg_figure(
-        width, height,
-        legend(study) + left.drawn(fmt::format("Time per step, {}", scene), "tetrahedra", "µs per step", times) +
-            (ratios ? right.drawn("Times faster than scalar C++", "tetrahedra", "ratio", beside)
-                    : right.drawn("Time per element and step", "tetrahedra", "ns per element-step", beside)));
+        legend(study),
+        {{.title = fmt::format("Time per step, {}", scene), .x = elements, .y = {"µs per step"}, .curves = times},
+         {.left = 570,
+          .title = ratios ? "Times faster than scalar C++" : "Time per element and step",
+          .x = elements,
+          .y = {ratios ? "ratio" : "ns per element-step"},
+          .curves = beside}});
 }
 
 }  // namespace tissuewarp::apps

@@ -1,12 +1,8 @@
 #include "apps/bench_outputs.hpp"
 
-#include "core/atomic_file.hpp"
-#include "core/errors.hpp"
-
 #include <fmt/format.h>
 
 #include <cmath>
-#include <fstream>
 
 namespace tissuewarp::apps {
 
@@ -175,15 +171,6 @@ std::string bench_csv(const BenchResults& results) {
                     results.bandwidth_share(mesh, engine), results.fma_share(mesh, engine), mesh.critical_step,
                     mesh.real_time_factor(engine), optional_text(engine.difference), engine.repeats_equal ? 1 : 0);
     return text;
-}
-
-void write_text(const std::string& text, const std::filesystem::path& path) {
-    AtomicFile file(path);
-    std::ofstream stream(file.path(), std::ios::binary);
-    stream << text;
-    stream.close();
-    if (!stream) throw IoError("cannot write '" + path.string() + "'");
-    file.commit();
 }
 
 }  // namespace tissuewarp::apps

@@ -5,7 +5,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include <filesystem>
 #include <string>
 
 namespace tissuewarp::apps {
@@ -24,8 +23,5 @@ std::string bench_csv(const BenchResults& results);
 /// Time per step, and the ratio to the scalar loops (cube and brain: figures 2 and 3 of Taylor, Cheng, Ourselin 2007)
 /// or the time of an element-step (scaling), over the number of elements, as SVG.
 std::string bench_figure(const StudyResults& study);
-
-/// Throws IoError.
-void write_text(const std::string& text, const std::filesystem::path& path);
 
 }  // namespace tissuewarp::apps

@@ -15,8 +15,6 @@ using namespace registration;
 void require_compatible(const RegisterOptions& options) {
     if (options.edge_length > 0)
         throw InvalidInput("--edge-length beside --accuracy or --time-budget, which choose it; leave one of them out");
-    if (options.time_budget && !options.fit.empty())
-        throw InvalidInput("--fit registers many times; leave out --time-budget");
     if (options.accuracy && options.no_error_estimate)
         throw InvalidInput("--accuracy is checked against the error estimate; leave out --no-error-estimate");
 }

@@ -77,7 +77,6 @@ void run_explain(const ExplainOptions& options) {
                scene.solve.duration, scene.solve.frames);
     fmt::print("{} nodes, {} {}, {} faces outside, {} stage(s)\n", plan.nodes, plan.tetrahedra, plan.element,
                plan.outer_faces, built.stages.size());
-    if (built.left_out) fmt::print("{}\n", simulation::text_of(*built.left_out));
     for (const std::string& law : plan.laws) fmt::print("  {}\n", law);
     fmt::print("\n{:<44}{}\n", "a step, counted", "   memory traffic   arithmetic");
     fmt::print("{:<44}{}\n", "elements and nodes on the CPU", work_text(plan.cpu));

@@ -113,10 +113,6 @@ struct Parser {
         verb.number("--data-stiffness", o.data_stiffness, "KPA/MM", 1e-6, 1e6,
                     "Pull of the matched boundary per area (kPa/mm)");
         verb.number("--fade", o.fade, "MM", 1.0, 1e4, "Distance from the organ where the field has become rigid (mm)");
-        verb.list("--fit", o.fit, "NAME",
-                  "Fit, where the data tell it: poissons-ratio[:LABEL], stiffness-ratio:LABEL, gravity, pressure; "
-                  "repeatable or separated by commas")
-            ->delimiter(',');
         verb.flag("--match-image", o.match_image, "Match blocks of the images besides the other data");
         verb.flag("--no-align", o.no_align, "Skip the rigid alignment: the images share one frame");
         verb.flag("--no-error-estimate", o.no_error_estimate, "Leave out how far off targets may lie, for speed");

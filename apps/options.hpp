@@ -62,7 +62,6 @@ struct RegisterOptions {
     double data_stiffness = 3.0;                 ///< kPa/mm
     double fade = 60.0;                          ///< mm
     std::vector<int> anchors, rigid_neighbours;  ///< labels of the preoperative map
-    std::vector<std::string> fit;                ///< names of parameters, as registration::fit_parameter reads them
     bool match_image = false;                    ///< implied where the fixed image is all there is
     bool no_align = false;
     bool resample_labels = false;

@@ -1,6 +1,6 @@
 #include "apps/parameters.hpp"
 
-#include "apps/text_file.hpp"
+#include "core/atomic_file.hpp"
 
 #include <algorithm>
 #include <numeric>
@@ -69,7 +69,7 @@ std::string to_toml(const std::vector<Parameter>& parameters) {
 }
 
 void save_parameters(const std::vector<Parameter>& parameters, const std::filesystem::path& path) {
-    write_text(to_toml(parameters), path);
+    write_file(to_toml(parameters), path);
 }
 
 std::string nearest_name(const std::string& word, const std::vector<std::string>& names) {

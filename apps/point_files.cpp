@@ -1,6 +1,6 @@
 #include "apps/point_files.hpp"
 
-#include "apps/text_file.hpp"
+#include "core/atomic_file.hpp"
 #include "imaging/vector_sampling.hpp"
 #include "meshing/mesh_io.hpp"
 
@@ -19,7 +19,7 @@ void write_columns(const std::vector<Column>& columns, const std::filesystem::pa
     for (Eigen::Index row = 0; row < columns.front().values.size(); ++row)
         for (std::size_t c = 0; c < columns.size(); ++c)
             text += fmt::format("{:.6f}{}", columns[c].values[row], c + 1 < columns.size() ? ',' : '\n');
-    write_text(text, path);
+    write_file(text, path);
 }
 
 void append_points(std::vector<Column>& columns, const std::string& prefix, const Eigen::Matrix3Xd& points) {

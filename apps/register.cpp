@@ -99,23 +99,8 @@ bool looks_for_loads(const RegistrationRun& run) {
     return !run.options.match_image && (!run.inputs.fixed_labels.empty() || !run.options.no_align);
 }
 
-FitOptions fit_options(const RegisterOptions& options) {
-    FitOptions result;
-    for (const std::string& name : options.fit) result.parameters.push_back(fit_parameter(name));
-    return result;
-}
-
 void append(std::vector<StageTime>& times, const std::vector<StageTime>& more) {
     times.insert(times.end(), more.begin(), more.end());
-}
-
-void register_model(RegistrationRun& run, const FitOptions& to_fit, ProgressLine& progress) {
-    FittedUpdate fitted =
-        update_and_fit(*run.prepared, seen(run.inputs, run.options), update_options(run), to_fit, progress);
-    run.result = std::move(fitted.result);
-    run.fit = std::move(fitted.fit);
-    append(run.times, run.result.times);
-    if (!to_fit.parameters.empty()) run.times.push_back({"parameter fit", run.fit.seconds});
 }
 
 void make_fields(RegistrationRun& run, ProgressLine& progress) {
@@ -191,7 +176,6 @@ Scores score(const RegistrationRun& run) {
 void run_register(const RegisterOptions& options) {
     StageClock clock;
     ProgressLine progress(options.common.quiet);
-    const FitOptions to_fit = fit_options(options);
     RegistrationRun run(options, utc_now());
 
     if (options.dry_run) require_could_write(options.output);
@@ -220,7 +204,8 @@ void run_register(const RegisterOptions& options) {
 
     progress.begin("registering", 0.20, 0.47);
     const double ready = clock.total();
-    register_model(run, to_fit, progress);
+    run.result = Updater(*run.prepared, update_options(run), progress).update(seen(run.inputs, options), progress);
+    append(run.times, run.result.times);
     clock.lap("");
 
     make_fields(run, progress);

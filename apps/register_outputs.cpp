@@ -113,18 +113,6 @@ std::string estimate_text(const registration::UncertaintySummary& s) {
     return text;
 }
 
-std::string fit_table(const registration::ParameterFit& fit) {
-    if (fit.parameters.empty()) return "";
-    std::string text = "fitted parameters         given  fitted     +/-\n";
-    for (const registration::FittedParameter& each : fit.parameters) {
-        const std::string unit = each.unit.empty() ? "" : " (" + each.unit + ")";
-        const double used = each.identified() ? each.fitted : each.given;
-        text += fmt::format("  {:<22}{:>8.3g}{:>8.3g}{:>8.2g}  {}: {}{}\n", each.name, each.given, used, each.deviation,
-                            each.identified() ? "fitted" : "left alone", each.reason, unit);
-    }
-    return text;
-}
-
 }  // namespace
 
 std::vector<std::string> output_names(const RegisterOptions& options) {
@@ -224,7 +212,6 @@ std::string summary_text(const RegistrationRun& run, double total_seconds) {
             text += fmt::format("expected error of tissue: {:.1f} mm, at most {:.1f} mm\n", expected->mean_mm,
                                 expected->worst_mm);
     }
-    text += fit_table(run.fit);
     if (!run.scores.after.empty()) text += "Dice                      before   after\n";
     for (const auto& [label, after] : run.scores.after)
         text += fmt::format("  {:<22}{:>8.3f}{:>8.3f}\n", label == 0 ? "all labels" : fmt::format("label {}", label),

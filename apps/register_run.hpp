@@ -4,8 +4,8 @@
 #include "apps/inputs.hpp"
 #include "meshing/quality.hpp"
 #include "registration/dial/dial.hpp"
-#include "registration/parameter_fit.hpp"
 #include "registration/uncertainty.hpp"
+#include "registration/update.hpp"
 
 #include <chrono>
 #include <memory>
@@ -47,7 +47,6 @@ struct RegistrationRun {
     registration::UpdateResult result;
     std::optional<registration::DialChoice> dial;  ///< where an accuracy or a time was asked for
     double intraoperative_seconds = 0;             ///< from data and model at hand to the warped image
-    registration::ParameterFit fit;                ///< without parameters where none was asked for
     Products products;
     Scores scores;
     std::vector<registration::StageTime> times;

@@ -1,8 +1,8 @@
 #include "apps/report_json.hpp"
 
 #include "apps/register_outputs.hpp"
-#include "apps/text_file.hpp"
 #include "apps/versions.hpp"
+#include "core/atomic_file.hpp"
 
 #include <cmath>
 
@@ -194,28 +194,10 @@ json dial(const RegistrationRun& run) {
     return object;
 }
 
-json fitted(const registration::ParameterFit& fit) {
-    json list = json::array();
-    for (const registration::FittedParameter& each : fit.parameters)
-        list.push_back({{"name", each.name},
-                        {"unit", each.unit},
-                        {"given", number(each.given)},
-                        {"best", number(each.fitted)},
-                        {"used", number(each.identified() ? each.fitted : each.given)},
-                        {"deviation", number(each.deviation)},
-                        {"identified", each.identified()},
-                        {"reason", each.reason}});
-    return {{"parameters", list},
-            {"held_out_misfit_ratio", number(fit.misfit_ratio)},
-            {"blocks", fit.blocks},
-            {"equilibria", fit.equilibria},
-            {"seconds", number(fit.seconds)}};
-}
-
 }  // namespace
 
 void write_json(const json& document, const std::filesystem::path& path) {
-    write_text(document.dump(2, ' ', false, json::error_handler_t::replace) + "\n", path);
+    write_file(document.dump(2, ' ', false, json::error_handler_t::replace) + "\n", path);
 }
 
 json to_json(const registration::Summary& s) {
@@ -326,7 +308,6 @@ json report_json(const RegistrationRun& run, double total_seconds) {
     }
     report["intraoperative_seconds"] = run.intraoperative_seconds;
     if (run.dial) report["dial"] = dial(run);
-    if (!run.fit.parameters.empty()) report["fit"] = fitted(run.fit);
     if (scores.target_error) report["target_registration_error"] = to_json(*scores.target_error);
     if (scores.curves)
         report["curves"]["to_lines"] = {{"before", to_json(scores.curves->before)},

@@ -64,15 +64,6 @@ void read_probes(TomlReader& file, Scene& scene) {
     }
 }
 
-void read_leave_out(TomlReader& file, Scene& scene) {
-    auto reader = file.table("leave_out");
-    if (!reader) return;
-    LeaveOut leave_out;
-    leave_out.tolerance_mm = reader->number("tolerance_mm", {1e-6, 1e3, "mm"}).value_or(leave_out.tolerance_mm);
-    scene.leave_out = leave_out;
-    reader->finish();
-}
-
 }  // namespace
 
 Scene read_scene(const std::filesystem::path& path) {
@@ -88,7 +79,6 @@ Scene read_scene(const std::filesystem::path& path) {
     read_neighbours(file, folder, scene, uses);
     read_solve(file, scene);
     read_probes(file, scene);
-    read_leave_out(file, scene);
     (void)file.table("geometry");
     file.finish();
     require_names(scene, uses);

@@ -6,9 +6,9 @@
 #include "apps/report_json.hpp"
 #include "apps/scene_file.hpp"
 #include "apps/scene_templates.hpp"
-#include "apps/text_file.hpp"
 #include "apps/verbs.hpp"
 #include "apps/versions.hpp"
+#include "core/atomic_file.hpp"
 #include "core/sha256.hpp"
 #include "simulation/limits.hpp"
 #include "simulation/series_io.hpp"
@@ -45,20 +45,12 @@ json summary_json(const SimulateOptions& options, const simulation::BuiltScene& 
                     {"engine", run.engine},
                     {"seconds", {{"building", building}, {"solving", run.seconds}}},
                     {"notes", notes}};
-    if (built.left_out)
-        summary["left_out"] = {{"tetrahedra", built.left_out->tetrahedra},
-                               {"of", built.mesh.tet_count()},
-                               {"estimated_change_mm", built.left_out->estimated_change_mm}};
     return summary;
 }
 
 void print_summary(const simulation::BuiltScene& built, const simulation::RunSummary& run, const fs::path& folder) {
     const tled::RestState& simulated = built.stages.front().rest;
     fmt::print("{} nodes, {} tetrahedra, {}\n", simulated.node_count, simulated.element_count(), run.engine);
-    if (built.left_out)
-        fmt::print("{}\n", simulation::text_of(*built.left_out));
-    else if (built.scene.leave_out)
-        fmt::print("no tissue is left out: the probes need it all\n");
     fmt::print("{} frames in {:.2f} s, {} force evaluations; largest displacement {:.3f} mm, least det F {:.3f}\n",
                run.frames, run.seconds, run.steps, run.largest_displacement, run.min_jacobian);
     if (run.estimated_error_mm > 0) fmt::print("estimated error {:.4f} mm\n", run.estimated_error_mm);
@@ -85,9 +77,9 @@ void write_template(const SimulateOptions& options) {
     require_new(file);
     if (!scene.labels.empty()) {
         require_new(labels);
-        write_text(scene.labels, labels);
+        write_file(scene.labels, labels);
     }
-    write_text(scene.text, file);
+    write_file(scene.text, file);
     if (!options.common.quiet)
         fmt::print("{0}; run it with\n    tissuewarp simulate {0} --output {1}\n", file.string(), options.init);
 }

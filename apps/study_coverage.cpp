@@ -2,8 +2,8 @@
 
 #include "apps/progress.hpp"
 #include "apps/study.hpp"
-#include "apps/text_file.hpp"
 #include "apps/update_device.hpp"
+#include "core/atomic_file.hpp"
 #include "core/errors.hpp"
 #include "study/coverage_summary.hpp"
 
@@ -39,7 +39,7 @@ void run_coverage_study(const StudyOptions& options) {
     const auto coverage = study::coverage_of(measured(options, plan, progress));
     progress.clear();
     if (coverage.empty()) throw SolverFailure("no phantom could be registered; give other seeds");
-    write_text(study::coverage_figure(coverage), options.output / "coverage.svg");
+    write_file(study::coverage_figure(coverage), options.output / "coverage.svg");
     fmt::print("{}", study::table_of(coverage));
 }
 

@@ -227,19 +227,13 @@ void lung(const Arguments& arguments, const std::string& name) {
         read_landmarks(folder / "moving_pts.txt", folder / "fixed_pts.txt"), arguments);
 }
 
-void run(Arguments arguments) {
+void run(const Arguments& arguments) {
     print_head();
-    for (const Similarity similarity : {Similarity::SelfSimilarityContext, Similarity::CrossCorrelation}) {
-        const std::string by = similarity == Similarity::CrossCorrelation ? " by correlation" : " by self-similarity";
-        const auto chosen = [&](const std::string& name) {
-            return (name + by).find(arguments.part) != std::string::npos;
-        };
-        arguments.matching.similarity = similarity;
-        if (chosen("brain shift")) brain_shift(arguments, "brain shift" + by);
-        if (chosen("brain sag clean")) brain_sag(arguments, "brain sag clean" + by, "intraop.nii.gz");
-        if (chosen("brain sag degraded")) brain_sag(arguments, "brain sag degraded" + by, "intraop_degraded.nii.gz");
-        if (chosen("lung")) lung(arguments, "lung" + by);
-    }
+    const auto chosen = [&](const std::string& name) { return name.find(arguments.part) != std::string::npos; };
+    if (chosen("brain shift")) brain_shift(arguments, "brain shift");
+    if (chosen("brain sag clean")) brain_sag(arguments, "brain sag clean", "intraop.nii.gz");
+    if (chosen("brain sag degraded")) brain_sag(arguments, "brain sag degraded", "intraop_degraded.nii.gz");
+    if (chosen("lung")) lung(arguments, "lung");
 }
 
 }  // namespace

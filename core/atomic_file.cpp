@@ -7,6 +7,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 #include <string>
 #include <system_error>
 
@@ -51,6 +52,15 @@ void AtomicFile::commit() {
     fs::rename(temporary_, destination_, failure);
     if (failure) throw IoError("cannot write '" + destination_.string() + "': " + failure.message());
     committed_ = true;
+}
+
+void write_file(std::string_view bytes, const fs::path& path) {
+    AtomicFile file(path);
+    std::ofstream stream(file.path(), std::ios::binary);
+    stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    stream.close();
+    if (!stream) throw IoError("cannot write '" + path.string() + "'; check the folder, the permission and the space");
+    file.commit();
 }
 
 void require_writable_folder(const fs::path& folder) {

@@ -2,6 +2,7 @@
 /// Files that appear complete or not at all.
 
 #include <filesystem>
+#include <string_view>
 
 namespace tissuewarp {
 
@@ -23,6 +24,9 @@ private:
     std::filesystem::path destination_, temporary_;
     bool committed_ = false;
 };
+
+/// A file of these bytes. Throws IoError (full disk, missing folder, permission).
+void write_file(std::string_view bytes, const std::filesystem::path& path);
 
 /// Throws IoError unless a file can be created in `folder`, which is made when missing.
 void require_writable_folder(const std::filesystem::path& folder);

@@ -7,7 +7,6 @@
 
 #include <charconv>
 #include <cstdint>
-#include <fstream>
 
 namespace tissuewarp::meshing {
 
@@ -196,13 +195,7 @@ Polylines read_polylines(const std::filesystem::path& path) {
 }
 
 void write_surface(const SurfaceMesh& surface, const std::filesystem::path& path) {
-    const std::string content = document(surface, path);
-    AtomicFile file(path);
-    std::ofstream stream(file.path(), std::ios::binary);
-    stream.write(content.data(), static_cast<std::streamsize>(content.size()));
-    stream.close();
-    if (!stream) throw IoError("cannot write '" + path.string() + "'; check the folder, the permission and the space");
-    file.commit();
+    write_file(document(surface, path), path);
 }
 
 }  // namespace tissuewarp::meshing

@@ -7,7 +7,6 @@
 #include "meshing/mesh_io.hpp"
 
 #include <cstdint>
-#include <fstream>
 
 namespace tissuewarp::meshing {
 
@@ -80,13 +79,7 @@ void write(const TetMesh& mesh, const HexCells& hexahedra, const std::filesystem
                            std::to_string(mesh.tet_count()) + " tetrahedra and " +
                            std::to_string(hexahedra.labels.size()) + " for " + std::to_string(hexahedra.count()) +
                            " hexahedra; give one label each");
-    const std::string content = document(mesh, hexahedra, point_arrays, cell_arrays);
-    AtomicFile file(path);
-    std::ofstream stream(file.path(), std::ios::binary);
-    stream.write(content.data(), static_cast<std::streamsize>(content.size()));
-    stream.close();
-    if (!stream) throw IoError("cannot write '" + path.string() + "'; check the folder, the permission and the space");
-    file.commit();
+    write_file(document(mesh, hexahedra, point_arrays, cell_arrays), path);
 }
 
 }  // namespace

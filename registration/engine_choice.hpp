@@ -10,8 +10,7 @@ namespace tissuewarp::registration::detail {
 std::unique_ptr<tled::Engine> make_engine(const PreparedModel& prepared, const UpdateOptions& options,
                                           Observer& observer);
 
-/// The same of dense forces, for which every hardware GPU is worth while. The model has an image, whose template is
-/// made of self-similarity descriptors.
+/// The same of dense forces, for which every hardware GPU is worth while. The model has an image.
 std::unique_ptr<ImageEngine> make_image_engine(const PreparedModel& prepared, const UpdateOptions& options,
                                                Observer& observer);
 

@@ -1,25 +1,26 @@
 #pragma once
-/// Figures as SVG text: panels with logarithmic axes.
+/// Figures as SVG text: panels of curves side by side, with a legend above them.
 
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace tissuewarp::report {
 
-/// In the units of the axes; on a page, in pixels from the top left.
 struct FigurePoint {
     double x = 0, y = 0;
 };
 
 enum class LineStyle { Solid, Dashed, None };
-enum class Mark { None, Dot, Ring, Cross };
+enum class Mark { None, Dot, Ring };
 
 struct FigureCurve {
     std::string colour;  ///< "#1d4ed8"
     LineStyle line = LineStyle::Solid;
     Mark mark = Mark::Dot;
-    std::vector<FigurePoint> points{};
-    double thickness = 1.8;  ///< pixels
+    std::vector<FigurePoint> points{};  ///< in the units of the axes
+    double thickness = 1.8;             ///< pixels
 };
 
 /// Words above a point of a panel.
@@ -28,39 +29,31 @@ struct FigureNote {
     std::string text;
 };
 
-/// Where the panel lies within the figure, pixels.
-struct PanelPlace {
+enum class Scale { Logarithmic, Linear };
+
+struct FigureAxis {
+    std::string label;
+    Scale scale = Scale::Logarithmic;  ///< of positive values
+    std::optional<std::pair<double, double>>
+        ends{};  ///< what lies beyond is drawn at them; none: all curves, and a margin
+};
+
+/// Lengths in pixels of the figure. Words may hold entities of SVG.
+struct FigurePanel {
     double left = 90, top = 70, width = 380, height = 300;
+    std::string title;
+    FigureAxis x, y;
+    std::vector<FigureCurve> curves;
+    std::vector<FigureNote> notes{};
 };
 
-/// Axes that hold all curves, with a margin. Coordinates of curves are positive.
-class LogPanel {
-public:
-    LogPanel(const PanelPlace& place, const std::vector<FigureCurve>& curves);
-
-    /// Axes with their words, which may hold entities of SVG, the curves and the notes.
-    [[nodiscard]] std::string drawn(const std::string& title, const std::string& x_label, const std::string& y_label,
-                                    const std::vector<FigureCurve>& curves,
-                                    const std::vector<FigureNote>& notes = {}) const;
-    /// On the page.
-    [[nodiscard]] FigurePoint at(FigurePoint p) const;
-
-private:
-    [[nodiscard]] std::string axes() const;
-
-    PanelPlace place_;
-    FigurePoint low_, high_;
+/// Line and mark as in the panels, and words beside them.
+struct LegendEntry {
+    FigureCurve look;
+    std::string label;
 };
 
-/// <svg …> with a white ground, what is within, </svg>.
-std::string svg_figure(double width, double height, const std::string& content);
-/// `anchor` is SVG's "start", "middle" or "end"; `more` further attributes.
-std::string svg_text(FigurePoint at, const std::string& content, const char* anchor = "middle",
-                     const std::string& more = "");
-std::string svg_line(FigurePoint from, FigurePoint to, const std::string& colour, const std::string& more = "");
-/// A line or mark as in the panels, and words beside it.
-std::string svg_legend_entry(FigurePoint at, const FigureCurve& curve, const std::string& label);
-/// Pixels that such an entry takes.
-double legend_width(const std::string& label);
+/// <svg …>: the panels on white ground. The legend's rows lie 22 pixels from the top and 20 apart.
+std::string svg_figure(const std::vector<LegendEntry>& legend, const std::vector<FigurePanel>& panels);
 
 }  // namespace tissuewarp::report

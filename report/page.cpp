@@ -6,13 +6,11 @@
 #include "report/detail/view.hpp"
 
 #include "core/atomic_file.hpp"
-#include "core/errors.hpp"
 
 #include <opencv2/imgcodecs.hpp>
 
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <limits>
 #include <optional>
 #include <string>
@@ -21,16 +19,6 @@
 namespace tissuewarp::report {
 
 namespace {
-
-template <class Bytes>
-void write_file(const Bytes& bytes, const std::filesystem::path& path) {
-    AtomicFile file(path);
-    std::ofstream stream(file.path(), std::ios::binary);
-    stream.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    stream.close();
-    if (!stream) throw IoError("cannot write '" + path.string() + "'; is the folder there and the disk not full?");
-    file.commit();
-}
 
 /// The slice nearest to where tissue moved most, or the middle one.
 std::size_t first_shown(const nlohmann::json& stack, const std::optional<detail::Focus>& focus) {
@@ -70,7 +58,7 @@ void write_report(const ReportInput& input, const std::filesystem::path& folder)
     const detail::Preview preview = detail::draw_preview(input);
     std::vector<unsigned char> png;
     cv::imencode(".png", preview.picture, png, {cv::IMWRITE_PNG_COMPRESSION, 9});
-    write_file(png, folder / "preview.png");
+    write_file({reinterpret_cast<const char*>(png.data()), png.size()}, folder / "preview.png");
     write_file(detail::fill(detail::page_template(), page_values(input, preview, png)), folder / "report.html");
 }
 

@@ -214,9 +214,9 @@ Stage remaining(const tled::Model& model, const Scene& scene, const std::vector<
     return stage;
 }
 
-std::vector<Stage> stages_of(const Scene& scene, const meshing::TetMesh& mesh, const RegionFinder& finder,
-                             std::vector<bool> gone) {
+std::vector<Stage> stages_of(const Scene& scene, const meshing::TetMesh& mesh, const RegionFinder& finder) {
     const tled::Model whole = model_of(scene, mesh);
+    std::vector<bool> gone(static_cast<std::size_t>(mesh.tet_count()), false);
     std::vector<Stage> stages{remaining(whole, scene, gone, 0.0)};
     std::vector<Resection> resections = scene.resections;
     std::stable_sort(resections.begin(), resections.end(),
@@ -248,19 +248,7 @@ BuiltScene build(const Scene& scene, const meshing::TetMesh& mesh, Observer& obs
     built.effects = effects_of(scene, tissue.mesh, finder, std::move(interfaces), observer);
     built.probes = located(scene.probes, tissue.mesh);
     built.mesh = tissue.mesh;
-    std::vector<bool> gone(static_cast<std::size_t>(tissue.mesh.tet_count()), false);
-    built.stages = stages_of(scene, tissue.mesh, finder, gone);
-    if (!scene.leave_out) return built;
-    built.left_out = left_out(built, observer);
-    if (!built.left_out) {
-        observer.note("no tissue is left out: the probes need it all");
-        return built;
-    }
-    if (built.effects.contact) observer.note("tissue that is left out touches no body");
-    gone = built.left_out->keep;
-    gone.flip();
-    built.stages = stages_of(scene, tissue.mesh, finder, gone);
-    built.springs.insert(built.springs.end(), built.left_out->springs.begin(), built.left_out->springs.end());
+    built.stages = stages_of(scene, tissue.mesh, finder);
     return built;
 }
 

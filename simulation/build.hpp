@@ -3,7 +3,6 @@
 
 #include "core/observer.hpp"
 #include "meshing/point_location.hpp"
-#include "simulation/leave_out.hpp"
 #include "simulation/scene.hpp"
 #include "simulation/tissue_mesh.hpp"
 #include "tled/conditions.hpp"
@@ -42,7 +41,6 @@ struct BuiltScene {
     std::vector<tled::Spring> springs;
     tled::Effects effects;  ///< pressures and levels where their curves are 1, obstacles where they are at time 0
     std::vector<meshing::Location> probes;  ///< of Scene::probes, in that mesh
-    std::optional<LeftOut> left_out;        ///< by Scene::leave_out
 };
 
 /// Meshes and checks. Throws InvalidInput as require_valid(), mesh_of(), RegionFinder and obstacle() do, for probes

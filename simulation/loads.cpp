@@ -69,17 +69,6 @@ Matrix3Xd weight_at(const BuiltScene& built, const Stage& stage, const Matrix3Xd
     return gravity_of(built, time) * stage.rest.lumped_mass.transpose() - image_load;
 }
 
-/// That, and what tissue left out does, mN.
-Matrix3Xd force_at(const BuiltScene& built, const Stage& stage, const Matrix3Xd& image_load, double time) {
-    Matrix3Xd force = weight_at(built, stage, image_load, time);
-    if (!built.left_out) return force;
-    const Matrix3Xd far = far_force(*built.left_out, time);
-    for (std::size_t i = 0; i < built.left_out->nodes.size(); ++i)
-        force.col(stage.place[static_cast<std::size_t>(built.left_out->nodes[i])]) +=
-            far.col(static_cast<Eigen::Index>(i));
-    return force;
-}
-
 /// Faces that a tetrahedron of the stage still has, in the stage's nodes.
 Eigen::Matrix3Xi remaining_faces(const Eigen::Matrix3Xi& faces, const Stage& stage) {
     if (stage.node.size() == stage.place.size()) return faces;
@@ -180,7 +169,7 @@ tled::Conditions conditions_at(const BuiltScene& built, const Stage& stage, doub
         spring.node = stage.place[static_cast<std::size_t>(spring.node)];
         if (spring.node >= 0) conditions.springs.push_back(spring);
     }
-    conditions.external_force = force_at(built, stage, image_load(built, stage), time);
+    conditions.external_force = weight_at(built, stage, image_load(built, stage), time);
     conditions.effects = remaining_effects(built, stage);
     move_effects(built, stage, time, conditions.effects);
     return conditions;
@@ -196,9 +185,9 @@ LoadsInTime::LoadsInTime(const BuiltScene& built, const Stage& stage, double tim
 
 void LoadsInTime::turn_gravity(double time) {
     const Vector3d gravity = gravity_of(built_, time);
-    if (gravity == gravity_ && !built_.left_out) return;
+    if (gravity == gravity_) return;
     gravity_ = gravity;
-    conditions_.external_force = force_at(built_, stage_, image_load_, time);
+    conditions_.external_force = weight_at(built_, stage_, image_load_, time);
     if (!conditions_.effects.fluid) return;
     tled::Effects fluid;
     fluid.fluid = fluid_of(built_, level_at(*built_.scene.fluid, built_, time), gravity);

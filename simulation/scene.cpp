@@ -166,10 +166,6 @@ void require_valid(const Scene& scene) {
     std::set<std::string> probes;
     for (const Probe& probe : scene.probes)
         require(probes.insert(probe.name).second, "two probes are named '" + probe.name + "'");
-    if (!scene.leave_out) return;
-    require_positive(scene.leave_out->tolerance_mm, "the tolerance (mm) for leaving out tissue");
-    require(!scene.probes.empty(), "tissue is left out by what it changes at probes; give a probe");
-    require(scene.resections.empty(), "tissue cannot be left out where some is resected; leave out 'leave_out'");
 }
 
 }  // namespace tissuewarp::simulation

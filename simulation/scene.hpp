@@ -165,12 +165,6 @@ struct Solve {
     std::optional<tled::Element> element;  ///< none: suggested_element()
 };
 
-/// Tissue that the probes can do without is not simulated: springs and forces of linear tissue act in its place, where
-/// that changes the linear answer at no probe by more than this.
-struct LeaveOut {
-    double tolerance_mm = 0.1;
-};
-
 struct Probe {
     std::string name;
     Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< mm, at rest
@@ -194,7 +188,6 @@ struct Scene {
     std::vector<Resection> resections;
     Solve solve;
     std::vector<Probe> probes;
-    std::optional<LeaveOut> leave_out;
 };
 
 /// Throws InvalidInput, naming what and where, for numbers without meaning, sets that do not exist, labels without a

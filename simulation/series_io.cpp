@@ -1,5 +1,6 @@
 #include "simulation/series_io.hpp"
 
+#include "core/atomic_file.hpp"
 #include "core/detail/hdf5.hpp"
 #include "core/errors.hpp"
 #include "meshing/mesh_io.hpp"
@@ -94,7 +95,7 @@ struct SeriesWriter::Impl {
     /// What of the mesh is left, where that is not all of it.
     void add_stages() {
         for (std::size_t s = 0; s < built.stages.size(); ++s) {
-            if (s == 0 && !built.left_out) {
+            if (s == 0) {
                 frames.stages.push_back({"mesh/tetrahedra", "mesh/labels", built.mesh.tet_count()});
                 continue;
             }
@@ -140,14 +141,11 @@ void SeriesWriter::finish() {
     series.record.close();
     series.probes.close();
     series.require_written();
-    std::ofstream pvd(series.folder / "frames.pvd", std::ios::binary);
-    pvd << "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n"
-           "  <Collection>\n"
-        << series.collection << "  </Collection>\n</VTKFile>\n";
-    pvd.close();
-    if (!pvd)
-        throw IoError("cannot write '" + (series.folder / "frames.pvd").string() +
-                      "'; check that the folder exists and the disk has room");
+    write_file(
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n"
+        "  <Collection>\n" +
+            series.collection + "  </Collection>\n</VTKFile>\n",
+        series.folder / "frames.pvd");
     write_xdmf(series.frames, series.folder / "frames.xdmf");
 }
 

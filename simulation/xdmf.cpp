@@ -1,10 +1,9 @@
 #include "simulation/xdmf.hpp"
 
-#include "core/errors.hpp"
+#include "core/atomic_file.hpp"
 
 #include <array>
 #include <charconv>
-#include <fstream>
 
 namespace tissuewarp::simulation {
 namespace {
@@ -65,14 +64,11 @@ std::string grid(const XdmfSeries& series, std::size_t frame) {
 }  // namespace
 
 void write_xdmf(const XdmfSeries& series, const std::filesystem::path& path) {
-    std::ofstream file(path, std::ios::binary);
-    file << "<?xml version=\"1.0\"?>\n<Xdmf Version=\"2.0\">\n  <Domain>\n"
-            "    <Grid Name=\"tissue\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
-    for (std::size_t frame = 0; frame < series.frames.size(); ++frame) file << grid(series, frame);
-    file << "    </Grid>\n  </Domain>\n</Xdmf>\n";
-    file.close();
-    if (!file)
-        throw IoError("cannot write '" + path.string() + "'; check that the folder exists and the disk has room");
+    std::string xml =
+        "<?xml version=\"1.0\"?>\n<Xdmf Version=\"2.0\">\n  <Domain>\n"
+        "    <Grid Name=\"tissue\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
+    for (std::size_t frame = 0; frame < series.frames.size(); ++frame) xml += grid(series, frame);
+    write_file(xml + "    </Grid>\n  </Domain>\n</Xdmf>\n", path);
 }
 
 }  // namespace tissuewarp::simulation

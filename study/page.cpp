@@ -1,13 +1,11 @@
 #include "study/page.hpp"
 
 #include "core/atomic_file.hpp"
-#include "core/errors.hpp"
 #include "report/detail/template.hpp"
 #include "study/detail/figures.hpp"
 
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
 
 namespace tissuewarp::study {
 
@@ -18,15 +16,6 @@ const char* page_template();  // page.html, embedded at build time
 namespace {
 
 using nlohmann::json;
-
-void write_text(const std::string& text, const std::filesystem::path& path) {
-    AtomicFile file(path);
-    std::ofstream stream(file.path(), std::ios::binary);
-    stream << text;
-    stream.close();
-    if (!stream) throw IoError("cannot write '" + path.string() + "'; is the folder there and the disk not full?");
-    file.commit();
-}
 
 std::string perhaps(const std::optional<double>& millimetres) {
     return millimetres ? mm_text(*millimetres) : "–";
@@ -106,8 +95,8 @@ json problem_values(const ProblemSummary& problem, const std::vector<Point>& poi
                 {"solved", !findings.solved.empty()}};
     if (findings.solved.empty()) return values;
     const std::string front = detail::front_figure(problem, findings), grid = detail::grid_figure(problem, findings);
-    write_text(front, folder / file_name(problem.name, "front"));
-    if (!grid.empty()) write_text(grid, folder / file_name(problem.name, "grid"));
+    write_file(front, folder / file_name(problem.name, "front"));
+    if (!grid.empty()) write_file(grid, folder / file_name(problem.name, "grid"));
     values["front"] = front;
     values["grid"] = grid;
     values["tiles"] = json::array();
@@ -131,7 +120,7 @@ void write_page(const std::vector<ProblemSummary>& problems, const std::vector<P
     for (const ProblemSummary& problem : problems)
         values["problems"].push_back(problem_values(problem, points, folder));
     for (const auto& [name, value] : provenance) values["provenance"].push_back({{"name", name}, {"value", value}});
-    write_text(report::detail::fill(detail::page_template(), values), folder / "accuracy-time.html");
+    write_file(report::detail::fill(detail::page_template(), values), folder / "accuracy-time.html");
 }
 
 }  // namespace tissuewarp::study

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
 
 namespace tissuewarp::study {
 
@@ -107,12 +106,7 @@ void Store::add(Point point) {
 
 void Store::write() const {
     write_measurements(measured_, folder_ / "results.h5");
-    AtomicFile table(folder_ / "results.csv");
-    std::ofstream stream(table.path(), std::ios::binary);
-    stream << csv();
-    stream.close();
-    if (!stream) throw IoError("cannot write '" + (folder_ / "results.csv").string() + "'; is the disk full?");
-    table.commit();
+    write_file(csv(), folder_ / "results.csv");
 }
 
 std::string Store::csv() const {

@@ -139,12 +139,7 @@ Fronts shipped_fronts() {
 
 void write_fronts(const Fronts& fronts, const std::filesystem::path& path) {
     require_writable_folder(path.parent_path());
-    AtomicFile file(path);
-    std::ofstream stream(file.path());
-    stream << to_json_text(fronts);
-    stream.close();
-    if (!stream) throw IoError(path.string() + ": cannot be written; check space and permissions");
-    file.commit();
+    write_file(to_json_text(fronts), path);
 }
 
 }  // namespace tissuewarp::registration

@@ -35,15 +35,9 @@ struct FeaturePoints {
 FeaturePoints select_feature_points(const imaging::Volume& image, const imaging::Volume& mask,
                                     const FeatureOptions& options = {});
 
-/// What makes two blocks alike.
-enum class Similarity {
-    SelfSimilarityContext,  ///< MIND-SSC descriptors (Heinrich et al., MICCAI 2013): any pair of modalities
-    CrossCorrelation        ///< normalised cross-correlation: images of one modality
-};
-
-/// What of the moving image is compared, and on which grids.
+/// What of the moving image is compared, and on which grids: MIND-SSC descriptors (Heinrich et al., MICCAI 2013), alike
+/// in any pair of modalities.
 struct TemplateOptions {
-    Similarity similarity = Similarity::SelfSimilarityContext;
     double grid_spacing_mm = 1.0;  ///< isotropic working grid of the last level; every level before doubles it
     int levels = 3;                ///< 4, 2, 1 mm
     int block_radius = 4;          ///< voxels of the level's grid: blocks of 36, 18 and 9 mm

@@ -247,20 +247,6 @@ json materials_view(const json& materials) {
     return rows;
 }
 
-json fit_view(const json& fit) {
-    json rows = json::array();
-    if (!at(fit, "parameters").is_array()) return rows;
-    for (const json& each : at(fit, "parameters"))
-        rows.push_back({{"name", text(at(each, "name"))},
-                        {"unit", text(at(each, "unit"))},
-                        {"given", number(at(each, "given"), 3)},
-                        {"used", number(at(each, "used"), 3)},
-                        {"deviation", number(at(each, "deviation"), 3)},
-                        {"verdict", at(each, "identified") == true ? "fitted" : "left alone"},
-                        {"reason", text(at(each, "reason"))}});
-    return rows;
-}
-
 /// A sentence on each kind of data that pulled at the model.
 json data_view(const json& report) {
     json lines = json::array();
@@ -328,7 +314,6 @@ json view_of(const json& report) {
         view["mesh_size"] = {{"nodes", number(at(report, "mesh", "nodes"), 0)},
                              {"tetrahedra", number(at(report, "mesh", "tetrahedra"), 0)}};
     put_table(view, "materials", materials_view(at(report, "materials")));
-    put_table(view, "fit", fit_view(at(report, "fit")));
     if (at(report, "notes").is_array() && !at(report, "notes").empty())
         view["notable"] = {{"notes", at(report, "notes")}};
     json doubts = json::array();

@@ -15,12 +15,11 @@ namespace {
 
 using report::FigureCurve;
 using report::FigureNote;
+using report::FigurePanel;
 using report::FigurePoint;
+using report::LegendEntry;
 using report::LineStyle;
-using report::LogPanel;
 using report::Mark;
-
-constexpr double width = 980;
 
 /// How points that differ from the base in one factor are drawn.
 struct Look {
@@ -77,21 +76,6 @@ std::string short_number(double value) {
     char text[32];
     std::snprintf(text, sizeof text, "%.3g", value);
     return text;
-}
-
-/// Entries side by side, in rows as they fit.
-std::string legend_of(const std::vector<std::pair<FigureCurve, std::string>>& entries) {
-    std::string svg;
-    double x = 40, y = 22;
-    for (const auto& [curve, label] : entries) {
-        if (x + report::legend_width(label) > width) {
-            x = 40;
-            y += 20;
-        }
-        svg += report::svg_legend_entry({x, y}, curve, label);
-        x += report::legend_width(label);
-    }
-    return svg;
 }
 
 FigureCurve across(double level, const std::vector<FigureCurve>& curves) {
@@ -169,24 +153,24 @@ void add_levels(const Grid& grid, const Eigen::MatrixXd& values, const FigureCur
 
 std::string front_figure(const ProblemSummary& problem, const Findings& findings) {
     std::vector<FigureCurve> curves;
-    std::vector<std::pair<FigureCurve, std::string>> legend;
+    std::vector<LegendEntry> legend;
     for (const Look& look : looks) {
         FigureCurve curve = curve_of(look, problem, findings);
         if (curve.points.empty()) continue;
-        legend.emplace_back(curve, look.label);
+        legend.push_back({curve, look.label});
         curves.push_back(std::move(curve));
     }
     FigureCurve front{"#111827", LineStyle::Solid, Mark::None, {}, 3.0};
     for (const Point* point : findings.front) front.points.push_back(place_of(*point));
-    legend.emplace_back(front, "front");
+    legend.push_back({front, "front"});
     curves.push_back(front);
     if (findings.base != nullptr) {
         curves.push_back({"#111827", LineStyle::None, Mark::Ring, {place_of(*findings.base)}});
-        legend.emplace_back(curves.back(), "base");
+        legend.push_back({curves.back(), "base"});
     }
     if (findings.knee != nullptr) {
         curves.push_back({"#dc2626", LineStyle::None, Mark::Ring, {place_of(*findings.knee)}});
-        legend.emplace_back(curves.back(), "knee: 5 % from the best");
+        legend.push_back({curves.back(), "knee: 5 % from the best"});
     }
 
     std::vector<FigureNote> notes;
@@ -200,12 +184,15 @@ std::string front_figure(const ProblemSummary& problem, const Findings& findings
         curves.push_back(across(*findings.best->reference_mm, curves));
         notes.push_back({curves.back().points.front(), "the reference is known to this"});
     }
-    const LogPanel panel({90, 84, 850, 400}, curves);
-    return report::svg_figure(width, 550,
-                              legend_of(legend) + panel.drawn("Accuracy over time: " + problem.name,
-                                                              "s, median of the runs, from data in to displacement "
-                                                              "out; prepared before",
-                                                              error_name(problem), curves, notes));
+    return report::svg_figure(legend,
+                              {{.top = 84,
+                                .width = 850,
+                                .height = 400,
+                                .title = "Accuracy over time: " + problem.name,
+                                .x = {"s, median of the runs, from data in to displacement out; prepared before"},
+                                .y = {error_name(problem)},
+                                .curves = curves,
+                                .notes = notes}});
 }
 
 std::string grid_figure(const ProblemSummary& problem, const Findings& findings) {
@@ -222,13 +209,16 @@ std::string grid_figure(const ProblemSummary& problem, const Findings& findings)
     std::vector<FigureCurve> curves{measured};
     add_levels(grid, grid.error, error, " mm", curves, notes);
     add_levels(grid, grid.seconds, time, " s", curves, notes);
-    const LogPanel panel({90, 64, 850, 300}, curves);
-    return report::svg_figure(width, 430,
-                              legend_of({{error, problem.registration ? "equal target error" : "equal error"},
-                                         {time, "equal time"},
-                                         {measured, "measured"}}) +
-                                  panel.drawn("Meshes against tolerances: " + problem.name, "elements",
-                                              "tolerance of the solver, mm", curves, notes));
+    return report::svg_figure({{error, problem.registration ? "equal target error" : "equal error"},
+                               {time, "equal time"},
+                               {measured, "measured"}},
+                              {{.top = 64,
+                                .width = 850,
+                                .title = "Meshes against tolerances: " + problem.name,
+                                .x = {"elements"},
+                                .y = {"tolerance of the solver, mm"},
+                                .curves = curves,
+                                .notes = notes}});
 }
 
 }  // namespace tissuewarp::study::detail

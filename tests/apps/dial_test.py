@@ -69,7 +69,6 @@ class Dial(PhantomTest):
         self.assert_refused(self.phantom.register("--accuracy", "0.5kg"), INPUT, "--accuracy", "0.5kg")
         self.assert_refused(self.phantom.register("--time-budget", "-2s"), INPUT, "--time-budget", "-2s")
         self.assert_refused(self.phantom.register("--accuracy", 1, "--no-error-estimate"), INPUT, "--no-error-estimate")
-        self.assert_refused(self.phantom.register("--time-budget", "2s", "--fit", "gravity"), INPUT, "--fit")
 
 
 class Calibrate(PhantomTest):

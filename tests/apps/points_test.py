@@ -106,30 +106,6 @@ class FromPairs(PhantomTest):
         result = self.phantom.register("--fixed-surface", path, fixed=None, fixed_labels=None)
         self.assert_refused(result, INPUT, "metres.csv", "mm")
 
-    def test_fits_are_told_apart_and_reported(self):
-        """Sixty pairs of a small organ do not tell everything; whatever is told must be named, with a reason."""
-        result = self.phantom.register("--fixed-points", pairs_of(self.phantom), "--edge-length", 4,
-                                       "--fit", "poissons-ratio,gravity", fixed=None, fixed_labels=None)
-        self.assertEqual(result.returncode, 0, result.stderr)
-        report = json.loads((self.phantom.output / "report.json").read_text())
-        fitted = report["fit"]["parameters"]
-        self.assertEqual([each["name"] for each in fitted],
-                         ["poissons-ratio", "gravity-x", "gravity-y", "gravity-z"])
-        page = (self.phantom.output / "report.html").read_text()
-        self.assertIn("Fitted parameters", page)
-        for each in fitted:
-            self.assertTrue(each["reason"])
-            self.assertIn(each["name"], result.stdout)
-            self.assertIn(each["name"], page)
-            if not each["identified"]:
-                self.assertEqual(each["used"], each["given"])
-
-    def test_parameters_that_cannot_be_fitted(self):
-        for name, remedy in (("colour", "poissons-ratio"), ("stiffness-ratio:9", "it has")):
-            result = self.phantom.register("--fixed-points", pairs_of(self.phantom), "--fit", name, fixed=None,
-                                           fixed_labels=None)
-            self.assert_refused(result, INPUT, name, remedy)
-
     def test_dry_run(self):
         result = self.phantom.register("--fixed-points", pairs_of(self.phantom), "--dry-run", fixed=None,
                                        fixed_labels=None)

@@ -58,17 +58,6 @@ side = "-z"
 
 )";
 
-TEST_F(SceneFiles, LeaveOutTissueByWhatProbesNotice) {
-    const std::string probe = "[[probe]]\nname = \"tip\"\nat_mm = [5, 5, 5]\n";
-    EXPECT_FALSE(read(cube + probe).leave_out);
-    EXPECT_EQ(read(cube + probe + "[leave_out]\n").leave_out->tolerance_mm, 0.1);
-    EXPECT_EQ(read(cube + probe + "[leave_out]\ntolerance_mm = 0.5\n").leave_out->tolerance_mm, 0.5);
-    EXPECT_THAT(refusal(cube + probe + "[leave_out]\ntolerance = 0.5\n"), HasSubstr("tolerance_mm"));
-    EXPECT_THAT(refusal(cube + "[leave_out]\n"), HasSubstr("give a probe"));
-    EXPECT_THAT(refusal(cube + probe + "[leave_out]\n[[resection]]\nset = \"base\"\ntime_s = 0.5\n"),
-                HasSubstr("resected"));
-}
-
 TEST_F(SceneFiles, SayWhatTheSceneHolds) {
     const simulation::Scene scene = read("density_kg_m3 = 1050\n" + cube);
     EXPECT_EQ(scene.title, "cube");

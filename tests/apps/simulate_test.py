@@ -82,24 +82,6 @@ class Simulate(unittest.TestCase):
         self.assertAlmostEqual(summary["largest_displacement_mm"],
                                float(numpy.linalg.norm(displacement[2], axis=1).max()), places=3)
 
-    def test_what_is_left_out_is_told(self):
-        bar = SMALL_CUBE.replace("[100, 100, 100], cells = [3, 3, 3]", "[160, 30, 30], cells = [16, 3, 3]")
-        bar = bar.replace("[50, 50, 100]", "[10, 15, 30]")
-        self.scene.write_text(bar + "[leave_out]\ntolerance_mm = 0.3\n")
-        done = run("simulate", self.scene, "-o", self.folder / "out")
-        self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertIn("are left out", done.stdout)
-        summary = json.loads((self.folder / "out" / "summary.json").read_text())
-        left_out = summary["left_out"]
-        self.assertEqual(left_out["of"], 6 * 16 * 3 * 3)
-        self.assertEqual(summary["tetrahedra"], left_out["of"] - left_out["tetrahedra"])
-        self.assertGreater(4 * left_out["tetrahedra"], left_out["of"])
-        self.assertLess(left_out["estimated_change_mm"], 0.1)
-        with h5py.File(self.folder / "out" / "displacement.h5") as record:
-            self.assertEqual(len(record["remaining/0"]), summary["tetrahedra"])
-            gone = numpy.isnan(record["displacement"][2]).any(axis=1)
-            self.assertEqual(int((~gone).sum()), summary["nodes"])
-
     def test_init_writes_a_scene_that_runs(self):
         done = run("simulate", "--init", "cube", folder=self.folder)
         self.assertEqual(done.returncode, 0, done.stderr)

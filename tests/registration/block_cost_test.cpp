@@ -50,7 +50,7 @@ MatchingImage image_with_hole(unsigned seed, const Voxel& hole) {
     for_each_voxel(seen, [&](const Eigen::Vector3d& index, std::int64_t offset) {
         seen.data<std::uint8_t>()[offset] = (index - Eigen::Vector3d(hole[0], hole[1], hole[2])).norm() > 2;
     });
-    return matching_image(image, seen, grid, SearchRegion(grid), Similarity::SelfSimilarityContext);
+    return matching_image(image, seen, grid, SearchRegion(grid));
 }
 
 /// Every cost of lattices of a reach about many places, against the plain definition. Counts the finite and the others.

@@ -31,7 +31,7 @@ Volume everything() {
 }
 
 MatchingImage described(const Volume& image, const Volume& seen) {
-    return matching_image(image, seen, grid, SearchRegion(grid), Similarity::SelfSimilarityContext);
+    return matching_image(image, seen, grid, SearchRegion(grid));
 }
 
 MatchingImage described(const Volume& image) {

@@ -58,26 +58,19 @@ BlockMatchingOptions searching(double range_mm) {
 
 /// Points looked for where they were.
 std::vector<BlockMatch> matches_of(const Volume& moving, const Volume& fixed, const Eigen::Matrix3Xd& points,
-                                   double range_mm, Similarity similarity = Similarity::SelfSimilarityContext) {
-    TemplateOptions options;
-    options.similarity = similarity;
-    return match_blocks(MatchingTemplate(moving, points, options), fixed, points, searching(range_mm));
+                                   double range_mm) {
+    return match_blocks(MatchingTemplate(moving, points), fixed, points, searching(range_mm));
 }
 
-class KnownDeformation : public ::testing::TestWithParam<Similarity> {};
-
 // A sign error, a swapped axis or a grid off by half a voxel lifts the median above the bound.
-TEST_P(KnownDeformation, IsFoundToAThirdOfAVoxel) {
+TEST(ImageMatching, FindsAKnownDeformationToAThirdOfAVoxel) {
     const Pair pair = deformed_pair();
     ASSERT_GE(pair.points.cols(), 200);
-    const auto matches = matches_of(pair.moving, pair.fixed, pair.points, 8, GetParam());
+    const auto matches = matches_of(pair.moving, pair.fixed, pair.points, 8);
     EXPECT_GE(static_cast<Eigen::Index>(matches.size()), pair.points.cols() * 9 / 10);
     EXPECT_LT(median(errors(matches)), 0.3);
     EXPECT_LT(median(errors(consistent_matches(matches))), 0.3);
 }
-
-INSTANTIATE_TEST_SUITE_P(Similarities, KnownDeformation,
-                         ::testing::Values(Similarity::SelfSimilarityContext, Similarity::CrossCorrelation));
 
 // A descriptor that depends on the sign or the scale of the contrast finds nothing here.
 TEST(ImageMatching, SeesThroughInvertedContrastAndNoise) {
@@ -119,20 +112,18 @@ TEST(ImageMatching, APlaneEdgeTellsOfItsNormalAlone) {
     Eigen::Matrix3Xd points(3, 25);
     const Eigen::Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
     for (int n = 0; n < 25; ++n) points.col(n) = 3.0 * (n % 5 - 2) * u + 3.0 * (n / 5 - 2) * v;
-    for (const Similarity similarity : {Similarity::SelfSimilarityContext, Similarity::CrossCorrelation}) {
-        const auto matches = matches_of(moving, fixed, points, 6, similarity);
-        ASSERT_GE(matches.size(), 12u);
-        std::vector<double> along, ratios, off;
-        for (const BlockMatch& match : matches) {
-            const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(match.information);
-            along.push_back(std::abs(axes.eigenvectors().col(2).dot(normal)));
-            ratios.push_back(axes.eigenvalues()[2] / std::max(axes.eigenvalues()[1], 1e-12));
-            off.push_back(std::abs(normal.dot(match.fixed - match.moving) - 2.5));
-        }
-        EXPECT_GT(median(along), 0.98);
-        EXPECT_GT(median(ratios), 10);
-        EXPECT_LT(median(off), 0.3);
+    const auto matches = matches_of(moving, fixed, points, 6);
+    ASSERT_GE(matches.size(), 12u);
+    std::vector<double> along, ratios, off;
+    for (const BlockMatch& match : matches) {
+        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(match.information);
+        along.push_back(std::abs(axes.eigenvectors().col(2).dot(normal)));
+        ratios.push_back(axes.eigenvalues()[2] / std::max(axes.eigenvalues()[1], 1e-12));
+        off.push_back(std::abs(normal.dot(match.fixed - match.moving) - 2.5));
     }
+    EXPECT_GT(median(along), 0.98);
+    EXPECT_GT(median(ratios), 10);
+    EXPECT_LT(median(off), 0.3);
 }
 
 // Zeros beyond the field of view must neither attract blocks nor spoil those beside the cut.

@@ -230,6 +230,30 @@ TEST(UnknownWeights, OfAnOrganThatLiesStillAreNothing) {
     EXPECT_LT(result.pulls.load_size, 0.2);
 }
 
+/// What weight does to the organ whose left two fifths are held.
+Matrix3Xd hanging(const PreparedModel& prepared, const Vector3d& body_force) {
+    tled::Conditions conditions;
+    const Matrix3Xd& nodes = prepared.model.mesh.nodes;
+    for (int n = 0; n < nodes.cols(); ++n)
+        if (nodes(0, n) < -8) conditions.prescribed.push_back({n});
+    conditions.external_force = body_force * (prepared.rest.lumped_mass / prepared.model.density).transpose();
+    const auto nodal = tled::nodal_conditions(conditions, prepared.rest.node_count);
+    const auto engine = tled::make_cpu_engine(prepared.rest, tled::Scalar::Float64);
+    return tled::equilibrium(*engine, tled::RestStiffness(prepared.rest, nodal), nodal, {}).displacement;
+}
+
+TEST(StatedLoads, MoveWhatNoPairShows) {
+    const PreparedModel prepared = organ(10);
+    UpdateOptions options = with_shapes(0);
+    options.align = false;
+    const Vector3d body_force(0, -2e-4, -5e-4);  // mN/mm³
+    const Matrix3Xd truth = hanging(prepared, body_force);
+    const PointPairs pairs = left_of_the_middle(prepared, truth);
+    const double untold = error_on_the_right(prepared, update(prepared, {.points = pairs}, options), truth);
+    options.loads.body_force = body_force;
+    EXPECT_LT(error_on_the_right(prepared, update(prepared, {.points = pairs}, options), truth), 0.5 * untold);
+}
+
 // Around an organ that is held, hold and loads are one.
 TEST(UnknownLoads, AreNotLookedForWhereTheOrganIsHeld) {
     const PreparedModel prepared = organ(12);

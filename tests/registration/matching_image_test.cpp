@@ -84,8 +84,7 @@ TEST(SelfSimilarity, IsTheSameInEveryRegion) {
     Eigen::Matrix3Xd points(3, 2);
     points << 20, 30, 33, 60, 31, 40;
     const SearchRegion all(grid), part(grid, points, 6);
-    const MatchingImage whole = matching_image(image, seen, grid, all, Similarity::SelfSimilarityContext),
-                        some = matching_image(image, seen, grid, part, Similarity::SelfSimilarityContext);
+    const MatchingImage whole = matching_image(image, seen, grid, all), some = matching_image(image, seen, grid, part);
     int compared = 0;
     for_each_voxel(image, [&](const Eigen::Vector3d& index, std::int64_t offset) {
         const auto n = static_cast<std::size_t>(offset);
@@ -109,8 +108,7 @@ TEST(SelfSimilarity, IsSeenThreeVoxelsFromWhatIsNot) {
     const Volume image = sampled(grid, Texture(), 0.2, 5);
     Volume seen = everything(grid);
     seen.data<std::uint8_t>()[seen.offset(17, 20, 35)] = 0;
-    const MatchingImage result =
-        matching_image(image, seen, grid, SearchRegion(grid), Similarity::SelfSimilarityContext);
+    const MatchingImage result = matching_image(image, seen, grid, SearchRegion(grid));
     for_each_voxel(image, [&](const Eigen::Vector3d& index, std::int64_t offset) {
         const bool near_hole = (index - Eigen::Vector3d(17, 20, 35)).cwiseAbs().maxCoeff() <= 3;
         const bool near_border = std::min(index.minCoeff(), 39 - index.maxCoeff()) < 3;

@@ -12,8 +12,7 @@ using testing::HasSubstr;
 using testing::Not;
 
 std::string drawn(FigurePoint from, FigurePoint to) {
-    const std::vector<FigureCurve> curves{{"#000000", LineStyle::Solid, Mark::Dot, {from, to}}};
-    return LogPanel({}, curves).drawn("title", "x", "y", curves);
+    return svg_figure({}, {{.title = "title", .x = {"x"}, .y = {"y"}, .curves = {{"#000000", {}, {}, {from, to}}}}});
 }
 
 TEST(Figure, NarrowAxesHaveTicksEnoughToReadThem) {

@@ -6,11 +6,9 @@
 
 namespace tissuewarp::registration::detail {
 
-/// Costs of one block of an image about places of another. A cost is the mean squared difference between the block and
-/// its like about a voxel, over the voxels seen in both; infinity when they are less than the least share.
-/// SelfSimilarityContext: of descriptors, over channels, 0..1. CrossCorrelation: 2 (1 − r), which is the mean squared
-/// difference of blocks brought to mean 0 and variance 1. The images have the same spacing; what lies off a grid is not
-/// seen.
+/// Costs of one block of an image about places of another. A cost is the mean squared difference of descriptors between
+/// the block and its like about a voxel, over channels and the voxels seen in both, 0..1; infinity when these are less
+/// than the least share. The images have the same spacing; what lies off a grid is not seen.
 class BlockCosts {
 public:
     /// `block` is one of `shown`. Both surroundings outlive this.
@@ -24,9 +22,6 @@ private:
     Surroundings &shown_, &looked_at_;
     Block block_;
     std::vector<std::int64_t> differences_, voxels_;
-
-    void descriptor_costs(CostLattice& lattice, int stride);
-    void correlation_costs(CostLattice& lattice, int stride) const;
 };
 
 }  // namespace tissuewarp::registration::detail

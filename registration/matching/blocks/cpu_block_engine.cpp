@@ -83,10 +83,9 @@ public:
 
     std::unique_ptr<FixedBlocks> fixed_on(const imaging::Geometry& grid, const SearchRegion& region,
                                           std::size_t level) override {
-        const TemplateOptions& options = moving_.options;
-        return std::make_unique<CpuFixedBlocks>(
-            moving_.levels.at(level), matching_image(fixed_.image, fixed_.seen, grid, region, options.similarity),
-            options.block_radius);
+        return std::make_unique<CpuFixedBlocks>(moving_.levels.at(level),
+                                                matching_image(fixed_.image, fixed_.seen, grid, region),
+                                                moving_.options.block_radius);
     }
 
 private:

@@ -30,7 +30,7 @@ public:
     virtual BlockEngine& blocks() = 0;
 };
 
-/// `prepared.image` is there, its template made of self-similarity descriptors; `prepared` outlives the engine.
+/// `prepared.image` is there; `prepared` outlives the engine.
 std::unique_ptr<ImageEngine> make_cpu_image_engine(const PreparedModel& prepared);
 
 /// The same in shaders; `gpu_index` as for shaders::Device. The descriptors differ from the processor's by rounding: by
@@ -40,9 +40,9 @@ std::unique_ptr<ImageEngine> make_gpu_image_engine(const PreparedModel& prepared
 
 /// What updates from images share, one after the other: nothing that an image says.
 struct ImageTools {
-    std::unique_ptr<ImageEngine> engine;  ///< null where the template has no descriptors
-    meshing::PointLocator locator;        ///< in the model at rest
-    SeenMemory memory;                    ///< of the image in hand
+    std::unique_ptr<ImageEngine> engine;
+    meshing::PointLocator locator;  ///< in the model at rest
+    SeenMemory memory;              ///< of the image in hand
 };
 
 }  // namespace tissuewarp::registration::detail

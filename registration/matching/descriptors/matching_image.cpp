@@ -36,45 +36,18 @@ struct Cut {
     }
 };
 
-/// Values brought to a mean of 0 where they are seen.
-void take_values(const GridSamples& samples, const SearchRegion& region, MatchingImage& result) {
-    const auto& size = result.grid.size;
-    const auto voxels = static_cast<std::size_t>(result.grid.voxel_count());
-    result.values.resize(voxels);
-    result.seen.resize(voxels);
-    double sum = 0, count = 0;
-    for (int k = 0; k < size[2]; ++k)
-        for (int j = 0; j < size[1]; ++j) {
-            const Range range = region.row(j, k, 0);
-            for (int i = range.first; i < range.last; ++i) {
-                const auto n = static_cast<std::size_t>(result.offset({i, j, k}));
-                result.seen[n] = *samples.seen(i, j, k);
-                result.values[n] = *samples.value(i, j, k);
-                if (!result.seen[n]) continue;
-                sum += double(result.values[n]);
-                ++count;
-            }
-        }
-    const auto mean = static_cast<float>(sum / std::max(count, 1.0));
-    for (float& value : result.values) value -= mean;
-}
-
 MatchingImage described(const GridSamples& samples, const imaging::Geometry& grid, const SearchRegion& region) {
     Descriptors descriptors = self_similarity_context(samples, grid, region);
-    return {grid, std::move(descriptors.channels), {}, std::move(descriptors.seen)};
+    return {grid, std::move(descriptors.channels), std::move(descriptors.seen)};
 }
 
 }  // namespace
 
 MatchingImage matching_image(const Volume& image, const Volume& seen, const imaging::Geometry& grid,
-                             const SearchRegion& region, Similarity similarity) {
+                             const SearchRegion& region) {
     const double sigma = working_deviation(grid.spacing[0]);
     const Cut cut(image, seen, grid, GridSamples::rim * grid.spacing[0] + 4 * sigma);
-    const GridSamples samples(imaging::smooth(cut.image, sigma), cut.seen, grid, region);
-    if (similarity == Similarity::SelfSimilarityContext) return described(samples, grid, region);
-    MatchingImage result{grid, {}, {}, {}};
-    take_values(samples, region, result);
-    return result;
+    return described(GridSamples(imaging::smooth(cut.image, sigma), cut.seen, grid, region), grid, region);
 }
 
 Volume smoothed_for(const Volume& image, const imaging::Geometry& grid) {

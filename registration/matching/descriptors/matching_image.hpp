@@ -1,5 +1,5 @@
 #pragma once
-/// An image made ready for block matching: on an isotropic working grid, in the form that its similarity compares.
+/// An image made ready for block matching: descriptors on an isotropic working grid.
 
 #include "registration/matching/descriptors/self_similarity.hpp"
 #include "registration/matching/image_matching.hpp"
@@ -12,8 +12,7 @@ using Voxel = std::array<int, 3>;
 
 struct MatchingImage {
     imaging::Geometry grid;
-    std::unique_ptr<std::uint8_t[]> descriptors;  ///< SelfSimilarityContext: 12 per voxel, 255 the most alike
-    std::vector<float> values;                    ///< CrossCorrelation: one per voxel, mean about 0
+    std::unique_ptr<std::uint8_t[]> descriptors;  ///< of self-similarity: 12 per voxel, 255 the most alike
     std::vector<std::uint8_t> seen;               ///< 1 where a voxel counts; 0 off the region that was asked for
 
     [[nodiscard]] std::int64_t offset(const Voxel& v) const {
@@ -24,7 +23,7 @@ struct MatchingImage {
 /// Samples `image` (float32, whose voxels `seen` != 0 count) in a region of `grid`, smoothed for
 /// it. Voxels whose descriptor reaches beyond what is seen are not seen.
 MatchingImage matching_image(const imaging::Volume& image, const imaging::Volume& seen, const imaging::Geometry& grid,
-                             const SearchRegion& region, Similarity similarity);
+                             const SearchRegion& region);
 
 /// Standard deviation (mm) of the Gaussian that smooths an image for a working grid: 0.4 of its spacing.
 constexpr double working_deviation(double spacing_mm) {

@@ -48,7 +48,7 @@ MatchingTemplate::MatchingTemplate(const Volume& moving, const Eigen::Matrix3Xd&
         const double spacing = options.grid_spacing_mm * std::pow(2, options.levels - 1 - level);
         const int margin = detail::search_margin(detail::refinement_reach, options.block_radius);
         const imaging::Geometry grid = detail::grid_about(usable, moving.geometry.direction, spacing, margin * spacing);
-        images->levels.push_back(detail::matching_image(image, seen, grid, images->region(grid), options.similarity));
+        images->levels.push_back(detail::matching_image(image, seen, grid, images->region(grid)));
     }
     images_ = std::move(images);
 }
