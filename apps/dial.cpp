@@ -42,13 +42,14 @@ DialChoice dial_choice(const RegistrationInputs& inputs, const RegisterOptions& 
 
 void doubt_dial(RegistrationRun& run) {
     constexpr double late = 1.1;
-    std::vector<std::string>& doubts = run.result.doubts;
+    std::vector<registration::Doubt>& doubts = run.result.doubts;
     if (const auto& budget = run.options.time_budget; budget && run.intraoperative_seconds > late * *budget)
         doubts.push_back(
-            fmt::format("the time budget of {:.3g} s was exceeded: {:.3g} s", *budget, run.intraoperative_seconds));
+            {"time.exceeded", run.intraoperative_seconds, *budget,
+             fmt::format("the time budget of {:.3g} s was exceeded: {:.3g} s", *budget, run.intraoperative_seconds)});
     if (!run.options.accuracy) return;
-    std::string doubt = doubt_of_accuracy(summarise(*run.products.uncertainty), *run.options.accuracy);
-    if (!doubt.empty()) doubts.push_back(std::move(doubt));
+    if (auto doubt = doubt_of_accuracy(summarise(*run.products.uncertainty), *run.options.accuracy))
+        doubts.push_back(std::move(*doubt));
 }
 
 }  // namespace tissuewarp::apps

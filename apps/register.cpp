@@ -136,9 +136,8 @@ void estimate_errors(RegistrationRun& run, ProgressLine& progress) {
     products.uncertainty = uncertainty(*run.prepared, run.result, {}, progress);
     products.uncertainty_volumes =
         uncertainty_on_grid(*products.uncertainty, run.result.deformation, products.fixed_to_moving.geometry);
-    std::vector<std::string>& doubts = run.result.doubts;
-    for (std::string& doubt : doubts_of(*products.uncertainty, run.options.tolerance))
-        doubts.push_back(std::move(doubt));
+    for (Doubt& doubt : doubts_of(*products.uncertainty, run.options.tolerance))
+        run.result.doubts.push_back(std::move(doubt));
 }
 
 CurveDistances curve_distances(const RegistrationRun& run) {
@@ -204,7 +203,7 @@ void run_register(const RegisterOptions& options) {
 
     progress.begin("registering", 0.20, 0.47);
     const double ready = clock.total();
-    run.result = Updater(*run.prepared, update_options(run), progress).update(seen(run.inputs, options), progress);
+    run.result = update(*run.prepared, seen(run.inputs, options), update_options(run), progress);
     append(run.times, run.result.times);
     clock.lap("");
 

@@ -218,7 +218,7 @@ std::string summary_text(const RegistrationRun& run, double total_seconds) {
                             run.scores.before.contains(label) ? run.scores.before.at(label).dice : 0.0, after.dice);
     text +=
         fmt::format("det J of the mesh: minimum {:.3f}, folded {}\n", run.scores.mesh.minimum, run.scores.mesh.folded);
-    for (const std::string& doubt : run.result.doubts) text += "doubt: " + doubt + "\n";
+    for (const registration::Doubt& doubt : run.result.doubts) text += "doubt: " + doubt.text + "\n";
     return text + "results in " + run.options.output.string() + "\n";
 }
 

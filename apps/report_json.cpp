@@ -291,7 +291,7 @@ json report_json(const RegistrationRun& run, double total_seconds) {
         {"rounds", rounds(run)},
         {"jacobian",
          {{"mesh", to_json(scores.mesh)}, {"field_in_organ", to_json(scores.organ)}, {"field", to_json(scores.grid)}}},
-        {"doubts", run.result.doubts},
+        {"doubts", texts(run.result.doubts)},
         {"notes", notes(run)},
         {"outputs", output_names(run.options)},
         {"stages", stages(run)},

@@ -290,7 +290,7 @@ double percentile(std::vector<double> values, double share) {
 /// The moving image where a deformation takes it, on the grid of the intraoperative image.
 class Warper {
 public:
-    Warper(const PreparedModel& prepared, const Case& study, Device device) : moving_(study.moving) {
+    Warper(const std::shared_ptr<const PreparedModel>& prepared, const Case& study, Device device) : moving_(study.moving) {
         grid_ = study.seen.image ? study.seen.image->geometry : study.moving.geometry;
         if (device != Device::Cpu) gpu_.emplace(prepared.model.mesh, moving_.as(CV_32F), grid_);
     }
@@ -310,10 +310,10 @@ private:
 };
 
 /// Data in, warped image out, again and again.
-void time_updates(const std::string& name, const PreparedModel& prepared, const Case& study,
+void time_updates(const std::string& name, const std::shared_ptr<const PreparedModel>& prepared, const Case& study,
                   const UpdateOptions& options, int repeats) {
     Updater updater(prepared, options);
-    Warper warper(prepared, study, options.device);
+    Warper warper(*prepared, study, options.device);
     std::vector<double> wall, processor;
     std::map<std::string, std::vector<double>> stages;
     for (int n = 0; n < repeats; ++n) {
@@ -348,7 +348,8 @@ void run(const Arguments& arguments) {
             options.meshing.edge_length = suggested_edge_length_without_labels(study.labels);
         options.default_material =
             tled::neo_hookean_lnj(3.0, arguments.poissons_ratio > 0 ? arguments.poissons_ratio : study.poissons_ratio);
-        PreparedModel prepared = prepare(study.labels, options);
+        const auto model = std::make_shared<PreparedModel>(prepare(study.labels, options));
+        PreparedModel& prepared = *model;
         ImageModelOptions image_options;
         image_options.features.count = arguments.count;
         if (study.seen.image)
@@ -369,7 +370,7 @@ void run(const Arguments& arguments) {
             const Clocks clocks;
             const UpdateResult result = update(prepared, study.seen, update_options);
             print_row(name, result, study.targets, clocks.wall());
-            if (arguments.repeats > 0) time_updates(name, prepared, study, update_options, arguments.repeats);
+            if (arguments.repeats > 0) time_updates(name, model, study, update_options, arguments.repeats);
             if (!arguments.errors.empty())
                 write_errors(arguments.errors / (name + ".csv"), result.deformation, study.targets);
         }

@@ -186,7 +186,7 @@ void run(const Arguments& arguments) {
         UpdateResult result = update(prepared, {.surface = draw.seen}, options);
         const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         const ExpectedError expected = expected_error(prepared, result);
-        if (const std::string doubt = doubt_of_data(expected); !doubt.empty()) result.doubts.push_back(doubt);
+        if (const auto doubt = doubt_of_data(expected)) result.doubts.push_back(*doubt);
         errors.push_back(mean_error(PointTransform(result.deformation)(landmarks.moving), targets));
         constexpr double failure_mm = 5;
         failed += errors.back() > failure_mm;
@@ -197,7 +197,7 @@ void run(const Arguments& arguments) {
             seed, draw.coverage, result.surface->coverage, draw.outliers, draw.angle_deg, draw.shift_mm,
             rigid_errors.back(), errors.back(), result.surface->inlier_share, result.surface->residual_mm,
             result.surface->rival_mm, result.surface->rival_support, expected.mean_mm, seconds);
-        for (const std::string& doubt : result.doubts) std::printf(" %s;", doubt.c_str());
+        for (const Doubt& doubt : result.doubts) std::printf(" %s;", doubt.text.c_str());
         std::printf(" |\n");
         std::fflush(stdout);
     }

@@ -2,6 +2,7 @@
 /// Where the equilibrium and the forces of images are computed.
 
 #include "registration/matching/dense/image_engine.hpp"
+#include "registration/prepare.hpp"
 
 namespace tissuewarp::registration::detail {
 

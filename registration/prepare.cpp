@@ -1,12 +1,14 @@
 // Before the operation: label map → mesh → rest state → rest stiffness.
 
 #include "registration/prepare.hpp"
+#include "registration/boundary/label_boundary_field.hpp"
 #include "registration/loads/coarse_twin.hpp"
 #include "registration/stopwatch.hpp"
 #include "registration/terms/anchors.hpp"
 #include "registration/terms/label_springs.hpp"
 
 #include "imaging/labels.hpp"
+#include "registration/boundary/surroundings.hpp"
 
 #include <cmath>
 

@@ -5,14 +5,16 @@
 #include "registration/terms/anchors.hpp"
 
 #include "core/atomic_file.hpp"
+#include "registration/boundary/surroundings.hpp"
 
 namespace tissuewarp::registration {
 
 namespace {
 
 constexpr const char* format = "tissuewarp prepared model";
-constexpr int version = 3;
-constexpr const char* coarse_mesh = "coarse_mesh";  // absent without a coarse model
+constexpr int version = 4, oldest_version = 1;
+constexpr const char* coarse_mesh = "coarse_mesh";  // absent without a coarse model; since version 3
+constexpr const char* image = "image";              // absent without an image model; since version 4
 
 std::vector<hsize_t> voxel_shape(const imaging::Geometry& grid) {
     return {static_cast<hsize_t>(grid.size[2]), static_cast<hsize_t>(grid.size[1]), static_cast<hsize_t>(grid.size[0])};
@@ -38,7 +40,9 @@ void write_list(Hdf5Output& file, const std::string& name, const std::vector<int
     file.vector<int>(name, Eigen::VectorXi::Map(list.data(), static_cast<Eigen::Index>(list.size())), "1");
 }
 
+/// Empty where a version had no such list.
 std::vector<int> read_list(const Hdf5Input& file, const std::string& name) {
+    if (!file.holds(name)) return {};
     const Eigen::VectorXi list = file.vector<int>(name);
     return {list.begin(), list.end()};
 }
@@ -97,6 +101,29 @@ void read_coarse_model(const Hdf5Input& file, const std::filesystem::path& path,
         std::make_unique<PreparedModel>(detail::coarse_model_for_loads(prepared, std::move(mesh), observer));
 }
 
+/// The image and what is looked for of it; the template is made of these again, bit by bit the same.
+void write_image(Hdf5Output& file, const ImageModel& model) {
+    const imaging::Volume grey = model.image.as(CV_32F);
+    const TemplateOptions& options = model.blocks.options();
+    detail::write_grid(file, "image/grid", grey.geometry);
+    file.array<float>("image/voxels", grey.data<float>(), voxel_shape(grey.geometry), "1");
+    file.columns<double>("image/points", model.blocks.points(), "mm");
+    file.scalar<double>("image/template/grid_spacing", options.grid_spacing_mm, "mm");
+    file.scalar<int>("image/template/levels", options.levels, "1");
+    file.scalar<int>("image/template/block_radius", options.block_radius, "voxel");
+}
+
+ImageModel read_image(const Hdf5Input& file) {
+    const imaging::Geometry grid = detail::read_grid(file, "image/grid");
+    file.require_shape("image/voxels", voxel_shape(grid));
+    imaging::Volume grey(grid, CV_32FC1);
+    file.array<float>("image/voxels", grey.data<float>(), voxel_shape(grid));
+    const TemplateOptions options{file.scalar<double>("image/template/grid_spacing"),
+                                  file.scalar<int>("image/template/levels"),
+                                  file.scalar<int>("image/template/block_radius")};
+    return {grey, MatchingTemplate(grey, file.columns<double>("image/points", 3), options)};
+}
+
 }  // namespace
 
 void write_prepared(const PreparedModel& prepared, const std::filesystem::path& path) {
@@ -111,13 +138,14 @@ void write_prepared(const PreparedModel& prepared, const std::filesystem::path& 
     write_list(file, "options/anchors", prepared.options.anchors);
     write_list(file, "options/rigid_neighbours", prepared.options.rigid_neighbours);
     if (prepared.coarse) detail::write_mesh(file, coarse_mesh, prepared.coarse->model.mesh);
+    if (prepared.image) write_image(file, *prepared.image);
     detail::write_stages(file, "stages/prepare", prepared.times);
     file.close();
     target.commit();
 }
 
 PreparedModel read_prepared(const std::filesystem::path& path, Observer& observer) {
-    const Hdf5Input file(path, format, version);
+    const Hdf5Input file(path, format, version, oldest_version);
     tled::Model model = detail::read_model(file);
     PrepareOptions options;
     options.meshing = read_meshing(file);
@@ -131,6 +159,7 @@ PreparedModel read_prepared(const std::filesystem::path& path, Observer& observe
     if (!(options.data_stiffness > 0) || !(options.tangential_ratio > 0))
         throw InvalidInput("'" + path.string() + "': the stiffness of the data must be positive");
     PreparedModel prepared = prepare(std::move(model.mesh), read_label_map(file), options, observer);
+    if (file.holds(image)) prepared.image = read_image(file);
     if (file.holds(coarse_mesh)) read_coarse_model(file, path, prepared, observer);
     return prepared;
 }

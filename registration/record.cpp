@@ -11,7 +11,7 @@ namespace tissuewarp::registration {
 namespace {
 
 constexpr const char* format = "tissuewarp registration record";
-constexpr int version = 2;
+constexpr int version = 2, oldest_version = 1;
 
 /// det F of every tetrahedron; the placement is rigid and has no part in it.
 Eigen::VectorXd jacobians(const Deformation& deformation) {
@@ -88,7 +88,7 @@ void write_result(Hdf5Output& file, const UpdateResult& result) {
         file.scalar<double>("anchors/largest_mm", result.anchors->largest_mm, "mm");
     }
     file.texts("engine", {result.engine});
-    file.texts("doubts", result.doubts);
+    file.texts("doubts", texts(result.doubts));
 }
 
 }  // namespace
@@ -112,9 +112,9 @@ void write_record(const PreparedModel& prepared, const UpdateResult& result, con
 }
 
 Record read_record(const std::filesystem::path& path) {
-    const Hdf5Input file(path, format, version);
+    const Hdf5Input file(path, format, version, oldest_version);
     Record record;
-    record.format_version = version;
+    record.format_version = file.version();
     tled::Model model = detail::read_model(file);
     record.materials = std::move(model.materials);
     record.element = model.element;

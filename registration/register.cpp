@@ -134,9 +134,6 @@ struct Registration {
 
 UpdateResult register_model(const PreparedModel& prepared, Terms& terms, LoadFinder& loads, tled::Engine& engine,
                             const UpdateOptions& options, Observer& observer) {
-    Standing start;
-    start.state.displacement.setZero(3, prepared.rest.node_count);
-    start.result.engine = engine.description();
     return Registration{prepared,
                         terms,
                         loads,
@@ -145,7 +142,7 @@ UpdateResult register_model(const PreparedModel& prepared, Terms& terms, LoadFin
                         Schedule(options, terms.searches()),
                         RoundSolver(prepared, terms, engine, options, observer),
                         Pace(options.time_budget_s),
-                        start}
+                        at_rest(prepared, engine)}
         .run();
 }
 

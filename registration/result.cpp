@@ -9,4 +9,10 @@ std::vector<tled::Spring> LastPulls::of(Origin origin) const {
     return result;
 }
 
+std::vector<std::string> texts(const std::vector<Doubt>& doubts) {
+    std::vector<std::string> result;
+    for (const Doubt& doubt : doubts) result.push_back(doubt.text);
+    return result;
+}
+
 }  // namespace tissuewarp::registration

@@ -106,6 +106,9 @@ struct Doubt {
     std::string text = {};  ///< for people, with the remedy
 };
 
+/// What doubts say, for people.
+std::vector<std::string> texts(const std::vector<Doubt>& doubts);
+
 struct UpdateResult {
     Deformation deformation;
     Alignment alignment;

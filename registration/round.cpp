@@ -7,6 +7,13 @@
 
 namespace tissuewarp::registration::detail {
 
+Standing at_rest(const PreparedModel& prepared, const tled::Engine& engine) {
+    Standing start;
+    start.state.displacement.setZero(3, prepared.rest.node_count);
+    start.result.engine = engine.description();
+    return start;
+}
+
 RoundSolver::RoundSolver(const PreparedModel& prepared, Terms& terms, tled::Engine& engine,
                          const UpdateOptions& options, Observer& observer)
     : prepared_(prepared),

@@ -12,6 +12,9 @@ struct Standing {
     UpdateResult result;
 };
 
+/// Before the first round.
+Standing at_rest(const PreparedModel& prepared, const tled::Engine& engine);
+
 class RoundSolver {
 public:
     /// Model, terms, engine and observer outlive this.

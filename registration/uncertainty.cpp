@@ -172,24 +172,25 @@ UncertaintySummary summarise(const Uncertainty& uncertainty) {
     return sum;
 }
 
-std::string doubt_of_solver(const UncertaintySummary& summary, double tolerance_mm) {
-    if (summary.algebraic_mm <= tolerance_mm) return {};
+std::optional<Doubt> doubt_of_solver(const UncertaintySummary& summary, double tolerance_mm) {
+    if (summary.algebraic_mm <= tolerance_mm) return std::nullopt;
     char text[160];
     std::snprintf(text, sizeof text,
                   "the solver stopped %.2g mm (root mean square) from equilibrium, where %.2g mm were asked for",
                   summary.algebraic_mm, tolerance_mm);
-    return text;
+    return Doubt{"solver.short", summary.algebraic_mm, tolerance_mm, text};
 }
 
-std::vector<std::string> doubts_of(const Uncertainty& uncertainty, double tolerance_mm) {
-    std::vector<std::string> reasons{doubt_of_solver(summarise(uncertainty), tolerance_mm)};
-    if (uncertainty.expected()) reasons.push_back(doubt_of_data(*uncertainty.expected()));
-    std::erase(reasons, "");
-    return reasons;
+std::vector<Doubt> doubts_of(const Uncertainty& uncertainty, double tolerance_mm) {
+    std::vector<Doubt> doubts;
+    if (auto doubt = doubt_of_solver(summarise(uncertainty), tolerance_mm)) doubts.push_back(std::move(*doubt));
+    if (!uncertainty.expected()) return doubts;
+    if (auto doubt = doubt_of_data(*uncertainty.expected())) doubts.push_back(std::move(*doubt));
+    return doubts;
 }
 
-std::string doubt_of_accuracy(const UncertaintySummary& summary, double accuracy_mm) {
-    if (summary.interval_mm <= accuracy_mm) return {};
+std::optional<Doubt> doubt_of_accuracy(const UncertaintySummary& summary, double accuracy_mm) {
+    if (summary.interval_mm <= accuracy_mm) return std::nullopt;
     char text[256];
     std::snprintf(text, sizeof text,
                   "%.3g mm were asked for, and errors are within %.3g mm with a probability of 95 %% (1 σ: %.3g mm, of "
@@ -197,7 +198,7 @@ std::string doubt_of_accuracy(const UncertaintySummary& summary, double accuracy
                   accuracy_mm, summary.interval_mm, summary.deviation_mm, summary.data_mm, summary.discretisation_mm,
                   summary.data_mm > summary.discretisation_mm ? "more or better data would help, a finer mesh would not"
                                                               : "a finer mesh would help");
-    return text;
+    return Doubt{"accuracy.not_sure", summary.interval_mm, accuracy_mm, text};
 }
 
 Uncertainty uncertainty(const PreparedModel& prepared, const UpdateResult& result, const UncertaintyOptions& options,

@@ -79,16 +79,16 @@ struct UncertaintySummary {
 };
 UncertaintySummary summarise(const Uncertainty& uncertainty);
 
-/// In words, where the solver stopped farther from equilibrium than the tolerance it was given, mm; otherwise empty.
-std::string doubt_of_solver(const UncertaintySummary& summary, double tolerance_mm);
+/// In words, where the solver stopped farther from equilibrium than the tolerance it was given, mm; otherwise nothing.
+std::optional<Doubt> doubt_of_solver(const UncertaintySummary& summary, double tolerance_mm);
 
 /// All that the estimate says against a result whose equilibria had this tolerance, mm; empty when there is nothing.
-std::vector<std::string> doubts_of(const Uncertainty& uncertainty, double tolerance_mm);
+std::vector<Doubt> doubts_of(const Uncertainty& uncertainty, double tolerance_mm);
 
 /// In words, where errors are not within `accuracy_mm` with a probability of 95 % on average over the tissue, what is
-/// at fault and what would help; otherwise empty. Of random phantoms, the error over the tissue (root mean square) of
+/// at fault and what would help; otherwise nothing. Of random phantoms, the error over the tissue (root mean square) of
 /// 96 to 99 in a hundred is within that radius (docs/accuracy-time.md, "Is an accuracy kept?").
-std::string doubt_of_accuracy(const UncertaintySummary& summary, double accuracy_mm);
+std::optional<Doubt> doubt_of_accuracy(const UncertaintySummary& summary, double accuracy_mm);
 
 /// What a voxel of the trust map says.
 enum class Trust : unsigned char {

@@ -117,15 +117,15 @@ private:
         Stopwatch stopwatch;
         PrepareOptions options;
         options.meshing.edge_length = organ_size(phantom.moving_labels) / density;
-        PreparedModel prepared = prepare(phantom.moving_labels, options);
-        prepare_loads(prepared);
+        const auto prepared = std::make_shared<PreparedModel>(prepare(phantom.moving_labels, options));
+        prepare_loads(*prepared);
         const double preparation = stopwatch.lap();
         Updater updater(prepared, plan_.update);
         for (const DataKind kind : {DataKind::Labels, DataKind::Partial}) {
             const UpdateResult result = updater.update(detail::seen_of(phantom, kind));
             engine_ = result.engine;
             Sample& sample = samples_[{kind, density}];
-            sample.tetrahedra.push_back(prepared.model.mesh.tet_count());
+            sample.tetrahedra.push_back(prepared->model.mesh.tet_count());
             sample.preparation.push_back(preparation);
             sample.rounds.push_back(seconds_of(result.times, "correspondence") +
                                     seconds_of(result.times, "equilibrium"));

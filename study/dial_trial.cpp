@@ -26,11 +26,12 @@ DialTrial tried(const Phantom& phantom, DataKind kind, const DialRequest& reques
     const DialChoice choice = choose(fronts, request, case_of(phantom, kind));
     PrepareOptions options;
     options.meshing.edge_length = choice.edge_length_mm;
-    PreparedModel prepared = prepare(phantom.moving_labels, options);
-    prepare_loads(prepared);
+    const auto model = std::make_shared<PreparedModel>(prepare(phantom.moving_labels, options));
+    const PreparedModel& prepared = *model;
+    prepare_loads(*model);
     const imaging::Volume image = phantom.moving_labels.as(CV_32F);
     update.time_budget_s = choice.update_budget_s;
-    Updater updater(prepared, update);
+    Updater updater(model, update);
 
     const auto begin = std::chrono::steady_clock::now();
     const UpdateResult result = updater.update(detail::seen_of(phantom, kind));
@@ -46,7 +47,7 @@ DialTrial tried(const Phantom& phantom, DataKind kind, const DialRequest& reques
     trial.estimated_mm = estimate.deviation_mm;
     trial.possible = choice.time_met && choice.accuracy_met;
     const bool doubted =
-        (request.accuracy_mm && !doubt_of_accuracy(estimate, *request.accuracy_mm).empty()) || !trial.kept_time();
+        (request.accuracy_mm && doubt_of_accuracy(estimate, *request.accuracy_mm)) || !trial.kept_time();
     trial.announced = !trial.possible || result.cut_short || doubted;
     return trial;
 }

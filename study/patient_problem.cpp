@@ -77,7 +77,7 @@ private:
         options.default_material = material_of(setting.physics);
         options.element = setting.element == Element::T4 ? tled::Element::T4 : tled::Element::AveragedPressureT4;
         if (setting.physics.hold == Hold::Hard) options.data_stiffness *= stiffer;
-        prepared_.emplace(reg::prepare(patient_.labels, options, observer));
+        prepared_ = std::make_shared<const reg::PreparedModel>(reg::prepare(patient_.labels, options, observer));
         shared_ = setting;
     }
 
@@ -105,7 +105,7 @@ private:
         StageTable table;
         for (const reg::StageTime& time : prepared_->times) table.add(time.stage, Phase::Preparation, time.seconds);
         const Clock engine_clock;
-        reg::Updater updater(*prepared_, update_options(setting), observer);
+        reg::Updater updater(prepared_, update_options(setting), observer);
         table.add("engine", Phase::Preparation, engine_clock.seconds());
         const reg::Intraoperative data = seen(setting.physics.hold);
         const imaging::Geometry& grid = data.labels ? data.labels->geometry : patient_.labels.geometry;
@@ -137,7 +137,7 @@ private:
     Patient patient_;
     int gpu_index_;
     Setting shared_;
-    std::optional<reg::PreparedModel> prepared_;
+    std::shared_ptr<const reg::PreparedModel> prepared_;
 };
 
 }  // namespace

@@ -147,7 +147,7 @@ void write_reference(const Reference& reference, const std::filesystem::path& pa
 }
 
 Reference read_reference(const std::filesystem::path& path) {
-    const Hdf5Input file(path, format, version);
+    const Hdf5Input file(path, format, version, version);
     return {file.columns<double>("displacement", 3), file.columns<double>("coarser", 3),
             file.scalar<double>("uncertainty"), file.scalar<double>("largest_uncertainty"),
             file.scalar<int>("tetrahedra")};

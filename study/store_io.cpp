@@ -279,7 +279,7 @@ void write_measurements(const Measurements& measured, const std::filesystem::pat
 }
 
 Measurements read_measurements(const std::filesystem::path& path) {
-    const Hdf5Input file(path, format, version);
+    const Hdf5Input file(path, format, version, version);
     Measurements measured;
     measured.points = read_columns(file, path.string());
     read_times(file, measured.points, path.string());

@@ -220,24 +220,28 @@ void Hdf5Output::close() {
     if (!file_.close() || !flushed) throw IoError("cannot write '" + path_.string() + "'; is the disk full?");
 }
 
-Hdf5Input::Hdf5Input(const std::filesystem::path& path, const std::string& format, int version) : path_(path) {
+Hdf5Input::Hdf5Input(const std::filesystem::path& path, const std::string& format, int newest_version,
+                     int oldest_version)
+    : path_(path) {
     if (!std::filesystem::is_regular_file(path)) throw IoError("'" + path.string() + "' is not a file");
     file_ = Hdf5Handle(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access()), H5Fclose);
     if (!file_.valid())
         throw IoError("'" + path.string() + "' cannot be read as HDF5; is it complete, and the file you meant?");
-    require_format(format, version);
+    require_format(format, newest_version, oldest_version);
 }
 
-void Hdf5Input::require_format(const std::string& format, int version) const {
+void Hdf5Input::require_format(const std::string& format, int newest_version, int oldest_version) {
     const std::string found = read_text_attribute(file_, "format");
     if (found != format)
         throw InvalidInput("'" + path_.string() + "' is " + (found.empty() ? "no file of tissuewarp" : "a " + found) +
                            "; a " + format + " is wanted");
-    const int found_version = read_int_attribute(file_, "format_version");
-    if (found_version != version)
-        throw InvalidInput("'" + path_.string() + "' has format version " + std::to_string(found_version) +
-                           ", this program reads version " + std::to_string(version) +
-                           "; write the file again with this program");
+    version_ = read_int_attribute(file_, "format_version");
+    if (version_ < oldest_version || version_ > newest_version)
+        throw InvalidInput("'" + path_.string() + "' has format version " + std::to_string(version_) +
+                           ", this program reads versions " + std::to_string(oldest_version) + " to " +
+                           std::to_string(newest_version) +
+                           (version_ > newest_version ? "; read it with the newer program that wrote it"
+                                                      : "; write the file again with this program"));
 }
 
 void Hdf5Input::refuse(const std::string& name, const std::string& reason) const {
@@ -245,6 +249,8 @@ void Hdf5Input::refuse(const std::string& name, const std::string& reason) const
 }
 
 bool Hdf5Input::holds(const std::string& name) const {
+    for (std::size_t end = name.find('/'); end != std::string::npos; end = name.find('/', end + 1))
+        if (H5Lexists(file_, name.substr(0, end).c_str(), H5P_DEFAULT) <= 0) return false;
     return H5Lexists(file_, name.c_str(), H5P_DEFAULT) > 0;
 }
 

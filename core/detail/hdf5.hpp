@@ -83,7 +83,10 @@ private:
 /// Throws IoError on what cannot be read, InvalidInput on another format, version, type or shape, and on NaN.
 class Hdf5Input {
 public:
-    Hdf5Input(const std::filesystem::path& path, const std::string& format, int version);
+    /// Files of this format up to `newest_version` are read; what a version lacks is the reader's to know.
+    Hdf5Input(const std::filesystem::path& path, const std::string& format, int newest_version, int oldest_version);
+
+    [[nodiscard]] int version() const { return version_; }
 
     /// A dataset (columns × `rows`) as an Eigen matrix (`rows` × columns).
     template <class T>
@@ -96,7 +99,7 @@ public:
     /// Fills memory for exactly this shape.
     template <class T>
     void array(const std::string& name, T* values, const std::vector<hsize_t>& shape) const;
-    /// Whether the root has a group or dataset of this name.
+    /// Whether there is a group or dataset of this name, `a/b/c`.
     [[nodiscard]] bool holds(const std::string& name) const;
     /// Throws unless the dataset has this shape: before memory is set aside for it.
     void require_shape(const std::string& name, const std::vector<hsize_t>& wanted) const;
@@ -108,11 +111,12 @@ private:
     [[nodiscard]] Hdf5Handle dataset(const std::string& name) const;
     [[nodiscard]] std::vector<hsize_t> shape(hid_t dataset, const std::string& name) const;
     [[noreturn]] void refuse(const std::string& name, const std::string& reason) const;
-    void require_format(const std::string& format, int version) const;
+    void require_format(const std::string& format, int newest_version, int oldest_version);
 
     Hdf5Quiet quiet_;
     std::filesystem::path path_;
     Hdf5Handle file_;
+    int version_ = 0;
 };
 
 }  // namespace tissuewarp

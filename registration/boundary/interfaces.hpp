@@ -1,13 +1,12 @@
 #pragma once
-/// From segmented images to conditions on the mesh: where does each interface node belong in the fixed label map?
+/// Where labels of a mesh meet: the nodes that a label map says something of.
 
-#include "imaging/volume.hpp"
 #include "meshing/tet_mesh.hpp"
 
-#include <Eigen/Geometry>
+#include <Eigen/Core>
 
+#include <array>
 #include <map>
-#include <memory>
 #include <vector>
 
 namespace tissuewarp::registration {
@@ -39,28 +38,6 @@ private:
     std::vector<InterfaceNode> nodes_;
     std::vector<std::array<int, 3>> faces_;         // mesh nodes
     std::vector<std::array<int, 3>> face_entries_;  // positions in nodes_
-};
-
-/// Smoothed label indicators of an image, sampled anywhere: a sub-voxel boundary from voxel labels.
-class LabelBoundaryField {
-public:
-    /// Smooths each label of `thickness_mm` (Interfaces::thickness) by a Gaussian of one voxel, which takes the steps
-    /// off its boundary, or of a quarter of its thickness, where that is less, but half a voxel at least: a plate
-    /// thinner than 1.35 standard deviations is nowhere half there, and has no boundary left. Throws InvalidInput for
-    /// an empty map.
-    LabelBoundaryField(const imaging::Volume& label_map, const std::map<int, double>& thickness_mm);
-    ~LabelBoundaryField();
-    LabelBoundaryField(LabelBoundaryField&&) noexcept;
-    LabelBoundaryField& operator=(LabelBoundaryField&&) noexcept;
-
-    /// Signed distance (mm) along `normal` from `point` to the nearest crossing from `inner` to `outer` within ± range;
-    /// NaN when there is none whose own normal lies within `max_angle_deg` of `normal`. Points and normal in LPS.
-    [[nodiscard]] double crossing(const Eigen::Vector3d& point, const Eigen::Vector3d& normal, int inner, int outer,
-                                  double range_mm, double max_angle_deg) const;
-
-private:
-    struct Impl;
-    std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace tissuewarp::registration

@@ -17,6 +17,16 @@ tled::Element element_named(const std::string& name) {
 /// Rows of materials/parameters; what a law does not use is zero.
 constexpr int parameter_rows = 8;
 
+/// Version 1 of records knew the two neo-Hookean laws, by the shear modulus and that of the volumetric part.
+Eigen::MatrixXd law_parameters_of(const Hdf5Input& file, const std::string& group) {
+    if (file.holds(group + "/parameters")) return file.columns<double>(group + "/parameters", parameter_rows);
+    const Eigen::VectorXd shear = file.vector<double>(group + "/shear_modulus");
+    Eigen::MatrixXd parameters = Eigen::MatrixXd::Zero(parameter_rows, shear.size());
+    parameters.row(0) = shear;
+    parameters.row(1) = file.vector<double>(group + "/volumetric_modulus", shear.size());
+    return parameters;
+}
+
 }  // namespace
 
 void write_materials(Hdf5Output& file, const std::string& group, const tled::MaterialTable& materials) {
@@ -39,7 +49,7 @@ void write_materials(Hdf5Output& file, const std::string& group, const tled::Mat
 
 tled::MaterialTable read_materials(const Hdf5Input& file, const std::string& group) {
     const Eigen::VectorXi label = file.vector<int>(group + "/label");
-    const Eigen::MatrixXd parameters = file.columns<double>(group + "/parameters", parameter_rows);
+    const Eigen::MatrixXd parameters = law_parameters_of(file, group);
     const std::vector<std::string> law = file.texts(group + "/law");
     if (law.size() != static_cast<std::size_t>(label.size()) || parameters.cols() != label.size())
         throw InvalidInput("'" + group + "' names " + std::to_string(law.size()) + " laws and " +

@@ -1,6 +1,7 @@
 #pragma once
 /// Rigid motions that come closest to displacements.
 
+#include "registration/prepare.hpp"
 #include "registration/terms/term.hpp"
 
 namespace tissuewarp::registration::detail {

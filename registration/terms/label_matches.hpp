@@ -1,6 +1,7 @@
 #pragma once
 /// One round of correspondence: interface nodes of the deformed mesh to the boundaries of the fixed labels.
 
+#include "registration/boundary/label_boundary_field.hpp"
 #include "registration/terms/label_springs.hpp"
 #include "registration/terms/term.hpp"
 

@@ -1,7 +1,7 @@
 #pragma once
 /// A segmented intraoperative volume: interface nodes of the deformed mesh belong on the boundaries of its labels.
 
-#include "registration/boundary/interfaces.hpp"
+#include "registration/boundary/label_boundary_field.hpp"
 #include "registration/options.hpp"
 #include "registration/prepare.hpp"
 #include "registration/terms/term.hpp"

@@ -1,6 +1,7 @@
 #pragma once
 /// The organ's surface as the preoperative image shows it.
 
+#include "meshing/point_location.hpp"
 #include "registration/prepare.hpp"
 
 #include <vector>

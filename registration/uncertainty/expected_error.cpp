@@ -54,15 +54,15 @@ ExpectedError expected_error(const PreparedModel& prepared, const UpdateResult& 
 
 /// Tissue 5 mm off is a registration that failed. The expected error is a root mean square over patients like this one:
 /// one in twenty-five is 1.7 times as far off (docs/results.md).
-std::string doubt_of_data(const ExpectedError& expected) {
+std::optional<Doubt> doubt_of_data(const ExpectedError& expected) {
     constexpr double most_mm = 5.0 / 1.7;
-    if (expected.mean_mm <= most_mm) return {};
+    if (expected.mean_mm <= most_mm) return std::nullopt;
     char text[256];
     std::snprintf(text, sizeof text,
                   "the data show too little of the organ: tissue is expected to lie %.2f mm off, and %.2f mm where "
                   "least is known; show more of it, or give landmarks",
                   expected.mean_mm, expected.worst_mm);
-    return text;
+    return Doubt{"data.show_too_little", expected.mean_mm, most_mm, text};
 }
 
 }  // namespace tissuewarp::registration

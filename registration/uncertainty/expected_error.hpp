@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include <string>
+#include <optional>
 
 namespace tissuewarp::registration {
 
@@ -23,6 +23,6 @@ ExpectedError expected_error(const PreparedModel& prepared, const UpdateResult& 
 
 /// In words, where the data show too little of the organ to tell a registration from one that failed (tissue 5 mm off),
 /// and what would help; otherwise empty.
-std::string doubt_of_data(const ExpectedError& expected);
+std::optional<Doubt> doubt_of_data(const ExpectedError& expected);
 
 }  // namespace tissuewarp::registration

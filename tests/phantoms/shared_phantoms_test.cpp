@@ -67,7 +67,7 @@ TEST_F(SharedPhantoms, ALungThatTissueResistsIsFollowedAndDoubted) {
     const TargetError error = target_error(landmarks, PointTransform(result.deformation)(landmarks.moving));
     EXPECT_LT(error.after.mean, 4.2);  // 3.90; 6.15 with weights that let go of the boundary
     ASSERT_FALSE(result.doubts.empty());
-    EXPECT_NE(result.doubts.back().find("Poisson"), std::string::npos);
+    EXPECT_NE(result.doubts.back().text.find("Poisson"), std::string::npos);
 }
 
 TEST_F(SharedPhantoms, SaggedBrainFromMasks) {

@@ -1,5 +1,6 @@
 /// Sub-voxel boundaries from voxel labels, and interface nodes with their normals.
 #include "registration/boundary/interfaces.hpp"
+#include "registration/boundary/label_boundary_field.hpp"
 
 #include "core/errors.hpp"
 

@@ -152,7 +152,7 @@ TEST(TimeBudget, EndsTheRoundsAndSaysSo) {
     const UpdateResult hurried = update(prepared, {.labels = fixed}, options);
     EXPECT_TRUE(hurried.cut_short);
     EXPECT_EQ(hurried.rounds.size(), 1u);
-    EXPECT_THAT(hurried.doubts, testing::Contains(HasSubstr("time budget")));
+    EXPECT_THAT(texts(hurried.doubts), testing::Contains(HasSubstr("time budget")));
     options.time_budget_s = 1e6;
     const UpdateResult unhurried = update(prepared, {.labels = fixed}, options);
     EXPECT_FALSE(unhurried.cut_short);

@@ -4,16 +4,21 @@
 #include "core/errors.hpp"
 #include "registration/evaluation.hpp"
 #include "registration/field.hpp"
+#include "registration/prepared_io.hpp"
 #include "tests/registration/textured_phantom.hpp"
 #include "tests/support/label_shapes.hpp"
 
 #include <gtest/gtest.h>
+
+#include <filesystem>
+#include <map>
 
 namespace tissuewarp::registration {
 namespace {
 
 using namespace test;
 using imaging::Volume;
+namespace fs = std::filesystem;
 
 constexpr double spacing_mm = 1.5;
 
@@ -67,6 +72,27 @@ TEST(ImageUpdate, FollowsADeformationThroughTheWholeOrgan) {
     EXPECT_LT(error.mean, 0.35);
     EXPECT_LT(error.percentile_95, 0.9);
     EXPECT_TRUE(result.doubts.empty());
+}
+
+// A model that was written before the operation and read during it gives the same bits, for every kind of data.
+TEST(ImageUpdate, AModelOnDiskGivesTheSameBits) {
+    const PreparedModel prepared = textured_model();
+    const fs::path path = fs::path(testing::TempDir()) / "image-update-model.tw";
+    write_prepared(prepared, path);
+    const PreparedModel read = read_prepared(path);
+    fs::remove(path);
+    const auto still = Eigen::Isometry3d::Identity();
+    PointPairs pairs;
+    pairs.moving = 0.5 * prepared.model.mesh.nodes.leftCols(12);
+    pairs.fixed = pairs.moving;
+    for (auto place : pairs.fixed.colwise()) place += smooth_displacement(place);
+    const std::map<std::string, Intraoperative> data{{"image", {.image = after(prepared, still)}},
+                                                     {"labels", {.labels = prepared.labels}},
+                                                     {"points", {.points = pairs}}};
+    for (const auto& [name, seen] : data)
+        EXPECT_EQ(update(prepared, seen, quick()).deformation.displacement,
+                  update(read, seen, quick()).deformation.displacement)
+            << name;
 }
 
 // Without the rotation in the blocks' offsets and in the information the errors grow with the angle.

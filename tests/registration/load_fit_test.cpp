@@ -216,7 +216,7 @@ TEST(UnknownWeights, MoveWhatLabelsDoNotShow) {
     const UpdateResult with = update(prepared, {.labels = labels}, options);
     EXPECT_EQ(without.pulls.load_size, 0);
     EXPECT_GT(with.pulls.load_size, 1);
-    EXPECT_TRUE(with.pulls.ground.empty());  // of the fit alone
+    EXPECT_TRUE(with.pulls.of(Origin::Prior).empty());  // of the fit alone
     const double before = error_at_nodes(without, prepared, truth), after = error_at_nodes(with, prepared, truth);
     EXPECT_LT(after, 0.8 * before) << before << " mm without";
     EXPECT_GT(with.min_jacobian, 0.5);
@@ -265,10 +265,11 @@ TEST(UnknownLoads, AreNotLookedForWhereTheOrganIsHeld) {
 
 // An updater keeps shapes, not what an earlier update found.
 TEST(UnknownLoads, DoNotDependOnTheUpdateBefore) {
-    const PreparedModel prepared = organ(12);
+    const auto model = std::make_shared<const PreparedModel>(organ(12));
+    const PreparedModel& prepared = *model;
     const Matrix3Xd truth = bent(prepared);
     const PointPairs pairs = left_of_the_middle(prepared, truth), others = left_of_the_middle(prepared, -truth);
-    Updater fresh(prepared, with_shapes(48)), used(prepared, with_shapes(48));
+    Updater fresh(model, with_shapes(48)), used(model, with_shapes(48));
     static_cast<void>(used.update({.points = others}));
     EXPECT_EQ(fresh.update({.points = pairs}).deformation.displacement,
               used.update({.points = pairs}).deformation.displacement);

@@ -54,7 +54,7 @@ UpdateResult some_result() {
     result.rounds = {{15.0, 120, 150, 11, 1.25, 6.0, 900, 0.04}, {4.0, 140, 150, 0, 0.5, 0.1, 400, 0.02}};
     result.engine = "CPU, 2 threads";
     result.times = {{"alignment", 1.5}, {"round 1", 0.25}};
-    result.doubts = {"only 80 % of the boundary was matched"};
+    result.doubts = {{"labels.unmatched", 0.8, 1, "only 80 % of the boundary was matched"}};
     return result;
 }
 
@@ -86,6 +86,38 @@ protected:
         ASSERT_GE(H5Dwrite(data, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), 0);
         H5Sclose(space);
         H5Dclose(data);
+        H5Fclose(file);
+    }
+
+    void set_version(int version) const {
+        const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+        const hid_t attribute = H5Aopen(file, "format_version", H5P_DEFAULT);
+        ASSERT_GE(H5Awrite(attribute, H5T_NATIVE_INT, &version), 0);
+        H5Aclose(attribute);
+        H5Fclose(file);
+    }
+
+    /// Materials as version 1 had them: the moduli of the two neo-Hookean laws.
+    void make_materials_old(const std::string& group) const {
+        const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+        const hid_t data = H5Dopen2(file, (group + "/parameters").c_str(), H5P_DEFAULT);
+        const hid_t space = H5Dget_space(data);
+        std::vector<double> values(static_cast<std::size_t>(H5Sget_simple_extent_npoints(space)));
+        ASSERT_GE(H5Dread(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), 0);
+        H5Sclose(space);
+        H5Dclose(data);
+        const hsize_t laws = values.size() / 8;
+        for (const auto& [name, place] : {std::pair{"/shear_modulus", 0}, std::pair{"/volumetric_modulus", 1}}) {
+            std::vector<double> moduli(laws);
+            for (std::size_t n = 0; n < laws; ++n) moduli[n] = values[8 * n + static_cast<std::size_t>(place)];
+            const hid_t row = H5Screate_simple(1, &laws, nullptr);
+            const hid_t written =
+                H5Dcreate2(file, (group + name).c_str(), H5T_NATIVE_DOUBLE, row, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+            ASSERT_GE(H5Dwrite(written, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, moduli.data()), 0);
+            H5Dclose(written);
+            H5Sclose(row);
+        }
+        ASSERT_GE(H5Ldelete(file, (group + "/parameters").c_str(), H5P_DEFAULT), 0);
         H5Fclose(file);
     }
 
@@ -121,6 +153,18 @@ TEST_F(Records, ComeBackBitByBit) {
     EXPECT_EQ(stiff.shear_modulus, std::get<tled::NeoHookeanIso>(prepared().model.materials.at(7)).shear_modulus);
 }
 
+TEST_F(Records, OfTheFirstVersionAreRead) {
+    write();
+    make_materials_old("materials");
+    set_version(1);
+    const Record record = read_record(path);
+    EXPECT_EQ(record.format_version, 1);
+    for (const auto& [label, material] : prepared().model.materials) {
+        EXPECT_EQ(tled::law_name(record.materials.at(label)), tled::law_name(material));
+        EXPECT_EQ(tled::law_parameters(record.materials.at(label)), tled::law_parameters(material));
+    }
+}
+
 TEST_F(Records, HoldEveryLaw) {
     const tled::MaterialTable materials{
         {0, tled::NeoHookeanStable{1.0, 49.0}},
@@ -133,7 +177,7 @@ TEST_F(Records, HoldEveryLaw) {
         Hdf5Output file(path, "materials", 1);
         detail::write_materials(file, "materials", materials);
     }
-    const Hdf5Input file(path, "materials", 1);
+    const Hdf5Input file(path, "materials", 1, 1);
     EXPECT_EQ(detail::read_materials(file, "materials"), materials);
 }
 
@@ -217,14 +261,9 @@ TEST_F(Records, OfForeignFormatsAreRefused) {
     EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr("a tissuewarp prepared model")));
 }
 
-TEST_F(Records, OfAnotherVersionAreRefused) {
+TEST_F(Records, OfANewerVersionAreRefused) {
     write();
-    const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
-    const hid_t attribute = H5Aopen(file, "format_version", H5P_DEFAULT);
-    const int version = 3;
-    ASSERT_GE(H5Awrite(attribute, H5T_NATIVE_INT, &version), 0);
-    H5Aclose(attribute);
-    H5Fclose(file);
+    set_version(3);
     EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr("format version 3")));
 }
 

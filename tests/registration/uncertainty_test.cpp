@@ -131,8 +131,8 @@ TEST(Uncertainty, TellsWhetherPointsShowEnough) {
     const Uncertainty of_few = uncertainty(prepared, few), of_enough = uncertainty(prepared, enough);
     ASSERT_TRUE(of_few.expected() && of_enough.expected());
     EXPECT_NEAR(of_few.expected()->mean_mm / expected_error(prepared, few).mean_mm, 1, 1e-9);
-    EXPECT_THAT(doubts_of(of_few, 1), too_little);
-    EXPECT_THAT(doubts_of(of_enough, 1), testing::IsEmpty()) << of_enough.expected()->mean_mm;
+    EXPECT_THAT(texts(doubts_of(of_few, 1)), too_little);
+    EXPECT_THAT(texts(doubts_of(of_enough, 1)), testing::IsEmpty()) << of_enough.expected()->mean_mm;
 }
 
 TEST(CoarseTwin, CarriesLinearFieldsAndAllOfTheStiffness) {
@@ -148,8 +148,8 @@ TEST(CoarseTwin, CarriesLinearFieldsAndAllOfTheStiffness) {
         for (const tled::Spring& spring : springs) sum += spring.stiffness.trace();
         return sum;
     };
-    EXPECT_NEAR(trace(twin.pulls.data) / trace(result.pulls.data), 1, 1e-9);
-    EXPECT_NEAR(trace(twin.pulls.ground) / trace(result.pulls.ground), 1, 0.01);
+    EXPECT_NEAR(trace(twin.pulls.of(Origin::Datum)) / trace(result.pulls.of(Origin::Datum)), 1, 1e-9);
+    EXPECT_NEAR(trace(twin.pulls.of(Origin::Prior)) / trace(result.pulls.of(Origin::Prior)), 1, 0.01);
 }
 
 // The simple twin: the factor of the large mesh. Springs added up along other normals, displacements of other nodes, or
@@ -189,8 +189,8 @@ TEST(Uncertainty, ExpectsNothingBeforehandWhereLabelsShowTheOrgan) {
 TEST(Uncertainty, HoldsOfLabelsAreNoData) {
     const PreparedModel prepared = organ();
     const UpdateResult result = update(prepared, {.labels = prepared.labels}, on_cpu());
-    ASSERT_FALSE(result.pulls.holds.empty());
-    for (const tled::Spring& spring : result.pulls.data)
+    ASSERT_FALSE(result.pulls.of(Origin::Hold).empty());
+    for (const tled::Spring& spring : result.pulls.of(Origin::Datum))
         EXPECT_NEAR(spring.stiffness.determinant(), 0, 1e-6 * std::pow(spring.stiffness.trace(), 3));
 }
 
@@ -254,9 +254,9 @@ TEST(Uncertainty, RefusesAResultOfAnotherModel) {
 TEST(Uncertainty, DoubtsASolverThatStoppedFarFromEquilibrium) {
     UncertaintySummary summary;
     summary.algebraic_mm = 0.05;
-    EXPECT_EQ(doubt_of_solver(summary, 0.05), "");
+    EXPECT_FALSE(doubt_of_solver(summary, 0.05));
     summary.algebraic_mm = 0.3;
-    const std::string doubt = doubt_of_solver(summary, 0.05);
+    const std::string doubt = doubt_of_solver(summary, 0.05).value().text;
     EXPECT_NE(doubt.find("0.3 mm"), std::string::npos) << doubt;
     EXPECT_NE(doubt.find("0.05 mm"), std::string::npos) << doubt;
 }
@@ -265,13 +265,13 @@ TEST(Uncertainty, AnAccuracyThatIsNotSureIsDoubted) {
     UncertaintySummary summary;
     summary.deviation_mm = summary.data_mm = 0.9;
     summary.interval_mm = 1.5;
-    EXPECT_EQ(doubt_of_accuracy(summary, 1.5), "");
-    const std::string doubt = doubt_of_accuracy(summary, 1);  // more than the deviation is not enough
+    EXPECT_FALSE(doubt_of_accuracy(summary, 1.5));
+    const std::string doubt = doubt_of_accuracy(summary, 1).value().text;  // more than the deviation is not enough
     EXPECT_NE(doubt.find("1 mm were asked for"), std::string::npos) << doubt;
     EXPECT_NE(doubt.find("within 1.5 mm"), std::string::npos) << doubt;
     EXPECT_NE(doubt.find("better data would help"), std::string::npos) << doubt;
     summary.discretisation_mm = 2;
-    EXPECT_NE(doubt_of_accuracy(summary, 1).find("; a finer mesh would help"), std::string::npos);
+    EXPECT_NE(doubt_of_accuracy(summary, 1)->text.find("; a finer mesh would help"), std::string::npos);
 }
 
 }  // namespace

@@ -53,7 +53,7 @@ struct Listener : Observer {
 
 class UpdaterOnAFailingDevice : public ::testing::Test {
 protected:
-    PreparedModel prepared = prepared_organ();
+    std::shared_ptr<const PreparedModel> prepared = std::make_shared<const PreparedModel>(prepared_organ());
     Intraoperative seen{.labels = shapes::organ_labels({}, shapes::motion(5, {0, 0, 1}, {2, 1, 0}))};
     Listener listener;
 
@@ -65,14 +65,14 @@ protected:
     [[nodiscard]] Updater updater(Device device) const {
         UpdateOptions options;
         options.device = device;
-        return {prepared, options, std::make_unique<Failing>(prepared.rest, 3)};
+        return {prepared, options, std::make_unique<Failing>(prepared->rest, 3)};
     }
 };
 
 TEST_F(UpdaterOnAFailingDevice, GoesOnWithTheProcessor) {
     UpdateOptions on_cpu;
     on_cpu.device = Device::Cpu;
-    const Matrix3Xd expected = update(prepared, seen, on_cpu).deformation.displacement;
+    const Matrix3Xd expected = update(*prepared, seen, on_cpu).deformation.displacement;
     Updater failing = updater(Device::Auto);
     const UpdateResult first = failing.update(seen, listener);
     EXPECT_EQ(first.deformation.displacement, expected);

@@ -3,6 +3,7 @@
 
 #include "meshing/point_location.hpp"
 #include "registration/matching/dense/image_engine.hpp"
+#include "registration/prepare.hpp"
 
 #include <algorithm>
 

@@ -4,6 +4,7 @@
 #include "meshing/point_location.hpp"
 #include "registration/matching/blocks/block_engine.hpp"
 #include "registration/matching/dense/dense_force.hpp"
+#include "registration/prepare.hpp"
 #include "registration/terms/term.hpp"
 
 #include <memory>

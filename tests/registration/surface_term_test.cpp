@@ -1,11 +1,11 @@
 /// Points of a part of a surface: closest triangles, normals, the pose from anywhere, the tissue that follows.
 #include "registration/field.hpp"
 #include "registration/field/surface_proximity.hpp"
-#include "registration/update.hpp"
 #include "registration/pose/rigid_part.hpp"
 #include "registration/pose/surface_pose.hpp"
 #include "registration/search/surface_tree.hpp"
 #include "registration/terms/surface_data.hpp"
+#include "registration/update.hpp"
 #include "tests/registration/numbers.hpp"
 #include "tests/registration/shapes.hpp"
 #include "tests/support/label_shapes.hpp"
@@ -196,7 +196,7 @@ PrepareOptions coarse() {
     return options;
 }
 
-TEST(SurfaceEvidence, ASurfaceThatDidNotChangeLeavesTheTissueInPeace) {
+TEST(SurfaceTerm, ASurfaceThatDidNotChangeLeavesTheTissueInPeace) {
     Numbers numbers(6);
     const auto prepared = prepare(shapes::organ_labels({}), coarse());
     auto ellipsoid = meshing::boundary_surface(test::ball({0, 0, 0}, 1, 12)).surface;
@@ -210,7 +210,7 @@ TEST(SurfaceEvidence, ASurfaceThatDidNotChangeLeavesTheTissueInPeace) {
     EXPECT_TRUE(result.doubts.empty());
 }
 
-TEST(SurfaceEvidence, PointsOfAnotherOrganAreDoubted) {
+TEST(SurfaceTerm, PointsOfAnotherOrganAreDoubted) {
     Numbers numbers(7);
     const auto prepared = prepare(shapes::organ_labels({}), coarse());
     auto small = pear_surface(8);
@@ -220,14 +220,14 @@ TEST(SurfaceEvidence, PointsOfAnotherOrganAreDoubted) {
 }
 
 // A patch of a smooth organ fits elsewhere as well; where the headers hold, it need not tell where the organ lies.
-TEST(SurfaceEvidence, ASmallPatchDoesNotTellWhereAnOrganLies) {
+TEST(SurfaceTerm, ASmallPatchDoesNotTellWhereAnOrganLies) {
     const auto prepared = prepare(shapes::organ_labels({}), coarse());
     const auto said = [&](double share, bool align) {
         Numbers numbers(9);
         const auto seen = seen_part(pear_surface(8), {0, 1, 0}, share, 500, 0.5, 0, numbers, true);
         UpdateOptions options = on_cpu();
         options.align = align;
-        const auto doubts = update(prepared, {.surface = seen}, options).doubts;
+        const auto doubts = texts(update(prepared, {.surface = seen}, options).doubts);
         return std::any_of(doubts.begin(), doubts.end(), [](const std::string& reason) {
             return reason.find("too little to tell where it lies") != std::string::npos;
         });
@@ -237,7 +237,7 @@ TEST(SurfaceEvidence, ASmallPatchDoesNotTellWhereAnOrganLies) {
     EXPECT_FALSE(said(0.4, true));
 }
 
-TEST(SurfaceEvidence, PointsFarFromAModelThatMayNotMoveAreRefused) {
+TEST(SurfaceTerm, PointsFarFromAModelThatMayNotMoveAreRefused) {
     Numbers numbers(8);
     const auto prepared = prepare(shapes::organ_labels({}), coarse());
     const auto seen = moved(seen_part(pear_surface(8), {0, 1, 0}, 0.3, 500, 0.5, 0, numbers, true),
