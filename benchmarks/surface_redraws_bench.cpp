@@ -10,8 +10,8 @@
 #include "meshing/mesher.hpp"
 #include "registration/evaluation.hpp"
 #include "registration/field.hpp"
+#include "registration/uncertainty.hpp"
 #include "registration/update.hpp"
-#include "registration/uncertainty/expected_error.hpp"
 
 #include <algorithm>
 #include <chrono>

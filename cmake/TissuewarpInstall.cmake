@@ -1,23 +1,39 @@
-# Installation and the exported CMake package: find_package(tissuewarp) gives tissuewarp::<folder>.
+# Installation and the exported CMake package: find_package(tissuewarp COMPONENTS tled) or registration, the default.
+# Studies, pages, benchmarks and their engines are not installed.
 
 include(CMakePackageConfigHelpers)
 
-get_property(libraries GLOBAL PROPERTY TISSUEWARP_LIBRARIES)
-install(TARGETS ${libraries} EXPORT tissuewarpTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+configure_file(${PROJECT_SOURCE_DIR}/core/version.hpp.in ${PROJECT_BINARY_DIR}/generated/version.hpp @ONLY)
+
+# The public face of each library, and what its headers include.
+file(GLOB_RECURSE headers RELATIVE ${PROJECT_SOURCE_DIR} CONFIGURE_DEPENDS
+  ${PROJECT_SOURCE_DIR}/core/*.hpp ${PROJECT_SOURCE_DIR}/meshing/*.hpp ${PROJECT_SOURCE_DIR}/shaders/*.hpp
+  ${PROJECT_SOURCE_DIR}/tled/*.hpp ${PROJECT_SOURCE_DIR}/imaging/*.hpp)
+list(FILTER headers EXCLUDE REGEX "^[a-z]+/[a-z_]+/")  # rooms are not public
+set(components tled)
+set(tled_targets core shaders meshing tled)
+if(TISSUEWARP_COMPONENTS STREQUAL "all")
+  list(APPEND components registration)
+  set(registration_targets imaging mesher hdf5 registration)
+  list(APPEND headers ${TISSUEWARP_REGISTRATION_HEADERS})
+endif()
+
+string(REPLACE ";" "|" header_argument "${headers};${PROJECT_BINARY_DIR}/generated/version.hpp")
+install(CODE "execute_process(COMMAND \"${CMAKE_COMMAND}\" \"-DROOT=${PROJECT_SOURCE_DIR}\"
+  \"-DHEADERS=${header_argument}\"
+  \"-DDESTINATION=\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_INCLUDEDIR}/tissuewarp\"
+  -P \"${PROJECT_SOURCE_DIR}/cmake/InstallHeaders.cmake\" COMMAND_ERROR_IS_FATAL ANY)")
 if(TARGET tissuewarp_app)
   install(TARGETS tissuewarp_app RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 endif()
 
-foreach(folder core imaging meshing shaders tled simulation registration report study)
-  if(TARGET tissuewarp_${folder})
-    install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/
-      DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tissuewarp/${folder}
-      FILES_MATCHING PATTERN "*.hpp" PATTERN "detail" EXCLUDE)
-  endif()
-endforeach()
-
 set(config_dir ${CMAKE_INSTALL_LIBDIR}/cmake/tissuewarp)
-install(EXPORT tissuewarpTargets NAMESPACE tissuewarp:: DESTINATION ${config_dir})
+foreach(component ${components})
+  list(TRANSFORM ${component}_targets PREPEND tissuewarp_ OUTPUT_VARIABLE libraries)
+  install(TARGETS ${libraries} EXPORT tissuewarp_${component} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(EXPORT tissuewarp_${component} NAMESPACE tissuewarp:: DESTINATION ${config_dir}
+    FILE tissuewarp_${component}.cmake)
+endforeach()
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/tissuewarpConfig.cmake.in
   ${PROJECT_BINARY_DIR}/tissuewarpConfig.cmake INSTALL_DESTINATION ${config_dir})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/tissuewarpConfigVersion.cmake

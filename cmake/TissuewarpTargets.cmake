@@ -28,12 +28,10 @@ function(tissuewarp_library name)
   set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
   target_include_directories(${target} PUBLIC
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
-    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
-    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/tissuewarp>)
+    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_compile_features(${target} PUBLIC cxx_std_20)
   target_link_libraries(${target} PUBLIC ${ARG_PUBLIC}
     PRIVATE ${ARG_PRIVATE} $<BUILD_INTERFACE:tissuewarp_warnings>)
-  set_property(GLOBAL APPEND PROPERTY TISSUEWARP_LIBRARIES ${target})
 endfunction()
 
 # tissuewarp_test(<name> SOURCES … LIBS … [TIMEOUT seconds] [LABELS …]): a GoogleTest program; every TEST is a ctest test,

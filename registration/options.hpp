@@ -1,8 +1,6 @@
 #pragma once
 /// What an update may be told, with the defaults that were chosen on phantoms (docs/method.md).
 
-#include "registration/matching/image_matching.hpp"
-#include "registration/pose/alignment.hpp"
 #include "tled/equilibrium.hpp"
 
 #include <Eigen/Core>
@@ -10,6 +8,55 @@
 #include <vector>
 
 namespace tissuewarp::registration {
+
+struct FeatureOptions {
+    int count = 5000;              ///< most points returned; fewer when the organ is too small to spread them
+    double margin_mm = 2.0;        ///< points up to this far outside the mask: the organ's own surface is an edge
+    double grid_spacing_mm = 1.0;  ///< structure is looked at on a grid of at most this spacing
+    double gradient_mm = 1.0;      ///< standard deviation of the smoothing before the gradient
+    double window_mm = 2.0;        ///< standard deviation of the window over gradient products
+};
+
+/// What of the moving image is compared, and on which grids: MIND-SSC descriptors (Heinrich et al., MICCAI 2013), alike
+/// in any pair of modalities.
+struct TemplateOptions {
+    double grid_spacing_mm = 1.0;  ///< isotropic working grid of the last level; every level before doubles it
+    int levels = 3;                ///< 4, 2, 1 mm
+    int block_radius = 4;          ///< voxels of the level's grid: blocks of 36, 18 and 9 mm
+};
+
+struct ImageModelOptions {
+    FeatureOptions features;
+    TemplateOptions blocks;
+};
+
+/// How a model is placed rigidly.
+struct AlignmentOptions {
+    double trim_mm = 8.0;           ///< distances beyond this count as this much: what deformed does not drag the pose
+    double start_angle_deg = 30.0;  ///< the search starts from rotations of up to this angle about each axis
+    int samples = 6000;             ///< boundary points used, half from each image
+};
+
+/// Which points are searched on the finest grid: all; or those alone that lie too near the border of what the moving
+/// image shows to be described, where dense searches are to follow, which say nothing there.
+enum class FinestGrid { AllPoints, UndescribedPoints };
+
+struct BlockMatchingOptions {
+    int skipped_levels = 0;  ///< coarse levels left out: a prediction good to a few mm needs none of them
+    FinestGrid finest = FinestGrid::AllPoints;
+    double search_mm = 16.0;       ///< range of the first level about the predicted position, along each axis
+    double least_share = 0.05;     ///< share of a block that both images must show
+    double back_match_voxels = 1;  ///< standard deviation of the back-match error in the confidence
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< moving → fixed, that the predicted positions contain
+};
+
+struct ConsistencyOptions {
+    int neighbours = 24;             ///< matches around each that must tell the same story
+    double trimmed_share = 0.4;      ///< of the neighbours, left out of each fit
+    double least_confidence = 0.15;  ///< matches below it are dropped, and vouch for none
+    double most_residual_mm = 2.0;   ///< matches further from their neighbours' story are outliers; so are those
+                                     ///< whose neighbours are that far from any story (median)
+};
 
 enum class Device { Auto, Cpu, Gpu };
 

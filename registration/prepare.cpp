@@ -9,6 +9,7 @@
 
 #include "imaging/labels.hpp"
 #include "registration/boundary/surroundings.hpp"
+#include "registration/matching/image_matching.hpp"
 
 #include <cmath>
 
@@ -93,7 +94,7 @@ PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_label
     make_ready(stiffness);
     times.push_back({"rest stiffness", stopwatch.lap()});
     return {std::move(model),     std::move(organ), options,      std::move(interfaces), std::move(rest),
-            std::move(stiffness), std::move(times), std::nullopt, std::move(neighbours), nullptr};
+            std::move(stiffness), std::move(times), nullptr, std::move(neighbours), nullptr};
 }
 
 PreparedModel with_materials(PreparedModel prepared, const tled::MaterialTable& materials) {
@@ -112,7 +113,8 @@ void prepare_image(PreparedModel& prepared, const imaging::Volume& moving, const
     observer.checkpoint("feature points", 0.0);
     const FeaturePoints features =
         select_feature_points(moving, imaging::mask_of_all(prepared.labels), options.features);
-    prepared.image = ImageModel{moving, MatchingTemplate(moving, features.points, options.blocks)};
+    prepared.image = std::make_shared<const ImageModel>(
+        ImageModel{moving, MatchingTemplate(moving, features.points, options.blocks)});
     prepared.times.push_back({"feature points", stopwatch.lap()});
 }
 

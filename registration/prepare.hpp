@@ -5,7 +5,7 @@
 #include "imaging/volume.hpp"
 #include "meshing/mesher.hpp"
 #include "registration/boundary/interfaces.hpp"
-#include "registration/matching/image_matching.hpp"
+#include "registration/options.hpp"
 #include "registration/stage_time.hpp"
 #include "tled/model.hpp"
 #include "tled/rest_stiffness.hpp"
@@ -52,15 +52,7 @@ struct PrepareOptions {
 void require_surroundings(const imaging::Volume& moving_labels, const PrepareOptions& options);
 
 /// What the preoperative image shows of the tissue, to be found again in a bare intraoperative volume.
-struct ImageModel {
-    imaging::Volume image;
-    MatchingTemplate blocks;
-};
-
-struct ImageModelOptions {
-    FeatureOptions features;
-    TemplateOptions blocks;
-};
+struct ImageModel;
 
 /// Bone and the like about the organ, on the grid of the preoperative label map.
 struct RigidNeighbours {
@@ -77,7 +69,7 @@ struct PreparedModel {
     tled::RestState rest;
     tled::RestStiffness stiffness;  ///< K₀ with all interface springs at full weight
     std::vector<StageTime> times;
-    std::optional<ImageModel> image;  ///< see prepare_image
+    std::shared_ptr<const ImageModel> image;  ///< see prepare_image; null without
     std::optional<RigidNeighbours> neighbours;
     std::unique_ptr<PreparedModel> coarse;  ///< of the same organ, see prepare_loads
 };

@@ -1,5 +1,6 @@
 #include "registration/prepared_io.hpp"
 
+#include "registration/matching/image_matching.hpp"
 #include "registration/io/stored_model.hpp"
 #include "registration/loads/coarse_twin.hpp"
 #include "registration/terms/anchors.hpp"
@@ -159,7 +160,7 @@ PreparedModel read_prepared(const std::filesystem::path& path, Observer& observe
     if (!(options.data_stiffness > 0) || !(options.tangential_ratio > 0))
         throw InvalidInput("'" + path.string() + "': the stiffness of the data must be positive");
     PreparedModel prepared = prepare(std::move(model.mesh), read_label_map(file), options, observer);
-    if (file.holds(image)) prepared.image = read_image(file);
+    if (file.holds(image)) prepared.image = std::make_shared<const ImageModel>(read_image(file));
     if (file.holds(coarse_mesh)) read_coarse_model(file, path, prepared, observer);
     return prepared;
 }

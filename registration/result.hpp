@@ -2,7 +2,6 @@
 /// What an update found, and what it says of it.
 
 #include "registration/deformation.hpp"
-#include "registration/pose/alignment.hpp"
 #include "registration/stage_time.hpp"
 #include "tled/conditions.hpp"
 
@@ -11,6 +10,11 @@
 #include <vector>
 
 namespace tissuewarp::registration {
+
+struct Alignment {
+    Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();  ///< moving → fixed
+    double mean_distance_mm = 0;  ///< mean truncated distance of the boundaries, with the fitted change of size
+};
 
 /// What a round of correspondence and equilibrium did.
 struct Round {

@@ -5,6 +5,7 @@
 
 #include "core/observer.hpp"
 #include "imaging/volume.hpp"
+#include "registration/options.hpp"
 
 #include <Eigen/Core>
 
@@ -12,14 +13,6 @@
 #include <vector>
 
 namespace tissuewarp::registration {
-
-struct FeatureOptions {
-    int count = 5000;              ///< most points returned; fewer when the organ is too small to spread them
-    double margin_mm = 2.0;        ///< points up to this far outside the mask: the organ's own surface is an edge
-    double grid_spacing_mm = 1.0;  ///< structure is looked at on a grid of at most this spacing
-    double gradient_mm = 1.0;      ///< standard deviation of the smoothing before the gradient
-    double window_mm = 2.0;        ///< standard deviation of the window over gradient products
-};
 
 /// Feature points, LPS mm (3 × N), and their structure tensors G * (∇I ∇Iᵀ) in LPS, (intensity/mm)².
 struct FeaturePoints {
@@ -34,14 +27,6 @@ struct FeaturePoints {
 /// in it.
 FeaturePoints select_feature_points(const imaging::Volume& image, const imaging::Volume& mask,
                                     const FeatureOptions& options = {});
-
-/// What of the moving image is compared, and on which grids: MIND-SSC descriptors (Heinrich et al., MICCAI 2013), alike
-/// in any pair of modalities.
-struct TemplateOptions {
-    double grid_spacing_mm = 1.0;  ///< isotropic working grid of the last level; every level before doubles it
-    int levels = 3;                ///< 4, 2, 1 mm
-    int block_radius = 4;          ///< voxels of the level's grid: blocks of 36, 18 and 9 mm
-};
 
 namespace detail {
 struct TemplateImages;
@@ -64,17 +49,10 @@ private:
     std::shared_ptr<const detail::TemplateImages> images_;
 };
 
-/// Which points are searched on the finest grid: all; or those alone that lie too near the border of what the moving
-/// image shows to be described, where dense searches are to follow, which say nothing there.
-enum class FinestGrid { AllPoints, UndescribedPoints };
-
-struct BlockMatchingOptions {
-    int skipped_levels = 0;  ///< coarse levels left out: a prediction good to a few mm needs none of them
-    FinestGrid finest = FinestGrid::AllPoints;
-    double search_mm = 16.0;       ///< range of the first level about the predicted position, along each axis
-    double least_share = 0.05;     ///< share of a block that both images must show
-    double back_match_voxels = 1;  ///< standard deviation of the back-match error in the confidence
-    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< moving → fixed, that the predicted positions contain
+/// What the preoperative image shows of the tissue, to be found again in a bare intraoperative volume.
+struct ImageModel {
+    imaging::Volume image;
+    MatchingTemplate blocks;
 };
 
 /// A block of the moving image found in the fixed one.
@@ -101,14 +79,6 @@ struct BlockMatch {
 std::vector<BlockMatch> match_blocks(const MatchingTemplate& moving, const imaging::Volume& fixed,
                                      const Eigen::Matrix3Xd& predicted, const BlockMatchingOptions& options = {},
                                      Observer& observer = silent_observer());
-
-struct ConsistencyOptions {
-    int neighbours = 24;             ///< matches around each that must tell the same story
-    double trimmed_share = 0.4;      ///< of the neighbours, left out of each fit
-    double least_confidence = 0.15;  ///< matches below it are dropped, and vouch for none
-    double most_residual_mm = 2.0;   ///< matches further from their neighbours' story are outliers; so are those
-                                     ///< whose neighbours are that far from any story (median)
-};
 
 /// The matches that agree with a local affine motion of their neighbours, fitted by least trimmed squares (Rousseeuw
 /// 1984, concentration steps of Rousseeuw and Van Driessen 2006). Residuals are taken along what the blocks show: a

@@ -4,6 +4,7 @@
 
 #include "registration/matching/blocks/block_search.hpp"
 #include "registration/matching/dense/dense_search.hpp"
+#include "registration/matching/image_matching.hpp"
 #include "registration/options.hpp"
 #include "registration/prepare.hpp"
 

@@ -1,5 +1,6 @@
 #include "registration/terms/image.hpp"
 
+#include "registration/matching/image_matching.hpp"
 #include "registration/pose/least_trimmed_motion.hpp"
 #include "registration/search/near_points.hpp"
 #include "registration/uncertainty/doubts.hpp"

@@ -4,7 +4,7 @@
 #include "registration/loads/white_noise.hpp"
 #include "registration/pose/rigid_part.hpp"
 #include "registration/terms/ground.hpp"
-#include "registration/uncertainty/posterior_error.hpp"
+#include "registration/uncertainty/expected_error.hpp"
 #include "tled/reference.hpp"
 
 #include <Eigen/Cholesky>

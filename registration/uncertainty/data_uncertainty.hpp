@@ -1,7 +1,7 @@
 #pragma once
 /// What data and tissue leave open: part of the error estimate.
 
-#include "registration/uncertainty/expected_error.hpp"
+#include "registration/uncertainty.hpp"
 #include "registration/uncertainty/posterior.hpp"
 
 #include <Eigen/Core>

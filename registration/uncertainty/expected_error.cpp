@@ -1,4 +1,4 @@
-#include "registration/uncertainty/posterior_error.hpp"
+#include "registration/uncertainty/expected_error.hpp"
 
 #include "core/errors.hpp"
 

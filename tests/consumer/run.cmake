@@ -1,15 +1,43 @@
-# Installs tissuewarp, then configures, builds and runs the consumer against the installed package.
+# Installs tissuewarp, then configures, builds and runs against the installed package what users would write: the tutorial
+# of examples/navigation on the head of data/brainshift, and a program that takes the solver alone.
 #     cmake -DBUILD=<build folder> -DSOURCE=<source folder> -P run.cmake
 set(prefix ${BUILD}/consumer/prefix)
 file(REMOVE_RECURSE ${BUILD}/consumer)
 function(run)
-  execute_process(COMMAND ${ARGV} RESULT_VARIABLE status)
+  execute_process(COMMAND ${ARGV} RESULT_VARIABLE status OUTPUT_VARIABLE said WORKING_DIRECTORY ${BUILD})
+  message("${said}")
   if(NOT status EQUAL 0)
     message(FATAL_ERROR "failed: ${ARGV}")
   endif()
+  set(said "${said}" PARENT_SCOPE)
 endfunction()
+function(build source name)
+  run(${CMAKE_COMMAND} -S ${source} -B ${BUILD}/consumer/${name} -G Ninja -DCMAKE_BUILD_TYPE=Release
+    -DCMAKE_PREFIX_PATH=${prefix})
+  run(${CMAKE_COMMAND} --build ${BUILD}/consumer/${name})
+endfunction()
+
 run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${prefix})
-run(${CMAKE_COMMAND} -S ${SOURCE}/tests/consumer -B ${BUILD}/consumer/build -G Ninja
-  -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH=${prefix})
-run(${CMAKE_COMMAND} --build ${BUILD}/consumer/build)
-run(${BUILD}/consumer/build/consumer)
+file(GLOB_RECURSE headers ${prefix}/include/tissuewarp/*.hpp)
+foreach(header ${headers})
+  file(STRINGS ${header} unprefixed REGEX "#include \"(core|imaging|meshing|shaders|tled|simulation|registration)/")
+  if(unprefixed)
+    message(FATAL_ERROR "${header} includes without the project's name: ${unprefixed}")
+  endif()
+endforeach()
+file(GLOB_RECURSE inner ${prefix}/include/tissuewarp/study/* ${prefix}/include/tissuewarp/report/*
+  ${prefix}/include/tissuewarp/registration/terms/*)
+if(inner)
+  message(FATAL_ERROR "installed, but for nobody to include: ${inner}")
+endif()
+
+build(${SOURCE}/tests/consumer solver)
+run(${BUILD}/consumer/solver/solver)
+build(${SOURCE}/examples/navigation navigation)
+set(head ${SOURCE}/data/brainshift)
+run(${BUILD}/consumer/navigation/navigation ${head}/preop.nii.gz ${head}/preop_labels.nii.gz ${head}/intraop.nii.gz
+  ${head}/intraop_surface.ply)
+# The truth, landmarks.csv: this target moved by 5.2 mm.
+if(NOT said MATCHES "image: [^\n]* moved 5\\.[0-4] mm" OR NOT said MATCHES "surface: [^\n]* moved [3-6]\\.[0-9] mm")
+  message(FATAL_ERROR "the example's targets are wrong: ${said}")
+endif()

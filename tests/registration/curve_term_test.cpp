@@ -4,7 +4,7 @@
 #include "core/errors.hpp"
 #include "registration/field.hpp"
 #include "registration/pose/curve_pose.hpp"
-#include "registration/uncertainty/expected_error.hpp"
+#include "registration/uncertainty.hpp"
 #include "tests/registration/numbers.hpp"
 #include "tests/registration/shapes.hpp"
 #include "tests/support/label_shapes.hpp"

@@ -1,0 +1,11 @@
+#pragma once
+/// All that a program needs to prepare a patient's model, register it during the operation and use the result.
+
+#include "registration/evaluation.hpp"
+#include "registration/field.hpp"
+#include "registration/gpu_warp.hpp"
+#include "registration/prepared_io.hpp"
+#include "registration/record.hpp"
+#include "registration/uncertainty.hpp"
+#include "registration/update.hpp"
+#include "registration/warp.hpp"
