@@ -60,7 +60,6 @@ ProgressLine::~ProgressLine() {
 
 void ProgressLine::begin(const std::string& stage, double from, double to) {
     {
-        const std::lock_guard lock(mutex_);
         stage_ = stage;
         from_ = from;
         to_ = to;
@@ -73,14 +72,12 @@ void ProgressLine::begin(const std::string& stage, double from, double to) {
 
 void ProgressLine::progress(std::string_view stage, double fraction) {
     const auto [from, to] = share_of(stage);
-    const std::lock_guard lock(mutex_);
     const double part = from + (to - from) * std::clamp(fraction, 0.0, 1.0);
     done_ = std::max(done_, from_ + (to_ - from_) * part);  // never backwards
     draw();
 }
 
 void ProgressLine::note(std::string_view message) {
-    const std::lock_guard lock(mutex_);
     notes_.emplace_back(message);
 }
 
@@ -97,7 +94,6 @@ void ProgressLine::draw() {
 }
 
 void ProgressLine::clear() {
-    const std::lock_guard lock(mutex_);
     if (!dirty_) return;
     fmt::print(terminal_, "\r\x1b[K");
     std::fflush(terminal_);

@@ -5,7 +5,6 @@
 
 #include <chrono>
 #include <cstdio>
-#include <mutex>
 #include <string>
 #include <vector>
 
@@ -49,7 +48,6 @@ private:
     using Clock = std::chrono::steady_clock;
     std::FILE* terminal_ = nullptr;  // standard error of its own, which SilencedStandardError leaves alone; or null
     bool dirty_ = false;
-    std::mutex mutex_;
     std::string stage_;
     double from_ = 0, to_ = 0, done_ = 0;
     Clock::time_point start_ = Clock::now(), last_{};

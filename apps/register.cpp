@@ -221,7 +221,7 @@ void run_register(const RegisterOptions& options) {
     progress.begin("writing and scoring", 0.65, 0.88);
     auto silenced = std::make_unique<SilencedStandardError>();
     tbb::task_group writing;  // compression takes one core per file; the scores run beside it
-    start_writing(run, *output, writing, progress);
+    start_writing(run, *output, writing);
     run.scores = score(run);
     run.times.push_back(clock.lap("score"));
     writing.wait();

@@ -1,6 +1,7 @@
 #include "apps/register_outputs.hpp"
 
 #include "apps/point_files.hpp"
+#include "apps/progress.hpp"
 #include "apps/report_json.hpp"
 #include "apps/versions.hpp"
 #include "meshing/mesh_io.hpp"
@@ -11,7 +12,6 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -130,15 +130,12 @@ std::vector<std::string> output_names(const RegisterOptions& options) {
     return names;
 }
 
-void start_writing(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks, Observer& observer) {
-    const auto written = std::make_shared<std::atomic<int>>(0);
-    const double file_count = static_cast<double>(output_names(run.options).size()) - 3;  // without the reports
+void start_writing(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks) {
     const auto start = [&](const std::string& name, auto write) {
-        tasks.run([=, &output, &observer, path = output.path(name)] {
-            if (observer.cancel_requested()) throw Cancelled();
+        tasks.run([=, &output, path = output.path(name)] {
+            if (interrupted()) throw Cancelled();
             try {
                 write(path);
-                observer.progress("writing", double(++*written) / file_count);
             } catch (const IoError& error) {
                 throw IoError(output.in_words(error.what()));
             }

@@ -17,7 +17,7 @@ std::vector<std::string> output_names(const RegisterOptions& options);
 
 /// Starts one task per file for images, fields, mesh, points and record; `run` and `output` must outlive `tasks`.
 /// wait() on the tasks rethrows the first IoError, or Cancelled.
-void start_writing(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks, Observer& observer);
+void start_writing(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks);
 
 /// report.json, preview.png and report.html.
 void write_reports(const RegistrationRun& run, const nlohmann::json& report, const OutputFolder& output);

@@ -12,7 +12,7 @@ class Observer {
 public:
     virtual ~Observer() = default;
 
-    /// `stage` names what runs, `fraction` in [0, 1] says how much of it is done. Called from the calling thread.
+    /// `stage` names what runs, `fraction` in [0, 1] says how much of it is done. Called by the thread that called the library.
     virtual void progress(std::string_view /*stage*/, double /*fraction*/) {}
 
     /// One line worth telling a person: a choice made, a doubt. Not for progress.

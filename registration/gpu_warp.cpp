@@ -77,8 +77,8 @@ Volume in_words(const Volume& image, Interpolation interpolation) {
     return image.as(interpolation == Interpolation::Nearest ? CV_32S : CV_32F);
 }
 
-std::span<std::uint32_t> words_of(Volume& volume) {
-    return {reinterpret_cast<std::uint32_t*>(volume.voxels.data), volume.voxels.total()};
+std::span<const std::byte> bytes_of(const Volume& volume) {
+    return std::as_bytes(std::span(volume.voxels.data, volume.voxels.total() * volume.voxels.elemSize()));
 }
 
 /// Calls copy(first voxel, voxels) for every slice, in parallel: one core alone takes longer over an image than the
@@ -151,7 +151,7 @@ struct GpuWarp::Impl {
         corners.emplace(device, detail::corners_of(mesh), "nodes of elements");
         portions.emplace(device, parts, "portions of elements");
         owner.emplace(device, voxels, "elements of voxels");
-        moving.emplace(device, words_of(words), "moving image");
+        moving.emplace(device, bytes_of(words), "moving image");
         result.emplace(device, voxels, "warped image");
         counts.emplace(device, 1, "counts of elements");
         readback.emplace(device, result->bytes(), "the warped image on its way down");
@@ -305,9 +305,10 @@ Volume GpuWarp::field(const Eigen::Matrix3Xd& displacement, const Eigen::Isometr
     Volume result = detail::uninitialised(impl.output, CV_32FC3);
     auto* to = result.data<cv::Vec3f>();
     for (int c = 0; c < 3; ++c) {
-        const auto* from = reinterpret_cast<const float*>(impl.resample(program, static_cast<std::uint32_t>(c)));
-        copy_slices(impl.output, [&](std::size_t first, std::size_t count) {
-            for (std::size_t voxel = first; voxel < first + count; ++voxel) to[voxel][c] = from[voxel];
+        copy_slices(impl.output, [&, from = impl.resample(program, static_cast<std::uint32_t>(c))](std::size_t first,
+                                                                                                   std::size_t count) {
+            for (std::size_t voxel = first; voxel < first + count; ++voxel)
+                std::memcpy(&to[voxel][c], from + sizeof(float) * voxel, sizeof(float));
         });
     }
     impl.finish_report();

@@ -48,6 +48,27 @@ void make_ready(const tled::RestStiffness& stiffness) {
     (void)stiffness.approximate_lowest_eigenvalue();
 }
 
+/// Precondition: require_surroundings.
+PreparedModel of_mesh(meshing::TetMesh mesh, const imaging::Volume& moving_labels, const PrepareOptions& options,
+                      Observer& observer) {
+    detail::Stopwatch stopwatch;
+    std::vector<StageTime> times;
+    imaging::Volume organ = imaging::without_labels(moving_labels, options.rigid_neighbours);
+    std::optional<RigidNeighbours> neighbours = detail::rigid_neighbours(moving_labels, options.rigid_neighbours);
+    tled::Model model = model_of(std::move(mesh), options);
+    tled::RestState rest = tled::rest_state(model);
+    Interfaces interfaces(model.mesh);
+    measure_offsets(interfaces, model.mesh, LabelBoundaryField(organ, interfaces.thickness(model.mesh)));
+    times.push_back({"rest state", stopwatch.lap()});
+    observer.checkpoint("rest stiffness", 0.0);
+    const auto springs = label_conditions(interfaces, options, rest.node_count);
+    tled::RestStiffness stiffness(rest, springs);
+    make_ready(stiffness);
+    times.push_back({"rest stiffness", stopwatch.lap()});
+    return {std::move(model),     std::move(organ), options, std::move(interfaces), std::move(rest),
+            std::move(stiffness), std::move(times), nullptr, std::move(neighbours), nullptr};
+}
+
 }  // namespace
 
 double organ_size(const imaging::Volume& labels) {
@@ -71,7 +92,7 @@ PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions
     detail::Stopwatch stopwatch;
     meshing::TetMesh mesh = meshing::mesh_labels(organ, options.meshing, observer);
     const StageTime meshing_time{"meshing", stopwatch.lap()};
-    PreparedModel prepared = prepare(std::move(mesh), moving_labels, options, observer);
+    PreparedModel prepared = of_mesh(std::move(mesh), moving_labels, options, observer);
     prepared.times.insert(prepared.times.begin(), meshing_time);
     return prepared;
 }
@@ -79,22 +100,7 @@ PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions
 PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_labels, const PrepareOptions& options,
                       Observer& observer) {
     require_surroundings(moving_labels, options);
-    detail::Stopwatch stopwatch;
-    std::vector<StageTime> times;
-    imaging::Volume organ = imaging::without_labels(moving_labels, options.rigid_neighbours);
-    std::optional<RigidNeighbours> neighbours = detail::rigid_neighbours(moving_labels, options.rigid_neighbours);
-    tled::Model model = model_of(std::move(mesh), options);
-    tled::RestState rest = tled::rest_state(model);
-    Interfaces interfaces(model.mesh);
-    measure_offsets(interfaces, model.mesh, LabelBoundaryField(organ, interfaces.thickness(model.mesh)));
-    times.push_back({"rest state", stopwatch.lap()});
-    observer.checkpoint("rest stiffness", 0.0);
-    const auto springs = label_conditions(interfaces, options, rest.node_count);
-    tled::RestStiffness stiffness(rest, springs);
-    make_ready(stiffness);
-    times.push_back({"rest stiffness", stopwatch.lap()});
-    return {std::move(model),     std::move(organ), options,      std::move(interfaces), std::move(rest),
-            std::move(stiffness), std::move(times), nullptr, std::move(neighbours), nullptr};
+    return of_mesh(std::move(mesh), moving_labels, options, observer);
 }
 
 PreparedModel with_materials(PreparedModel prepared, const tled::MaterialTable& materials) {

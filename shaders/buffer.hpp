@@ -60,6 +60,13 @@ public:
         const CurrentContext current = device.make_current();
         upload(values);
     }
+    /// Of values that lie in memory under another type, four voxels a word or floats that the device takes as bits.
+    Buffer(const Device& device, std::span<const std::byte> bytes, std::string what)
+        requires(!std::is_same_v<T, std::byte>)
+        : StorageBuffer(device, bytes.size(), std::move(what)), size_(bytes.size() / sizeof(T)) {
+        const CurrentContext current = device.make_current();
+        write(0, bytes);
+    }
 
     [[nodiscard]] std::size_t size() const { return size_; }
     void upload(std::span<const T> values, std::size_t first = 0) { write(first * sizeof(T), std::as_bytes(values)); }

@@ -1,6 +1,7 @@
 #include "registration/terms/labels.hpp"
 
 #include "imaging/labels.hpp"
+#include "registration/pose/alignment.hpp"
 #include "registration/terms/label_matches.hpp"
 #include "registration/uncertainty/doubts.hpp"
 

@@ -6,6 +6,8 @@
 #include "registration/prepare.hpp"
 #include "tled/conditions.hpp"
 
+#include <Eigen/Geometry>
+
 #include <vector>
 
 namespace tissuewarp::registration::detail {

@@ -14,6 +14,9 @@
 
 #include <algorithm>
 #include <optional>
+#include <set>
+#include <string>
+#include <thread>
 
 namespace tissuewarp::registration {
 namespace {
@@ -103,6 +106,32 @@ TEST(Solver, HalvesTheStepFourTimes) {
     const Matrix3Xd start = Matrix3Xd::Zero(3, prepared.rest.node_count);
     EXPECT_THROW((void)solver.solve(conditions, start, silent_observer()), SolverFailure);
     EXPECT_EQ(steps, (std::vector<double>{6, 3, 1.5, 0.75, 0.375}));
+}
+
+// What an observer is told, it is told by the thread that called: it may draw, and needs no lock.
+TEST(Updater, ProgressComesOnTheCallersThread) {
+    struct Caller : Observer {
+        std::thread::id thread = std::this_thread::get_id();
+        std::set<std::string, std::less<>> stages;
+        int elsewhere = 0;
+        void progress(std::string_view stage, double) override {
+            stages.emplace(stage);
+            elsewhere += std::this_thread::get_id() != thread;
+        }
+        bool cancel_requested() override {
+            elsewhere += std::this_thread::get_id() != thread;
+            return false;
+        }
+    } caller;
+    const imaging::Volume labels = shapes::organ_labels({});
+    PrepareOptions options;
+    options.meshing.edge_length = 10;
+    const PreparedModel prepared = prepare(labels, options, caller);
+    const UpdateResult result = update(prepared, {.labels = labels}, on_cpu(), caller);
+    (void)uncertainty(prepared, result, {}, caller);
+    EXPECT_EQ(caller.elsewhere, 0);
+    for (const char* stage : {"meshing", "rest stiffness", "rigid alignment", "registration", "error estimate"})
+        EXPECT_TRUE(caller.stages.contains(stage)) << stage;
 }
 
 // The updater shares the model: it lives as long as the updater needs it.

@@ -103,9 +103,9 @@ MatchLayout match_layout(const meshing::TetMesh& mesh, const MatchingImage& movi
     return layout;
 }
 
-std::span<const std::uint32_t> words_of(const MatchingImage& image) {
+std::span<const std::byte> words_of(const MatchingImage& image) {
     static_assert(descriptor_channels == 12, "three words of four channels");
-    return {reinterpret_cast<const std::uint32_t*>(image.descriptors.get()), 3 * image.seen.size()};
+    return std::as_bytes(std::span(image.descriptors.get(), descriptor_channels * image.seen.size()));
 }
 
 }  // namespace tissuewarp::registration::detail

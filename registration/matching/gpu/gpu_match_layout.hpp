@@ -61,6 +61,6 @@ struct MatchLayout {
 MatchLayout match_layout(const meshing::TetMesh& mesh, const MatchingImage& moving);
 
 /// Its descriptors, three words a voxel.
-std::span<const std::uint32_t> words_of(const MatchingImage& image);
+std::span<const std::byte> words_of(const MatchingImage& image);
 
 }  // namespace tissuewarp::registration::detail
