@@ -1,12 +1,15 @@
-"""Properties of the degraded volume, on a small head made here: view, slices, noise, contrast, repeatability."""
+"""Properties of the degraded volume, on a small head made here: view, slices, noise, contrast, repeatability. And that the
+one of the repository, which tests register to, is what the comparison makes of the complete volume."""
 
 import pathlib
 import sys
+import tempfile
 import unittest
 
 import numpy
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "scripts"))
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "scripts"))
 from study import degrade, fields
 
 SHAPE = (72, 80, 61)  # 61: one voxel is left over after slices of three
@@ -79,6 +82,16 @@ class Degraded(unittest.TestCase):
         numpy.testing.assert_array_equal(again, self.image)
         other, _, _ = degrade.degrade(self.voxels, AFFINE, self.brain, self.centre, seed=21)
         self.assertGreater((other != self.image)[self.view].mean(), 0.5)
+
+    def test_the_repository_holds_what_is_compared(self):
+        head = ROOT / "data" / "brainshift"
+        with tempfile.TemporaryDirectory() as folder:
+            image, view = (pathlib.Path(folder) / name for name in ("image.nii.gz", "view.nii.gz"))
+            degrade.degrade_files(head / "intraop.nii.gz", head / "intraop_labels.nii.gz", head / "intraop_surface.ply", image, view)
+            voxels, affine = fields.read_image(image)
+            kept, kept_affine = fields.read_image(head / "intraop_degraded.nii.gz")
+            numpy.testing.assert_array_equal(kept, voxels)
+            numpy.testing.assert_array_equal(kept_affine, affine)
 
 
 if __name__ == "__main__":
