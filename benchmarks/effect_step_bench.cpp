@@ -14,7 +14,6 @@
 #include "meshing/mesh_io.hpp"
 #include "meshing/primitives.hpp"
 #include "tled/reference.hpp"
-#include "tled/step_shape_cache.hpp"
 
 #include <Eigen/Geometry>
 

@@ -107,7 +107,6 @@ constexpr Row rows[] = {{"L-BFGS, metric K0", tled::EquilibriumMethod::Lbfgs, fa
                         {"L-BFGS, metric renewed", tled::EquilibriumMethod::Lbfgs, true},
                         {"dynamic relaxation", tled::EquilibriumMethod::DynamicRelaxation, false},
                         {"self-checked relaxation", tled::EquilibriumMethod::SelfCheckedRelaxation, false},
-                        {"nonlinear CG", tled::EquilibriumMethod::NonlinearCg, false},
                         {"automatic", tled::EquilibriumMethod::Automatic, false}};
 
 struct Cube {

@@ -12,7 +12,6 @@
 #include "tled/detail/stress_clock.hpp"
 #include "tled/engine.hpp"
 #include "tled/reference.hpp"
-#include "tled/step_shape_cache.hpp"
 
 #include <cmath>
 #include <limits>
@@ -455,14 +454,16 @@ void require_right_forces(Engine& engine, const RestState& rest) {
                          " %: its driver cannot be trusted; take another device or the CPU engine");
 }
 
+GpuStepShape usual_shape(const RestState& rest, int device) {
+    const shaders::Device on(device);
+    if (!on.hardware()) return {};
+    return suggested_gpu_step_shape(rest.element_count(), element_of(rest), on.limits().multiprocessors);
+}
+
 }  // namespace
 
 std::unique_ptr<Engine> make_gpu_engine(const RestState& rest, int device) {
-    const StepDevice on = step_device(device);
-    if (!on.hardware) return make_gpu_engine(rest, device, GpuStepShape{});
-    const StepShapeCache cache = read_step_shape_cache(step_shape_cache_path());
-    return make_gpu_engine(rest, device,
-                           best_known_gpu_step_shape(rest.element_count(), element_of(rest), on, cache).shape);
+    return make_gpu_engine(rest, device, usual_shape(rest, device));
 }
 
 std::unique_ptr<Engine> make_gpu_engine(const RestState& rest, int device, const GpuStepShape& shape) {

@@ -182,6 +182,10 @@ RestState rest_state(const Model& model) {
     return rest;
 }
 
+Element element_of(const RestState& rest) {
+    return rest.pressure.count() > 0 ? Element::AveragedPressureT4 : Element::T4;
+}
+
 bool admits_inversion(const RestState& rest) {
     return std::all_of(rest.materials.begin(), rest.materials.end(),
                        [](const Material& material) { return admits_inversion(material); });

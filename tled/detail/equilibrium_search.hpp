@@ -60,7 +60,6 @@ constexpr double linear_start_safety = 1.5;
 constexpr double least_starting_jacobian = 0.1;
 
 EquilibriumResult lbfgs(EquilibriumSearch& search, const Eigen::Matrix3Xd* start);
-EquilibriumResult nonlinear_cg(EquilibriumSearch& search, const Eigen::Matrix3Xd* start);
 EquilibriumResult dynamic_relaxation(EquilibriumSearch& search, const Eigen::Matrix3Xd* start);
 EquilibriumResult self_checked_relaxation(EquilibriumSearch& search, const Eigen::Matrix3Xd* start);
 

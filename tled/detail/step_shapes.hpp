@@ -1,5 +1,5 @@
 #pragma once
-/// Sizes of patches that suggested, tried and remembered shapes of GPU steps have in common.
+/// Sizes of patches that decide the suggested shapes of GPU steps.
 
 #include "tled/model.hpp"
 
