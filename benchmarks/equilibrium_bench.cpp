@@ -4,6 +4,7 @@
 //     equilibrium_bench [--cells 16|24|12] [--gpu] [--runs N] [tolerance_mm ...]
 
 #include "meshing/primitives.hpp"
+#include "tled/blas_threads.hpp"
 #include "tled/equilibrium.hpp"
 #include "tled/reference.hpp"
 
@@ -177,6 +178,7 @@ void solve_cube(int cells, double poisson, const std::vector<double>& tolerances
 }  // namespace
 
 int main(int argc, char** argv) {
+    tissuewarp::tled::let_solves_take_one_blas_thread(true);
     std::vector<double> tolerances;
     bool gpu = false;
     int only = 0, runs = 3;

@@ -2,6 +2,7 @@
 //   hexahedra_table cantilever | cube
 #include "meshing/hex_primitives.hpp"
 #include "meshing/primitives.hpp"
+#include "tled/blas_threads.hpp"
 #include "tled/reference.hpp"
 
 #include <array>
@@ -100,6 +101,7 @@ void cube(int cells, double coefficient) {
 }  // namespace
 
 int main(int count, char** arguments) {
+    tissuewarp::tled::let_solves_take_one_blas_thread(true);
     const std::string study = count > 1 ? arguments[1] : "cantilever";
     std::printf("coefficient 0: averaged-pressure tetrahedra, six to a cell\n");
     if (study == "cantilever") {

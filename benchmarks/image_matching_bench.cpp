@@ -12,6 +12,7 @@
 #include "registration/alignment.hpp"
 #include "registration/evaluation.hpp"
 #include "registration/image_matching.hpp"
+#include "tled/blas_threads.hpp"
 
 #include <Eigen/Eigenvalues>
 
@@ -245,6 +246,7 @@ void run(Arguments arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    tissuewarp::tled::let_solves_take_one_blas_thread(true);
     try {
         run(parse(argc, argv));
     } catch (const std::exception& error) {

@@ -47,7 +47,7 @@ function(tissuewarp_test name)
     set(ARG_LABELS ${name})
   endif()
   add_executable(test_${name} ${ARG_SOURCES})
-  target_link_libraries(test_${name} PRIVATE ${ARG_LIBS} GTest::gmock GTest::gtest_main tissuewarp_warnings)
+  target_link_libraries(test_${name} PRIVATE ${ARG_LIBS} tissuewarp_test_main GTest::gmock tissuewarp_warnings)
   target_compile_definitions(test_${name} PRIVATE
     TISSUEWARP_SOURCE_DIR="${PROJECT_SOURCE_DIR}" TISSUEWARP_BINARY_DIR="${PROJECT_BINARY_DIR}")
   # No test reads what the user has measured on this machine.

@@ -14,7 +14,7 @@
 #include "tled/detail/held_tissue.hpp"
 #include "tled/detail/lowest_mode.hpp"
 #include "tled/detail/parallel_pair.hpp"
-#include "tled/detail/single_blas_thread.hpp"
+#include "tled/blas_threads.hpp"
 #include "tled/detail/smooth_space.hpp"
 #include "tled/detail/springs.hpp"
 #include "tled/detail/stiffness.hpp"

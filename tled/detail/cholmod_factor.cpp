@@ -7,7 +7,7 @@
 #include <string>
 
 #include "core/errors.hpp"
-#include "tled/detail/single_blas_thread.hpp"
+#include "tled/blas_threads.hpp"
 
 namespace tissuewarp::tled::detail {
 

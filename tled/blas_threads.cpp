@@ -1,13 +1,15 @@
-#include "tled/detail/single_blas_thread.hpp"
+#include "tled/blas_threads.hpp"
 
 #include <dlfcn.h>
 
+#include <atomic>
 #include <mutex>
 
-namespace tissuewarp::tled::detail {
+namespace tissuewarp::tled {
 
 namespace {
 
+std::atomic<bool> may_change = false;
 std::mutex guard;
 int alive = 0, threads_before = 1;
 
@@ -23,7 +25,14 @@ int threads() {
 
 }  // namespace
 
-SingleBlasThread::SingleBlasThread() {
+void let_solves_take_one_blas_thread(bool allowed) {
+    may_change = allowed;
+}
+
+namespace detail {
+
+SingleBlasThread::SingleBlasThread() : counts_(may_change) {
+    if (!counts_) return;
     const std::lock_guard lock(guard);
     if (alive++ > 0) return;
     threads_before = threads();
@@ -31,8 +40,11 @@ SingleBlasThread::SingleBlasThread() {
 }
 
 SingleBlasThread::~SingleBlasThread() {
+    if (!counts_) return;
     const std::lock_guard lock(guard);
     if (--alive == 0) set_threads(threads_before);
 }
 
-}  // namespace tissuewarp::tled::detail
+}  // namespace detail
+
+}  // namespace tissuewarp::tled
