@@ -6,7 +6,8 @@
 #include "meshing/primitives.hpp"
 #include "tled/blas_threads.hpp"
 #include "tled/equilibrium.hpp"
-#include "tled/reference.hpp"
+#include "tled/internal_force.hpp"
+#include "tled/newton.hpp"
 
 #include <algorithm>
 #include <chrono>

@@ -18,7 +18,7 @@
 #include "meshing/mesh_io.hpp"
 #include "meshing/primitives.hpp"
 #include "shaders/device.hpp"
-#include "tled/reference.hpp"
+#include "tled/internal_force.hpp"
 #include "tled/render_pass_engine.hpp"
 
 #include <algorithm>

@@ -5,7 +5,8 @@
 #include "study/detail/clock.hpp"
 #include "study/reference.hpp"
 #include "tled/load_path.hpp"
-#include "tled/reference.hpp"
+#include "tled/internal_force.hpp"
+#include "tled/newton.hpp"
 #include "tled/rest_stiffness.hpp"
 
 #include <algorithm>

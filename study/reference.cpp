@@ -5,7 +5,8 @@
 #include "core/errors.hpp"
 #include "meshing/point_location.hpp"
 #include "tled/load_path.hpp"
-#include "tled/reference.hpp"
+#include "tled/newton.hpp"
+#include "tled/discrete_energy.hpp"
 #include "tled/rest_stiffness.hpp"
 
 #include <cmath>

@@ -1,7 +1,7 @@
 #include "tled/discrete_energy.hpp"
 
 #include "tled/detail/stiffness.hpp"
-#include "tled/reference.hpp"
+#include "tled/internal_force.hpp"
 
 namespace tissuewarp::tled {
 

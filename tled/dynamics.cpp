@@ -11,7 +11,7 @@
 #include "core/errors.hpp"
 #include "tled/critical_step.hpp"
 #include "tled/detail/springs.hpp"
-#include "tled/reference.hpp"
+#include "tled/internal_force.hpp"
 
 namespace tissuewarp::tled {
 

@@ -11,7 +11,7 @@
 #include "tled/detail/kinematics.hpp"
 #include "tled/detail/stress_clock.hpp"
 #include "tled/engine.hpp"
-#include "tled/reference.hpp"
+#include "tled/internal_force.hpp"
 
 #include <cmath>
 #include <limits>

@@ -1,7 +1,7 @@
 #include "tled/lifted_residual.hpp"
 
 #include "tled/detail/springs.hpp"
-#include "tled/reference.hpp"
+#include "tled/internal_force.hpp"
 
 namespace tissuewarp::tled {
 

@@ -1,9 +1,11 @@
+#include "tled/newton.hpp"
 #include "core/errors.hpp"
 #include "tled/detail/cholmod_factor.hpp"
 #include "tled/detail/held_tissue.hpp"
 #include "tled/detail/springs.hpp"
 #include "tled/detail/stiffness.hpp"
-#include "tled/reference.hpp"
+#include "tled/discrete_energy.hpp"
+#include "tled/internal_force.hpp"
 
 #include <cmath>
 #include <memory>

@@ -2,7 +2,8 @@
 
 #include "core/errors.hpp"
 #include "meshing/mesher.hpp"
-#include "tled/reference.hpp"
+#include "tled/internal_force.hpp"
+#include "tled/newton.hpp"
 
 #include <Eigen/LU>
 

@@ -9,7 +9,8 @@
 #include "tled/detail/hierarchical_product.hpp"
 #include "tled/detail/stiffness.hpp"
 #include "tled/quadratic.hpp"
-#include "tled/reference.hpp"
+#include "tled/internal_force.hpp"
+#include "tled/newton.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

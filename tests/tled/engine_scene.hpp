@@ -5,7 +5,8 @@
 #include "meshing/primitives.hpp"
 #include "tled/detail/stress_clock.hpp"
 #include "tled/engine.hpp"
-#include "tled/reference.hpp"
+#include "tled/internal_force.hpp"
+#include "tled/viscous_stresses.hpp"
 
 #include <algorithm>
 #include <array>

@@ -5,7 +5,9 @@
 #include "meshing/hex_primitives.hpp"
 #include "tled/detail/hexahedra.hpp"
 #include "tled/equilibrium.hpp"
+#include "tled/newton.hpp"
 #include "tled/rest_stiffness.hpp"
+#include "tled/tangent_stiffness.hpp"
 
 #include <gmock/gmock.h>
 #include <Eigen/Dense>

@@ -5,7 +5,7 @@
 #include "core/errors.hpp"
 #include "meshing/primitives.hpp"
 #include "tled/equilibrium.hpp"
-#include "tled/reference.hpp"
+#include "tled/newton.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,7 @@
 #include "core/errors.hpp"
 #include "meshing/primitives.hpp"
-#include "tled/reference.hpp"
+#include "tled/internal_force.hpp"
+#include "tled/newton.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

@@ -5,7 +5,7 @@
 #include "tled/constitutive.hpp"
 #include "tled/detail/quadrature.hpp"
 #include "tled/detail/stiffness.hpp"
-#include "tled/reference.hpp"
+#include "tled/newton.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

@@ -1,4 +1,5 @@
-#include "tled/reference.hpp"
+#include "tled/internal_force.hpp"
+#include "tled/tangent_stiffness.hpp"
 
 #include "core/errors.hpp"
 #include "meshing/primitives.hpp"

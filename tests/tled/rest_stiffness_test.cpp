@@ -2,7 +2,8 @@
 
 #include "core/errors.hpp"
 #include "meshing/primitives.hpp"
-#include "tled/reference.hpp"
+#include "tled/internal_force.hpp"
+#include "tled/tangent_stiffness.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

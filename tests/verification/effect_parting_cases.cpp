@@ -8,7 +8,7 @@
 #include "simulation/run.hpp"
 #include "tled/dynamics.hpp"
 #include "tled/nodal_effects.hpp"
-#include "tled/reference.hpp"
+#include "tled/internal_force.hpp"
 
 #include <algorithm>
 #include <cmath>

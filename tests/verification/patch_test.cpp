@@ -5,7 +5,8 @@
 #include "tests/verification/reference_file.hpp"
 #include "tled/constitutive.hpp"
 #include "tled/quadratic.hpp"
-#include "tled/reference.hpp"
+#include "tled/newton.hpp"
+#include "tled/discrete_energy.hpp"
 
 #include <gtest/gtest.h>
 

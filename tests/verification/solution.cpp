@@ -2,7 +2,8 @@
 
 #include "core/errors.hpp"
 #include "tests/verification/shapes.hpp"
-#include "tled/reference.hpp"
+#include "tled/newton.hpp"
+#include "tled/discrete_energy.hpp"
 
 #include <Eigen/Dense>
 

@@ -2,7 +2,7 @@
 /// The one-point hexahedron in plain float64: rest data, energy and its derivatives (tled/hex_state.hpp).
 
 #include "tled/constitutive.hpp"
-#include "tled/reference.hpp"
+#include "tled/internal_force.hpp"
 #include "tled/rest_state.hpp"
 
 #include <Eigen/Core>
