@@ -2,8 +2,8 @@
 
 #include "core/errors.hpp"
 #include "shaders/device.hpp"
-#include "tled/render_pass_engine.hpp"
-#include "tled/scalar_steps.hpp"
+#include "tled/reference/scalar_steps.hpp"
+#include "tled/render_pass/render_pass_engine.hpp"
 
 #include <algorithm>
 #include <memory>

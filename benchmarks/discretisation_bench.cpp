@@ -4,8 +4,8 @@
 
 #include "meshing/primitives.hpp"
 #include "tled/blas_threads.hpp"
-#include "tled/discretisation_error.hpp"
 #include "tled/equilibrium.hpp"
+#include "tled/error/discretisation_error.hpp"
 #include "tled/rest_state.hpp"
 
 #include <chrono>

@@ -13,7 +13,7 @@
 #include "core/errors.hpp"
 #include "meshing/mesh_io.hpp"
 #include "meshing/primitives.hpp"
-#include "tled/internal_force.hpp"
+#include "tled/model/internal_force.hpp"
 
 #include <Eigen/Geometry>
 

@@ -6,8 +6,8 @@
 #include "meshing/primitives.hpp"
 #include "tled/blas_threads.hpp"
 #include "tled/equilibrium.hpp"
-#include "tled/internal_force.hpp"
-#include "tled/newton.hpp"
+#include "tled/model/internal_force.hpp"
+#include "tled/reference/newton.hpp"
 
 #include <algorithm>
 #include <chrono>

@@ -18,8 +18,8 @@
 #include "meshing/mesh_io.hpp"
 #include "meshing/primitives.hpp"
 #include "shaders/device.hpp"
-#include "tled/internal_force.hpp"
-#include "tled/render_pass_engine.hpp"
+#include "tled/model/internal_force.hpp"
+#include "tled/render_pass/render_pass_engine.hpp"
 
 #include <algorithm>
 #include <cstdio>

@@ -3,8 +3,8 @@
 #include "meshing/hex_primitives.hpp"
 #include "meshing/primitives.hpp"
 #include "tled/blas_threads.hpp"
-#include "tled/internal_force.hpp"
-#include "tled/newton.hpp"
+#include "tled/model/internal_force.hpp"
+#include "tled/reference/newton.hpp"
 
 #include <array>
 #include <cstdio>

@@ -6,7 +6,7 @@
 #include "meshing/primitives.hpp"
 #include "tled/blas_threads.hpp"
 #include "tled/model.hpp"
-#include "tled/rest_stiffness.hpp"
+#include "tled/stiffness/rest_stiffness.hpp"
 
 #include <chrono>
 #include <cstdio>

@@ -5,8 +5,8 @@
 #include "registration/detail/rigid_part.hpp"
 #include "registration/detail/unknown_loads.hpp"
 #include "registration/detail/white_noise.hpp"
-#include "tled/internal_force.hpp"
-#include "tled/tangent_stiffness.hpp"
+#include "tled/model/internal_force.hpp"
+#include "tled/stiffness/tangent_stiffness.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>

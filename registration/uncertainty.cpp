@@ -4,7 +4,7 @@
 #include "registration/detail/coarse_twin.hpp"
 #include "registration/detail/data_uncertainty.hpp"
 #include "registration/detail/pull.hpp"
-#include "tled/lifted_residual.hpp"
+#include "tled/error/lifted_residual.hpp"
 
 #include <algorithm>
 #include <cmath>

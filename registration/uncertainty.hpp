@@ -7,7 +7,7 @@
 #include "meshing/point_location.hpp"
 #include "registration/expected_error.hpp"
 #include "registration/pipeline.hpp"
-#include "tled/discretisation_error.hpp"
+#include "tled/error/discretisation_error.hpp"
 
 #include <Eigen/Core>
 

@@ -4,7 +4,7 @@
 #include "simulation/loads.hpp"
 #include "tled/nodal_effects.hpp"
 #include "tled/region.hpp"
-#include "tled/rest_stiffness.hpp"
+#include "tled/stiffness/rest_stiffness.hpp"
 
 #include <algorithm>
 #include <array>

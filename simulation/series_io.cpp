@@ -4,7 +4,7 @@
 #include "core/errors.hpp"
 #include "meshing/mesh_io.hpp"
 #include "simulation/xdmf.hpp"
-#include "tled/internal_force.hpp"
+#include "tled/model/internal_force.hpp"
 
 #include <array>
 #include <charconv>

@@ -5,9 +5,9 @@
 #include "study/detail/clock.hpp"
 #include "study/reference.hpp"
 #include "tled/load_path.hpp"
-#include "tled/internal_force.hpp"
-#include "tled/newton.hpp"
-#include "tled/rest_stiffness.hpp"
+#include "tled/model/internal_force.hpp"
+#include "tled/reference/newton.hpp"
+#include "tled/stiffness/rest_stiffness.hpp"
 
 #include <algorithm>
 #include <cmath>

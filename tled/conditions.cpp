@@ -4,7 +4,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "tled/detail/parallel.hpp"
+#include "tled/parallel/parallel.hpp"
 
 #include <string>
 #include <vector>

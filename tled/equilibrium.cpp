@@ -1,7 +1,7 @@
 #include "tled/equilibrium.hpp"
 
-#include "tled/detail/equilibrium_search.hpp"
-#include "tled/detail/held_tissue.hpp"
+#include "tled/model/held_tissue.hpp"
+#include "tled/statics/equilibrium_search.hpp"
 
 #include <cmath>
 

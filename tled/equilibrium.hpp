@@ -3,7 +3,7 @@
 
 #include "core/observer.hpp"
 #include "tled/engine.hpp"
-#include "tled/rest_stiffness.hpp"
+#include "tled/stiffness/rest_stiffness.hpp"
 
 #include <string>
 

@@ -2,7 +2,7 @@
 
 #include "core/errors.hpp"
 #include "tled/nodal_effects.hpp"
-#include "tled/rest_stiffness.hpp"
+#include "tled/stiffness/rest_stiffness.hpp"
 
 #include <Eigen/Eigenvalues>
 

@@ -1,7 +1,7 @@
 #include "tled/rest_state.hpp"
 
 #include "core/errors.hpp"
-#include "tled/detail/hexahedra.hpp"
+#include "tled/model/hexahedra.hpp"
 
 #include <Eigen/LU>
 

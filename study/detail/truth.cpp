@@ -2,8 +2,8 @@
 
 #include "core/errors.hpp"
 #include "meshing/mesher.hpp"
-#include "tled/internal_force.hpp"
-#include "tled/newton.hpp"
+#include "tled/model/internal_force.hpp"
+#include "tled/reference/newton.hpp"
 
 #include <Eigen/LU>
 

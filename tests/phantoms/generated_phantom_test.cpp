@@ -6,7 +6,7 @@
 #include "registration/pipeline.hpp"
 #include "registration/warp.hpp"
 #include "tests/support/label_shapes.hpp"
-#include "tled/newton.hpp"
+#include "tled/reference/newton.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 /// Every method on every engine against Newton's method, on the cube of Taylor, Cheng and Ourselin (2007).
 #include "tests/tled/engine_scene.hpp"
 #include "tests/tled/equilibrium_scenes.hpp"
-#include "tled/newton.hpp"
+#include "tled/reference/newton.hpp"
 
 #include <gmock/gmock.h>
 #include <tbb/global_control.h>

@@ -2,8 +2,8 @@
 
 #include "core/errors.hpp"
 #include "tests/verification/shapes.hpp"
-#include "tled/newton.hpp"
-#include "tled/discrete_energy.hpp"
+#include "tled/reference/discrete_energy.hpp"
+#include "tled/reference/newton.hpp"
 
 #include <Eigen/Dense>
 
