@@ -7,11 +7,10 @@
 #include "tled/engine.hpp"
 #include "tled/gpu/gpu_effects.hpp"
 #include "tled/gpu/gpu_force.hpp"
+#include "tled/gpu/gpu_observation.hpp"
 #include "tled/gpu/gpu_patches.hpp"
+#include "tled/gpu/right_forces.hpp"
 #include "tled/material/stress_clock.hpp"
-#include "tled/model/hexahedra.hpp"
-#include "tled/model/internal_force.hpp"
-#include "tled/model/kinematics.hpp"
 
 #include <cmath>
 #include <limits>
@@ -32,17 +31,6 @@ using Mask = Eigen::Matrix<bool, 3, Eigen::Dynamic>;
 
 /// Recorded steps are handed over in portions of this many, so that the device starts while the host still records.
 constexpr int steps_per_flush = 64;
-
-/// What shaders/kernels/observe_nodes.comp leaves per workgroup.
-struct NodePartial {
-    float increment_squared_max, residual_squared_max, increment_mass, increment_stiffness;
-    std::uint32_t bad_displacements, bad_residuals;
-};
-/// What shaders/kernels/observe_elements.comp leaves per workgroup.
-struct ElementPartial {
-    float volume_change;
-    std::uint32_t element;
-};
 
 void require_shape(const Matrix3Xd& matrix, int node_count, const char* what) {
     if (matrix.cols() != node_count)
@@ -66,11 +54,10 @@ public:
         : device_(device),
           programs_((require_limits(device_), device_)),
           node_count_(rest.node_count),
-          tet_(rest.tet),
-          hex_(rest.hexahedra.hex),
           admits_inversion_(tled::admits_inversion(rest)),
           force_(device_, programs_, rest, blocks_),
           effects_(device_, programs_, rest),
+          observation_(device_, programs_, rest),
           stress_clock_(rest.viscosity),
           kept_stress_clock_(rest.viscosity),
           displacement_(node_vectors("displacements")),
@@ -82,8 +69,6 @@ public:
           imposed_(node_vectors("imposed displacements")),
           kept_displacement_(node_vectors("kept displacements")),
           kept_increment_(node_vectors("kept increments")),
-          node_partials_(device_, shaders::observe_partials, "partial results of nodes"),
-          element_partials_(device_, shaders::observe_partials, "partial results of elements"),
           mass_(rest.lumped_mass.transpose().replicate(3, 1)),
           constrained_(Mask::Constant(3, rest.node_count, false)) {
         const CurrentContext current = device_.make_current();
@@ -200,10 +185,8 @@ public:
         const CurrentContext current = device_.make_current();
         if (!previous_residual_known_) find_previous_residual();
         evaluate(displacement_, effects_.on_nodes(), MaskConstrained::Yes, residual_);
-        reduce(node_program(shaders::observe_nodes_program()), node_partials_);
-        Observation seen;
-        const SmallestJacobian smallest = smallest_jacobian();
-        summarise_nodes(seen);
+        Observation seen = observation_.nodes(node_program(shaders::observe_nodes_program()), blocks_);
+        const SmallestJacobian smallest = observation_.smallest_jacobian(force_, blocks_);
         seen.min_jacobian = smallest.value;
         seen.min_jacobian_tet = smallest.tet;
         seen.min_jacobian_hex = smallest.hex;
@@ -214,20 +197,8 @@ public:
 
     [[nodiscard]] SmallestJacobian smallest_jacobian() override {
         const CurrentContext current = device_.make_current();
-        SmallestJacobian smallest{std::numeric_limits<double>::infinity()};
-        const Program& elements = programs_.get(shaders::observe_elements_program());
-        force_.set_all_elements(elements);
-        reduce(elements, element_partials_);
-        if (const auto [jacobian, e] = least_partial(); jacobian < smallest.value) smallest = {jacobian, tet_[e]};
-        if (!hex_.empty()) {
-            const Program& hexahedra = programs_.get(shaders::observe_elements_program(shaders::Cell::Hexahedron));
-            force_.set_all_hexahedra(hexahedra);
-            reduce(hexahedra, element_partials_);
-            if (const auto [jacobian, e] = least_partial(); jacobian < smallest.value)
-                smallest = {jacobian, -1, hex_[e]};
-        }
-        if (std::isinf(smallest.value)) smallest.value = -smallest.value;  // no J is finite
-        return smallest;
+        blocks_.set("Displacement", displacement_);
+        return observation_.smallest_jacobian(force_, blocks_);
     }
 
     [[nodiscard]] std::string description() const override {
@@ -355,104 +326,23 @@ private:
         previous_residual_known_ = true;
     }
 
-    void reduce(const Program& program, const shaders::StorageBuffer& partials) {
-        blocks_.set("Displacement", displacement_);
-        blocks_.set("Residual", residual_);
-        blocks_.set("Partial", partials);
-        blocks_.bind(program);
-        program.dispatch(static_cast<std::size_t>(shaders::observe_partials * program.workgroup_size()));
-        shaders::storage_barrier();
-    }
-
-    void summarise_nodes(Observation& seen) const {
-        double increment_squared = 0;
-        double residual_squared = 0;
-        std::uint64_t bad_displacements = 0;
-        std::uint64_t bad_residuals = 0;
-        for (const NodePartial& part : node_partials_.download()) {
-            increment_squared = std::max(increment_squared, static_cast<double>(part.increment_squared_max));
-            residual_squared = std::max(residual_squared, static_cast<double>(part.residual_squared_max));
-            seen.increment_mass += static_cast<double>(part.increment_mass);
-            seen.increment_stiffness += static_cast<double>(part.increment_stiffness);
-            bad_displacements += part.bad_displacements;
-            bad_residuals += part.bad_residuals;
-        }
-        constexpr double infinite = std::numeric_limits<double>::infinity();
-        seen.increment_max = bad_displacements > 0 ? infinite : std::sqrt(increment_squared);
-        seen.residual_max = bad_displacements + bad_residuals > 0 ? infinite : std::sqrt(residual_squared);
-        seen.finite = bad_displacements + bad_residuals == 0;
-    }
-
-    struct LeastJacobian {
-        double value;  ///< +∞ where no J is finite
-        std::size_t element;
-    };
-
-    /// Merges the partial results of the last reduction over elements.
-    [[nodiscard]] LeastJacobian least_partial() const {
-        float least = std::numeric_limits<float>::max();
-        std::uint32_t element = std::numeric_limits<std::uint32_t>::max();
-        for (const ElementPartial& part : element_partials_.download())
-            if (part.volume_change < least || (part.volume_change == least && part.element < element)) {
-                least = part.volume_change;
-                element = part.element;
-            }
-        if (element == std::numeric_limits<std::uint32_t>::max()) return {std::numeric_limits<double>::infinity(), 0};
-        return {1.0 + static_cast<double>(least), element};
-    }
-
     shaders::Device device_;
     shaders::ProgramCache programs_;
     int node_count_;
-    std::vector<int> tet_, hex_;
     bool admits_inversion_;
     BlockBuffers blocks_;
     detail::GpuForce force_;
     detail::GpuEffects effects_;
+    detail::GpuObservation observation_;
     detail::StressClock stress_clock_, kept_stress_clock_;
     std::optional<detail::GpuPatches> patches_;  ///< absent where patches do not know the scene
     Buffer<Float4> displacement_, increment_, inverse_mass_, residual_, previous_residual_, previous_displacement_,
         imposed_, kept_displacement_, kept_increment_;
-    Buffer<NodePartial> node_partials_;
-    Buffer<ElementPartial> element_partials_;
     bool over_patches_ = false;  ///< whether steps take patches, which do not know all effects
     Matrix3Xd mass_;             ///< 3 × N
     Mask constrained_;
     bool previous_residual_known_ = false;
 };
-
-/// A displacement by node number that makes every element pull: strains of some per cent, and in no sliver more than a
-/// tenth. The height above a face is 1/|∇N|.
-Matrix3Xd test_displacement(const RestState& rest) {
-    double least_height = std::numeric_limits<double>::infinity();
-    for (int e = 0; e < rest.element_count(); ++e)
-        least_height = std::min(least_height, 1 / detail::shape_gradients(rest, e).colwise().norm().maxCoeff());
-    for (int e = 0; e < rest.hexahedra.count(); ++e)
-        least_height =
-            std::min(least_height, 1 / detail::hex_shape_gradients(rest.hexahedra, e).colwise().norm().maxCoeff());
-    const double volume = rest.volume.sum() + rest.hexahedra.volume.sum();
-    const double edge = std::cbrt(volume / (rest.element_count() / 6.0 + rest.hexahedra.count()));
-    const double size = std::min(0.01 * edge, 0.05 * least_height);
-    Matrix3Xd u(3, rest.node_count);
-    for (Eigen::Index a = 0; a < u.cols(); ++a)
-        u.col(a) << std::sin(0.37 * static_cast<double>(a)), std::cos(0.23 * static_cast<double>(a)),
-            std::sin(0.51 * static_cast<double>(a) + 1);
-    return size * u;
-}
-
-/// Drivers have been seen to lose uploads without an error: one evaluation on the very mesh is compared with the scalar
-/// reference before anything relies on the device.
-void require_right_forces(Engine& engine, const RestState& rest) {
-    const Matrix3Xd still = Matrix3Xd::Zero(3, rest.node_count);
-    const Matrix3Xd u = test_displacement(rest);
-    const Matrix3Xd expected = internal_force(rest, u);
-    engine.set_state(u, still);
-    const double error = (engine.internal_force() - expected).norm() / expected.norm();
-    engine.set_state(still, still);
-    if (error < 1e-3) return;
-    throw GpuUnavailable(engine.description() + " computes forces that are off by " + std::to_string(100 * error) +
-                         " %: its driver cannot be trusted; take another device or the CPU engine");
-}
 
 GpuStepShape usual_shape(const RestState& rest, int device) {
     const shaders::Device on(device);
@@ -468,7 +358,7 @@ std::unique_ptr<Engine> make_gpu_engine(const RestState& rest, int device) {
 
 std::unique_ptr<Engine> make_gpu_engine(const RestState& rest, int device, const GpuStepShape& shape) {
     auto engine = std::make_unique<GpuEngine>(rest, device, shape);
-    require_right_forces(*engine, rest);
+    detail::require_right_forces(*engine, rest);
     return engine;
 }
 

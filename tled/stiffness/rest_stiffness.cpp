@@ -1,7 +1,5 @@
 #include "tled/stiffness/rest_stiffness.hpp"
 
-#include <Eigen/Eigenvalues>
-
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -14,7 +12,10 @@
 #include "tled/model/springs.hpp"
 #include "tled/parallel/parallel_pair.hpp"
 #include "tled/stiffness/cholmod_factor.hpp"
+#include "tled/stiffness/conjugate_gradients.hpp"
 #include "tled/stiffness/effect_stiffness.hpp"
+#include "tled/stiffness/free_degrees.hpp"
+#include "tled/stiffness/lanczos.hpp"
 #include "tled/stiffness/lowest_mode.hpp"
 #include "tled/stiffness/smooth_space.hpp"
 #include "tled/stiffness/stiffness.hpp"
@@ -58,36 +59,9 @@ struct RestStiffness::Impl {
     std::shared_ptr<const std::vector<Matrix3d>> elastic_diagonal;  // of every node
     std::shared_ptr<Analysis> analysis = std::make_shared<Analysis>();
     std::shared_ptr<Outline> outline;
-    Matrix3Xd position;      // at rest, mm
-    std::vector<int> index;  // degree of freedom 3·node + component → free number or −1
-    int free_count = 0;
+    Matrix3Xd position;  // at rest, mm
+    detail::FreeDegrees free;
 
-    [[nodiscard]] VectorXd reduced(const Matrix3Xd& x) const {
-        VectorXd result(free_count);
-        for (std::size_t d = 0; d < index.size(); ++d) {
-            if (index[d] >= 0) result[index[d]] = x.data()[d];
-        }
-        return result;
-    }
-    [[nodiscard]] Matrix3Xd expanded(const VectorXd& x) const {
-        Matrix3Xd result = Matrix3Xd::Zero(3, static_cast<Eigen::Index>(index.size()) / 3);
-        for (std::size_t d = 0; d < index.size(); ++d) {
-            if (index[d] >= 0) result.data()[d] = x[index[d]];
-        }
-        return result;
-    }
-    /// `operation` on the free rows of columns (3N × k); zero elsewhere.
-    template <class Operation>
-    [[nodiscard]] MatrixXd on_free(const MatrixXd& columns, const Operation& operation) const {
-        MatrixXd free(free_count, columns.cols()), result = MatrixXd::Zero(columns.rows(), columns.cols());
-        if (free_count == 0) return result;
-        for (std::size_t d = 0; d < index.size(); ++d)
-            if (index[d] >= 0) free.row(index[d]) = columns.row(static_cast<Eigen::Index>(d));
-        const MatrixXd answer = operation(free);
-        for (std::size_t d = 0; d < index.size(); ++d)
-            if (index[d] >= 0) result.row(static_cast<Eigen::Index>(d)) = answer.row(index[d]);
-        return result;
-    }
     [[nodiscard]] Matrix3Xd diagonal(const NodalConditions& present) const;
     [[nodiscard]] Matrix3Xd multiply(const Matrix3Xd& x, const NodalConditions& present) const {
         Matrix3Xd y = elastic->multiply(x);
@@ -110,7 +84,10 @@ struct RestStiffness::Impl {
         elastic_diagonal = std::make_shared<const std::vector<Matrix3d>>(stiffness.diagonal_blocks());
         elastic = std::make_shared<const detail::Stiffness>(std::move(stiffness));
     }
-    void number_free(const NodalConditions& present);
+    void take(const NodalConditions& present) {
+        conditions = present;
+        free = detail::FreeDegrees(present.constrained);
+    }
     void factorise() const;
     [[nodiscard]] const detail::CholmodFactor& factor() const;
     [[nodiscard]] detail::BlockRows free_rows(const NodalConditions& springs) const;
@@ -120,18 +97,14 @@ struct RestStiffness::Impl {
     void analyse(const std::function<Eigen::SparseMatrix<double>()>& lower) const;
     void require_compatible(const NodalConditions& present) const;
     [[nodiscard]] Matrix3Xd linear_force(const NodalConditions& present) const;
-    template <class Preconditioner>
-    [[nodiscard]] Matrix3Xd conjugate_gradients(const Matrix3Xd& force, const NodalConditions& present,
-                                                const Preconditioner& precondition, double relative_tolerance) const;
-
-    [[nodiscard]] double lowest_by_lanczos(const Matrix3Xd& diagonal) const;
+    [[nodiscard]] Matrix3Xd iterated(const Matrix3Xd& force, const NodalConditions& present,
+                                     const detail::Product& precondition, double relative_tolerance) const;
+    [[nodiscard]] const detail::Mode& slowest() const;
 
     mutable std::once_flag divided;
     mutable std::unique_ptr<const detail::TwoLevel> levels;  // by two_levels()
     mutable std::once_flag factorised;
     mutable std::unique_ptr<detail::CholmodFactor> made;  // by factor()
-    [[nodiscard]] const detail::Mode& slowest() const;
-
     std::once_flag lowest_known;
     double lowest = 0.0;
     Matrix3Xd slowest_about;  // where slowest() begins, if given
@@ -148,75 +121,14 @@ void RestStiffness::Impl::require_compatible(const NodalConditions& present) con
     }
 }
 
-// Preconditioned conjugate gradients (Saad, Iterative Methods for Sparse Linear Systems, algorithm 9.1). The error is
-// measured in the norm of the preconditioner, √(r·z), relative to its start.
-// Force, answer and what the preconditioner makes of them are zero on the constrained degrees of freedom.
-template <class Preconditioner>
-Matrix3Xd RestStiffness::Impl::conjugate_gradients(const Matrix3Xd& force, const NodalConditions& present,
-                                                   const Preconditioner& precondition,
-                                                   double relative_tolerance) const {
-    constexpr int max_iterations = 2000;
-    const auto dot = [](const Matrix3Xd& a, const Matrix3Xd& b) { return a.cwiseProduct(b).sum(); };
-    Matrix3Xd x = Matrix3Xd::Zero(3, force.cols()), r = force, z = precondition(r), p = z;
-    double rz = dot(r, z);
-    const double limit = relative_tolerance * relative_tolerance * rz;
-    for (int iteration = 0; rz > limit; ++iteration) {
-        const Matrix3Xd Kp = present.constrained.select(0.0, multiply(p, present));
-        const double curvature = dot(p, Kp);
-        if (iteration == max_iterations || !(curvature > 0.0)) {
-            throw SolverFailure("conjugate gradients stopped at a relative residual of " +
-                                std::to_string(relative_tolerance * std::sqrt(rz / limit)) + " after " +
-                                std::to_string(iteration) +
-                                " iterations: factorise the stiffness again with the present springs");
-        }
-        const double step = rz / curvature;
-        x += step * p;
-        r -= step * Kp;
-        z = precondition(r);
-        const double next = dot(r, z);
-        p = z + next / rz * p;
-        rz = next;
-    }
-    return x;
-}
-
-// Smallest λ of K x = λ D x for the diagonal D: Lanczos steps on K⁻¹ D, symmetric in the inner product of D, from a
-// fixed vector without symmetry (Parlett, The Symmetric Eigenvalue Problem (1998), section 13.2), with all directions
-// made orthogonal again. The largest Ritz value errs by the square of its vector's error.
-double RestStiffness::Impl::lowest_by_lanczos(const Matrix3Xd& diagonal) const {
-    constexpr int most_steps = 20;
-    constexpr double tolerance = 1e-4;  // damping presets and frequencies, its users, follow √λ
-    const VectorXd D = reduced(diagonal);
-    VectorXd q(free_count);
-    for (int i = 0; i < q.size(); ++i) q[i] = 1.0 + 0.5 * std::sin(0.7 * i);
-    q /= std::sqrt(q.dot(D.cwiseProduct(q)));
-    std::vector<VectorXd> basis;
-    MatrixXd projected = MatrixXd::Zero(most_steps + 1, most_steps + 1);  // of K⁻¹ D, tridiagonal
-    double largest = 0.0;
-    for (int step = 0; step < most_steps; ++step) {
-        basis.push_back(q);
-        VectorXd next = factor().solve(D.cwiseProduct(q));
-        projected(step, step) = next.dot(D.cwiseProduct(q));
-        for (int pass = 0; pass < 2; ++pass)
-            for (const VectorXd& other : basis) next -= next.dot(D.cwiseProduct(other)) * other;
-        const double length = std::sqrt(next.dot(D.cwiseProduct(next)));
-        const Eigen::SelfAdjointEigenSolver<MatrixXd> ritz(projected.topLeftCorner(step + 1, step + 1));
-        const double before = largest;
-        largest = ritz.eigenvalues()[step];
-        const double remainder = length * std::abs(ritz.eigenvectors()(step, step));
-        const bool settled = remainder <= std::sqrt(tolerance) * largest && largest - before <= tolerance * largest;
-        if (settled || remainder <= tolerance * largest) break;  // none remains once all directions are spanned
-        projected(step + 1, step) = projected(step, step + 1) = length;
-        q = next / length;
-    }
-    return 1.0 / largest;
-}
-
-void RestStiffness::Impl::number_free(const NodalConditions& present) {
-    conditions = present;
-    index.assign(static_cast<std::size_t>(present.constrained.size()), -1);
-    for (int d = 0; d < static_cast<int>(index.size()); ++d)
-        if (!present.constrained.data()[d]) index[static_cast<std::size_t>(d)] = free_count++;
+/// Force and answer are zero on the constrained degrees of freedom.
+Matrix3Xd RestStiffness::Impl::iterated(const Matrix3Xd& force, const NodalConditions& present,
+                                        const detail::Product& precondition, double relative_tolerance) const {
+    const auto product = [&](const Matrix3Xd& x) -> Matrix3Xd {
+        return present.constrained.select(0.0, multiply(x, present));
+    };
+    return detail::conjugate_gradients(product, precondition, present.constrained.select(0.0, force),
+                                       relative_tolerance);
 }
 
 /// Of `elastic` + springs on the free degrees of freedom.
@@ -224,16 +136,12 @@ Eigen::SparseMatrix<double> RestStiffness::Impl::lower_triangle() const {
     detail::BlockRows K = detail::assembled(*elastic, detail::Triangle::Lower);
     for (std::size_t s = 0; s < conditions.spring_node.size(); ++s)
         K.diagonal(conditions.spring_node[s]) += detail::spring_matrix(conditions, static_cast<int>(s));
-    return detail::scalar_matrix(K, index, detail::Triangle::Lower);
+    return detail::scalar_matrix(K, free.index(), detail::Triangle::Lower);
 }
 
 void RestStiffness::Impl::analyse(const std::function<Eigen::SparseMatrix<double>()>& lower) const {
-    std::call_once(analysis->made, [&] {
-        std::vector<int> node_of;
-        for (std::size_t d = 0; d < index.size(); ++d)
-            if (index[d] >= 0) node_of.push_back(static_cast<int>(d) / 3);
-        analysis->factor = std::make_unique<const detail::CholmodFactor>(lower(), node_of);
-    });
+    std::call_once(analysis->made,
+                   [&] { analysis->factor = std::make_unique<const detail::CholmodFactor>(lower(), free.nodes()); });
 }
 
 void RestStiffness::Impl::factorise() const {
@@ -312,7 +220,7 @@ RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& condi
     detail::add_effects(conditions.effects.surface, rest.position, elastic);
     impl_->take(std::move(elastic));
     impl_->position = rest.position;
-    impl_->number_free(conditions);
+    impl_->take(conditions);
 }
 
 RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& conditions, const Matrix3Xd& displacement)
@@ -325,7 +233,7 @@ RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& condi
     detail::add_effects(conditions.effects.surface, rest.position, metric);
     impl_->take(std::move(metric));
     impl_->position = rest.position;
-    impl_->number_free(conditions);
+    impl_->take(conditions);
 }
 
 RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& conditions, const RestStiffness& other)
@@ -337,7 +245,7 @@ RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& condi
     impl_->analysis = other.impl_->analysis;
     impl_->outline = other.impl_->outline;
     impl_->position = rest.position;
-    impl_->number_free(conditions);
+    impl_->take(conditions);
 }
 
 RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& conditions, const RestStiffness& other,
@@ -351,11 +259,11 @@ RestStiffness::RestStiffness(RestStiffness&&) noexcept = default;
 RestStiffness& RestStiffness::operator=(RestStiffness&&) noexcept = default;
 
 void RestStiffness::analyse() const {
-    if (impl_->free_count > 0) impl_->analyse([this] { return impl_->lower_triangle(); });
+    if (impl_->free.count() > 0) impl_->analyse([this] { return impl_->lower_triangle(); });
 }
 
 void RestStiffness::factorise() const {
-    if (impl_->free_count > 0) static_cast<void>(impl_->factor());
+    if (impl_->free.count() > 0) static_cast<void>(impl_->factor());
 }
 
 void factorise_together(const RestStiffness& first, const RestStiffness& second) {
@@ -365,21 +273,20 @@ void factorise_together(const RestStiffness& first, const RestStiffness& second)
 }
 
 Matrix3Xd RestStiffness::solve(const Matrix3Xd& force) const {
-    if (impl_->free_count == 0) return Matrix3Xd::Zero(3, force.cols());
-    return impl_->expanded(impl_->factor().solve(impl_->reduced(force)));
+    if (impl_->free.count() == 0) return Matrix3Xd::Zero(3, force.cols());
+    return impl_->free.expanded(impl_->factor().solve(impl_->free.reduced(force)));
 }
 
 Matrix3Xd RestStiffness::solve(const Matrix3Xd& force, const NodalConditions& conditions,
                                double relative_tolerance) const {
     impl_->require_compatible(conditions);
-    if (same_springs(conditions, impl_->conditions) || impl_->free_count == 0) return solve(force);
+    if (same_springs(conditions, impl_->conditions) || impl_->free.count() == 0) return solve(force);
     const auto precondition = [this](const Matrix3Xd& r) { return solve(r); };
-    return impl_->conjugate_gradients(conditions.constrained.select(0.0, force), conditions, precondition,
-                                      relative_tolerance);
+    return impl_->iterated(force, conditions, precondition, relative_tolerance);
 }
 
 MatrixXd RestStiffness::solve_columns(const MatrixXd& forces) const {
-    return impl_->on_free(forces, [&](const MatrixXd& free) { return impl_->factor().solve_columns(free); });
+    return impl_->free.on_free(forces, [&](const MatrixXd& free) { return impl_->factor().solve_columns(free); });
 }
 
 bool RestStiffness::is_large() const {
@@ -387,16 +294,16 @@ bool RestStiffness::is_large() const {
 }
 
 Matrix3Xd RestStiffness::precondition(const Matrix3Xd& force) const {
-    if (!is_large() || impl_->free_count == 0) return solve(force);
+    if (!is_large() || impl_->free.count() == 0) return solve(force);
     return impl_->two_levels().cycle(impl_->conditions.constrained.select(0.0, force));
 }
 
 Matrix3Xd RestStiffness::solve_iteratively(const Matrix3Xd& force, const NodalConditions& conditions,
                                            double relative_tolerance) const {
-    if (!is_large() || impl_->free_count == 0) return solve(force, conditions, relative_tolerance);
+    if (!is_large() || impl_->free.count() == 0) return solve(force, conditions, relative_tolerance);
     impl_->require_compatible(conditions);
     const auto about = [this](const Matrix3Xd& r) { return precondition(r); };
-    return impl_->conjugate_gradients(conditions.constrained.select(0.0, force), conditions, about, relative_tolerance);
+    return impl_->iterated(force, conditions, about, relative_tolerance);
 }
 
 // K_ff u_f = f_f + springs' targets − K_fc u_c: the imposed values enter with the residual of u = (0, u_c).
@@ -423,14 +330,16 @@ Matrix3Xd RestStiffness::diagonal(const NodalConditions& conditions) const {
 }
 
 double RestStiffness::lowest_eigenvalue() const {
-    if (impl_->free_count == 0) return std::numeric_limits<double>::infinity();
-    std::call_once(impl_->lowest_known,
-                   [this] { impl_->lowest = impl_->lowest_by_lanczos(diagonal(impl_->conditions)); });
+    if (impl_->free.count() == 0) return std::numeric_limits<double>::infinity();
+    std::call_once(impl_->lowest_known, [this] {
+        const auto solve = [this](const VectorXd& b) { return impl_->factor().solve(b); };
+        impl_->lowest = detail::lowest_by_lanczos(solve, impl_->free.reduced(diagonal(impl_->conditions)));
+    });
     return impl_->lowest;
 }
 
 double RestStiffness::approximate_lowest_eigenvalue() const {
-    return impl_->free_count > 0 ? impl_->slowest().value : std::numeric_limits<double>::infinity();
+    return impl_->free.count() > 0 ? impl_->slowest().value : std::numeric_limits<double>::infinity();
 }
 
 const Matrix3Xd& RestStiffness::approximate_slowest_mode() const {
@@ -438,7 +347,7 @@ const Matrix3Xd& RestStiffness::approximate_slowest_mode() const {
 }
 
 long long RestStiffness::factor_nonzeros() const {
-    return impl_->free_count > 0 ? impl_->factor().nonzeros() : 0;
+    return impl_->free.count() > 0 ? impl_->factor().nonzeros() : 0;
 }
 
 }  // namespace tissuewarp::tled
