@@ -12,7 +12,7 @@ foreach(folder core imaging meshing shaders tled simulation registration report 
   if(TARGET tissuewarp_${folder})
     install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/
       DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tissuewarp/${folder}
-      FILES_MATCHING PATTERN "*.hpp" PATTERN "detail" EXCLUDE)
+      FILES_MATCHING PATTERN "*.hpp" PATTERN "detail" EXCLUDE REGEX "/tled/(cpu|gpu|parallel|statics)/" EXCLUDE)
   endif()
 endforeach()
 

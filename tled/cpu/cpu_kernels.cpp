@@ -1,4 +1,4 @@
-// The kernels of detail/cpu_fans-inl.hpp and detail/cpu_elements-inl.hpp for every instruction set, law and scalar,
+// The kernels of cpu_fans-inl.hpp and cpu_elements-inl.hpp for every instruction set, law and scalar,
 // chosen at run time.
 
 #undef HWY_TARGET_INCLUDE

@@ -101,7 +101,7 @@ void hex_volume_changes(const HexBatches<T>& hexahedra, std::size_t begin, std::
                         T* jacobian_minus_1);
 
 /// A material as the kernels take it: `law` indexes the alternatives of Material, the parameters are those of
-/// detail/kernel_parameters.hpp.
+/// tled/material/kernel_parameters.hpp.
 template <class T>
 struct KernelMaterial {
     std::size_t law = 0;

@@ -21,7 +21,7 @@ namespace tissuewarp::tled::detail {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// What a law knows beside the strain: its parameters (detail/kernel_parameters.hpp), and the fibre where it has one.
+/// What a law knows beside the strain: its parameters (kernel_parameters.hpp), and the fibre where it has one.
 template <class D>
 struct Tissue {
     const Scalar<D>* parameter;

@@ -1,7 +1,7 @@
 #pragma once
-/// The patches and fans of detail/patches.hpp in the batches of the CPU kernels: batch_width fans of equal length are a
-/// group, tetrahedron k of a group's fans is a batch. Nodes get internal numbers: those that one patch alone moves come
-/// first, patch by patch, then all others.
+/// The patches and fans of tled/model/patches.hpp in the batches of the CPU kernels: batch_width fans of equal length
+/// are a group, tetrahedron k of a group's fans is a batch. Nodes get internal numbers: those that one patch alone
+/// moves come first, patch by patch, then all others.
 
 #include "tled/cpu/cpu_batches.hpp"
 #include "tled/model/patches.hpp"

@@ -1,6 +1,6 @@
 #pragma once
-/// The constitutive laws in plain float64, one deformation gradient at a time: what reference.cpp is built from and
-/// what the kernels of the engines are tested against. Stresses and moduli in kPa.
+/// The constitutive laws in plain float64, one deformation gradient at a time: what internal_force.cpp is built from
+/// and what the kernels of the engines are tested against. Stresses and moduli in kPa.
 
 #include "tled/material.hpp"
 
