@@ -49,7 +49,7 @@ public:
 private:
     struct Spring {
         std::uint32_t node;  // internal
-        std::array<T, 9> k;  // xx yy zz xy yz zx, K·target
+        std::array<T, 9> k;  // K as tled/model/symmetric.hpp, K·target
     };
     std::vector<Spring> springs_;  // ascending
 };

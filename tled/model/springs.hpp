@@ -2,6 +2,7 @@
 /// Springs of NodalConditions as matrices and forces.
 
 #include "tled/conditions.hpp"
+#include "tled/model/symmetric.hpp"
 #include "tled/parallel/parallel.hpp"
 
 #include <Eigen/Core>
@@ -10,8 +11,7 @@ namespace tissuewarp::tled::detail {
 
 /// K of entry `spring`, mN/mm.
 inline Eigen::Matrix3d spring_matrix(const NodalConditions& conditions, int spring) {
-    const auto k = conditions.spring_stiffness.col(spring);  // xx yy zz xy yz zx
-    return Eigen::Matrix3d{{k[0], k[3], k[5]}, {k[3], k[1], k[4]}, {k[5], k[4], k[2]}};
+    return symmetric_matrix(conditions.spring_stiffness.col(spring));
 }
 
 /// y += K u at every spring, mN.

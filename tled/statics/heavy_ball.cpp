@@ -1,5 +1,7 @@
 #include "tled/statics/heavy_ball.hpp"
 
+#include "tled/model/symmetric.hpp"
+
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
@@ -22,9 +24,7 @@ constexpr double damping_factor = 1.4;  // on the lowest eigenvalue of K₀: the
 /// displacements are imposed.
 double lowest_of_shifts(const NodalConditions& conditions, const Matrix3Xd& mass) {
     if (conditions.constrained.any()) return std::numeric_limits<double>::infinity();
-    const Eigen::Matrix<double, 6, 1> k = conditions.spring_stiffness.rowwise().sum();  // xx yy zz xy yz zx
-    const Eigen::Matrix3d springs =
-        (Eigen::Matrix3d() << k[0], k[3], k[5], k[3], k[1], k[4], k[5], k[4], k[2]).finished();
+    const Eigen::Matrix3d springs = symmetric_matrix(conditions.spring_stiffness.rowwise().sum());
     const Eigen::Vector3d root = mass.rowwise().sum().cwiseSqrt().cwiseInverse();
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> shifts(root.asDiagonal() * springs * root.asDiagonal(),
                                                                 Eigen::EigenvaluesOnly);
