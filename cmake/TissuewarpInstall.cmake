@@ -8,11 +8,12 @@ if(TARGET tissuewarp_app)
   install(TARGETS tissuewarp_app RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 endif()
 
-foreach(folder core imaging meshing shaders tled simulation registration report study)
+foreach(folder core imaging meshing shaders tled simulation registration report)
   if(TARGET tissuewarp_${folder})
     install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/
       DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tissuewarp/${folder}
-      FILES_MATCHING PATTERN "*.hpp" PATTERN "detail" EXCLUDE REGEX "/tled/(cpu|gpu|parallel|statics)/" EXCLUDE)
+      FILES_MATCHING PATTERN "*.hpp" PATTERN "detail" EXCLUDE
+      REGEX "/tled/(cpu|gpu|parallel|statics|reference|render_pass)/" EXCLUDE)
   endif()
 endforeach()
 

@@ -18,10 +18,11 @@ if(TISSUEWARP_SANITIZE)
   add_link_options(-fsanitize=${TISSUEWARP_SANITIZE})
 endif()
 
-# tissuewarp_library(<folder> SOURCES … [PUBLIC libs…] [PRIVATE libs…])
+# tissuewarp_library(<folder> [LABORATORY] SOURCES … [PUBLIC libs…] [PRIVATE libs…])
 # Declares the library tissuewarp_<folder> with the alias tissuewarp::<folder>; headers are found as "<folder>/x.hpp".
+# Those of the LABORATORY, for studies, tests and benchmarks, are not installed: no installed library may link them.
 function(tissuewarp_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "LABORATORY" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   set(target tissuewarp_${name})
   add_library(${target} STATIC ${ARG_SOURCES})
   add_library(tissuewarp::${name} ALIAS ${target})
@@ -33,7 +34,9 @@ function(tissuewarp_library name)
   target_compile_features(${target} PUBLIC cxx_std_20)
   target_link_libraries(${target} PUBLIC ${ARG_PUBLIC}
     PRIVATE ${ARG_PRIVATE} $<BUILD_INTERFACE:tissuewarp_warnings>)
-  set_property(GLOBAL APPEND PROPERTY TISSUEWARP_LIBRARIES ${target})
+  if(NOT ARG_LABORATORY)
+    set_property(GLOBAL APPEND PROPERTY TISSUEWARP_LIBRARIES ${target})
+  endif()
 endfunction()
 
 # tissuewarp_test(<name> SOURCES … LIBS … [TIMEOUT seconds] [LABELS …]): a GoogleTest program; every TEST is a ctest test,
