@@ -2,7 +2,6 @@
 
 #include "apps/bench_outputs.hpp"
 #include "apps/bench_timing.hpp"
-#include "apps/bench_tune.hpp"
 #include "apps/cpu_ceilings.hpp"
 #include "apps/output_folder.hpp"
 #include "apps/progress.hpp"
@@ -108,8 +107,6 @@ public:
         results_.repeats = options.repeats;
         results_.device = bench_device(options.device.name);
         engines_ = engines_of(options, results_.device, results_.notes);
-        if (results_.device && results_.device->measured.skipped > 0)
-            results_.notes.push_back(skipped_lines(results_.device->measured));
         studies_ = planned(options, results_.notes);
         for (const PlannedStudy& study : studies_)
             for (const int elements : study.elements) all_work_ += work_of(elements);
@@ -237,7 +234,6 @@ void require_correct(const BenchResults& results) {
 
 void run_bench(const BenchOptions& options) {
     ProgressLine progress(options.common.quiet);
-    if (options.tune) return run_tuning(options, progress);
     if (options.study == "all" && !options.elements.empty())
         throw InvalidInput("--elements with --study all fits no study; name one: cube, brain or scaling");
     std::optional<OutputFolder> output;

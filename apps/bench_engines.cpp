@@ -2,8 +2,8 @@
 
 #include "core/errors.hpp"
 #include "shaders/device.hpp"
-#include "tled/render_pass_engine.hpp"
-#include "tled/scalar_steps.hpp"
+#include "tled/reference/scalar_steps.hpp"
+#include "tled/render_pass/render_pass_engine.hpp"
 
 #include <algorithm>
 #include <memory>
@@ -35,21 +35,17 @@ Stepper stepper_with_conditions(std::unique_ptr<tled::Engine> engine, const Benc
     return stepper_of(std::shared_ptr<tled::Engine>(std::move(engine)), scene, work);
 }
 
-/// What was measured, if that was patches. A software rasteriser need not run all patches at the same time, and pays
-/// for every invocation and barrier.
-tled::KnownStepShape fused_shape(const BenchScene& scene, const BenchDevice& device) {
-    const int elements = scene.rest.element_count();
-    const tled::KnownStepShape known =
-        tled::best_known_gpu_step_shape(elements, tled::element_of(scene.rest), device.gpu, device.measured);
-    if (known.measured && known.shape.patch_tets > 0) return known;
-    if (!device.gpu.hardware) return {{.patch_tets = 2000, .longest_fan = 5, .workgroup = 32}};
-    return {tled::suggested_gpu_step_shape(elements, tled::element_of(scene.rest), device.gpu.multiprocessors)};
+/// A software rasteriser need not run all patches at the same time, and pays for every invocation and barrier.
+tled::GpuStepShape fused_shape(const BenchScene& scene, const BenchDevice& device) {
+    if (!device.hardware) return {.patch_tets = 2000, .longest_fan = 5, .workgroup = 32};
+    return tled::suggested_gpu_step_shape(scene.rest.element_count(), tled::element_of(scene.rest),
+                                          device.multiprocessors);
 }
 
-Stepper compute_stepper(const BenchScene& scene, const BenchDevice& device, const tled::KnownStepShape& known) {
-    Stepper stepper = stepper_with_conditions(tled::make_gpu_engine(scene.rest, device.index, known.shape), scene,
-                                              tled::gpu_step_work(scene.rest, known.shape));
-    stepper.shape = known;
+Stepper compute_stepper(const BenchScene& scene, const BenchDevice& device, const tled::GpuStepShape& shape) {
+    Stepper stepper = stepper_with_conditions(tled::make_gpu_engine(scene.rest, device.index, shape), scene,
+                                              tled::gpu_step_work(scene.rest, shape));
+    stepper.shape = shape;
     return stepper;
 }
 
@@ -74,8 +70,8 @@ std::optional<BenchDevice> bench_device(const std::string& name) {
     if (name == "cpu") return std::nullopt;
     const int index = name.starts_with("gpu:") ? std::stoi(name.substr(4)) : -1;
     try {
-        const int found = shaders::Device(index).index();
-        return BenchDevice{found, tled::step_device(found), tled::read_step_shape_cache(tled::step_shape_cache_path())};
+        const shaders::Device found(index);
+        return BenchDevice{found.index(), found.renderer(), found.limits().multiprocessors, found.hardware()};
     } catch (const GpuUnavailable&) {
         if (name != "auto") throw;
         return std::nullopt;

@@ -3,7 +3,6 @@
 
 #include "apps/bench_scenes.hpp"
 #include "tled/engine.hpp"
-#include "tled/step_shape_cache.hpp"
 #include "tled/step_work.hpp"
 
 #include <functional>
@@ -27,9 +26,10 @@ tled::Processor processor_of(BenchEngine engine);
 
 /// An OpenGL device as the benchmark knows it.
 struct BenchDevice {
-    int index = -1;  ///< of EGL's devices
-    tled::StepDevice gpu;
-    tled::StepShapeCache measured;  ///< shapes of steps, on this device and on others
+    int index = -1;           ///< of EGL's devices
+    std::string name;         ///< renderer string of OpenGL
+    int multiprocessors = 0;  ///< 0 where unknown
+    bool hardware = false;
 };
 /// The device that --device names: "auto" (nothing where there is none), "gpu", "gpu:<n>" or "cpu" (nothing). Throws
 /// GpuUnavailable.
@@ -39,7 +39,7 @@ std::optional<BenchDevice> bench_device(const std::string& name);
 struct Stepper {
     std::string description;
     tled::StepWork work;
-    std::optional<tled::KnownStepShape> shape;  ///< of compute passes and patches
+    std::optional<tled::GpuStepShape> shape;  ///< of compute passes and patches
     std::function<void()> restart;
     std::function<void(int steps, const tled::StepCoefficients&)> run;
     std::function<Eigen::Matrix3Xd()> displacement;

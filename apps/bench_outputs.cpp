@@ -17,30 +17,25 @@ std::string difference_text(const EngineTiming& engine) {
     return difference + (engine.repeats_equal ? "" : " NOT REPEATED");
 }
 
-const char* source_of(const tled::KnownStepShape& shape) {
-    return shape.measured ? "measured" : "suggested";
-}
-
 /// Of patches: two passes have but one shape.
 std::string shape_text(const EngineTiming& engine) {
     if (engine.engine != BenchEngine::Fused || !engine.shape) return "";
-    return fmt::format("  {} {}", source_of(*engine.shape), name_of(engine.shape->shape));
+    return "  " + name_of(*engine.shape);
 }
 
 nlohmann::json shape_json(const EngineTiming& engine) {
     if (engine.engine != BenchEngine::Fused || !engine.shape) return {};
-    const tled::GpuStepShape& shape = engine.shape->shape;
+    const tled::GpuStepShape& shape = *engine.shape;
     return {{"patch_tets", shape.patch_tets},
             {"longest_fan", shape.longest_fan},
             {"workgroup", shape.workgroup},
-            {"at_once", shape.at_once},
-            {"source", source_of(*engine.shape)}};
+            {"at_once", shape.at_once}};
 }
 
 void print_ceilings(const BenchResults& results) {
     for (const auto& [processor, c] : results.ceilings)
         fmt::print("{}: copy {:.1f} GB/s, multiply-adds {:.1f} Gflop/s\n",
-                   processor == tled::Processor::Cpu ? results.cpu : results.device->gpu.name,
+                   processor == tled::Processor::Cpu ? results.cpu : results.device->name,
                    c.copy_bytes_per_second * 1e-9, c.fma_flops_per_second * 1e-9);
 }
 
@@ -139,7 +134,7 @@ nlohmann::json bench_json(const BenchResults& results) {
             limits[name_of(engine)] = {{"kind", kinds[static_cast<int>(limit->kind)]}, {"elements", limit->elements}};
         }
     nlohmann::json gpu;
-    if (results.device) gpu = {{"name", results.device->gpu.name}, {"hardware", results.device->gpu.hardware}};
+    if (results.device) gpu = {{"name", results.device->name}, {"hardware", results.device->hardware}};
     return {{"schema", "tissuewarp.bench"},
             {"schema_version", 1},
             {"cpu", results.cpu},

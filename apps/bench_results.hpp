@@ -21,9 +21,9 @@ struct EngineTiming {
     int steps = 0;                         ///< of each run
     std::vector<double> seconds_per_step;  ///< of each run
     tled::StepWork work;
-    std::optional<tled::KnownStepShape> shape;  ///< of compute passes and patches
-    bool repeats_equal = true;                  ///< all runs ended in the same bits
-    int compared_steps = 0;                     ///< 0: not compared
+    std::optional<tled::GpuStepShape> shape;  ///< of compute passes and patches
+    bool repeats_equal = true;                ///< all runs ended in the same bits
+    int compared_steps = 0;                   ///< 0: not compared
     std::optional<double>
         difference;  ///< to float64 after compared_steps, over the largest displacement; NaN: blown up
 

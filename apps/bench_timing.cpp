@@ -75,7 +75,7 @@ SceneReference scene_reference(const BenchScene& scene, const TimingPlan& plan, 
 std::optional<EngineTiming> timed(BenchEngine engine, const BenchScene& scene, const SceneReference& reference,
                                   const BenchDevice& device, const TimingPlan& plan, Observer& observer) {
     const Stepper stepper = make_stepper(engine, scene, device);
-    const bool hardware = processor_of(engine) == tled::Processor::Gpu && device.gpu.hardware;
+    const bool hardware = processor_of(engine) == tled::Processor::Gpu && device.hardware;
     timed_run(stepper, 1, reference.coefficients);  // compiles
     const double first = timed_run(stepper, least_steps, reference.coefficients).seconds_per_step;
     if (!hardware && plan.longest_step > 0 && first > plan.longest_step) return std::nullopt;

@@ -7,6 +7,7 @@
 #include "apps/threads.hpp"
 #include "apps/verbs.hpp"
 #include "core/errors.hpp"
+#include "tled/blas_threads.hpp"
 
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
@@ -43,6 +44,7 @@ int report(const std::vector<std::string>& arguments, int code, std::string mess
 
 int main(int argc, char** argv) {
     apps::start_again_if_blas_mistook_the_processor(argv);
+    tled::let_solves_take_one_blas_thread(true);
     spdlog::set_default_logger(spdlog::stderr_logger_st("tissuewarp"));
     spdlog::set_pattern("%v");
     const std::vector<std::string> arguments(argv + 1, argv + argc);

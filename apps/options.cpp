@@ -247,7 +247,6 @@ struct Parser {
         verb.text("--device", o.device.name, "auto, cpu, gpu or gpu:<index>")
             ->check(CLI::Validator(check_device, "", "device"));
         verb.path("-o,--output", o.output, "Folder for bench.json, bench.csv and figures")->type_name("FOLDER");
-        verb.flag("--tune", o.tune, "Find the fastest patches for this device and keep them for later runs");
         verb.flag("--quick", o.quick, "Small meshes, few steps: whether everything runs, not how fast");
         verb.common(o.common);
     }

@@ -119,7 +119,6 @@ struct BenchOptions {
     int steps = 1000;
     int repeats = 5;
     bool quick = false;
-    bool tune = false;  ///< shapes of GPU steps in place of engines
     DeviceChoice device;
 };
 

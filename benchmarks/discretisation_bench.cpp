@@ -3,8 +3,9 @@
 //     discretisation_bench [CELLS]
 
 #include "meshing/primitives.hpp"
-#include "tled/discretisation_error.hpp"
+#include "tled/blas_threads.hpp"
 #include "tled/equilibrium.hpp"
+#include "tled/error/discretisation_error.hpp"
 #include "tled/rest_state.hpp"
 
 #include <chrono>
@@ -68,6 +69,7 @@ void print_row(int cells, double nu) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    tissuewarp::tled::let_solves_take_one_blas_thread(true);
     std::printf(
         "| tetrahedra | ν | factor, s (of all threads) | equilibrium | estimate | iterations | largest error, mm |\n"
         "|---|---|---|---|---|---|---|\n");

@@ -13,8 +13,7 @@
 #include "core/errors.hpp"
 #include "meshing/mesh_io.hpp"
 #include "meshing/primitives.hpp"
-#include "tled/reference.hpp"
-#include "tled/step_shape_cache.hpp"
+#include "tled/model/internal_force.hpp"
 
 #include <Eigen/Geometry>
 

@@ -3,6 +3,7 @@
 // Prints a table in Markdown: the reference, and each engine's difference from it beside what is accepted. Ends with 1
 // when one is larger.
 #include "tests/verification/effect_cases.hpp"
+#include "tled/blas_threads.hpp"
 
 #include <cmath>
 #include <cstdio>
@@ -54,6 +55,7 @@ int print_table(const std::vector<Column>& engines) {
 }  // namespace
 
 int main(int count, char** arguments) {
+    tissuewarp::tled::let_solves_take_one_blas_thread(true);
     const bool gpu = count == 2 && std::strcmp(arguments[1], "--gpu") == 0;
     if (count > 1 && !gpu) {
         std::fprintf(stderr, "usage: effect_table [--gpu]\n");

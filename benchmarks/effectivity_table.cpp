@@ -4,6 +4,7 @@
 
 #include "tests/verification/effectivity.hpp"
 #include "tests/verification/problems.hpp"
+#include "tled/blas_threads.hpp"
 
 #include <cstdio>
 #include <exception>
@@ -45,6 +46,7 @@ Elements quadratic_elements(const Problem& problem) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    tissuewarp::tled::let_solves_take_one_blas_thread(true);
     const std::string part = argc == 3 && argv[1] == std::string("--problem") ? argv[2] : "";
     std::printf(
         "| problem | law | element | tetrahedra | quantity | estimated, mm | true, mm | effectivity | 0.5–2 | left, mm "

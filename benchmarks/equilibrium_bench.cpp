@@ -4,8 +4,10 @@
 //     equilibrium_bench [--cells 16|24|12] [--gpu] [--runs N] [tolerance_mm ...]
 
 #include "meshing/primitives.hpp"
+#include "tled/blas_threads.hpp"
 #include "tled/equilibrium.hpp"
-#include "tled/reference.hpp"
+#include "tled/model/internal_force.hpp"
+#include "tled/reference/newton.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -107,7 +109,6 @@ constexpr Row rows[] = {{"L-BFGS, metric K0", tled::EquilibriumMethod::Lbfgs, fa
                         {"L-BFGS, metric renewed", tled::EquilibriumMethod::Lbfgs, true},
                         {"dynamic relaxation", tled::EquilibriumMethod::DynamicRelaxation, false},
                         {"self-checked relaxation", tled::EquilibriumMethod::SelfCheckedRelaxation, false},
-                        {"nonlinear CG", tled::EquilibriumMethod::NonlinearCg, false},
                         {"automatic", tled::EquilibriumMethod::Automatic, false}};
 
 struct Cube {
@@ -178,6 +179,7 @@ void solve_cube(int cells, double poisson, const std::vector<double>& tolerances
 }  // namespace
 
 int main(int argc, char** argv) {
+    tissuewarp::tled::let_solves_take_one_blas_thread(true);
     std::vector<double> tolerances;
     bool gpu = false;
     int only = 0, runs = 3;

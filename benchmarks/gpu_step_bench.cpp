@@ -18,9 +18,8 @@
 #include "meshing/mesh_io.hpp"
 #include "meshing/primitives.hpp"
 #include "shaders/device.hpp"
-#include "tled/reference.hpp"
-#include "tled/render_pass_engine.hpp"
-#include "tled/step_shape_cache.hpp"
+#include "tled/model/internal_force.hpp"
+#include "tled/render_pass/render_pass_engine.hpp"
 
 #include <algorithm>
 #include <cstdio>
@@ -108,13 +107,15 @@ void report(AnyEngine& engine, double start_seconds, const Scene& scene, const t
     std::fflush(stdout);
 }
 
+tled::GpuStepShape suggested_shape(const tled::RestState& rest, const Options& options) {
+    return tled::suggested_gpu_step_shape(rest.element_count(), tled::element_of(rest),
+                                          shaders::Device(options.device).limits().multiprocessors);
+}
+
 void report_engines(const Scene& scene, const tled::RestState& rest, const std::string& name, const std::string& mesh,
                     const Options& options) {
     std::vector<tled::GpuStepShape> shapes = options.shapes;
-    if (shapes.empty()) {
-        const int multiprocessors = tled::step_device(options.device).multiprocessors;
-        shapes = {tled::suggested_gpu_step_shape(rest.element_count(), tled::element_of(rest), multiprocessors)};
-    }
+    if (shapes.empty()) shapes = {suggested_shape(rest, options)};
     for (const tled::GpuStepShape& shape : shapes) {
         const double begin = now();
         const auto gpu = tled::make_gpu_engine(rest, options.device, shape);
@@ -135,8 +136,7 @@ void measure(const meshing::TetMesh& mesh, const std::string& mesh_name, const O
 /// The shapes in which tissue is timed: what more registers and shared memory for tissue ask for may differ.
 std::vector<tled::GpuStepShape> tissue_shapes(const tled::RestState& rest, const Options& options) {
     if (!options.shapes.empty()) return options.shapes;
-    const tled::GpuStepShape suggested = tled::suggested_gpu_step_shape(
-        rest.element_count(), tled::element_of(rest), tled::step_device(options.device).multiprocessors);
+    const tled::GpuStepShape suggested = suggested_shape(rest, options);
     std::vector<tled::GpuStepShape> shapes{suggested};
     for (const int workgroup : {384, 512}) {
         shapes.push_back(suggested);

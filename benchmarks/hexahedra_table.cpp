@@ -2,7 +2,9 @@
 //   hexahedra_table cantilever | cube
 #include "meshing/hex_primitives.hpp"
 #include "meshing/primitives.hpp"
-#include "tled/reference.hpp"
+#include "tled/blas_threads.hpp"
+#include "tled/model/internal_force.hpp"
+#include "tled/reference/newton.hpp"
 
 #include <array>
 #include <cstdio>
@@ -100,6 +102,7 @@ void cube(int cells, double coefficient) {
 }  // namespace
 
 int main(int count, char** arguments) {
+    tissuewarp::tled::let_solves_take_one_blas_thread(true);
     const std::string study = count > 1 ? arguments[1] : "cantilever";
     std::printf("coefficient 0: averaged-pressure tetrahedra, six to a cell\n");
     if (study == "cantilever") {

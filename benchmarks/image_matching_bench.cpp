@@ -12,6 +12,7 @@
 #include "registration/evaluation.hpp"
 #include "registration/matching/image_matching.hpp"
 #include "registration/pose/alignment.hpp"
+#include "tled/blas_threads.hpp"
 
 #include <Eigen/Eigenvalues>
 
@@ -239,6 +240,7 @@ void run(const Arguments& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    tissuewarp::tled::let_solves_take_one_blas_thread(true);
     try {
         run(parse(argc, argv));
     } catch (const std::exception& error) {

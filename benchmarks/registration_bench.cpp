@@ -17,6 +17,7 @@
 #include "registration/io/surface_points.hpp"
 #include "registration/update.hpp"
 #include "registration/warp.hpp"
+#include "tled/blas_threads.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -380,6 +381,7 @@ void run(const Arguments& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    tissuewarp::tled::let_solves_take_one_blas_thread(true);
     try {
         run(parse(argc, argv));
     } catch (const std::exception& error) {

@@ -4,8 +4,9 @@
 //     rest_stiffness_bench [--without-factor] [cells an edge ...; default 16 20 24 27]
 
 #include "meshing/primitives.hpp"
+#include "tled/blas_threads.hpp"
 #include "tled/model.hpp"
-#include "tled/rest_stiffness.hpp"
+#include "tled/stiffness/rest_stiffness.hpp"
 
 #include <chrono>
 #include <cstdio>
@@ -94,6 +95,7 @@ void measure(int cells, tled::Element element, bool with_factor) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    tissuewarp::tled::let_solves_take_one_blas_thread(true);
     std::vector<int> cells{16, 20, 24, 27};
     const bool with_factor = argc < 2 || std::strcmp(argv[1], "--without-factor") != 0;
     const int first = with_factor ? 1 : 2;

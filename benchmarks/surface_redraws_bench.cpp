@@ -12,6 +12,7 @@
 #include "registration/field.hpp"
 #include "registration/uncertainty.hpp"
 #include "registration/update.hpp"
+#include "tled/blas_threads.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -210,6 +211,7 @@ void run(const Arguments& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    tissuewarp::tled::let_solves_take_one_blas_thread(true);
     try {
         run(parse(argc, argv));
     } catch (const std::exception& error) {

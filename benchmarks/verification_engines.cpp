@@ -4,7 +4,7 @@
 #include "tests/verification/problems.hpp"
 #include "tests/verification/solution.hpp"
 #include "tled/equilibrium.hpp"
-#include "tled/reference.hpp"
+#include "tled/reference/newton.hpp"
 
 #include <cmath>
 #include <cstdio>

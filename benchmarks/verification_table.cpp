@@ -9,6 +9,7 @@
 #include "core/errors.hpp"
 #include "tests/verification/problems.hpp"
 #include "tests/verification/study.hpp"
+#include "tled/blas_threads.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -166,6 +167,7 @@ void list_problems() {
 }  // namespace
 
 int main(int argc, char** argv) {
+    tissuewarp::tled::let_solves_take_one_blas_thread(true);
     try {
         const Arguments arguments = parse(argc, argv);
         if (arguments.list) {

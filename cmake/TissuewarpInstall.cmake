@@ -5,18 +5,40 @@ include(CMakePackageConfigHelpers)
 
 configure_file(${PROJECT_SOURCE_DIR}/core/version.hpp.in ${PROJECT_BINARY_DIR}/generated/version.hpp @ONLY)
 
-# The public face of each library, and what its headers include.
-file(GLOB_RECURSE headers RELATIVE ${PROJECT_SOURCE_DIR} CONFIGURE_DEPENDS
-  ${PROJECT_SOURCE_DIR}/core/*.hpp ${PROJECT_SOURCE_DIR}/meshing/*.hpp ${PROJECT_SOURCE_DIR}/shaders/*.hpp
-  ${PROJECT_SOURCE_DIR}/tled/*.hpp ${PROJECT_SOURCE_DIR}/imaging/*.hpp)
-list(FILTER headers EXCLUDE REGEX "^[a-z]+/[a-z_]+/")  # rooms are not public
+# The public face of a library is what lies directly in its folder (registration names its own), and what that includes.
+function(with_what_they_include list)
+  set(open ${${list}})
+  while(open)
+    list(POP_FRONT open header)
+    file(STRINGS ${PROJECT_SOURCE_DIR}/${header} includes REGEX "^#include \"[a-z_]+/")
+    foreach(include ${includes})
+      string(REGEX REPLACE "^#include \"([^\"]+)\".*" "\\1" included "${include}")
+      if(NOT included IN_LIST ${list})
+        list(APPEND ${list} ${included})
+        list(APPEND open ${included})
+      endif()
+    endforeach()
+  endwhile()
+  set(${list} ${${list}} PARENT_SCOPE)
+endfunction()
+
 set(components tled)
 set(tled_targets core shaders meshing tled)
+set(folders core shaders meshing tled)
 if(TISSUEWARP_COMPONENTS STREQUAL "all")
   list(APPEND components registration)
   set(registration_targets imaging mesher hdf5 registration)
-  list(APPEND headers ${TISSUEWARP_REGISTRATION_HEADERS})
+  list(APPEND folders imaging)
+  set(headers ${TISSUEWARP_REGISTRATION_HEADERS})
 endif()
+foreach(folder ${folders})
+  file(GLOB face RELATIVE ${PROJECT_SOURCE_DIR} CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${folder}/*.hpp)
+  if(TISSUEWARP_COMPONENTS STREQUAL "tled")
+    list(FILTER face EXCLUDE REGEX "meshing/(mesher|voxel_hexahedra|fidelity)")  # these need images
+  endif()
+  list(APPEND headers ${face})
+endforeach()
+with_what_they_include(headers)
 
 string(REPLACE ";" "|" header_argument "${headers};${PROJECT_BINARY_DIR}/generated/version.hpp")
 install(CODE "execute_process(COMMAND \"${CMAKE_COMMAND}\" \"-DROOT=${PROJECT_SOURCE_DIR}\"

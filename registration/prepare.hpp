@@ -8,7 +8,7 @@
 #include "registration/options.hpp"
 #include "registration/stage_time.hpp"
 #include "tled/model.hpp"
-#include "tled/rest_stiffness.hpp"
+#include "tled/stiffness/rest_stiffness.hpp"
 
 #include <memory>
 #include <optional>

@@ -4,7 +4,7 @@
 #include "registration/loads/coarse_twin.hpp"
 #include "registration/terms/pull.hpp"
 #include "registration/uncertainty/data_uncertainty.hpp"
-#include "tled/lifted_residual.hpp"
+#include "tled/error/lifted_residual.hpp"
 
 #include <algorithm>
 #include <cmath>

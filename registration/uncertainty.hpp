@@ -7,7 +7,7 @@
 #include "meshing/point_location.hpp"
 #include "registration/prepare.hpp"
 #include "registration/result.hpp"
-#include "tled/discretisation_error.hpp"
+#include "tled/error/discretisation_error.hpp"
 
 #include <Eigen/Core>
 

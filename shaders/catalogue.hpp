@@ -59,7 +59,7 @@ struct SurfaceForces {
     bool parting = false;
 };
 
-/// The most that a pass over elements or nodes declares; those over patches are counted in tled/detail/gpu_patches.cpp.
+/// The most that a pass over elements or nodes declares; those over patches are counted in tled/gpu/gpu_patches.cpp.
 inline constexpr int storage_blocks_of_passes = 11;
 
 enum class StoreResidual { No, Yes };

@@ -7,7 +7,6 @@
 #include "tled/dynamics.hpp"
 #include "tled/engine_choice.hpp"
 #include "tled/load_path.hpp"
-#include "tled/reference.hpp"
 
 #include <algorithm>
 #include <chrono>

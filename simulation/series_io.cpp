@@ -5,7 +5,7 @@
 #include "core/errors.hpp"
 #include "meshing/mesh_io.hpp"
 #include "simulation/xdmf.hpp"
-#include "tled/reference.hpp"
+#include "tled/model/internal_force.hpp"
 
 #include <array>
 #include <charconv>

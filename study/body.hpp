@@ -7,7 +7,7 @@
 #include "meshing/tet_mesh.hpp"
 #include "study/setting.hpp"
 #include "tled/conditions.hpp"
-#include "tled/quadratic.hpp"
+#include "tled/reference/quadratic.hpp"
 
 #include <Eigen/Core>
 

@@ -5,8 +5,9 @@
 #include "study/detail/clock.hpp"
 #include "study/reference.hpp"
 #include "tled/load_path.hpp"
-#include "tled/reference.hpp"
-#include "tled/rest_stiffness.hpp"
+#include "tled/model/internal_force.hpp"
+#include "tled/reference/newton.hpp"
+#include "tled/stiffness/rest_stiffness.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -251,7 +252,7 @@ private:
                                                          : tled::make_cpu_engine(prepared_.rest, setting.arithmetic);
         point.stages.push_back({"engine", Phase::Preparation, {clock.seconds()}});
         return [this, setting, engine, &observer] {
-            constexpr int most_evaluations = 40000;  // conjugate gradients to 0.001 mm take some thousands
+            constexpr int most_evaluations = 40000;  // relaxation to 0.001 mm takes some thousands
             tled::LoadPathOptions options;
             options.equilibrium.tolerance_mm = setting.tolerance_mm;
             options.equilibrium.max_steps = most_evaluations;

@@ -28,15 +28,14 @@ Axes axes_of(Extent extent, bool registration) {
                 {Law::Linear},
                 {},
                 {Solver::Lbfgs, Solver::DynamicRelaxation, Solver::SelfCheckedRelaxation}};
-    return {
-        {5000, 10000, 20000, 50000, 100000, 200000, 500000},
-        {20000, 50000, 100000, 200000, 500000, 1000000},
-        {1, 0.1, 0.01},
-        {0.3, 0.03, 0.003, 0.001},
-        {Element::T4, Element::AveragedPressure, Element::Hexahedra},
-        {Law::Linear, Law::Iso, Law::Stable, Law::MooneyRivlin, Law::Ogden},
-        {0.3, 0.4, 0.45, 0.49, 0.495},
-        {Solver::Lbfgs, Solver::DynamicRelaxation, Solver::SelfCheckedRelaxation, Solver::NonlinearCg, Solver::Newton}};
+    return {{5000, 10000, 20000, 50000, 100000, 200000, 500000},
+            {20000, 50000, 100000, 200000, 500000, 1000000},
+            {1, 0.1, 0.01},
+            {0.3, 0.03, 0.003, 0.001},
+            {Element::T4, Element::AveragedPressure, Element::Hexahedra},
+            {Law::Linear, Law::Iso, Law::Stable, Law::MooneyRivlin, Law::Ogden},
+            {0.3, 0.4, 0.45, 0.49, 0.495},
+            {Solver::Lbfgs, Solver::DynamicRelaxation, Solver::SelfCheckedRelaxation, Solver::Newton}};
 }
 
 class Planner {

@@ -5,8 +5,9 @@
 #include "core/errors.hpp"
 #include "meshing/point_location.hpp"
 #include "tled/load_path.hpp"
-#include "tled/reference.hpp"
-#include "tled/rest_stiffness.hpp"
+#include "tled/reference/discrete_energy.hpp"
+#include "tled/reference/newton.hpp"
+#include "tled/stiffness/rest_stiffness.hpp"
 
 #include <cmath>
 

@@ -41,8 +41,7 @@ std::string name_of(Law law) {
 }
 
 std::string name_of(Solver solver) {
-    constexpr const char* names[] = {"automatic",           "L-BFGS", "dynamic relaxation", "self-checked relaxation",
-                                     "conjugate gradients", "Newton"};
+    constexpr const char* names[] = {"automatic", "L-BFGS", "dynamic relaxation", "self-checked relaxation", "Newton"};
     return names[static_cast<int>(solver)];
 }
 
@@ -110,8 +109,6 @@ tled::EquilibriumMethod method_of(Solver solver) {
             return tled::EquilibriumMethod::DynamicRelaxation;
         case Solver::SelfCheckedRelaxation:
             return tled::EquilibriumMethod::SelfCheckedRelaxation;
-        case Solver::NonlinearCg:
-            return tled::EquilibriumMethod::NonlinearCg;
         case Solver::Newton:
             break;
     }

@@ -21,7 +21,7 @@ enum class Law {
     Ogden          ///< one term, α = −4.7: brain tissue (Miller and Chinzei, J. Biomech. 35 (2002) 483)
 };
 
-enum class Solver { Automatic, Lbfgs, DynamicRelaxation, SelfCheckedRelaxation, NonlinearCg, Newton };
+enum class Solver { Automatic, Lbfgs, DynamicRelaxation, SelfCheckedRelaxation, Newton };
 
 enum class Hold {
     Hard,  ///< imposed displacements; in registrations springs of the data ten times stiffer than by default
@@ -49,9 +49,8 @@ struct Setting {
 
 inline constexpr std::array every_element{Element::T4, Element::AveragedPressure, Element::Hexahedra};
 inline constexpr std::array every_law{Law::Linear, Law::LnJ, Law::Iso, Law::Stable, Law::MooneyRivlin, Law::Ogden};
-inline constexpr std::array every_solver{Solver::Automatic,         Solver::Lbfgs,
-                                         Solver::DynamicRelaxation, Solver::SelfCheckedRelaxation,
-                                         Solver::NonlinearCg,       Solver::Newton};
+inline constexpr std::array every_solver{Solver::Automatic, Solver::Lbfgs, Solver::DynamicRelaxation,
+                                         Solver::SelfCheckedRelaxation, Solver::Newton};
 
 /// Names of files and of people: "averaged pressure", "neo-Hookean, ln J", "L-BFGS", …
 std::string name_of(Element element);

@@ -4,7 +4,8 @@
 
 #include <Eigen/Cholesky>
 
-#include "tled/detail/parallel.hpp"
+#include "tled/model/symmetric.hpp"
+#include "tled/parallel/parallel.hpp"
 
 #include <string>
 #include <vector>
@@ -56,9 +57,7 @@ void sum_springs(const std::vector<Spring>& springs, int node_count, NodalCondit
     for (const Spring& spring : springs) {
         const Eigen::Index column = column_of[static_cast<std::size_t>(spring.node)];
         const Eigen::Matrix3d& k = spring.stiffness;
-        Eigen::Matrix<double, 6, 1> entries;
-        entries << k(0, 0), k(1, 1), k(2, 2), k(0, 1), k(1, 2), k(2, 0);
-        nodal.spring_stiffness.col(column) += entries;
+        nodal.spring_stiffness.col(column) += symmetric_entries(k);
         nodal.spring_force.col(column) += k * spring.target;
     }
 }

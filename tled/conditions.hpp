@@ -33,7 +33,7 @@ struct Conditions {
 
 /// Conditions in the form that engines take: per node one summed spring K and K·target, a mask and imposed values.
 struct NodalConditions {
-    Eigen::Matrix<double, 6, Eigen::Dynamic> spring_stiffness;  ///< mN/mm, rows xx yy zz xy yz zx; 6 × S
+    Eigen::Matrix<double, 6, Eigen::Dynamic> spring_stiffness;  ///< mN/mm, rows as tled/model/symmetric.hpp; 6 × S
     Eigen::Matrix3Xd spring_force;                              ///< K·target, mN, 3 × S
     std::vector<int> spring_node;                               ///< S, ascending
     Eigen::Matrix<bool, 3, Eigen::Dynamic> constrained;         ///< 3 × N

@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "core/errors.hpp"
-#include "tled/detail/kinematics.hpp"
-#include "tled/detail/vectors.hpp"
+#include "tled/model/kinematics.hpp"
+#include "tled/model/vectors.hpp"
 
 namespace tissuewarp::tled {
 

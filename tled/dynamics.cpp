@@ -10,8 +10,8 @@
 
 #include "core/errors.hpp"
 #include "tled/critical_step.hpp"
-#include "tled/detail/springs.hpp"
-#include "tled/reference.hpp"
+#include "tled/model/internal_force.hpp"
+#include "tled/model/springs.hpp"
 
 namespace tissuewarp::tled {
 

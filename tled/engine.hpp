@@ -119,9 +119,12 @@ struct GpuStepShape {
 /// so many multiprocessors; where these are unknown (0), to one of as many as an H100 has.
 GpuStepShape suggested_gpu_step_shape(int element_count, Element element = Element::T4, int multiprocessors = 0);
 
+/// "two passes", "2910:5:640" (tetrahedra, fan, workgroup) or "2910:5:640:132" (workgroups at once).
+std::string name_of(const GpuStepShape& shape);
+
 /// OpenGL 4.5 compute through EGL, float32. `device` counts EGL devices; −1 takes the first hardware device, or the
-/// software rasteriser when there is none. Without a shape, hardware takes the best known one (step_shape_cache.hpp)
-/// and a software rasteriser two passes. Its forces on this mesh are compared with the scalar reference once. Throws
+/// software rasteriser when there is none. Without a shape, hardware takes the suggested one and a
+/// software rasteriser two passes. Its forces on this mesh are compared with the scalar reference once. Throws
 /// GpuUnavailable, also when they differ.
 std::unique_ptr<Engine> make_gpu_engine(const RestState& rest, int device = -1);
 std::unique_ptr<Engine> make_gpu_engine(const RestState& rest, int device, const GpuStepShape& shape);

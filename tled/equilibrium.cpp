@@ -1,7 +1,7 @@
 #include "tled/equilibrium.hpp"
 
-#include "tled/detail/equilibrium_search.hpp"
-#include "tled/detail/held_tissue.hpp"
+#include "tled/model/held_tissue.hpp"
+#include "tled/statics/equilibrium_search.hpp"
 
 #include <cmath>
 
@@ -47,8 +47,6 @@ Choice choose(const Engine& engine, const RestStiffness& stiffness, const NodalC
 
 EquilibriumResult solve(EquilibriumMethod method, detail::EquilibriumSearch& search, const Eigen::Matrix3Xd* start) {
     switch (method) {
-        case EquilibriumMethod::NonlinearCg:
-            return detail::nonlinear_cg(search, start);
         case EquilibriumMethod::DynamicRelaxation:
             return detail::dynamic_relaxation(search, start);
         case EquilibriumMethod::SelfCheckedRelaxation:
@@ -70,8 +68,6 @@ const char* name_of(EquilibriumMethod method) {
             return "dynamic relaxation";
         case EquilibriumMethod::SelfCheckedRelaxation:
             return "self-checked relaxation";
-        case EquilibriumMethod::NonlinearCg:
-            return "nonlinear conjugate gradients";
         case EquilibriumMethod::Automatic:
             break;
     }

@@ -3,7 +3,7 @@
 
 #include "core/observer.hpp"
 #include "tled/engine.hpp"
-#include "tled/rest_stiffness.hpp"
+#include "tled/stiffness/rest_stiffness.hpp"
 
 #include <string>
 
@@ -14,7 +14,6 @@ enum class EquilibriumMethod {
     Lbfgs,                  ///< limited-memory BFGS with the factor of K₀ as metric (Liu and Nocedal 1989)
     DynamicRelaxation,      ///< heavy ball with mass diag K₀ (Underwood 1983; Joldes, Wittek, Miller 2011)
     SelfCheckedRelaxation,  ///< the same, started and checked without the factor of K₀
-    NonlinearCg,            ///< conjugate gradients (Polak and Ribière 1969), preconditioned with diag K₀
 };
 
 struct EquilibriumOptions {

@@ -3,7 +3,7 @@
 #include "tled/nodal_effects.hpp"
 
 #include "core/errors.hpp"
-#include "tled/detail/interpolation_reach.hpp"
+#include "tled/model/interpolation_reach.hpp"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>

@@ -44,7 +44,7 @@ struct NodalFluid {
     Eigen::VectorXd column_height;  ///< N, cube root of the node's volume, mm
 };
 
-/// How little of an obstacle's grid must be read where contact is far (detail/interpolation_reach.hpp).
+/// How little of an obstacle's grid must be read where contact is far (tled/model/interpolation_reach.hpp).
 struct GridReach {
     double interpolation = 0;  ///< mm
     double steepness = 0;      ///< mm/mm

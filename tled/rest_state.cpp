@@ -1,7 +1,7 @@
 #include "tled/rest_state.hpp"
 
 #include "core/errors.hpp"
-#include "tled/detail/hexahedra.hpp"
+#include "tled/model/hexahedra.hpp"
 
 #include <Eigen/LU>
 
@@ -180,6 +180,10 @@ RestState rest_state(const Model& model) {
         throw InvalidInput("the model's mesh has nodes that belong to no element; remove them");
     if (model.element == Element::AveragedPressureT4) rest.pressure = pressure_nodes(rest);
     return rest;
+}
+
+Element element_of(const RestState& rest) {
+    return rest.pressure.count() > 0 ? Element::AveragedPressureT4 : Element::T4;
 }
 
 bool admits_inversion(const RestState& rest) {

@@ -50,6 +50,9 @@ std::vector<int> material_of_elements(const RestState& rest);
 /// The same for the elements of any blocks.
 std::vector<int> material_of_elements(const std::vector<MaterialBlock>& blocks);
 
+/// Element::AveragedPressureT4 where the model averages its pressure.
+Element element_of(const RestState& rest);
+
 /// Whether every material's energy is finite for det F ≤ 0.
 bool admits_inversion(const RestState& rest);
 

@@ -1,7 +1,7 @@
 #include "tled/step_work.hpp"
 
-#include "tled/detail/fan_layout.hpp"
-#include "tled/detail/patches.hpp"
+#include "tled/cpu/fan_layout.hpp"
+#include "tled/model/patches.hpp"
 
 #include <algorithm>
 

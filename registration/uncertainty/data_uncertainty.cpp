@@ -5,7 +5,8 @@
 #include "registration/pose/rigid_part.hpp"
 #include "registration/terms/ground.hpp"
 #include "registration/uncertainty/expected_error.hpp"
-#include "tled/reference.hpp"
+#include "tled/model/internal_force.hpp"
+#include "tled/stiffness/tangent_stiffness.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>

@@ -1,6 +1,6 @@
 // Needs: bindings.
 // Gives: the constants of a law for the materials of the scene: eight numbers each, in the order of
-// tled/detail/kernel_parameters.hpp (kPa and exponents).
+// tled/material/kernel_parameters.hpp (kPa and exponents).
 
 layout(std430, binding = BINDING_MATERIAL_PARAMETERS) readonly buffer MaterialParameters {
     vec4 material_parameters[];

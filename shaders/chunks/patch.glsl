@@ -1,5 +1,5 @@
 // Needs: bindings.
-// Gives: what a workgroup knows of its patch of the mesh (tled/detail/patch_layout.hpp), whose nodes are slots. A node that
+// Gives: what a workgroup knows of its patch of the mesh (tled/gpu/patch_layout.hpp), whose nodes are slots. A node that
 // more patches share has a slot in each, all with the same state; shared nodes come first, most shared ones before.
 //! define SLOTS
 

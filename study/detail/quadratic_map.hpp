@@ -2,7 +2,7 @@
 /// Where quadratic tetrahedra lie, and the exact map that they define.
 
 #include "meshing/point_location.hpp"
-#include "tled/quadratic.hpp"
+#include "tled/reference/quadratic.hpp"
 
 #include <Eigen/Core>
 

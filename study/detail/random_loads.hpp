@@ -5,7 +5,7 @@
 #include "study/detail/organ_shape.hpp"
 
 #include "tled/conditions.hpp"
-#include "tled/quadratic.hpp"
+#include "tled/reference/quadratic.hpp"
 
 #include <Eigen/Core>
 

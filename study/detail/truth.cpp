@@ -2,7 +2,8 @@
 
 #include "core/errors.hpp"
 #include "meshing/mesher.hpp"
-#include "tled/reference.hpp"
+#include "tled/model/internal_force.hpp"
+#include "tled/reference/newton.hpp"
 
 #include <Eigen/LU>
 

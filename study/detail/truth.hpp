@@ -6,7 +6,7 @@
 #include "study/detail/random_tissue.hpp"
 
 #include "core/observer.hpp"
-#include "tled/quadratic.hpp"
+#include "tled/reference/quadratic.hpp"
 
 #include <Eigen/Core>
 

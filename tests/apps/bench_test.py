@@ -104,6 +104,10 @@ class Benchmark(unittest.TestCase):
     def test_table_holds_every_row(self):
         for _, mesh, engine in self.timings():
             self.assertRegex(self.result.stdout, rf"(?m)^ *{mesh['elements']}  {engine['engine']} ")
+            if engine["engine"] == "fused":
+                shape = engine["step_shape"]
+                names = ("patch_tets", "longest_fan", "workgroup")
+                self.assertIn("  " + ":".join(str(shape[name]) for name in names), self.result.stdout)
         self.assertRegex(self.result.stdout, r"copy [\d.]+ GB/s, multiply-adds [\d.]+ Gflop/s")
         self.assertIn("largest cube in real time, scalar:", self.result.stdout)
 
@@ -193,90 +197,6 @@ class BenchmarkOptions(PhantomTest):
         path = self.phantom.folder / "taken"
         path.write_text("")
         self.assert_refused(run("bench", "--quick", "--output", path), IO, "taken")
-
-
-def tune(cache, *more):
-    return run("bench", "--tune", "--quick", "--elements", 384, "--repeats", 2, *more, timeout=250,
-               TISSUEWARP_CACHE=str(cache))
-
-
-class Tuning(unittest.TestCase):
-    """One tuning of a tiny cube, and what later runs make of it."""
-
-    @classmethod
-    def setUpClass(cls):
-        cls.phantom = Phantom()
-        cls.cache = cls.phantom.folder / "cache"
-        cls.file = cls.cache / "gpu_step_shapes.tsv"
-        cls.result = tune(cls.cache)
-        cls.text = cls.file.read_text() if cls.result.returncode == 0 else None
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.phantom.temporary.cleanup()
-
-    def setUp(self):
-        self.assertEqual(self.result.returncode, 0, self.result.stderr)
-
-    def lines(self):
-        return [line.split("\t") for line in self.text.splitlines() if not line.startswith("#")]
-
-    def fused_shape(self):
-        output = self.phantom.folder / "bench"
-        result = run("bench", "--quick", "--study", "cube", "--elements", 384, "--engines", "fused", "--output", output,
-                     TISSUEWARP_CACHE=str(self.cache))
-        self.assertEqual(result.returncode, 0, result.stderr)
-        report = json.loads((output / "bench.json").read_text())
-        return report["studies"][0]["meshes"][0]["engines"][0]["step_shape"], result.stdout
-
-    # A table that is not sorted, a cache that holds another shape than the fastest, one element alone.
-    def test_keeps_the_fastest_of_each_table(self):
-        printed = self.result.stdout
-        self.assertIn(str(self.file), printed)
-        tables = re.findall(r"(?m)^384 (linear tetrahedra|averaged pressure)\nshape.*\n((?:.+\n)+)", printed)
-        self.assertEqual([kind for kind, _ in tables], ["linear tetrahedra", "averaged pressure"])
-        self.assertEqual([line[2:4] for line in self.lines()], [["t4", "384"], ["averaged", "384"]])
-        for (_, table), line in zip(tables, self.lines()):
-            rows = table.splitlines()
-            self.assertEqual(sum(row.endswith("suggested") for row in rows), 1, table)
-            names = [re.split(r"  +", row)[0] for row in rows]
-            self.assertIn("two passes", names)
-            ratios = [float(re.split(r"  +", row)[3]) for row in rows if "out:" not in row]
-            self.assertEqual(ratios, sorted(ratios))
-            self.assertEqual(ratios[0], 1)
-            fastest = ["0", "5", "128", "0"] if names[0] == "two passes" else (names[0].split(":") + ["0"])[:4]
-            self.assertEqual(line[4:8], fastest)
-
-    # A measured shape that no run takes; one of which nobody hears; a damaged line that ends a run.
-    def test_later_runs_take_what_was_measured_and_say_so(self):
-        line = self.lines()[0]
-        line[4:8] = ["100", "2", "64", "0"]
-        self.file.write_text("\t".join(line) + "\nnonsense\n")
-        shape, printed = self.fused_shape()
-        self.assertEqual(shape, {"patch_tets": 100, "longest_fan": 2, "workgroup": 64, "at_once": 0,
-                                 "source": "measured"})
-        self.assertIn("measured 100:2:64", printed)
-        self.assertIn(f"1 lines of {self.file} could not be used", printed)
-        line[1] = "another driver"
-        self.file.write_text("\t".join(line) + "\n")
-        shape, printed = self.fused_shape()
-        self.assertEqual(shape["source"], "suggested")
-        self.assertIn("  suggested ", printed)
-
-
-class TuningOptions(PhantomTest):
-    def test_options_of_the_studies_are_refused(self):
-        for option in (["--study", "cube"], ["--engines", "fused"], ["--output", self.phantom.output]):
-            self.assert_refused(tune(self.phantom.folder / "cache", *option), INPUT, option[0], "--tune")
-
-    def test_needs_a_device(self):
-        self.assert_refused(tune(self.phantom.folder / "cache", "--device", "cpu"), INPUT, "--tune", "--device cpu")
-
-    # Found before an hour of measuring, not after it.
-    def test_place_that_cannot_be_written(self):
-        taken = self.phantom.folder / "taken"
-        taken.write_text("")
-        self.assert_refused(run("bench", "--tune", TISSUEWARP_CACHE=str(taken)), IO, "taken", "TISSUEWARP_CACHE")
 
 
 if __name__ == "__main__":

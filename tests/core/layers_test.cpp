@@ -28,6 +28,26 @@ const std::map<std::string, std::set<std::string>> may_include{
      {"core", "imaging", "meshing", "shaders", "tled", "simulation", "registration", "report", "study", "apps"}},
 };
 
+/// The rooms of tled, and into which of the others each may look. All see the headers that lie directly in tled/.
+const std::map<std::string, std::set<std::string>> rooms_of_tled{
+    {"parallel", {}},
+    {"material", {}},
+    {"model", {"material", "parallel"}},
+    {"cpu", {"material", "model", "parallel"}},
+    {"gpu", {"material", "model", "parallel"}},
+    {"stiffness", {"material", "model", "parallel"}},
+    {"statics", {"model", "parallel", "stiffness"}},
+    {"error", {"material", "model", "parallel", "stiffness"}},
+    {"reference", {"material", "model", "parallel", "stiffness"}},
+    {"render_pass", {"gpu", "parallel"}},
+};
+
+/// Rooms that are targets of their own, for tests, studies and benchmarks.
+const std::set<std::string> laboratory{"reference", "render_pass"};
+
+/// What registration and simulation may know of tled's rooms, beside its public headers.
+const std::set<std::string> known_to_products{"error", "model", "stiffness"};
+
 /// Files of meshing that belong to the mesher: they name it, its label field, its seeds or its fidelity.
 bool is_mesher(const std::string& file) {
     static const std::regex names("mesher|label|voxel|seed|fidelity|refine|relaxation");
@@ -36,12 +56,19 @@ bool is_mesher(const std::string& file) {
 
 struct Include {
     std::string from, to, file;
+    std::string header;  ///< as it is written
 };
+
+/// "stiffness" of "tled/stiffness/lattice.hpp", nothing of "tled/engine.hpp".
+std::string room_of(const std::string& path) {
+    const fs::path folder = fs::path(path).parent_path();
+    return folder.has_parent_path() ? folder.filename().string() : "";
+}
 
 std::vector<Include> includes() {
     std::vector<Include> found;
     const fs::path root = TISSUEWARP_SOURCE_DIR;
-    const std::regex quoted(R"re(^\s*#include\s+"([a-z]+)/)re");
+    const std::regex quoted(R"re(^\s*#include\s+"(([a-z]+)/[^"]+)")re");
     for (const auto& [folder, allowed] : may_include)
         for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
             const std::string extension = entry.path().extension();
@@ -50,7 +77,7 @@ std::vector<Include> includes() {
             for (std::string line; std::getline(file, line);) {
                 std::smatch match;
                 if (std::regex_search(line, match, quoted))
-                    found.push_back({folder, match[1], fs::relative(entry.path(), root).string()});
+                    found.push_back({folder, match[2], fs::relative(entry.path(), root).string(), match[1]});
             }
         }
     return found;
@@ -63,6 +90,39 @@ TEST(Layers, IncludesRunOneWay) {
         if (include.from == "meshing" && include.to == "imaging" && is_mesher(include.file)) continue;
         EXPECT_TRUE(may_include.at(include.from).contains(include.to))
             << include.file << " includes a header of " << include.to << "/";
+    }
+}
+
+TEST(Layers, RoomsOfTledLookOneWay) {
+    std::set<std::string> seen;
+    for (const Include& include : includes()) {
+        if (include.to != "tled" || include.from != "tled") continue;
+        const std::string from = room_of(include.file), to = room_of(include.header);
+        if (from.empty() || to.empty() || from == to) continue;
+        seen.insert(from);
+        ASSERT_TRUE(rooms_of_tled.contains(from)) << include.file << " lies in a room that this test does not know";
+        EXPECT_TRUE(rooms_of_tled.at(from).contains(to)) << include.file << " includes " << include.header;
+    }
+    EXPECT_GT(seen.size(), 5u);
+}
+
+// Equilibria are sought by means of a RestStiffness of the caller's: the one room that a public header opens.
+TEST(Layers, PublicHeadersOfTledIncludeNoRoom) {
+    for (const Include& include : includes()) {
+        const bool is_public = include.from == "tled" && room_of(include.file).empty();
+        if (!is_public || include.to != "tled" || room_of(include.header).empty()) continue;
+        if (include.file.ends_with(".cpp"))
+            EXPECT_FALSE(laboratory.contains(room_of(include.header))) << include.file << ": " << include.header;
+        else
+            EXPECT_EQ(include.file + ": " + include.header, "tled/equilibrium.hpp: tled/stiffness/rest_stiffness.hpp");
+    }
+}
+
+TEST(Layers, ProductsKnowFewRoomsOfTled) {
+    for (const Include& include : includes()) {
+        if ((include.from != "registration" && include.from != "simulation") || include.to != "tled") continue;
+        const std::string room = room_of(include.header);
+        EXPECT_TRUE(room.empty() || known_to_products.contains(room)) << include.file << " includes " << include.header;
     }
 }
 

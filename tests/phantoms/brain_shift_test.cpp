@@ -17,7 +17,7 @@ protected:
         const TargetError error = claims::error_of(result, read_landmarks(head / "landmarks.csv"));
         claims::expect({57, 3.83, mean, percentile_95}, error.moved_before, error.moved_after);
         claims::expect_unfolded(result.deformation, moving);
-        EXPECT_THAT(result.doubts, ::testing::IsEmpty());
+        EXPECT_THAT(texts(result.doubts), ::testing::IsEmpty());
     }
 
     [[nodiscard]] UpdateResult from_image(const std::string& name, bool align) const {

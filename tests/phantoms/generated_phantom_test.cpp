@@ -6,7 +6,7 @@
 #include "registration/update.hpp"
 #include "registration/warp.hpp"
 #include "tests/support/label_shapes.hpp"
-#include "tled/reference.hpp"
+#include "tled/reference/newton.hpp"
 
 #include <gtest/gtest.h>
 

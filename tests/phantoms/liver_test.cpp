@@ -21,7 +21,7 @@ protected:
         const TargetError error = claims::error_of(result, read_landmarks(liver / "landmarks.csv"));
         claims::expect({210, 10.11, mean, percentile_95}, error.before, error.after);
         claims::expect_unfolded(result.deformation, moving);
-        EXPECT_THAT(result.doubts, IsEmpty());
+        EXPECT_THAT(texts(result.doubts), IsEmpty());
     }
 };
 

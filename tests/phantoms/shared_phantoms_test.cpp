@@ -58,7 +58,7 @@ TEST_F(Lung, ThatTissueResistsIsFollowedAndDoubted) {
     claims::expect({26, 35.66, 3.90, 8.64}, error.before, error.after);
     claims::expect_unfolded(result.deformation, moving);
     ASSERT_FALSE(result.doubts.empty());
-    EXPECT_NE(result.doubts.back().find("Poisson"), std::string::npos);
+    EXPECT_NE(result.doubts.back().text.find("Poisson"), std::string::npos);
 }
 
 TEST_F(Lung, FromItsImage) {

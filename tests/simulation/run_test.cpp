@@ -5,7 +5,7 @@
 #include "core/errors.hpp"
 #include "meshing/primitives.hpp"
 #include "tests/simulation/cube.hpp"
-#include "tled/reference.hpp"
+#include "tled/model/internal_force.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

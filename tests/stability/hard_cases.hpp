@@ -6,7 +6,7 @@
 #include "tests/tled/engine_scene.hpp"
 #include "tled/equilibrium.hpp"
 #include "tled/load_path.hpp"
-#include "tled/reference.hpp"
+#include "tled/reference/newton.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

@@ -3,7 +3,7 @@
 #include "study/reference.hpp"
 
 #include "meshing/primitives.hpp"
-#include "tled/quadratic.hpp"
+#include "tled/reference/quadratic.hpp"
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>

@@ -34,7 +34,7 @@ protected:
         point.setting.elements = 12345;
         point.setting.element = Element::T4;
         point.setting.physics = {Law::Ogden, 0.4, Hold::Soft};
-        point.setting.solver = Solver::NonlinearCg;
+        point.setting.solver = Solver::DynamicRelaxation;
         point.setting.tolerance_mm = 0.003;
         point.setting.arithmetic = tled::Scalar::Float64;
         point.setting.processor = tled::Processor::Gpu;

@@ -1,4 +1,4 @@
-#include "tled/constitutive.hpp"
+#include "tled/material/constitutive.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

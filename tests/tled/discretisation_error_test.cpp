@@ -1,15 +1,16 @@
 // The estimated error of linear tetrahedra: its matrices against those of quadratic tetrahedra, its numbers against
 // their solution.
 
-#include "tled/discretisation_error.hpp"
+#include "tled/error/discretisation_error.hpp"
 
 #include "core/errors.hpp"
 #include "meshing/primitives.hpp"
-#include "tled/constitutive.hpp"
-#include "tled/detail/hierarchical_product.hpp"
-#include "tled/detail/stiffness.hpp"
-#include "tled/quadratic.hpp"
-#include "tled/reference.hpp"
+#include "tled/error/hierarchical_product.hpp"
+#include "tled/material/constitutive.hpp"
+#include "tled/model/internal_force.hpp"
+#include "tled/reference/newton.hpp"
+#include "tled/reference/quadratic.hpp"
+#include "tled/stiffness/stiffness.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -4,6 +4,7 @@
 #include "tests/tled/engine_scene.hpp"
 #include "tled/critical_step.hpp"
 #include "tled/nodal_effects.hpp"
+#include "tled/stiffness/tangent_stiffness.hpp"
 
 #include <gmock/gmock.h>
 #include <Eigen/Eigenvalues>

@@ -2,7 +2,7 @@
 /// out.
 #include "meshing/primitives.hpp"
 #include "tests/tled/engine_scene.hpp"
-#include "tled/detail/interpolation_reach.hpp"
+#include "tled/model/interpolation_reach.hpp"
 
 #include <gmock/gmock.h>
 #include <Eigen/Geometry>

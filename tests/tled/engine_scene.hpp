@@ -3,9 +3,10 @@
 
 #include "meshing/hex_primitives.hpp"
 #include "meshing/primitives.hpp"
-#include "tled/detail/stress_clock.hpp"
 #include "tled/engine.hpp"
-#include "tled/reference.hpp"
+#include "tled/material/stress_clock.hpp"
+#include "tled/model/internal_force.hpp"
+#include "tled/reference/viscous_stresses.hpp"
 
 #include <algorithm>
 #include <array>

@@ -3,7 +3,6 @@
 
 #include "meshing/primitives.hpp"
 #include "tled/equilibrium.hpp"
-#include "tled/reference.hpp"
 
 #include <cmath>
 #include <string>

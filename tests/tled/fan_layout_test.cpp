@@ -1,5 +1,5 @@
 /// The patches and fans of the CPU engine, against the rest state that they are cut from.
-#include "tled/detail/fan_layout.hpp"
+#include "tled/cpu/fan_layout.hpp"
 
 #include "core/errors.hpp"
 #include "tests/tled/engine_scene.hpp"

@@ -3,9 +3,11 @@
 
 #include "core/errors.hpp"
 #include "meshing/hex_primitives.hpp"
-#include "tled/detail/hexahedra.hpp"
 #include "tled/equilibrium.hpp"
-#include "tled/rest_stiffness.hpp"
+#include "tled/model/hexahedra.hpp"
+#include "tled/reference/newton.hpp"
+#include "tled/stiffness/rest_stiffness.hpp"
+#include "tled/stiffness/tangent_stiffness.hpp"
 
 #include <gmock/gmock.h>
 #include <Eigen/Dense>

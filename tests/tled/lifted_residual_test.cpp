@@ -1,11 +1,11 @@
 // What a solver left, in mm.
 
-#include "tled/lifted_residual.hpp"
+#include "tled/error/lifted_residual.hpp"
 
 #include "core/errors.hpp"
 #include "meshing/primitives.hpp"
 #include "tled/equilibrium.hpp"
-#include "tled/reference.hpp"
+#include "tled/reference/newton.hpp"
 
 #include <gtest/gtest.h>
 

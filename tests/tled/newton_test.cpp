@@ -1,6 +1,7 @@
+#include "tled/reference/newton.hpp"
 #include "core/errors.hpp"
 #include "meshing/primitives.hpp"
-#include "tled/reference.hpp"
+#include "tled/model/internal_force.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

@@ -1,6 +1,6 @@
 /// Fibres and viscosity over patches on the GPU, against the plain loop and the other shapes of steps.
 #include "tests/tled/engine_scene.hpp"
-#include "tled/detail/patch_layout.hpp"
+#include "tled/gpu/patch_layout.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,7 +1,7 @@
 /// Patches and fans of a mesh, and GPU steps over them where they differ from two passes.
 #include "core/errors.hpp"
 #include "tests/tled/engine_scene.hpp"
-#include "tled/detail/patch_layout.hpp"
+#include "tled/gpu/patch_layout.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

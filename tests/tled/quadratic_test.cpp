@@ -1,11 +1,11 @@
-#include "tled/quadratic.hpp"
+#include "tled/reference/quadratic.hpp"
 
 #include "core/errors.hpp"
 #include "meshing/primitives.hpp"
-#include "tled/constitutive.hpp"
-#include "tled/detail/quadrature.hpp"
-#include "tled/detail/stiffness.hpp"
-#include "tled/reference.hpp"
+#include "tled/material/constitutive.hpp"
+#include "tled/reference/newton.hpp"
+#include "tled/reference/quadrature.hpp"
+#include "tled/stiffness/stiffness.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

@@ -1,4 +1,5 @@
-#include "tled/reference.hpp"
+#include "tled/model/internal_force.hpp"
+#include "tled/stiffness/tangent_stiffness.hpp"
 
 #include "core/errors.hpp"
 #include "meshing/primitives.hpp"

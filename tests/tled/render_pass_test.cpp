@@ -1,7 +1,7 @@
 /// The render passes of 2007 against the CPU engine in float64.
 #include "core/errors.hpp"
 #include "tests/tled/engine_scene.hpp"
-#include "tled/render_pass_engine.hpp"
+#include "tled/render_pass/render_pass_engine.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,8 +1,9 @@
-#include "tled/rest_stiffness.hpp"
+#include "tled/stiffness/rest_stiffness.hpp"
 
 #include "core/errors.hpp"
 #include "meshing/primitives.hpp"
-#include "tled/reference.hpp"
+#include "tled/model/internal_force.hpp"
+#include "tled/stiffness/tangent_stiffness.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 /// The scalar step of the literature against the CPU engine in float64.
-#include "tled/scalar_steps.hpp"
+#include "tled/reference/scalar_steps.hpp"
 #include "core/errors.hpp"
 #include "tests/tled/engine_scene.hpp"
 

@@ -2,6 +2,7 @@
 /// tear.
 #include "tests/tled/engine_scene.hpp"
 #include "tests/tled/equilibrium_scenes.hpp"
+#include "tled/reference/newton.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,6 +1,6 @@
 /// When viscous stresses move on, and what the schedule does to a stress that follows a strain.
-#include "tled/detail/stress_clock.hpp"
-#include "tled/detail/prony_coefficients.hpp"
+#include "tled/material/stress_clock.hpp"
+#include "tled/material/prony_coefficients.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,9 @@
 /// Smooth displacements of a mesh, and the stiffness in two levels, against dense matrices and the factor.
-#include "tled/detail/two_level.hpp"
+#include "tled/stiffness/two_level.hpp"
 
 #include "meshing/primitives.hpp"
-#include "tled/detail/springs.hpp"
-#include "tled/rest_stiffness.hpp"
+#include "tled/model/springs.hpp"
+#include "tled/stiffness/rest_stiffness.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Cholesky>

@@ -4,7 +4,7 @@
 #include "tests/verification/effect_column.hpp"
 #include "tled/equilibrium.hpp"
 #include "tled/growth.hpp"
-#include "tled/reference.hpp"
+#include "tled/model/internal_force.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 #include "tests/verification/problems.hpp"
 #include "tests/verification/solution.hpp"
 #include "tled/contact.hpp"
-#include "tled/step_shape_cache.hpp"
+#include "tled/engine_choice.hpp"
 
 #include "core/errors.hpp"
 
@@ -21,7 +21,7 @@ INSTANTIATE_TEST_SUITE_P(All, Effects,
 
 TEST_P(Effects, AnswersAsTheReference) {
     const auto& [engine, effect] = GetParam();
-    if (engine.name == all_engines.back().name && effect.effect == "pressure" && !tled::step_device(-1).hardware)
+    if (engine.name == all_engines.back().name && effect.effect == "pressure" && !tled::has_gpu())
         GTEST_SKIP() << "some minutes on a software rasteriser; effects_engine_test.cpp has its forces there";
     EXPECT_NEAR(effect.measure(engine.make), effect.reference, effect.bound)
         << effect.scene << ", " << effect.quantity << " (" << effect.unit << "), from " << effect.source;

@@ -7,8 +7,8 @@
 #include "simulation/build.hpp"
 #include "simulation/run.hpp"
 #include "tled/dynamics.hpp"
+#include "tled/model/internal_force.hpp"
 #include "tled/nodal_effects.hpp"
-#include "tled/reference.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -5,7 +5,6 @@
 
 #include "simulation/build.hpp"
 #include "simulation/run.hpp"
-#include "tled/reference.hpp"
 
 #include <Eigen/Geometry>
 

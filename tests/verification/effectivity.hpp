@@ -2,7 +2,7 @@
 /// Does the estimated error of linear tetrahedra have the size of the true one?
 
 #include "tests/verification/solution.hpp"
-#include "tled/discretisation_error.hpp"
+#include "tled/error/discretisation_error.hpp"
 
 #include <cmath>
 #include <string>

@@ -3,9 +3,10 @@
 
 #include "meshing/primitives.hpp"
 #include "tests/verification/reference_file.hpp"
-#include "tled/constitutive.hpp"
-#include "tled/quadratic.hpp"
-#include "tled/reference.hpp"
+#include "tled/material/constitutive.hpp"
+#include "tled/reference/discrete_energy.hpp"
+#include "tled/reference/newton.hpp"
+#include "tled/reference/quadratic.hpp"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,8 @@
 
 #include "core/errors.hpp"
 #include "tests/verification/shapes.hpp"
-#include "tled/reference.hpp"
+#include "tled/reference/discrete_energy.hpp"
+#include "tled/reference/newton.hpp"
 
 #include <Eigen/Dense>
 

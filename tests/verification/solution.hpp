@@ -3,7 +3,7 @@
 
 #include "tests/verification/problem.hpp"
 #include "tled/model.hpp"
-#include "tled/quadratic.hpp"
+#include "tled/reference/quadratic.hpp"
 
 #include <functional>
 #include <memory>

@@ -3,7 +3,7 @@
 #include "core/errors.hpp"
 #include "meshing/primitives.hpp"
 #include "tled/dynamics.hpp"
-#include "tled/rest_stiffness.hpp"
+#include "tled/stiffness/rest_stiffness.hpp"
 
 #include <nlohmann/json.hpp>
 

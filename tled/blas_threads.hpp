@@ -1,0 +1,29 @@
+#pragma once
+/// Threads of the BLAS under factors and triangular solves.
+
+namespace tissuewarp::tled {
+
+/// Whether triangular solves and small factors may set OpenBLAS to one thread while they run, and back to what it was.
+/// Its threads wait for each other by spinning, which on small supernodes costs more than it gives and multiplies the
+/// time on busy cores. But it has one number for the whole process, which the process alone may give away: whatever
+/// else calls that BLAS in the meantime runs on one thread too. Not allowed until this is called; the last bits of
+/// large factors depend on the number of threads. Call it while nothing is being solved. No effect on any other BLAS.
+void let_solves_take_one_blas_thread(bool allowed);
+
+namespace detail {
+
+/// One thread of OpenBLAS for the whole process while any of these lives, if that is allowed.
+class SingleBlasThread {
+public:
+    SingleBlasThread();
+    ~SingleBlasThread();
+    SingleBlasThread(const SingleBlasThread&) = delete;
+    SingleBlasThread& operator=(const SingleBlasThread&) = delete;
+
+private:
+    bool counts_;
+};
+
+}  // namespace detail
+
+}  // namespace tissuewarp::tled

@@ -1,0 +1,79 @@
+#include "tled/gpu/gpu_observation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tissuewarp::tled::detail {
+
+namespace {
+
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
+void reduce(const shaders::Program& program, BlockBuffers& blocks, const shaders::StorageBuffer& partials) {
+    blocks.set("Partial", partials);
+    blocks.bind(program);
+    program.dispatch(static_cast<std::size_t>(shaders::observe_partials * program.workgroup_size()));
+    shaders::storage_barrier();
+}
+
+}  // namespace
+
+GpuObservation::GpuObservation(const shaders::Device& device, shaders::ProgramCache& programs, const RestState& rest)
+    : programs_(programs),
+      tet_(rest.tet),
+      hex_(rest.hexahedra.hex),
+      node_partials_(device, shaders::observe_partials, "partial results of nodes"),
+      element_partials_(device, shaders::observe_partials, "partial results of elements") {}
+
+Observation GpuObservation::nodes(const shaders::Program& program, BlockBuffers& blocks) const {
+    reduce(program, blocks, node_partials_);
+    Observation seen;
+    double increment_squared = 0;
+    double residual_squared = 0;
+    std::uint64_t bad_displacements = 0;
+    std::uint64_t bad_residuals = 0;
+    for (const NodePartial& part : node_partials_.download()) {
+        increment_squared = std::max(increment_squared, static_cast<double>(part.increment_squared_max));
+        residual_squared = std::max(residual_squared, static_cast<double>(part.residual_squared_max));
+        seen.increment_mass += static_cast<double>(part.increment_mass);
+        seen.increment_stiffness += static_cast<double>(part.increment_stiffness);
+        bad_displacements += part.bad_displacements;
+        bad_residuals += part.bad_residuals;
+    }
+    seen.increment_max = bad_displacements > 0 ? infinite : std::sqrt(increment_squared);
+    seen.residual_max = bad_displacements + bad_residuals > 0 ? infinite : std::sqrt(residual_squared);
+    seen.finite = bad_displacements + bad_residuals == 0;
+    return seen;
+}
+
+SmallestJacobian GpuObservation::smallest_jacobian(const GpuForce& force, BlockBuffers& blocks) const {
+    SmallestJacobian smallest{infinite};
+    const shaders::Program& elements = programs_.get(shaders::observe_elements_program());
+    force.set_all_elements(elements);
+    reduce(elements, blocks, element_partials_);
+    if (const auto [jacobian, e] = least_partial(); jacobian < smallest.value) smallest = {jacobian, tet_[e]};
+    if (!hex_.empty()) {
+        const shaders::Program& hexahedra = programs_.get(shaders::observe_elements_program(shaders::Cell::Hexahedron));
+        force.set_all_hexahedra(hexahedra);
+        reduce(hexahedra, blocks, element_partials_);
+        if (const auto [jacobian, e] = least_partial(); jacobian < smallest.value) smallest = {jacobian, -1, hex_[e]};
+    }
+    if (std::isinf(smallest.value)) smallest.value = -smallest.value;  // no J is finite
+    return smallest;
+}
+
+/// Merges the partial results of the last reduction over elements.
+GpuObservation::LeastJacobian GpuObservation::least_partial() const {
+    float least = std::numeric_limits<float>::max();
+    std::uint32_t element = std::numeric_limits<std::uint32_t>::max();
+    for (const ElementPartial& part : element_partials_.download())
+        if (part.volume_change < least || (part.volume_change == least && part.element < element)) {
+            least = part.volume_change;
+            element = part.element;
+        }
+    if (element == std::numeric_limits<std::uint32_t>::max()) return {infinite, 0};
+    return {1.0 + static_cast<double>(least), element};
+}
+
+}  // namespace tissuewarp::tled::detail

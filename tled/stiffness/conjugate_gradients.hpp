@@ -1,0 +1,16 @@
+#pragma once
+/// Preconditioned conjugate gradients (Saad, Iterative Methods for Sparse Linear Systems, algorithm 9.1).
+
+#include "tled/stiffness/product.hpp"
+
+#include <Eigen/Core>
+
+namespace tissuewarp::tled::detail {
+
+/// x (3 × N) with K x = force by products with K. The error is measured in the norm of the preconditioner, √(r·z),
+/// relative to its start. Force, products and what the preconditioner makes of them are zero on the constrained degrees
+/// of freedom. Throws SolverFailure after 2000 iterations and where K is not positive.
+Eigen::Matrix3Xd conjugate_gradients(const Product& product, const Product& precondition, const Eigen::Matrix3Xd& force,
+                                     double relative_tolerance);
+
+}  // namespace tissuewarp::tled::detail
