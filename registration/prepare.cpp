@@ -1,11 +1,11 @@
 // Before the operation: label map → mesh → rest state → rest stiffness.
 
 #include "registration/prepare.hpp"
+#include "core/stopwatch.hpp"
 #include "registration/boundary/label_boundary_field.hpp"
 #include "registration/loads/coarse_twin.hpp"
-#include "registration/stopwatch.hpp"
+#include "registration/springs/label_springs.hpp"
 #include "registration/terms/anchors.hpp"
-#include "registration/terms/label_springs.hpp"
 
 #include "imaging/labels.hpp"
 #include "registration/boundary/surroundings.hpp"
@@ -51,7 +51,7 @@ void make_ready(const tled::RestStiffness& stiffness) {
 /// Precondition: require_surroundings.
 PreparedModel of_mesh(meshing::TetMesh mesh, const imaging::Volume& moving_labels, const PrepareOptions& options,
                       Observer& observer) {
-    detail::Stopwatch stopwatch;
+    Stopwatch stopwatch;
     std::vector<StageTime> times;
     imaging::Volume organ = imaging::without_labels(moving_labels, options.rigid_neighbours);
     std::optional<RigidNeighbours> neighbours = detail::rigid_neighbours(moving_labels, options.rigid_neighbours);
@@ -89,7 +89,7 @@ PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions
     require_surroundings(moving_labels, options);
     const imaging::Volume organ = imaging::without_labels(moving_labels, options.rigid_neighbours);
     if (options.meshing.edge_length == 0) options.meshing.edge_length = suggested_edge_length(organ);
-    detail::Stopwatch stopwatch;
+    Stopwatch stopwatch;
     meshing::TetMesh mesh = meshing::mesh_labels(organ, options.meshing, observer);
     const StageTime meshing_time{"meshing", stopwatch.lap()};
     PreparedModel prepared = of_mesh(std::move(mesh), moving_labels, options, observer);
@@ -115,7 +115,7 @@ PreparedModel with_materials(PreparedModel prepared, const tled::MaterialTable& 
 
 void prepare_image(PreparedModel& prepared, const imaging::Volume& moving, const ImageModelOptions& options,
                    Observer& observer) {
-    detail::Stopwatch stopwatch;
+    Stopwatch stopwatch;
     observer.checkpoint("feature points", 0.0);
     const FeaturePoints features =
         select_feature_points(moving, imaging::mask_of_all(prepared.labels), options.features);
@@ -126,7 +126,7 @@ void prepare_image(PreparedModel& prepared, const imaging::Volume& moving, const
 
 void prepare_loads(PreparedModel& prepared, Observer& observer) {
     if (!detail::loads_take_coarse_model(prepared) || detail::is_held(prepared)) return;
-    detail::Stopwatch stopwatch;
+    Stopwatch stopwatch;
     observer.checkpoint("coarse model", 0.0);
     prepared.coarse = std::make_unique<PreparedModel>(detail::coarse_model_for_loads(prepared, observer));
     prepared.times.push_back({"coarse model", stopwatch.lap()});

@@ -4,12 +4,12 @@
 
 #include "registration/register.hpp"
 
+#include "core/stopwatch.hpp"
+#include "registration/doubts.hpp"
 #include "registration/pace.hpp"
 #include "registration/pose/rigid_part.hpp"
 #include "registration/round.hpp"
 #include "registration/schedule.hpp"
-#include "registration/stopwatch.hpp"
-#include "registration/uncertainty/doubts.hpp"
 
 #include <algorithm>
 #include <string>

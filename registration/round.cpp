@@ -1,6 +1,6 @@
 #include "registration/round.hpp"
 
-#include "registration/stopwatch.hpp"
+#include "core/stopwatch.hpp"
 
 #include <cmath>
 #include <utility>

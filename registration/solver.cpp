@@ -1,6 +1,6 @@
 #include "registration/solver.hpp"
 
-#include "registration/uncertainty/doubts.hpp"
+#include "registration/doubts.hpp"
 
 #include <string>
 

@@ -2,7 +2,7 @@
 
 #include "core/errors.hpp"
 #include "registration/loads/coarse_twin.hpp"
-#include "registration/terms/pull.hpp"
+#include "registration/springs/pull.hpp"
 #include "registration/uncertainty/data_uncertainty.hpp"
 #include "tled/error/lifted_residual.hpp"
 

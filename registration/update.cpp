@@ -1,9 +1,9 @@
 #include "registration/update.hpp"
 
+#include "core/stopwatch.hpp"
 #include "registration/boundary/surroundings.hpp"
 #include "registration/engine_choice.hpp"
 #include "registration/register.hpp"
-#include "registration/stopwatch.hpp"
 
 #include <string>
 #include <utility>
@@ -38,7 +38,7 @@ struct Updater::Impl {
 
     UpdateResult update(const Intraoperative& given, Observer& observer) {
         const Intraoperative seen = detail::without_neighbours(given, prepared->options.rigid_neighbours);
-        detail::Stopwatch stopwatch;
+        Stopwatch stopwatch;
         detail::Terms terms = detail::terms_of(*prepared, seen, options, image_tools);
         const double seconds = stopwatch.lap();
         UpdateResult result = detail::register_model(*prepared, terms, load_finder, *solver, options, observer);

@@ -2,7 +2,7 @@
 
 #include "imaging/filters.hpp"
 #include "registration/field/rasterisation.hpp"
-#include "registration/field/surface_proximity.hpp"
+#include "registration/search/surface_proximity.hpp"
 
 #include <tbb/parallel_for.h>
 

@@ -3,7 +3,7 @@
 
 #include "imaging/geometry.hpp"
 #include "meshing/tet_mesh.hpp"
-#include "registration/matching/gpu/gpu_words.hpp"
+#include "registration/field/gpu_words.hpp"
 
 #include <Eigen/Geometry>
 

@@ -1,7 +1,7 @@
 #include "registration/loads/coarse_twin.hpp"
 
 #include "registration/search/point_tree.hpp"
-#include "registration/terms/pull.hpp"
+#include "registration/springs/pull.hpp"
 
 #include <utility>
 

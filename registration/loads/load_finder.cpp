@@ -2,7 +2,7 @@
 
 #include "registration/loads/coarse_twin.hpp"
 #include "registration/loads/unknown_loads.hpp"
-#include "registration/terms/ground.hpp"
+#include "registration/springs/ground_springs.hpp"
 
 #include <utility>
 

@@ -9,7 +9,7 @@
 /// boundary loads reconstruct an organ from a part of its surface: Rucker et al., IEEE TMI 33 (2014) 147; Heiselman et
 /// al., IEEE TMI 39 (2020) 2223.
 
-#include "registration/uncertainty/posterior.hpp"
+#include "registration/loads/posterior.hpp"
 
 #include <Eigen/Core>
 

@@ -1,6 +1,6 @@
 #include "registration/matching/image_search.hpp"
 
-#include "registration/terms/pull.hpp"
+#include "registration/springs/pull.hpp"
 
 #include <tbb/parallel_for.h>
 

@@ -1,5 +1,7 @@
 #include "registration/pose/curve_pose.hpp"
 
+#include "registration/pose/robust_weight.hpp"
+
 #include <Eigen/Cholesky>
 
 #include <algorithm>
@@ -73,16 +75,6 @@ Eigen::Isometry3d step(const std::vector<CurveMatch>& matches, const Weighed& we
 }
 
 }  // namespace
-
-double median_distance(const std::vector<CurveMatch>& matches) {
-    std::vector<double> distances;
-    for (const CurveMatch& match : matches)
-        if (match.found) distances.push_back(match.hit.distance);
-    if (distances.empty()) return everywhere;
-    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-    std::nth_element(distances.begin(), middle, distances.end());
-    return *middle;
-}
 
 Alignment closest_curve_pose(const CurveTree& lines, const CurvePoints& points, const Eigen::Isometry3d& start,
                              double last_scale_mm, double max_angle_deg) {

@@ -1,7 +1,8 @@
 #pragma once
 /// Where lines go through points when nothing bends.
 
-#include "registration/terms/curves.hpp"
+#include "registration/pose/curve_matches.hpp"
+#include "registration/result.hpp"
 
 namespace tissuewarp::registration::detail {
 
@@ -12,8 +13,5 @@ namespace tissuewarp::registration::detail {
 /// `start` has it.
 Alignment closest_curve_pose(const CurveTree& lines, const CurvePoints& points, const Eigen::Isometry3d& start,
                              double last_scale_mm, double max_angle_deg);
-
-/// Median distance of the points that have a match; infinity where none has.
-double median_distance(const std::vector<CurveMatch>& matches);
 
 }  // namespace tissuewarp::registration::detail

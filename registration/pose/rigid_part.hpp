@@ -2,7 +2,7 @@
 /// Rigid motions that come closest to displacements.
 
 #include "registration/prepare.hpp"
-#include "registration/terms/term.hpp"
+#include "registration/state.hpp"
 
 namespace tissuewarp::registration::detail {
 

@@ -1,6 +1,6 @@
 #include "registration/pose/surface_pose.hpp"
 
-#include "registration/terms/term.hpp"
+#include "registration/pose/robust_weight.hpp"
 
 #include <tbb/parallel_for.h>
 #include <Eigen/Cholesky>

@@ -3,8 +3,8 @@
 
 #include "core/observer.hpp"
 #include "registration/pose/alignment.hpp"
+#include "registration/pose/surface_data.hpp"
 #include "registration/search/surface_tree.hpp"
-#include "registration/terms/surface_data.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 #include "registration/search/surface_tree.hpp"
 
 #include "core/errors.hpp"
-#include "registration/field/surface_proximity.hpp"
+#include "registration/search/surface_proximity.hpp"
 
 #include <algorithm>
 #include <array>

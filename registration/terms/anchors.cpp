@@ -1,6 +1,6 @@
 #include "registration/terms/anchors.hpp"
 
-#include "registration/uncertainty/doubts.hpp"
+#include "registration/doubts.hpp"
 
 #include <algorithm>
 #include <set>

@@ -1,6 +1,6 @@
 #include "registration/terms/contact.hpp"
 
-#include "registration/uncertainty/doubts.hpp"
+#include "registration/doubts.hpp"
 
 #include <algorithm>
 #include <map>

@@ -1,8 +1,8 @@
 #include "registration/terms/curves.hpp"
 
+#include "registration/doubts.hpp"
 #include "registration/io/curves.hpp"
 #include "registration/pose/curve_pose.hpp"
-#include "registration/uncertainty/doubts.hpp"
 
 #include <tbb/parallel_for.h>
 
@@ -81,22 +81,6 @@ void doubt(const CurveFit& fit, double deviation_mm, std::vector<Doubt>& doubts)
 }
 
 }  // namespace
-
-std::vector<CurveMatch> match_curves(const CurveTree& lines, const CurvePoints& points,
-                                     const Eigen::Isometry3d& placement, double reach_mm, double max_angle_deg) {
-    const Eigen::Isometry3d back = placement.inverse();
-    const double least_cosine = std::cos(max_angle_deg * EIGEN_PI / 180);
-    std::vector<CurveMatch> result(static_cast<std::size_t>(points.count()));
-    tbb::parallel_for(std::size_t{0}, result.size(), [&](std::size_t n) {
-        const auto column = static_cast<Eigen::Index>(n);
-        const Eigen::Vector3d point = back * points.points.col(column);
-        const auto hit = lines.nearest(point, reach_mm, {back.linear() * points.tangents.col(column), least_cosine});
-        if (!hit) return;
-        const Eigen::Vector3d away = point - hit->point;
-        result[n] = {true, *hit, away - hit->tangent * hit->tangent.dot(away)};
-    });
-    return result;
-}
 
 CurveTerm::CurveTerm(const PreparedModel& prepared, const Curves& curves, const CurveOptions& options, double energy)
     : prepared_(prepared), options_(options), energy_(energy), data_(made_ready(curves, options)) {

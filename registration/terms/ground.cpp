@@ -1,45 +1,8 @@
 #include "registration/terms/ground.hpp"
 
-#include <cmath>
+#include "registration/springs/ground_springs.hpp"
 
 namespace tissuewarp::registration::detail {
-
-double strain_energy_unit(const PreparedModel& prepared, const TissuePrior& tissue) {
-    const meshing::TetMesh& mesh = prepared.model.mesh;
-    const Eigen::VectorXd volumes = meshing::tet_volumes(mesh);
-    double energy = 0;
-    for (Eigen::Index tet = 0; tet < volumes.size(); ++tet) {
-        const tled::Material& material = prepared.model.materials.at(mesh.labels[static_cast<std::size_t>(tet)]);
-        const double youngs_modulus = 2 * tled::shear_modulus(material) * (1 + tled::poisson_ratio(material));
-        energy += volumes[tet] * youngs_modulus;
-    }
-    const double modulus = energy / volumes.sum();
-    return modulus * tissue.expected_strain * tissue.expected_strain * std::pow(tissue.strain_length_mm, 3);
-}
-
-std::vector<tled::Spring> ground_springs(const PreparedModel& prepared, double energy,
-                                         const std::function<ExpectedMotion(const InterfaceNode&)>& expected) {
-    constexpr double independent_area = 100.0;  // mm², that moves on its own
-    std::vector<tled::Spring> springs;
-    for (const InterfaceNode& node : prepared.interfaces.nodes()) {
-        if (node.outer != 0) continue;
-        const ExpectedMotion motion = expected(node);
-        const Eigen::Matrix3d across = node.normal * node.normal.transpose(),
-                              along = Eigen::Matrix3d::Identity() - across,
-                              information = across / (motion.across_mm * motion.across_mm) +
-                                            along / (motion.along_mm * motion.along_mm);
-        springs.push_back({node.node, energy * node.area / independent_area * information, Eigen::Vector3d::Zero()});
-    }
-    return springs;
-}
-
-void expect_free_motion(LastPulls& pulls, const PreparedModel& prepared, double motion_mm) {
-    std::erase_if(pulls.springs, [](const PulledNode& pulled) { return pulled.origin == Origin::Prior; });
-    for (const tled::Spring& spring :
-         ground_springs(prepared, pulls.energy, [&](const InterfaceNode&) { return motion_mm; }))
-        pulls.springs.push_back({spring, Origin::Prior});
-    pulls.free_placement = true;
-}
 
 GroundTerm::GroundTerm(const PreparedModel& prepared, double energy, double motion_mm)
     : springs_(pulled_by(Origin::Prior,

@@ -1,9 +1,9 @@
 #include "registration/terms/image.hpp"
 
+#include "registration/doubts.hpp"
 #include "registration/matching/image_matching.hpp"
 #include "registration/pose/least_trimmed_motion.hpp"
 #include "registration/search/near_points.hpp"
-#include "registration/uncertainty/doubts.hpp"
 
 #include <Eigen/Eigenvalues>
 

@@ -2,7 +2,7 @@
 /// A bare intraoperative volume: blocks of the preoperative image, then all of it, belong where they were found.
 
 #include "registration/matching/image_search.hpp"
-#include "registration/terms/pull.hpp"
+#include "registration/springs/pull.hpp"
 #include "registration/terms/term.hpp"
 #include "registration/terms/view_prior.hpp"
 

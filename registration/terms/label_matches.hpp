@@ -2,7 +2,7 @@
 /// One round of correspondence: interface nodes of the deformed mesh to the boundaries of the fixed labels.
 
 #include "registration/boundary/label_boundary_field.hpp"
-#include "registration/terms/label_springs.hpp"
+#include "registration/springs/label_springs.hpp"
 #include "registration/terms/term.hpp"
 
 namespace tissuewarp::registration::detail {

@@ -1,9 +1,9 @@
 #include "registration/terms/labels.hpp"
 
 #include "imaging/labels.hpp"
+#include "registration/doubts.hpp"
 #include "registration/pose/alignment.hpp"
 #include "registration/terms/label_matches.hpp"
-#include "registration/uncertainty/doubts.hpp"
 
 #include <algorithm>
 #include <cmath>

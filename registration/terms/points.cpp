@@ -1,7 +1,7 @@
 #include "registration/terms/points.hpp"
 
+#include "registration/doubts.hpp"
 #include "registration/pose/rigid_part.hpp"
-#include "registration/uncertainty/doubts.hpp"
 
 #include <Eigen/Eigenvalues>
 

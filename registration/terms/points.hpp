@@ -4,7 +4,7 @@
 #include "registration/intraoperative.hpp"
 #include "registration/options.hpp"
 #include "registration/prepare.hpp"
-#include "registration/terms/pull.hpp"
+#include "registration/springs/pull.hpp"
 #include "registration/terms/term.hpp"
 
 #include <vector>

@@ -1,6 +1,6 @@
 #include "registration/terms/surface.hpp"
 
-#include "registration/uncertainty/doubts.hpp"
+#include "registration/doubts.hpp"
 
 #include <tbb/parallel_for.h>
 

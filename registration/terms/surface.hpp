@@ -2,11 +2,11 @@
 /// Points of a part of the organ's surface: the tissue's surface goes through them.
 
 #include "registration/options.hpp"
+#include "registration/pose/surface_data.hpp"
 #include "registration/pose/surface_pose.hpp"
 #include "registration/search/surface_tree.hpp"
+#include "registration/springs/pull.hpp"
 #include "registration/terms/organ_surface.hpp"
-#include "registration/terms/pull.hpp"
-#include "registration/terms/surface_data.hpp"
 #include "registration/terms/term.hpp"
 
 #include <vector>

@@ -4,6 +4,7 @@
 /// of the solver in a round, and how the result agrees with it. It knows no other term.
 
 #include "core/observer.hpp"
+#include "registration/pose/robust_weight.hpp"
 #include "registration/result.hpp"
 #include "registration/schedule.hpp"
 #include "registration/state.hpp"
@@ -90,11 +91,5 @@ public:
 private:
     double first_mm_ = 0;
 };
-
-/// (σ²/(σ² + d²))²: the Geman–McClure function's weight in iteratively reweighted least squares.
-inline double robust_weight(double distance_mm, double scale_mm) {
-    const double squared = scale_mm * scale_mm, share = squared / (squared + distance_mm * distance_mm);
-    return share * share;
-}
 
 }  // namespace tissuewarp::registration::detail

@@ -1,6 +1,7 @@
 #include "registration/terms/terms.hpp"
 
 #include "imaging/labels.hpp"
+#include "registration/springs/ground_springs.hpp"
 #include "registration/terms/anchors.hpp"
 #include "registration/terms/contact.hpp"
 #include "registration/terms/curves.hpp"

@@ -1,6 +1,6 @@
 #include "registration/terms/view_prior.hpp"
 
-#include "registration/terms/ground.hpp"
+#include "registration/springs/ground_springs.hpp"
 
 #include <tbb/parallel_for.h>
 

@@ -3,7 +3,7 @@
 #include "registration/loads/unknown_loads.hpp"
 #include "registration/loads/white_noise.hpp"
 #include "registration/pose/rigid_part.hpp"
-#include "registration/terms/ground.hpp"
+#include "registration/springs/ground_springs.hpp"
 #include "registration/uncertainty/expected_error.hpp"
 #include "tled/model/internal_force.hpp"
 #include "tled/stiffness/tangent_stiffness.hpp"

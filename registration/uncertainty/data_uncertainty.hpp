@@ -1,8 +1,8 @@
 #pragma once
 /// What data and tissue leave open: part of the error estimate.
 
+#include "registration/loads/posterior.hpp"
 #include "registration/uncertainty.hpp"
-#include "registration/uncertainty/posterior.hpp"
 
 #include <Eigen/Core>
 

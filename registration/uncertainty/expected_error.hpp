@@ -1,8 +1,8 @@
 #pragma once
 /// How far off tissue is expected to lie, by a posterior that is already there.
 
+#include "registration/loads/posterior.hpp"
 #include "registration/uncertainty.hpp"
-#include "registration/uncertainty/posterior.hpp"
 
 namespace tissuewarp::registration::detail {
 

@@ -1,8 +1,10 @@
 /// The one direction of dependency: no folder includes a header of a folder that it may not know.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <regex>
 #include <set>
@@ -42,6 +44,23 @@ const std::map<std::string, std::set<std::string>> rooms_of_tled{
     {"render_pass", {"gpu", "parallel"}},
 };
 
+/// The same of registration, whose search structures and files lie lowest and whose terms know all that they are made
+/// of.
+const std::map<std::string, std::set<std::string>> rooms_of_registration{
+    {"boundary", {}},
+    {"dial", {}},
+    {"io", {}},
+    {"search", {}},
+    {"springs", {}},
+    {"evaluation", {"io", "search"}},
+    {"field", {"search"}},
+    {"matching", {"field", "springs"}},
+    {"pose", {"io", "search"}},
+    {"loads", {"pose", "search", "springs"}},
+    {"terms", {"boundary", "evaluation", "io", "loads", "matching", "pose", "search", "springs"}},
+    {"uncertainty", {"field", "loads", "pose", "springs"}},
+};
+
 /// Rooms that are targets of their own, for tests, studies and benchmarks.
 const std::set<std::string> laboratory{"reference", "render_pass"};
 
@@ -59,10 +78,10 @@ struct Include {
     std::string header;  ///< as it is written
 };
 
-/// "stiffness" of "tled/stiffness/lattice.hpp", nothing of "tled/engine.hpp".
+/// "stiffness" of "tled/stiffness/lattice.hpp", nothing of "tled/engine.hpp", the outer one of a room in a room.
 std::string room_of(const std::string& path) {
     const fs::path folder = fs::path(path).parent_path();
-    return folder.has_parent_path() ? folder.filename().string() : "";
+    return folder.has_parent_path() ? std::next(folder.begin())->string() : "";
 }
 
 std::vector<Include> includes() {
@@ -93,17 +112,44 @@ TEST(Layers, IncludesRunOneWay) {
     }
 }
 
-TEST(Layers, RoomsOfTledLookOneWay) {
+void expect_one_way(const std::string& folder, const std::map<std::string, std::set<std::string>>& rooms) {
     std::set<std::string> seen;
     for (const Include& include : includes()) {
-        if (include.to != "tled" || include.from != "tled") continue;
+        if (include.to != folder || include.from != folder) continue;
         const std::string from = room_of(include.file), to = room_of(include.header);
         if (from.empty() || to.empty() || from == to) continue;
         seen.insert(from);
-        ASSERT_TRUE(rooms_of_tled.contains(from)) << include.file << " lies in a room that this test does not know";
-        EXPECT_TRUE(rooms_of_tled.at(from).contains(to)) << include.file << " includes " << include.header;
+        ASSERT_TRUE(rooms.contains(from)) << include.file << " lies in a room that this test does not know";
+        EXPECT_TRUE(rooms.at(from).contains(to)) << include.file << " includes " << include.header;
     }
     EXPECT_GT(seen.size(), 5u);
+}
+
+TEST(Layers, RoomsOfTledLookOneWay) {
+    expect_one_way("tled", rooms_of_tled);
+}
+
+TEST(Layers, RoomsOfRegistrationLookOneWay) {
+    expect_one_way("registration", rooms_of_registration);
+}
+
+// The method is one page, and no folder a hall.
+TEST(Layers, FilesAndFoldersStaySmall) {
+    const fs::path root = TISSUEWARP_SOURCE_DIR;
+    const auto lines = [](const fs::path& path) {
+        std::ifstream file(path);
+        return std::count(std::istreambuf_iterator<char>(file), {}, '\n');
+    };
+    EXPECT_LE(lines(root / "registration" / "register.cpp"), 150);
+    for (const char* folder : {"registration", "tled"}) {
+        std::map<std::string, int> files;
+        for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
+            if (!entry.is_regular_file()) continue;
+            EXPECT_LE(lines(entry.path()), 400) << entry.path();
+            ++files[entry.path().parent_path().string()];
+        }
+        for (const auto& [name, count] : files) EXPECT_LE(count, 40) << name;
+    }
 }
 
 // Equilibria are sought by means of a RestStiffness of the caller's: the one room that a public header opens.

@@ -2,8 +2,8 @@
 #include "registration/terms/contact.hpp"
 #include "core/errors.hpp"
 #include "registration/prepared_io.hpp"
+#include "registration/springs/ground_springs.hpp"
 #include "registration/terms/anchors.hpp"
-#include "registration/terms/ground.hpp"
 #include "tests/registration/shapes.hpp"
 #include "tests/support/temporary_folder.hpp"
 

@@ -1,5 +1,5 @@
 /// What holds tissue of which no datum says where it went.
-#include "registration/terms/ground.hpp"
+#include "registration/springs/ground_springs.hpp"
 
 #include "tests/support/label_shapes.hpp"
 

@@ -3,7 +3,7 @@
 #include "registration/loads/load_finder.hpp"
 #include "registration/loads/unknown_loads.hpp"
 #include "registration/pose/rigid_part.hpp"
-#include "registration/terms/ground.hpp"
+#include "registration/springs/ground_springs.hpp"
 #include "registration/warp.hpp"
 #include "tests/support/label_shapes.hpp"
 

@@ -1,7 +1,7 @@
 /// Pairs of points as data, and what is expected of tissue that few data show.
 #include "core/errors.hpp"
 #include "registration/field.hpp"
-#include "registration/terms/ground.hpp"
+#include "registration/springs/ground_springs.hpp"
 #include "registration/terms/points.hpp"
 #include "registration/uncertainty/posterior_error.hpp"
 #include "tests/registration/shapes.hpp"

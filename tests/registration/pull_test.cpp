@@ -1,5 +1,5 @@
 /// Data inside elements against the same energy minimised as a dense system.
-#include "registration/terms/pull.hpp"
+#include "registration/springs/pull.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Dense>

@@ -1,10 +1,10 @@
 /// Points of a part of a surface: closest triangles, normals, the pose from anywhere, the tissue that follows.
 #include "registration/field.hpp"
-#include "registration/field/surface_proximity.hpp"
 #include "registration/pose/rigid_part.hpp"
+#include "registration/pose/surface_data.hpp"
 #include "registration/pose/surface_pose.hpp"
+#include "registration/search/surface_proximity.hpp"
 #include "registration/search/surface_tree.hpp"
-#include "registration/terms/surface_data.hpp"
 #include "registration/update.hpp"
 #include "tests/registration/numbers.hpp"
 #include "tests/registration/shapes.hpp"

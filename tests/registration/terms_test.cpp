@@ -3,6 +3,7 @@
 #include "registration/field.hpp"
 #include "registration/register.hpp"
 #include "registration/solver.hpp"
+#include "registration/springs/ground_springs.hpp"
 #include "registration/terms/anchors.hpp"
 #include "registration/terms/ground.hpp"
 #include "registration/uncertainty.hpp"

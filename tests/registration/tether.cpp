@@ -1,6 +1,6 @@
 #include "tests/registration/tether.hpp"
 
-#include "registration/terms/pull.hpp"
+#include "registration/springs/pull.hpp"
 
 namespace tissuewarp::registration::test {
 

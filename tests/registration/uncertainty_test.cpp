@@ -3,10 +3,10 @@
 #include "core/errors.hpp"
 #include "registration/field.hpp"
 #include "registration/loads/coarse_twin.hpp"
+#include "registration/loads/posterior.hpp"
 #include "registration/loads/unknown_loads.hpp"
-#include "registration/terms/ground.hpp"
+#include "registration/springs/ground_springs.hpp"
 #include "registration/uncertainty/data_uncertainty.hpp"
-#include "registration/uncertainty/posterior.hpp"
 #include "tests/registration/shapes.hpp"
 #include "tests/support/label_shapes.hpp"
 

@@ -1,6 +1,6 @@
 #include "registration/matching/dense/dense_search.hpp"
 
-#include "registration/terms/pull.hpp"
+#include "registration/springs/pull.hpp"
 
 #include <Eigen/LU>
 

@@ -5,7 +5,7 @@
 #include "registration/matching/blocks/block_engine.hpp"
 #include "registration/matching/dense/dense_force.hpp"
 #include "registration/prepare.hpp"
-#include "registration/terms/term.hpp"
+#include "registration/state.hpp"
 
 #include <memory>
 

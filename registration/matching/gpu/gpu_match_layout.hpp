@@ -3,10 +3,10 @@
 /// shaders/kernels/match_*.comp).
 
 #include "meshing/tet_mesh.hpp"
+#include "registration/field/gpu_words.hpp"
 #include "registration/field/growth.hpp"
 #include "registration/matching/dense/dense_cells.hpp"
 #include "registration/matching/descriptors/matching_image.hpp"
-#include "registration/matching/gpu/gpu_words.hpp"
 
 #include <Eigen/Geometry>
 

@@ -1,4 +1,4 @@
-#include "registration/terms/pull.hpp"
+#include "registration/springs/pull.hpp"
 
 #include <Eigen/Eigenvalues>
 

@@ -1,4 +1,4 @@
-#include "registration/terms/surface_data.hpp"
+#include "registration/pose/surface_data.hpp"
 
 #include "registration/io/surface_points.hpp"
 

@@ -1,4 +1,4 @@
-#include "registration/uncertainty/doubts.hpp"
+#include "registration/doubts.hpp"
 
 #include <cmath>
 #include <cstdio>

@@ -1,4 +1,4 @@
-#include "registration/uncertainty/posterior.hpp"
+#include "registration/loads/posterior.hpp"
 
 #include "registration/pose/rigid_part.hpp"
 

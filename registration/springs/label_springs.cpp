@@ -1,4 +1,4 @@
-#include "registration/terms/label_springs.hpp"
+#include "registration/springs/label_springs.hpp"
 
 namespace tissuewarp::registration::detail {
 

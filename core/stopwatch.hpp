@@ -3,7 +3,7 @@
 
 #include <chrono>
 
-namespace tissuewarp::registration::detail {
+namespace tissuewarp {
 
 class Stopwatch {
 public:
@@ -19,4 +19,4 @@ private:
     std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-}  // namespace tissuewarp::registration::detail
+}  // namespace tissuewarp
