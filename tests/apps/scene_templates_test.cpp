@@ -35,33 +35,32 @@ Eigen::Matrix3Xd last_probes(const Scene& scene) {
     const simulation::RunSummary run = simulation::simulate(
         built, [&](const simulation::Frame& frame) { probes = simulation::probe_displacements(built, frame); });
     EXPECT_EQ(run.frames, scene.solve.frames + 1);
-    EXPECT_GT(run.min_jacobian, 0);
+    EXPECT_GT(run.min_jacobian, 0.25);  // 0.28 in the breast
     return probes;
 }
 
 TEST(SceneTemplates, CubeSags) {
-    EXPECT_LT(last_probes(small("cube"))(2, 0), -5);
+    EXPECT_NEAR(last_probes(small("cube"))(2, 0), -11.5, 1.1);
 }
 
 TEST(SceneTemplates, BrainSettlesTowardsGravity) {
     const Eigen::Matrix3Xd probes = last_probes(small("brain-shift"));
-    EXPECT_GT(probes(0, 0), 1) << "the cortex below the craniotomy, mm to the left";
-    EXPECT_LT(probes.colwise().norm().maxCoeff(), 30);
+    EXPECT_NEAR(probes(0, 0), 2.06, 0.2) << "the cortex below the craniotomy, mm to the left";
+    EXPECT_NEAR(probes.colwise().norm().maxCoeff(), 3.52, 0.35);
 }
 
 TEST(SceneTemplates, LiverGivesWayToTheGas) {
-    EXPECT_GT(last_probes(small("liver"))(1, 0), 1) << "to the back";
+    EXPECT_NEAR(last_probes(small("liver"))(1, 0), 12.5, 1.2) << "to the back";
 }
 
 TEST(SceneTemplates, BreastSinksToTheBack) {
     const Eigen::Matrix3Xd probes = last_probes(small("breast"));
-    EXPECT_GT(probes(1, 0), 3);
-    EXPECT_LT(probes(1, 0), 40);
+    EXPECT_NEAR(probes(1, 0), 8.4, 0.8);
 }
 
 TEST(SceneTemplates, SpatulaPushesTissueAside) {
     const Eigen::Matrix3Xd probes = last_probes(small("retraction"));
-    EXPECT_LT(probes(2, 0), -2);
+    EXPECT_NEAR(probes(2, 0), -5.6, 0.5);
 }
 
 TEST(SceneTemplates, CavityChangesItsWalls) {
@@ -69,7 +68,7 @@ TEST(SceneTemplates, CavityChangesItsWalls) {
     const Eigen::Matrix3Xd with = last_probes(scene);
     EXPECT_TRUE(std::isnan(with(0, 1))) << "the tumour is gone";
     scene.resections.clear();
-    EXPECT_GT((with - last_probes(scene)).col(0).norm(), 0.05);
+    EXPECT_NEAR((with - last_probes(scene)).col(0).norm(), 0.59, 0.06);
 }
 
 TEST(Presets, StandInTheManualWithTheirSources) {

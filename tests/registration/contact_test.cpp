@@ -79,11 +79,11 @@ TEST(Contact, ABallPressedAgainstAPlateDoesNotEnterIt) {
     EXPECT_LT(lowest(update(without, {.points = pairs}, on_cpu())), plate_top - 3);  // what would be without
 
     const UpdateResult result = update(with, {.points = pairs}, on_cpu());
-    EXPECT_GT(lowest(result), plate_top - 0.2);
-    EXPECT_LT(lowest(result), plate_top + 0.5);  // and it does not hover
-    EXPECT_GT(result.contact->touching, 3);
-    EXPECT_LT(result.contact->deepest_mm, 0.2);
-    EXPECT_GT(result.min_jacobian, 0.2);
+    EXPECT_GT(lowest(result), plate_top - 0.05);
+    EXPECT_LT(lowest(result), plate_top + 0.05);  // and it does not hover
+    EXPECT_GT(result.contact->touching, 12);
+    EXPECT_LT(result.contact->deepest_mm, 0.01);
+    EXPECT_GT(result.min_jacobian, 0.76);
     const Matrix3Xd& u = result.deformation.displacement;
     EXPECT_LT(u.row(2).minCoeff(), -5.0);  // the top follows the data
 }
@@ -98,10 +98,10 @@ TEST(Contact, WhatTouchesSlidesFreely) {
     int touching = 0;
     for (Eigen::Index n = 0; n < both.cols(); ++n) {
         if (model.model.mesh.nodes(2, n) + both(2, n) > plate_top + 0.2) continue;
-        EXPECT_NEAR(both(0, n) - pressed(0, n), slid(0, n), 0.5);
+        EXPECT_NEAR(both(0, n) - pressed(0, n), slid(0, n), 0.3);
         ++touching;
     }
-    EXPECT_GT(touching, 3);
+    EXPECT_GT(touching, 8);
 }
 
 TEST(Contact, SpringsPullAlongTheNormalAloneAndOnlyWhereTheOrganTouches) {
@@ -115,7 +115,7 @@ TEST(Contact, SpringsPullAlongTheNormalAloneAndOnlyWhereTheOrganTouches) {
     EXPECT_FALSE(contact.settled(state));
     UpdateResult judged;
     contact.judge(state, judged);
-    EXPECT_NEAR(judged.contact->deepest_mm, 4 - (-radius - plate_top), 0.5);
+    EXPECT_NEAR(judged.contact->deepest_mm, 4 - (-radius - plate_top), 0.3);
     EXPECT_TRUE(contact.follow(state));
     const auto springs = contact.linearise(plan, state, silent_observer()).springs;
     ASSERT_FALSE(springs.empty());
@@ -136,7 +136,7 @@ TEST(Contact, SpringsPullAlongTheNormalAloneAndOnlyWhereTheOrganTouches) {
 TEST(Contact, TheOrganComesOffWhenPulledAway) {
     const UpdateResult result = update(ball_and_plate(), {.points = shifted({0, 0, 6})}, on_cpu());
     EXPECT_EQ(result.contact->touching, 0);
-    EXPECT_NEAR(lowest(result), -radius + 6, 1.0);
+    EXPECT_NEAR(lowest(result), -radius + 6, 0.1);
 }
 
 // Voxels leave an organ that lies on bone a fraction of a voxel within it; a contact that does not know this pushes.
@@ -149,7 +149,7 @@ TEST(Contact, AnOrganThatLiesOnItsNeighbourAndDidNotMoveIsNotMoved) {
     });
     const PreparedModel model = prepare(labels, coarse({plate}));
     const UpdateResult result = update(model, {.labels = labels}, on_cpu());
-    EXPECT_LT(result.deformation.displacement.colwise().norm().maxCoeff(), 0.15);
+    EXPECT_LT(result.deformation.displacement.colwise().norm().maxCoeff(), 0.01);
     EXPECT_TRUE(result.doubts.empty()) << result.doubts.front().text;
 }
 
@@ -164,8 +164,8 @@ TEST(Contact, SameBitsForOneThreadAndMany) {
 TEST(Anchors, HoldTheirTissueWhileTheRestFollowsTheData) {
     const PreparedModel model = prepare(ball_on_plate(), coarse({plate}, {cap}));
     const UpdateResult result = update(model, {.points = shifted({4, 0, 0})}, on_cpu());
-    EXPECT_GT(result.anchors->nodes, 5);
-    EXPECT_LT(result.anchors->largest_mm, 0.3);
+    EXPECT_GT(result.anchors->nodes, 73);
+    EXPECT_LT(result.anchors->largest_mm, 0.031);
     for (const int node : detail::anchored_nodes(model)) EXPECT_GT(model.model.mesh.nodes(2, node), 13.0);
     for (int node = 0; node < model.rest.node_count; ++node)
         if (model.model.mesh.nodes(2, node) < -10) {
@@ -184,8 +184,8 @@ TEST(Anchors, KeepThePlacementWhereAlignmentFoundIt) {
     const Eigen::Isometry3d motion = test::motion(20, {1, 1, 0}, {30, -10, 5});
     pairs.fixed = motion * pairs.moving;
     const UpdateResult result = update(model, {.points = pairs}, options);
-    EXPECT_LT((result.deformation.placement.matrix() - motion.matrix()).norm(), 0.05);
-    EXPECT_LT(result.deformation.displacement.colwise().norm().maxCoeff(), 0.1);
+    EXPECT_LT((result.deformation.placement.matrix() - motion.matrix()).norm(), 1e-6);
+    EXPECT_LT(result.deformation.displacement.colwise().norm().maxCoeff(), 1e-6);
 }
 
 TEST(Surroundings, AreNotMeshedAndComeBackFromAFile) {

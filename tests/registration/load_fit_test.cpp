@@ -158,7 +158,7 @@ TEST(PrincipalLoads, AreTheSameOnAnotherMesh) {
     EXPECT_EQ(detail::loads_along(coarse, found.axes), found.loads);
     const MatrixXd here = works(coarse, found.loads), there = works(fine, detail::loads_along(fine, found.axes));
     for (Eigen::Index k = 0; k < 48; ++k)
-        EXPECT_GT(here.col(k).dot(there.col(k)) / here.col(k).norm() / there.col(k).norm(), 0.5) << k;
+        EXPECT_GT(here.col(k).dot(there.col(k)) / here.col(k).norm() / there.col(k).norm(), 0.95) << k;
 }
 
 // Tissue that no pair shows is where smooth loads put it that bend what pairs show; strain energy alone lets it go.
@@ -169,11 +169,11 @@ TEST(UnknownLoads, MoveWhatNoPairShows) {
     const UpdateResult without = update(prepared, {.points = pairs}, with_shapes(0)),
                        with = update(prepared, {.points = pairs}, with_shapes(48));
     EXPECT_EQ(without.pulls.load_size, 0);
-    EXPECT_GT(with.pulls.load_size, 1);
+    EXPECT_GT(with.pulls.load_size, 7.9);
     const double before = error_on_the_right(prepared, without, truth),
                  after = error_on_the_right(prepared, with, truth);
-    EXPECT_LT(after, 0.7 * before) << before << " mm without";
-    EXPECT_GT(with.min_jacobian, 0.5);
+    EXPECT_LT(after, 0.68 * before) << before << " mm without";
+    EXPECT_GT(with.min_jacobian, 0.92);
 }
 
 /// A map of the organ after a deformation.
@@ -201,7 +201,7 @@ TEST(UnknownWeights, AreInEquilibriumAndAlike) {
     const MatrixXd motions = detail::rigid_motions(prepared.model.mesh.nodes);
     EXPECT_LT((motions.transpose() * weights).norm(), 1e-9 * weights.norm() * motions.norm());
     const MatrixXd drawn = detail::unknown_loads(prepared, 4, 3);
-    EXPECT_LT((weights.colwise().norm().maxCoeff()) / drawn.colwise().norm().mean(), 3);
+    EXPECT_LT((weights.colwise().norm().maxCoeff()) / drawn.colwise().norm().mean(), 0.23);
 }
 
 // A boundary all over shows weight by how the surface bulges; without, tissue within slides back along it.
@@ -215,18 +215,18 @@ TEST(UnknownWeights, MoveWhatLabelsDoNotShow) {
     options.tissue.load_shapes = 48;
     const UpdateResult with = update(prepared, {.labels = labels}, options);
     EXPECT_EQ(without.pulls.load_size, 0);
-    EXPECT_GT(with.pulls.load_size, 1);
+    EXPECT_GT(with.pulls.load_size, 7.9);
     EXPECT_TRUE(with.pulls.of(Origin::Prior).empty());  // of the fit alone
     const double before = error_at_nodes(without, prepared, truth), after = error_at_nodes(with, prepared, truth);
-    EXPECT_LT(after, 0.8 * before) << before << " mm without";
-    EXPECT_GT(with.min_jacobian, 0.5);
+    EXPECT_LT(after, 0.32 * before) << before << " mm without";
+    EXPECT_GT(with.min_jacobian, 0.93);
 }
 
 // An organ that did not move has none.
 TEST(UnknownWeights, OfAnOrganThatLiesStillAreNothing) {
     const PreparedModel prepared = organ(10);
     const UpdateResult result = update(prepared, {.labels = prepared.labels}, with_shapes(48));
-    EXPECT_LT(result.deformation.displacement.colwise().norm().maxCoeff(), 0.05);
+    EXPECT_LT(result.deformation.displacement.colwise().norm().maxCoeff(), 1e-3);
     EXPECT_LT(result.pulls.load_size, 0.2);
 }
 
@@ -293,7 +293,7 @@ TEST(UnknownLoads, OfALargeModelAreThoseOfASmallOne) {
                        of_small = update(small, {.points = pairs}, with_shapes(48)),
                        without = update(large, {.points = pairs}, with_shapes(0));
     EXPECT_NEAR(std::log2(of_large.pulls.load_size / of_small.pulls.load_size), 0, 1);
-    EXPECT_LT(error_on_the_right(large, of_large, truth), 0.7 * error_on_the_right(large, without, truth));
+    EXPECT_LT(error_on_the_right(large, of_large, truth), 0.62 * error_on_the_right(large, without, truth));
 
     prepare_loads(large);
     ASSERT_TRUE(large.coarse);

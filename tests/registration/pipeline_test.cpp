@@ -34,7 +34,7 @@ TEST(Pipeline, AnImageRegisteredToItselfDoesNotMove) {
     UpdateOptions options = on_cpu();
     options.align = false;
     const auto result = update(prepare(labels, coarse()), {.labels = labels}, options);
-    EXPECT_LT(largest(result.deformation.displacement), 0.05);
+    EXPECT_LT(largest(result.deformation.displacement), 1e-3);
     EXPECT_TRUE(result.doubts.empty());
 }
 
@@ -44,7 +44,7 @@ TEST(Pipeline, ARigidMotionIsFoundWithoutStrain) {
     const auto result = update(prepared, {.labels = organ_labels({}, truth)}, on_cpu());
     const Eigen::Matrix3Xd expected = truth * prepared.model.mesh.nodes;
     const Eigen::Matrix3Xd error = result.deformation.deformed_nodes() - expected;
-    EXPECT_LT(std::sqrt(error.colwise().squaredNorm().mean()), 0.4);  // voxels of 1.5 mm
+    EXPECT_LT(std::sqrt(error.colwise().squaredNorm().mean()), 0.323);  // voxels of 1.5 mm
     EXPECT_GT(result.min_jacobian, 0.9);
 }
 
@@ -60,8 +60,8 @@ TEST(Pipeline, AnOrganPressedFlatIsFollowed) {
     const Eigen::Vector3d stretch = pressed.semi_axes.cwiseQuotient(shapes::Organ{}.semi_axes);
     const Eigen::Matrix3Xd error =
         result.deformation.deformed_nodes() - stretch.asDiagonal() * prepared.model.mesh.nodes;
-    EXPECT_LT(error.colwise().norm().mean(), 0.8);
-    EXPECT_LT(result.rounds.back().mean_residual_mm, 0.3);
+    EXPECT_LT(error.colwise().norm().mean(), 0.46);
+    EXPECT_LT(result.rounds.back().mean_residual_mm, 0.077);
     EXPECT_EQ(mesh_jacobians(result.deformation).folded, 0);
 }
 
@@ -84,7 +84,7 @@ TEST(Pipeline, ABoundaryThatTissueResistsIsNotLetGo) {
     const auto prepared = prepare(organ_labels({}), coarse());
     const Round last = after_many_rounds(prepared, organ_labels(smaller));
     EXPECT_GT(last.matched, 0.98 * last.interface_nodes);
-    EXPECT_LT(last.mean_residual_mm, 1.5);
+    EXPECT_LT(last.mean_residual_mm, 1.2);
 }
 
 // A map that lacks a piece of the organ, 15 mm wide and 4 mm deep, moves what lies about it and nothing else.
@@ -107,7 +107,7 @@ TEST(Pipeline, AWrongPieceOfALabelMapStaysLocal) {
         if ((deformation.mesh.nodes.col(n) - top).norm() < 30) continue;
         EXPECT_LT(deformation.displacement.col(n).norm(), 0.3);
     }
-    EXPECT_LT(std::sqrt(deformation.displacement.colwise().squaredNorm().mean()), 0.5);
+    EXPECT_LT(std::sqrt(deformation.displacement.colwise().squaredNorm().mean()), 0.377);
 }
 
 TEST(Pipeline, SameBitsForOneThreadAndMany) {

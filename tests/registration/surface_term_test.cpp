@@ -122,10 +122,10 @@ TEST(SurfaceData, NormalsAndAreasOfANoisyPatch) {
     int straight = 0;
     for (Eigen::Index n = 0; n < data.count(); ++n)
         straight += std::abs(data.normals.col(n).dot(data.points.col(n).normalized())) > std::cos(15 * EIGEN_PI / 180);
-    EXPECT_GT(straight, 0.88 * 1500);  // outliers and their neighbours aside
+    EXPECT_GT(straight, 0.94 * 1500);  // outliers and their neighbours aside
     const double area = 0.4 * 4 * EIGEN_PI * radius * radius;
-    EXPECT_NEAR(data.areas.sum() / area, 1, 0.35);
-    EXPECT_LT(data.areas.maxCoeff(), 4 * area / 1500);  // a lone outlier stands for no more than others
+    EXPECT_NEAR(data.areas.sum() / area, 1, 0.1);
+    EXPECT_LT(data.areas.maxCoeff(), 2.1 * area / 1500);  // a lone outlier stands for no more than others
 }
 
 TEST(SurfaceData, DenseCloudsAreThinned) {
@@ -154,7 +154,7 @@ TEST_P(FarStarts, ThePoseIsFoundFromAPart) {
     const auto seen = seen_part(surface, numbers.direction(), 0.3, 1200, 0.7, outliers, numbers, GetParam() % 4 < 2);
     const auto truth = test::motion(30, numbers.direction(), 40 * numbers.direction());
     const Alignment found = align_surfaces(surface, moved(seen, truth));
-    EXPECT_LT(pose_error(surface, found.placement, truth), 2.0);  // started about 45 mm off
+    EXPECT_LT(pose_error(surface, found.placement, truth), 0.91);  // started about 45 mm off
 }
 
 TEST(SurfacePose, ASecondPlaceThatFitsAsWellIsSaid) {
@@ -164,7 +164,7 @@ TEST(SurfacePose, ASecondPlaceThatFitsAsWellIsSaid) {
     const SurfaceTree tree(surface);
     const auto pose = detail::search_surface_pose(tree, surface, detail::surface_data(seen), {}, silent_observer());
     EXPECT_GT(pose.rival_mm, 8);
-    EXPECT_LT(pose.rival_cost - pose.cost, 0.1);
+    EXPECT_LT(pose.rival_cost - pose.cost, 0.01);
 }
 
 TEST(RigidPart, GoesToThePlacementAndMovesNothing) {
@@ -178,7 +178,7 @@ TEST(RigidPart, GoesToThePlacementAndMovesNothing) {
     const Eigen::Matrix3Xd before = state.placement * (nodes + state.displacement);
     detail::give_rigid_part_to_placement(prepared, state);
     EXPECT_LT((state.placement * (nodes + state.displacement) - before).cwiseAbs().maxCoeff(), 1e-9);
-    EXPECT_LT(state.displacement.colwise().norm().maxCoeff(), 4);  // of more than 15
+    EXPECT_LT(state.displacement.colwise().norm().maxCoeff(), 1.82);  // of more than 15
     const detail::State once = state;
     detail::give_rigid_part_to_placement(prepared, state);
     EXPECT_LT((state.displacement - once.displacement).cwiseAbs().maxCoeff(), 1e-9);
@@ -205,8 +205,8 @@ TEST(SurfaceTerm, ASurfaceThatDidNotChangeLeavesTheTissueInPeace) {
     UpdateOptions options = on_cpu();
     options.align = false;
     const auto result = update(prepared, {.surface = seen}, options);
-    EXPECT_LT(result.deformation.displacement.colwise().norm().maxCoeff(), 1.0);  // two deviations of a point
-    EXPECT_GT(result.surface->inlier_share, 0.85);
+    EXPECT_LT(result.deformation.displacement.colwise().norm().maxCoeff(), 0.66);  // two deviations of a point
+    EXPECT_GT(result.surface->inlier_share, 0.9);
     EXPECT_TRUE(result.doubts.empty());
 }
 

@@ -190,7 +190,7 @@ TEST_P(Dynamics, ABlowThatInvertsTissueIsRefusedAndTheLastGoodStateIsLeft) {
         EXPECT_THAT(error.what(), ::testing::HasSubstr("dynamics stopped"));
     }
     EXPECT_TRUE(engine->displacement().allFinite());
-    EXPECT_GT(engine->observe().min_jacobian, 0);
+    EXPECT_GT(engine->observe().min_jacobian, 0.9);  // 1, at rest
 }
 
 // Power iteration against the dense eigenvalue of M⁻¹K.
@@ -280,9 +280,8 @@ TEST_P(Dynamics, MassScalingRaisesTheCriticalStep) {
     const double before = critical(lumped(sliver.rest));
     const double target = 1.5 * before;
     const MassScaling scaling = scaled_mass(sliver.rest, 1e-6, target);
-    EXPECT_GT(scaling.scaled_elements, 0);
     EXPECT_LT(scaling.scaled_elements, sliver.rest.element_count());
-    EXPECT_GT(scaling.added_fraction, 0.0);
+    EXPECT_NEAR(scaling.added_fraction, 0.467, 0.047);
     EXPECT_GE(critical(scaling.mass), target);
 }
 
