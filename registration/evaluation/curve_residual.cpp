@@ -1,8 +1,8 @@
 #include "registration/evaluation/curve_residual.hpp"
 
 #include "core/errors.hpp"
+#include "meshing/search/curve_tree.hpp"
 #include "registration/io/curves.hpp"
-#include "registration/search/curve_tree.hpp"
 
 #include <tbb/parallel_for.h>
 
@@ -14,8 +14,8 @@ namespace tissuewarp::registration {
 
 namespace {
 
-using detail::CurveTree;
-using detail::Segment;
+using meshing::CurveTree;
+using meshing::Segment;
 
 constexpr double anywhere = std::numeric_limits<double>::infinity();
 

@@ -1,8 +1,8 @@
 #include "registration/evaluation.hpp"
 
 #include "core/errors.hpp"
+#include "meshing/search/point_tree.hpp"
 #include "registration/evaluation/percentile.hpp"
-#include "registration/search/point_tree.hpp"
 
 #include <tbb/parallel_for.h>
 
@@ -58,7 +58,7 @@ std::map<int, Region> regions_of(const Volume& labels) {
     return regions;
 }
 
-std::vector<double> distances(const std::vector<Eigen::Vector3d>& from, const detail::PointTree& to) {
+std::vector<double> distances(const std::vector<Eigen::Vector3d>& from, const meshing::PointTree& to) {
     std::vector<double> result(from.size());
     tbb::parallel_for(std::size_t{0}, from.size(), [&](std::size_t n) { result[n] = to.distance(from[n]); });
     return result;
@@ -70,8 +70,8 @@ void measure_surfaces(const Region& a, const Region& b, Overlap& overlap) {
         overlap.mean_surface_distance_mm = overlap.hausdorff_95_mm = std::numeric_limits<double>::infinity();
         return;
     }
-    std::vector<double> to_b = distances(a.faces, detail::PointTree(b.faces));
-    std::vector<double> to_a = distances(b.faces, detail::PointTree(a.faces));
+    std::vector<double> to_b = distances(a.faces, meshing::PointTree(b.faces));
+    std::vector<double> to_a = distances(b.faces, meshing::PointTree(a.faces));
     const auto mean = [](const std::vector<double>& d) {
         return std::accumulate(d.begin(), d.end(), 0.0) / static_cast<double>(d.size());
     };

@@ -1,7 +1,7 @@
 #include "registration/evaluation/surface_residual.hpp"
 
 #include "core/errors.hpp"
-#include "registration/search/surface_tree.hpp"
+#include "meshing/search/surface_tree.hpp"
 
 #include <tbb/parallel_for.h>
 
@@ -18,7 +18,7 @@ SurfaceResidual surface_residual(const meshing::SurfaceMesh& surface, const Eige
     if (points.cols() == 0 || !points.allFinite())
         throw InvalidInput("surface residual: " + std::to_string(points.cols()) +
                            " points; at least one is needed, all of them finite");
-    const detail::SurfaceTree tree(surface);
+    const meshing::SurfaceTree tree(surface);
     std::vector<double> distances(static_cast<std::size_t>(points.cols())), signs(distances.size());
     tbb::parallel_for(std::size_t{0}, distances.size(), [&](std::size_t n) {
         const Eigen::Vector3d point = points.col(static_cast<Eigen::Index>(n));

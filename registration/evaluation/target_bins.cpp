@@ -4,7 +4,7 @@
 #include "imaging/filters.hpp"
 #include "imaging/labels.hpp"
 #include "imaging/sampling.hpp"
-#include "registration/search/point_tree.hpp"
+#include "meshing/search/point_tree.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -61,9 +61,7 @@ Eigen::VectorXd distance_to_data(const Eigen::Matrix3Xd& points, const Eigen::Ma
     if (data.cols() == 0 || !data.allFinite())
         throw InvalidInput("distance to data: " + std::to_string(data.cols()) +
                            " data points; at least one is needed, all of them finite");
-    std::vector<Eigen::Vector3d> places(static_cast<std::size_t>(data.cols()));
-    for (std::size_t n = 0; n < places.size(); ++n) places[n] = data.col(static_cast<Eigen::Index>(n));
-    const detail::PointTree tree(places);
+    const meshing::PointTree tree(data);
     Eigen::VectorXd distances(points.cols());
     for (Eigen::Index p = 0; p < points.cols(); ++p) distances[p] = tree.distance(points.col(p));
     return distances;

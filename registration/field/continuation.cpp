@@ -1,8 +1,8 @@
 #include "registration/field/continuation.hpp"
 
 #include "imaging/filters.hpp"
+#include "meshing/search/surface_proximity.hpp"
 #include "registration/field/rasterisation.hpp"
-#include "registration/search/surface_proximity.hpp"
 
 #include <tbb/parallel_for.h>
 
@@ -178,7 +178,7 @@ struct Continuation::Impl {
     Eigen::Vector3d lower;
     double spacing;
     Level grid;
-    SurfaceProximity surface;
+    meshing::SurfaceProximity surface;
 
     Impl(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tets, const meshing::BoundarySurface& boundary,
          const Eigen::Matrix3Xd& values, double fade_mm)
@@ -326,7 +326,7 @@ struct Continuation::Impl {
     }
 
     /// What the grid misses of the surface's displacement at a point of it.
-    [[nodiscard]] Eigen::Vector3d missing(const SurfaceProximity::Hit& hit) const {
+    [[nodiscard]] Eigen::Vector3d missing(const meshing::SurfaceProximity::Hit& hit) const {
         return hit.value - interpolated(hit.point);
     }
 
@@ -335,7 +335,7 @@ struct Continuation::Impl {
     [[nodiscard]] Eigen::Vector3d correction(const Eigen::Vector3d& point) const {
         const auto near = surface.closest(point);
         if (!near) return Eigen::Vector3d::Zero();
-        const auto fading = [&](const SurfaceProximity::Hit& hit) {
+        const auto fading = [&](const meshing::SurfaceProximity::Hit& hit) {
             const double t = hit.distance / surface.reach();
             return (1.0 - t) * (1.0 - t) * (1.0 + 2.0 * t);  // 1 at the surface, slope 0 at both ends
         };

@@ -1,6 +1,6 @@
 #include "registration/loads/coarse_twin.hpp"
 
-#include "registration/search/point_tree.hpp"
+#include "meshing/search/point_tree.hpp"
 #include "registration/springs/pull.hpp"
 
 #include <utility>
@@ -55,10 +55,11 @@ std::vector<tled::Spring> sampled(const std::vector<tled::Spring>& springs, cons
     std::vector<Eigen::Vector3d> places;
     places.reserve(springs.size());
     for (const tled::Spring& spring : springs) places.emplace_back(from.col(spring.node));
-    const PointTree tree(places);
+    const meshing::PointTree tree(places);
     std::vector<tled::Spring> result;
     for (const InterfaceNode& node : to.interfaces.nodes()) {
-        const tled::Spring& spring = springs[tree.nearest(to.model.mesh.nodes.col(node.node)).index];
+        const int nearest = tree.nearest(to.model.mesh.nodes.col(node.node)).index;
+        const tled::Spring& spring = springs[static_cast<std::size_t>(nearest)];
         result.push_back({node.node, spring.stiffness, spring.target});
     }
     const double share = total(springs) / total(result);
@@ -74,14 +75,14 @@ void add(LastPulls& pulls, Origin origin, const std::vector<tled::Spring>& sprin
 
 Eigen::MatrixXd carried(const meshing::TetMesh& from, const Eigen::MatrixXd& nodal, const Eigen::Matrix3Xd& to) {
     const meshing::PointLocator locator(from);
-    const PointTree tree({from.nodes.colwise().begin(), from.nodes.colwise().end()});
+    const meshing::PointTree tree(from.nodes);
     Eigen::MatrixXd result(nodal.rows(), to.cols());
     for (Eigen::Index p = 0; p < to.cols(); ++p) {
         if (const auto at = place_of(locator, to.col(p))) {
             result.col(p) = meshing::interpolate(from, nodal, *at);
             continue;
         }
-        result.col(p) = nodal.col(static_cast<Eigen::Index>(tree.nearest(to.col(p)).index));
+        result.col(p) = nodal.col(tree.nearest(to.col(p)).index);
     }
     return result;
 }

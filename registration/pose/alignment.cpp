@@ -165,7 +165,7 @@ Alignment align_surfaces(const meshing::SurfaceMesh& moving, const SurfacePoints
                          const AlignmentOptions& options, Observer& observer) {
     if (moving.triangle_count() == 0 || !moving.nodes.allFinite())
         throw InvalidInput("the moving surface has no triangles, or nodes that are not finite");
-    const detail::SurfacePose found = detail::search_surface_pose(detail::SurfaceTree(moving), moving,
+    const detail::SurfacePose found = detail::search_surface_pose(meshing::SurfaceTree(moving), moving,
                                                                   detail::surface_data(fixed), options, observer);
     return {found.placement, found.typical_distance_mm()};
 }

@@ -8,7 +8,7 @@
 
 namespace tissuewarp::registration::detail {
 
-std::vector<CurveMatch> match_curves(const CurveTree& lines, const CurvePoints& points,
+std::vector<CurveMatch> match_curves(const meshing::CurveTree& lines, const CurvePoints& points,
                                      const Eigen::Isometry3d& placement, double reach_mm, double max_angle_deg) {
     const Eigen::Isometry3d back = placement.inverse();
     const double least_cosine = std::cos(max_angle_deg * EIGEN_PI / 180);

@@ -1,7 +1,7 @@
 #pragma once
 /// Which places of lines belong to which points.
 
-#include "registration/search/curve_tree.hpp"
+#include "meshing/search/curve_tree.hpp"
 
 #include <Eigen/Geometry>
 
@@ -12,7 +12,7 @@ namespace tissuewarp::registration::detail {
 /// A point of the fixed frame and the nearest place on the lines, as the model has them.
 struct CurveMatch {
     bool found = false;
-    CurveTree::Hit hit;                                ///< moving frame
+    meshing::CurveTree::Hit hit;                       ///< moving frame
     Eigen::Vector3d across = Eigen::Vector3d::Zero();  ///< from the line to the point, normal to the line, mm
 };
 
@@ -26,7 +26,7 @@ struct CurvePoints {
 };
 
 /// Every point with its nearest place within `reach_mm`, where the tangents agree within an angle.
-std::vector<CurveMatch> match_curves(const CurveTree& lines, const CurvePoints& points,
+std::vector<CurveMatch> match_curves(const meshing::CurveTree& lines, const CurvePoints& points,
                                      const Eigen::Isometry3d& placement, double reach_mm, double max_angle_deg);
 
 /// Median distance of the points that have a match; infinity where none has.

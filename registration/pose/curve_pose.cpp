@@ -59,7 +59,7 @@ Eigen::Isometry3d step(const std::vector<CurveMatch>& matches, const Weighed& we
     Vector6d right = Vector6d::Zero();
     for (std::size_t n = 0; n < matches.size(); ++n) {
         if (weighed.weights[n] <= 0) continue;
-        const CurveTree::Hit& hit = matches[n].hit;
+        const meshing::CurveTree::Hit& hit = matches[n].hit;
         const Eigen::Matrix3d projection = Eigen::Matrix3d::Identity() - hit.tangent * hit.tangent.transpose();
         Eigen::Matrix<double, 3, 6> jacobian;
         jacobian << projection, -projection * cross_matrix((hit.point - weighed.centre) / weighed.radius);
@@ -76,7 +76,7 @@ Eigen::Isometry3d step(const std::vector<CurveMatch>& matches, const Weighed& we
 
 }  // namespace
 
-Alignment closest_curve_pose(const CurveTree& lines, const CurvePoints& points, const Eigen::Isometry3d& start,
+Alignment closest_curve_pose(const meshing::CurveTree& lines, const CurvePoints& points, const Eigen::Isometry3d& start,
                              double last_scale_mm, double max_angle_deg) {
     constexpr int passes = 60;
     constexpr double scale_ratio = 0.9;

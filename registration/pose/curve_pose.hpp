@@ -11,7 +11,7 @@ namespace tissuewarp::registration::detail {
 /// McKay 1992, the distance to the line in place of that to a point). s falls to `last_scale_mm` from three times the
 /// median distance at `start`. What the points do not tell, such as a shift along a single straight line, stays as
 /// `start` has it.
-Alignment closest_curve_pose(const CurveTree& lines, const CurvePoints& points, const Eigen::Isometry3d& start,
+Alignment closest_curve_pose(const meshing::CurveTree& lines, const CurvePoints& points, const Eigen::Isometry3d& start,
                              double last_scale_mm, double max_angle_deg);
 
 }  // namespace tissuewarp::registration::detail

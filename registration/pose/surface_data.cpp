@@ -1,5 +1,6 @@
 #include "registration/pose/surface_data.hpp"
 
+#include "meshing/search/point_tree.hpp"
 #include "registration/io/surface_points.hpp"
 
 #include <tbb/parallel_for.h>
@@ -39,16 +40,6 @@ std::vector<Eigen::Index> thinned(const Eigen::Matrix3Xd& points, int most) {
     return kept;
 }
 
-/// Squared distances and indices of all points, the nearest first, the first `sorted` in order.
-std::vector<std::pair<double, Eigen::Index>> neighbours(const Eigen::Matrix3Xd& points, Eigen::Index of,
-                                                        Eigen::Index sorted) {
-    std::vector<std::pair<double, Eigen::Index>> all(static_cast<std::size_t>(points.cols()));
-    for (Eigen::Index n = 0; n < points.cols(); ++n)
-        all[static_cast<std::size_t>(n)] = {(points.col(n) - points.col(of)).squaredNorm(), n};
-    std::partial_sort(all.begin(), all.begin() + sorted, all.end());
-    return all;
-}
-
 Eigen::Vector3d plane_normal(const Eigen::Matrix3Xd& points) {
     const Eigen::Matrix3Xd centred = points.colwise() - points.rowwise().mean();
     return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(centred * centred.transpose()).eigenvectors().col(0);
@@ -71,12 +62,13 @@ SurfaceData surface_data(const SurfacePoints& surface, int most_points) {
     data.areas.resize(data.count());
     const double within = std::pow(4 * surface.deviation_mm, 2);
     const Eigen::Index sorted = std::min(most_neighbours + 1, data.count());
+    const meshing::PointTree tree(data.points);
     tbb::parallel_for(Eigen::Index{0}, data.count(), [&](Eigen::Index n) {
-        const auto nearest = neighbours(data.points, n, sorted);
+        const auto nearest = tree.nearest(data.points.col(n), static_cast<std::size_t>(sorted));
         const auto area_count = std::min(area_neighbours, sorted - 1);
-        data.areas[n] = EIGEN_PI * nearest[static_cast<std::size_t>(area_count)].first / double(area_count);
+        data.areas[n] = EIGEN_PI * nearest[static_cast<std::size_t>(area_count)].squared_distance / double(area_count);
         if (data.oriented) return;
-        std::vector<Eigen::Index> around;
+        std::vector<int> around;
         for (Eigen::Index k = 0; k < sorted; ++k) {
             const auto& [squared, index] = nearest[static_cast<std::size_t>(k)];
             if (k < least_neighbours || squared < within) around.push_back(index);

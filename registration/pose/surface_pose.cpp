@@ -33,7 +33,8 @@ struct Descent {
 
 class PoseSearch {
 public:
-    PoseSearch(const SurfaceTree& model, const meshing::SurfaceMesh& surface, const SurfaceData& data, double scale_mm)
+    PoseSearch(const meshing::SurfaceTree& model, const meshing::SurfaceMesh& surface, const SurfaceData& data,
+               double scale_mm)
         : model_(model), surface_(surface), data_(data), scale_mm_(scale_mm) {
         centre_ = surface.nodes.rowwise().mean();
         radius_ = std::sqrt((surface.nodes.colwise() - centre_).colwise().squaredNorm().mean());
@@ -75,7 +76,7 @@ public:
     }
 
 private:
-    const SurfaceTree& model_;
+    const meshing::SurfaceTree& model_;
     const meshing::SurfaceMesh& surface_;
     const SurfaceData& data_;
     double scale_mm_, radius_;
@@ -83,8 +84,8 @@ private:
 
     [[nodiscard]] Eigen::Index stride(int points) const { return std::max<Eigen::Index>(1, data_.count() / points); }
 
-    [[nodiscard]] std::optional<SurfaceTree::Hit> match(const Eigen::Vector3d& point, const Eigen::Vector3d& normal,
-                                                        double scale) const {
+    [[nodiscard]] std::optional<meshing::SurfaceTree::Hit> match(const Eigen::Vector3d& point,
+                                                                 const Eigen::Vector3d& normal, double scale) const {
         return model_.closest(point, 4 * scale, {normal, least_cosine, data_.oriented});
     }
 
@@ -213,8 +214,8 @@ std::vector<Pose> distinct(const PoseSearch& search, const std::vector<Pose>& po
 
 }  // namespace
 
-SurfacePose search_surface_pose(const SurfaceTree& model, const meshing::SurfaceMesh& surface, const SurfaceData& data,
-                                const AlignmentOptions& options, Observer& observer) {
+SurfacePose search_surface_pose(const meshing::SurfaceTree& model, const meshing::SurfaceMesh& surface,
+                                const SurfaceData& data, const AlignmentOptions& options, Observer& observer) {
     const double scale = std::max(options.trim_mm / 2, 3 * data.deviation_mm);
     const PoseSearch search(model, surface, data, scale);
     std::vector<Pose> poses = search.starts();

@@ -2,9 +2,9 @@
 /// The rigid placement of a whole surface on points of a part of it.
 
 #include "core/observer.hpp"
+#include "meshing/search/surface_tree.hpp"
 #include "registration/pose/alignment.hpp"
 #include "registration/pose/surface_data.hpp"
-#include "registration/search/surface_tree.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -27,7 +27,7 @@ struct SurfacePose {
 /// (Rusinkiewicz, ACM Trans Graph 38 (2019) 85) under Geman–McClure weights whose scale falls (graduated non-convexity:
 /// Yang et al., IEEE RA-L 5 (2020) 1127), with few points at first; the best with more. The cost decides. `surface` is
 /// the one in `model`.
-SurfacePose search_surface_pose(const SurfaceTree& model, const meshing::SurfaceMesh& surface, const SurfaceData& data,
-                                const AlignmentOptions& options, Observer& observer);
+SurfacePose search_surface_pose(const meshing::SurfaceTree& model, const meshing::SurfaceMesh& surface,
+                                const SurfaceData& data, const AlignmentOptions& options, Observer& observer);
 
 }  // namespace tissuewarp::registration::detail

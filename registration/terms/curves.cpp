@@ -1,5 +1,6 @@
 #include "registration/terms/curves.hpp"
 
+#include "meshing/search/point_tree.hpp"
 #include "registration/doubts.hpp"
 #include "registration/io/curves.hpp"
 #include "registration/pose/curve_pose.hpp"
@@ -9,7 +10,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 
 namespace tissuewarp::registration::detail {
 
@@ -26,30 +26,11 @@ std::vector<Eigen::Index> thinned(Eigen::Index count) {
     return kept;
 }
 
-using Cell = std::array<long long, 3>;
-
-Cell cell_of(const Eigen::Vector3d& point, double side) {
-    const Eigen::Array3d cell = (point / side).array().floor();
-    return {static_cast<long long>(cell[0]), static_cast<long long>(cell[1]), static_cast<long long>(cell[2])};
-}
-
 /// One over the number of points within half a piece, themselves included.
 Eigen::VectorXd shares(const Eigen::Matrix3Xd& points, double piece_mm) {
-    const double reach = piece_mm / 2;
-    std::map<Cell, std::vector<Eigen::Index>> cells;
-    for (Eigen::Index n = 0; n < points.cols(); ++n) cells[cell_of(points.col(n), reach)].push_back(n);
+    const meshing::PointTree tree(points);
     Eigen::VectorXd result(points.cols());
-    for (Eigen::Index n = 0; n < points.cols(); ++n) {
-        const Cell at = cell_of(points.col(n), reach);
-        int together = 0;
-        for (int k = 0; k < 27; ++k) {
-            const auto found = cells.find({at[0] + k % 3 - 1, at[1] + k / 3 % 3 - 1, at[2] + k / 9 - 1});
-            if (found == cells.end()) continue;
-            for (const Eigen::Index other : found->second)
-                together += (points.col(other) - points.col(n)).norm() <= reach;
-        }
-        result[n] = 1.0 / together;
-    }
+    for (Eigen::Index n = 0; n < points.cols(); ++n) result[n] = 1.0 / tree.count_within(points.col(n), piece_mm / 2);
     return result;
 }
 
@@ -118,7 +99,7 @@ void CurveTerm::join_samples(int first, int last) {
         segments_.push_back({{n, n + 1}, {std::max(first, n - chord_reach), std::min(last - 1, n + 1 + chord_reach)}});
 }
 
-CurveTree CurveTerm::deformed_lines(const State& state) const {
+meshing::CurveTree CurveTerm::deformed_lines(const State& state) const {
     Eigen::Matrix3Xd places = samples_;
     for (std::size_t s = 0; s < places_.size(); ++s)
         places.col(static_cast<Eigen::Index>(s)) +=
@@ -143,7 +124,7 @@ void CurveTerm::add_pulls(const CurveMatch& match, double stiffness, const State
     const Eigen::Vector3d& tangent = match.hit.tangent;
     const Eigen::Matrix3d across = stiffness * (Eigen::Matrix3d::Identity() - tangent * tangent.transpose());
     const double step = std::min(1.0, most_step_mm / std::max(match.across.norm(), 1e-9));
-    const Segment& segment = segments_[static_cast<std::size_t>(match.hit.segment)];
+    const meshing::Segment& segment = segments_[static_cast<std::size_t>(match.hit.segment)];
     const std::array<double, 2> parts{1 - match.hit.along, match.hit.along};
     for (std::size_t end = 0; end < 2; ++end) {
         if (parts[end] <= 0) continue;
@@ -196,7 +177,7 @@ CurveFit CurveTerm::fit(const State& state) const {
     }
     fit.inlier_share = inliers / double(fit.points);
     fit.residual_mm = inliers > 0 ? std::sqrt(squared / inliers) : final_scale_mm();
-    for (const Segment& segment : segments_)
+    for (const meshing::Segment& segment : segments_)
         fit.length_mm += (samples_.col(segment.ends[1]) - samples_.col(segment.ends[0])).norm();
     return fit;
 }

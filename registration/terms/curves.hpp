@@ -34,16 +34,16 @@ private:
     const CurveOptions& options_;
     double energy_;  // mN mm
     CurvePoints data_;
-    Eigen::Matrix3Xd samples_;               // of the lines, those in the model, moving frame
-    std::vector<meshing::Location> places_;  // of the samples
-    std::vector<Segment> segments_;          // between them
-    FallingScale scale_;                     // of the robust weights
+    Eigen::Matrix3Xd samples_;                // of the lines, those in the model, moving frame
+    std::vector<meshing::Location> places_;   // of the samples
+    std::vector<meshing::Segment> segments_;  // between them
+    FallingScale scale_;                      // of the robust weights
 
     void take_lines(const std::vector<Eigen::Matrix3Xd>& lines);
     void join_samples(int first, int last);
     [[nodiscard]] double final_scale_mm() const { return options_.outlier_deviations * data_.deviation_mm; }
     [[nodiscard]] CurveFit fit(const State& state) const;
-    [[nodiscard]] CurveTree deformed_lines(const State& state) const;
+    [[nodiscard]] meshing::CurveTree deformed_lines(const State& state) const;
     [[nodiscard]] std::vector<CurveMatch> matches(const State& state, double reach_mm) const;
     void add_pulls(const CurveMatch& match, double stiffness, const State& state, double most_step_mm,
                    std::vector<Pull>& pulls) const;

@@ -1,9 +1,9 @@
 #include "registration/terms/image.hpp"
 
+#include "meshing/search/point_tree.hpp"
 #include "registration/doubts.hpp"
 #include "registration/matching/image_matching.hpp"
 #include "registration/pose/least_trimmed_motion.hpp"
-#include "registration/search/near_points.hpp"
 
 #include <Eigen/Eigenvalues>
 
@@ -144,12 +144,12 @@ ImageFit ImageTerm::fit(const State& state) {
     std::vector<Eigen::Vector3d> places;
     places.reserve(matches_.matches.size());
     for (const BlockMatch& match : matches_.matches) places.push_back(match.moving);
-    const NearPoints matched(std::move(places), near_mm);
+    const meshing::PointTree matched(places);
     const auto shown = tbb::parallel_reduce(
         tbb::blocked_range<Eigen::Index>(0, nodes.cols()), Eigen::Index{0},
         [&](const tbb::blocked_range<Eigen::Index>& range, Eigen::Index count) {
             for (Eigen::Index node = range.begin(); node < range.end(); ++node)
-                count += matched.any_about(nodes.col(node));
+                count += matched.any_within(nodes.col(node), near_mm);
             return count;
         },
         std::plus<>());

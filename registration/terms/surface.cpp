@@ -52,12 +52,12 @@ double SurfaceTerm::final_scale_mm() const {
 }
 
 Alignment SurfaceTerm::pose(const Eigen::Isometry3d& /*start*/, Observer& observer) {
-    pose_ = search_surface_pose(SurfaceTree(surface_.at_rest), surface_.at_rest, data_, alignment_, observer);
+    pose_ = search_surface_pose(meshing::SurfaceTree(surface_.at_rest), surface_.at_rest, data_, alignment_, observer);
     return {pose_.placement, pose_.typical_distance_mm()};
 }
 
 std::vector<SurfaceTerm::Match> SurfaceTerm::matches(const State& state, double reach_mm) const {
-    const SurfaceTree tree(surface_.deformed(state.displacement));
+    const meshing::SurfaceTree tree(surface_.deformed(state.displacement));
     const Eigen::Isometry3d back = state.placement.inverse();
     const double least_cosine = std::cos(options_.max_angle_deg * EIGEN_PI / 180);
     std::vector<Match> result(static_cast<std::size_t>(data_.count()));

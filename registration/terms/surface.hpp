@@ -1,10 +1,10 @@
 #pragma once
 /// Points of a part of the organ's surface: the tissue's surface goes through them.
 
+#include "meshing/search/surface_tree.hpp"
 #include "registration/options.hpp"
 #include "registration/pose/surface_data.hpp"
 #include "registration/pose/surface_pose.hpp"
-#include "registration/search/surface_tree.hpp"
 #include "registration/springs/pull.hpp"
 #include "registration/terms/organ_surface.hpp"
 #include "registration/terms/term.hpp"
@@ -33,7 +33,7 @@ public:
 private:
     struct Match {
         bool found = false;
-        SurfaceTree::Hit hit;
+        meshing::SurfaceTree::Hit hit;
         Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // unit, moving frame
         double distance_mm = 0;                            // along it, from the surface to the point
     };

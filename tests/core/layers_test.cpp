@@ -44,20 +44,18 @@ const std::map<std::string, std::set<std::string>> rooms_of_tled{
     {"render_pass", {"gpu", "parallel"}},
 };
 
-/// The same of registration, whose search structures and files lie lowest and whose terms know all that they are made
-/// of.
+/// The same of registration, whose files lie lowest and whose terms know all that they are made of.
 const std::map<std::string, std::set<std::string>> rooms_of_registration{
     {"boundary", {}},
     {"dial", {}},
     {"io", {}},
-    {"search", {}},
     {"springs", {}},
-    {"evaluation", {"io", "search"}},
-    {"field", {"search"}},
+    {"evaluation", {"io"}},
+    {"field", {}},
     {"matching", {"field", "springs"}},
-    {"pose", {"io", "search"}},
-    {"loads", {"pose", "search", "springs"}},
-    {"terms", {"boundary", "evaluation", "io", "loads", "matching", "pose", "search", "springs"}},
+    {"pose", {"io"}},
+    {"loads", {"pose", "springs"}},
+    {"terms", {"boundary", "evaluation", "io", "loads", "matching", "pose", "springs"}},
     {"uncertainty", {"field", "loads", "pose", "springs"}},
 };
 

@@ -6,9 +6,9 @@
 #include "registration/field.hpp"
 #include "registration/pose/curve_pose.hpp"
 #include "registration/uncertainty.hpp"
-#include "tests/registration/numbers.hpp"
 #include "tests/registration/shapes.hpp"
 #include "tests/support/label_shapes.hpp"
+#include "tests/support/numbers.hpp"
 
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ namespace {
 
 using Eigen::Matrix3Xd;
 using Eigen::Vector3d;
-using test::Numbers;
+using tissuewarp::test::Numbers;
 
 PrepareOptions coarse() {
     PrepareOptions options;
@@ -172,7 +172,7 @@ TEST(CurveTerm, SpringsHaveTheForcesOfThePulls) {
 TEST(CurveMatches, GoWhereTheTangentsAgree) {
     Matrix3Xd ends(3, 4);
     ends << -20, 20, 0, 0, 0, 0, -20, 20, 0, 0, 1, 1;
-    const detail::CurveTree lines(ends, {{{0, 1}, {0, 1}}, {{2, 3}, {2, 3}}});
+    const meshing::CurveTree lines(ends, {{{0, 1}, {0, 1}}, {{2, 3}, {2, 3}}});
     const Eigen::Isometry3d placement = test::motion(90, {0, 0, 1}, {30, -7, 12});
     detail::CurvePoints points;
     points.points = placement * Vector3d(0.2, 0.1, 0.3);

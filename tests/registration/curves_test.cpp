@@ -1,9 +1,7 @@
-/// Files of centre lines, tangents along them, the nearest place on them, and curves that cannot be used.
+/// Files of centre lines, tangents along them, and curves that cannot be used.
 #include "registration/io/curves.hpp"
 
 #include "core/errors.hpp"
-#include "registration/search/curve_tree.hpp"
-#include "tests/registration/numbers.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
@@ -16,8 +14,6 @@ namespace tissuewarp::registration {
 namespace {
 
 namespace fs = std::filesystem;
-using detail::CurveTree;
-using detail::Segment;
 using Eigen::Matrix3Xd;
 using Eigen::Vector3d;
 using tissuewarp::test::TemporaryFolder;
@@ -153,49 +149,6 @@ TEST(Curves, TangentsAreChordsOfAHelix) {
     }
     EXPECT_NEAR(tangents.col(0).norm(), 1, 1e-9);
     EXPECT_EQ(tangents_along(line.leftCols(5), 3).norm(), 0);  // 2.5 mm: too short to say
-}
-
-/// The simple twin: every segment is looked at.
-CurveTree::Hit nearest_of_all(const Matrix3Xd& points, const std::vector<Segment>& segments, const Vector3d& query,
-                              const detail::TangentGate& gate) {
-    CurveTree::Hit best;
-    best.distance = 1e30;
-    for (std::size_t s = 0; s < segments.size(); ++s) {
-        const Vector3d chord = (points.col(segments[s].chord[1]) - points.col(segments[s].chord[0])).normalized();
-        if (!gate.tangent.isZero() && std::abs(gate.tangent.dot(chord)) < gate.least_cosine) continue;
-        const Vector3d a = points.col(segments[s].ends[0]), b = points.col(segments[s].ends[1]);
-        const double along = std::clamp((b - a).dot(query - a) / (b - a).squaredNorm(), 0.0, 1.0);
-        const double distance = (a + along * (b - a) - query).norm();
-        if (distance < best.distance) best = {int(s), along, a + along * (b - a), chord, distance};
-    }
-    return best;
-}
-
-TEST(CurveTree, AgreesWithLookingAtEverySegment) {
-    test::Numbers numbers(1);
-    Matrix3Xd points(3, 300);
-    std::vector<Segment> segments;
-    for (int n = 0; n < 300; ++n) {
-        const bool start = n % 60 == 0;
-        points.col(n) = start ? Vector3d(40 * numbers.in_cube()) : Vector3d(points.col(n - 1) + 3 * numbers.in_cube());
-        if (!start) segments.push_back({{n - 1, n}, {std::max(n - n % 60, n - 3), n}});
-    }
-    const CurveTree tree(points, segments);
-    int gated = 0;
-    for (int n = 0; n < 500; ++n) {
-        const Vector3d query = 60 * numbers.in_cube();
-        const detail::TangentGate gate{n % 3 ? numbers.direction() : Vector3d(0, 0, 0), 0.7};
-        const auto expected = nearest_of_all(points, segments, query, gate);
-        const auto found = tree.nearest(query, 1e3, gate);
-        ASSERT_TRUE(found) << n;
-        EXPECT_EQ(found->segment, expected.segment) << n;
-        EXPECT_NEAR(found->distance, expected.distance, 1e-9) << n;
-        EXPECT_NEAR((found->point - expected.point).norm(), 0, 1e-9) << n;
-        EXPECT_NEAR((found->tangent - expected.tangent).norm(), 0, 1e-9) << n;
-        gated += expected.distance > nearest_of_all(points, segments, query, {}).distance + 1e-6;
-        EXPECT_FALSE(tree.nearest(query, 0.99 * expected.distance, gate)) << n;
-    }
-    EXPECT_GT(gated, 50);  // the gate decided
 }
 
 TEST(Curves, WhatCannotBeUsedIsRefused) {

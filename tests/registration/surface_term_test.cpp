@@ -1,14 +1,13 @@
-/// Points of a part of a surface: closest triangles, normals, the pose from anywhere, the tissue that follows.
+/// Points of a part of a surface: normals, the pose from anywhere, the tissue that follows.
+#include "meshing/search/surface_tree.hpp"
 #include "registration/field.hpp"
 #include "registration/pose/rigid_part.hpp"
 #include "registration/pose/surface_data.hpp"
 #include "registration/pose/surface_pose.hpp"
-#include "registration/search/surface_proximity.hpp"
-#include "registration/search/surface_tree.hpp"
 #include "registration/update.hpp"
-#include "tests/registration/numbers.hpp"
 #include "tests/registration/shapes.hpp"
 #include "tests/support/label_shapes.hpp"
+#include "tests/support/numbers.hpp"
 
 #include <gtest/gtest.h>
 
@@ -17,10 +16,9 @@
 namespace tissuewarp::registration {
 namespace {
 
-using detail::NormalGate;
-using detail::SurfaceTree;
 using Eigen::Vector3d;
-using test::Numbers;
+using meshing::SurfaceTree;
+using tissuewarp::test::Numbers;
 
 /// A pear with a flat side: no rotation brings it near itself.
 Vector3d pear(const Vector3d& unit) {
@@ -37,49 +35,6 @@ meshing::SurfaceMesh pear_surface(int cells) {
 Vector3d normal_of(const meshing::SurfaceMesh& surface, Eigen::Index t) {
     const Eigen::Matrix3d corners = surface.nodes(Eigen::all, surface.triangles.col(t));
     return (corners.col(1) - corners.col(0)).cross(corners.col(2) - corners.col(0)).normalized();
-}
-
-/// The simple twin: every triangle is looked at.
-SurfaceTree::Hit closest_of_all(const meshing::SurfaceMesh& surface, const Vector3d& point, const NormalGate& gate) {
-    SurfaceTree::Hit best;
-    best.distance = 1e30;
-    for (int t = 0; t < surface.triangle_count(); ++t) {
-        const double cosine = gate.normal.dot(normal_of(surface, t));
-        if ((gate.oriented ? cosine : std::abs(cosine)) < gate.least_cosine) continue;
-        const Eigen::Matrix3d corners = surface.nodes(Eigen::all, surface.triangles.col(t));
-        const Vector3d weights = detail::closest_in_triangle(corners.col(1) - corners.col(0),
-                                                             corners.col(2) - corners.col(0), point - corners.col(0));
-        const double distance = (corners * weights - point).norm();
-        if (distance < best.distance) best = {t, weights, corners * weights, Vector3d::Zero(), distance};
-    }
-    return best;
-}
-
-TEST(SurfaceTree, AgreesWithLookingAtEveryTriangle) {
-    const auto surface = pear_surface(8);
-    const SurfaceTree tree(surface);
-    Numbers numbers(1);
-    int gated = 0;
-    for (int n = 0; n < 400; ++n) {
-        const Vector3d point = 70 * numbers.in_cube();
-        const NormalGate gate{numbers.direction(), n % 3 == 0 ? -1.0 : 0.6, n % 2 == 0};
-        const auto expected = closest_of_all(surface, point, gate);
-        const auto found = tree.closest(point, 1e3, gate);
-        ASSERT_TRUE(found);
-        EXPECT_NEAR(found->distance, expected.distance, 1e-9) << n;
-        EXPECT_NEAR((found->point - expected.point).norm(), 0, 1e-9) << n;
-        EXPECT_NEAR(
-            (surface.nodes(Eigen::all, surface.triangles.col(found->triangle)) * found->barycentric - found->point)
-                .norm(),
-            0, 1e-9);
-        gated += std::abs(expected.distance - closest_of_all(surface, point, {}).distance) > 1e-6;
-        EXPECT_FALSE(tree.closest(point, 0.99 * expected.distance, gate)) << n;
-    }
-    EXPECT_GT(gated, 50);  // the gate decided
-}
-
-TEST(SurfaceTree, ASurfaceWithoutTrianglesIsRefused) {
-    EXPECT_THROW(SurfaceTree(meshing::SurfaceMesh{}), InvalidInput);
 }
 
 /// Points seen on the part of a surface that faces `towards` best.

@@ -1,14 +1,15 @@
 #pragma once
 /// Nearest places on polylines.
 
+#include "meshing/search/point_tree.hpp"
+
 #include <Eigen/Core>
 
 #include <array>
-#include <cstddef>
 #include <optional>
 #include <vector>
 
-namespace tissuewarp::registration::detail {
+namespace tissuewarp::meshing {
 
 /// A piece of a line between two of its points, and the two others of the line whose chord is its tangent.
 struct Segment {
@@ -22,8 +23,8 @@ struct TangentGate {
     double least_cosine = 0;
 };
 
-/// A balanced k-d tree (Bentley 1975) over the middles of segments. A segment is no nearer than its middle less half
-/// its length, which bounds the search: the place found is the nearest of all that the gate accepts.
+/// Searches a tree of the middles of segments. A segment is no nearer than its middle less half its length, which
+/// bounds the search: the place found is the nearest of all that the gate accepts.
 class CurveTree {
 public:
     /// Points 3 × P, mm, and the segments between them.
@@ -45,12 +46,9 @@ private:
     std::vector<Segment> segments_;
     Eigen::Matrix3Xd middles_, tangents_;  // of the segments
     double longest_half_ = 0;              // mm
-    std::vector<int> order_;               // of the tree
+    PointTree tree_;                       // of the middles
 
-    void build(std::size_t first, std::size_t last, int axis);
-    void search(const Eigen::Vector3d& query, const TangentGate& gate, std::size_t first, std::size_t last, int axis,
-                Hit& best) const;
     void visit(int segment, const Eigen::Vector3d& query, const TangentGate& gate, Hit& best) const;
 };
 
-}  // namespace tissuewarp::registration::detail
+}  // namespace tissuewarp::meshing

@@ -1,14 +1,13 @@
-#include "registration/search/surface_tree.hpp"
+#include "meshing/search/surface_tree.hpp"
 
 #include "core/errors.hpp"
-#include "registration/search/surface_proximity.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numeric>
 
-namespace tissuewarp::registration::detail {
+namespace tissuewarp::meshing {
 
 namespace {
 
@@ -111,4 +110,4 @@ std::optional<SurfaceTree::Hit> SurfaceTree::closest(const Eigen::Vector3d& poin
     return hit;
 }
 
-}  // namespace tissuewarp::registration::detail
+}  // namespace tissuewarp::meshing

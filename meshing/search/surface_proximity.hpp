@@ -1,7 +1,7 @@
 #pragma once
 /// The closest point of a triangle surface and a nodal field there, for points near the surface.
 
-#include "meshing/tet_mesh.hpp"
+#include "meshing/search/surface_tree.hpp"
 
 #include <Eigen/Dense>
 
@@ -13,31 +13,7 @@
 #include <utility>
 #include <vector>
 
-namespace tissuewarp::registration::detail {
-
-/// Barycentric coordinates of the point of a triangle (corner 0, edges to corners 1 and 2) closest to corner 0 + `p`:
-/// Ericson, Real-Time Collision Detection (2005), section 5.1.5.
-inline Eigen::Vector3d closest_in_triangle(const Eigen::Vector3d& ab, const Eigen::Vector3d& ac,
-                                           const Eigen::Vector3d& p) {
-    const double d1 = ab.dot(p), d2 = ac.dot(p);
-    if (d1 <= 0.0 && d2 <= 0.0) return {1.0, 0.0, 0.0};
-    const Eigen::Vector3d from_b = p - ab, from_c = p - ac;
-    const double d3 = ab.dot(from_b), d4 = ac.dot(from_b);
-    if (d3 >= 0.0 && d4 <= d3) return {0.0, 1.0, 0.0};
-    const double d5 = ab.dot(from_c), d6 = ac.dot(from_c);
-    if (d6 >= 0.0 && d5 <= d6) return {0.0, 0.0, 1.0};
-    const double vc = d1 * d4 - d3 * d2;
-    if (vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0) return {1.0 - d1 / (d1 - d3), d1 / (d1 - d3), 0.0};
-    const double vb = d5 * d2 - d1 * d6;
-    if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0) return {1.0 - d2 / (d2 - d6), 0.0, d2 / (d2 - d6)};
-    const double va = d3 * d6 - d5 * d4;
-    if (va <= 0.0 && d4 >= d3 && d5 >= d6) {
-        const double w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-        return {0.0, 1.0 - w, w};
-    }
-    const double sum = va + vb + vc;
-    return {va / sum, vb / sum, vc / sum};
-}
+namespace tissuewarp::meshing {
 
 /// Cells list the triangles that any of their points could have within reach.
 class SurfaceProximity {
@@ -167,4 +143,4 @@ private:
     std::vector<int> offset_, entry_;
 };
 
-}  // namespace tissuewarp::registration::detail
+}  // namespace tissuewarp::meshing

@@ -5,7 +5,7 @@
 
 #include <random>
 
-namespace tissuewarp::registration::test {
+namespace tissuewarp::test {
 
 /// Repeatable numbers, the same with every standard library.
 class Numbers {
@@ -30,4 +30,4 @@ private:
     std::mt19937 engine_;
 };
 
-}  // namespace tissuewarp::registration::test
+}  // namespace tissuewarp::test
