@@ -28,7 +28,7 @@ double median_distance(const std::vector<CurveMatch>& matches) {
     std::vector<double> distances;
     for (const CurveMatch& match : matches)
         if (match.found) distances.push_back(match.hit.distance);
-    if (distances.empty()) return everywhere;
+    if (distances.empty()) return std::numeric_limits<double>::infinity();
     const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
     std::nth_element(distances.begin(), middle, distances.end());
     return *middle;
