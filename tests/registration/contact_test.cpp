@@ -4,6 +4,7 @@
 #include "registration/prepared_io.hpp"
 #include "registration/springs/ground_springs.hpp"
 #include "registration/terms/anchors.hpp"
+#include "registration/update.hpp"
 #include "tests/registration/shapes.hpp"
 #include "tests/support/temporary_folder.hpp"
 

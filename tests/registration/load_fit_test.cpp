@@ -4,6 +4,7 @@
 #include "registration/loads/unknown_loads.hpp"
 #include "registration/pose/rigid_part.hpp"
 #include "registration/springs/ground_springs.hpp"
+#include "registration/update.hpp"
 #include "registration/warp.hpp"
 #include "tests/support/label_shapes.hpp"
 

@@ -3,7 +3,8 @@
 #include "registration/field.hpp"
 #include "registration/springs/ground_springs.hpp"
 #include "registration/terms/points.hpp"
-#include "registration/uncertainty/posterior_error.hpp"
+#include "registration/uncertainty/expected_error.hpp"
+#include "registration/update.hpp"
 #include "tests/registration/shapes.hpp"
 #include "tests/support/label_shapes.hpp"
 

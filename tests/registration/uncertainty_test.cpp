@@ -7,6 +7,7 @@
 #include "registration/loads/unknown_loads.hpp"
 #include "registration/springs/ground_springs.hpp"
 #include "registration/uncertainty/data_uncertainty.hpp"
+#include "registration/update.hpp"
 #include "tests/registration/shapes.hpp"
 #include "tests/support/label_shapes.hpp"
 
