@@ -19,6 +19,14 @@ struct RoundPlan {
     int searches_due = 0;     ///< of an image, this round's included
 };
 
+/// When a round counts as done, and by how much the next one looks. Chosen by hand; on which data is not recorded.
+struct RoundLimits {
+    double most_held_back = 0.02;         ///< share of the matches: with more beyond its step bound a round is repeated
+    double settled_before_search_mm = 1;  ///< largest change: a search looks farther than what is left to settle
+    double scales_of_range = 3;           ///< a round's search range over the scale of its robust weights
+    double first_scale_mm = 1e6;          ///< the first round trusts everything
+};
+
 /// Ranges fall geometrically from the first round's to the last's, scales with them. The searches of an image are
 /// spread over the rounds: those between only weigh the matches anew.
 class Schedule {

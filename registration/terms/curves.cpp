@@ -67,7 +67,7 @@ CurvePoints made_ready(const Curves& curves, const CurveOptions& options) {
 
 /// Across a line an unbiased point lies √2 deviations off in root mean square.
 void doubt(const CurveFit& fit, double deviation_mm, std::vector<Doubt>& doubts) {
-    constexpr double least_inliers = 0.5, most_residual = 1.7;
+    const auto& [least_inliers, most_residual] = curve_doubt_limits;
     if (fit.inlier_share < least_inliers)
         doubts.push_back({"curves.outliers", fit.inlier_share, least_inliers,
                           "only " + percent(fit.inlier_share) +

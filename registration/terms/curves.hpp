@@ -12,6 +12,14 @@
 
 namespace tissuewarp::registration::detail {
 
+/// What points along vessels may show without a doubt. Chosen by hand; on which data is not recorded.
+struct CurveDoubtLimits {
+    double least_inliers = 0.5;  ///< share of the points within the scale of the last round of a line
+    double most_residual =
+        1.7;  ///< root mean square across the lines over the stated deviation; unbiased points have √2
+};
+inline constexpr CurveDoubtLimits curve_doubt_limits{};
+
 class CurveTerm : public Term {
 public:
     /// `energy` is the strain energy (mN mm) that weighs as much as one standard deviation. Throws InvalidInput for

@@ -39,7 +39,7 @@ double median(const Eigen::RowVectorXd& given) {
 }
 
 void doubt(const PointFit& fit, std::vector<Doubt>& doubts) {
-    constexpr double most_outliers = 0.2;
+    constexpr double most_outliers = point_doubt_limits.most_outliers;
     if (fit.outliers > most_outliers * fit.used)
         doubts.push_back({"points.outliers", fit.outliers / double(fit.used), most_outliers,
                           std::to_string(fit.outliers) + " of " + std::to_string(fit.used) +

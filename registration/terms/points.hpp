@@ -11,6 +11,12 @@
 
 namespace tissuewarp::registration::detail {
 
+/// What pairs of points may show without a doubt. Chosen by hand; on which data is not recorded.
+struct PointDoubtLimits {
+    double most_outliers = 0.2;  ///< share of the pairs beyond the scale of the last round
+};
+inline constexpr PointDoubtLimits point_doubt_limits{};
+
 class PointTerm : public Term {
 public:
     /// `energy` is the strain energy (mN mm) that weighs as much as one standard deviation. Throws InvalidInput for

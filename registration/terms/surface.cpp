@@ -14,7 +14,7 @@ namespace {
 constexpr double least_deviation_mm = 0.3;  // the model's own surface is no better
 
 void doubt(const SurfaceFit& fit, double deviation_mm, std::vector<Doubt>& doubts) {
-    constexpr double least_inliers = 0.5, most_residual = 1.4, most_rival_support = 0.95, least_coverage = 0.25;
+    const auto& [least_inliers, most_residual, most_rival_support, least_coverage] = surface_doubt_limits;
     const double residual_limit = most_residual * std::max(deviation_mm, least_deviation_mm);
     if (fit.inlier_share < least_inliers)
         doubts.push_back({"surface.outliers", fit.inlier_share, least_inliers,
