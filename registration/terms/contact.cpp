@@ -1,6 +1,7 @@
 #include "registration/terms/contact.hpp"
 
 #include "registration/doubts.hpp"
+#include "registration/springs/ground_springs.hpp"
 
 #include <algorithm>
 #include <map>
@@ -16,7 +17,7 @@ constexpr double tolerance_mm = contact_options.tolerance_mm;
 ContactTerm::ContactTerm(const PreparedModel& prepared, double energy)
     : prepared_(prepared), distance_(prepared.neighbours->distance) {
     constexpr double deviation = contact_options.deviation_mm;
-    stiffness_ = energy / (deviation * deviation) / contact_options.independent_area;
+    stiffness_ = energy / (deviation * deviation) / ground_options.independent_area;
     std::map<int, double> areas;
     for (const InterfaceNode& node : prepared.interfaces.nodes())
         if (node.outer == 0) areas[node.node] += node.area;

@@ -13,9 +13,9 @@ namespace tissuewarp::registration::detail {
 /// How contact is solved and what is said of it. Chosen by hand; on which data is not recorded.
 struct ContactOptions {
     double tolerance_mm = 0.05;  ///< of a gap: far below a voxel
-    double deviation_mm = 0.1;   ///< of the spring of a node that touches: decides how fast pushes converge, not where
-    double independent_area = 100.0;  ///< mm² that this deviation is of, as of the ground
-    double most_depth_mm = 0.5;       ///< of any node in a neighbour, beyond which the result is doubted
+    double deviation_mm = 0.1;   ///< of the spring of a node that touches, over the area that the ground takes for
+                                ///< independent: decides how fast pushes converge, not where
+    double most_depth_mm = 0.5;  ///< of any node in a neighbour, beyond which the result is doubted
 };
 inline constexpr ContactOptions contact_options{};
 

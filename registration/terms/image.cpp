@@ -73,8 +73,7 @@ Alignment ImageTerm::pose(const Eigen::Isometry3d& /*start*/, Observer& observer
 }
 
 Eigen::Isometry3d ImageTerm::rigid_motion() const {
-    constexpr std::size_t fewest = 10;
-    if (matches_.matches.size() < fewest)
+    if (matches_.matches.size() < image_pose_options.fewest_blocks)
         throw InvalidInput("only " + std::to_string(matches_.matches.size()) +
                            " blocks of the moving image were found in the fixed one; check that they show the same "
                            "organ, and bring them within the search range of each other");
@@ -84,7 +83,8 @@ Eigen::Isometry3d ImageTerm::rigid_motion() const {
         moving.col(n) = matches_.matches[static_cast<std::size_t>(n)].moving;
         fixed.col(n) = matches_.matches[static_cast<std::size_t>(n)].fixed;
     }
-    if (prior_.share_in_view() < 0.9 && median_distance(moving, fixed) < options_.headers_within_mm)
+    if (prior_.share_in_view() < image_pose_options.whole_view &&
+        median_distance(moving, fixed) < options_.headers_within_mm)
         return Eigen::Isometry3d::Identity();
     return least_trimmed_motion(moving, fixed);
 }

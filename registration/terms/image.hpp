@@ -8,6 +8,15 @@
 
 namespace tissuewarp::registration::detail {
 
+/// How an image places the organ beside ImageOptions::headers_within_mm.
+struct ImagePoseOptions {
+    std::size_t fewest_blocks = 10;  ///< that a motion is fitted to. Chosen by hand; on which data is not recorded
+    /// Share of the organ's surface in view, below which the headers' placement stays: the part in view would turn the
+    /// organ by its deformation. The rule was found on the degraded sag (docs/method.md, 8.1), the number by hand.
+    double whole_view = 0.9;
+};
+inline constexpr ImagePoseOptions image_pose_options{};
+
 /// What an image may show without a doubt. Chosen by hand, but for the agreement; on which data is not recorded.
 struct ImageDoubtLimits {
     double least_matched = 0.1;     ///< share of the blocks that were found

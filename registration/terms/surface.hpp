@@ -13,6 +13,12 @@
 
 namespace tissuewarp::registration::detail {
 
+/// How points of a surface pull beside SurfaceOptions. Chosen by hand; on which data is not recorded.
+struct SurfacePullOptions {
+    double least_deviation_mm = 0.3;  ///< that points are taken for: the model's own surface is no better
+};
+inline constexpr SurfacePullOptions surface_pull_options{};
+
 /// What points of a surface may show without a doubt. Chosen by hand, but for the coverage; on which data is not
 /// recorded.
 struct SurfaceDoubtLimits {
