@@ -45,7 +45,7 @@ inline constexpr DataDoubtLimits data_doubt_limits{};
 std::optional<Doubt> doubt_of_data(const ExpectedError& expected);
 
 struct UncertaintyOptions {
-    int samples = 64;        ///< of the posterior; a deviation is known to 1/√(6 · samples), 5 %
+    int samples = 64;        ///< of the posterior; a deviation is known to 1/√(6 · samples), 5 %. By hand
     std::uint64_t seed = 1;  ///< of these
 };
 
