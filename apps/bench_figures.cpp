@@ -81,15 +81,16 @@ std::string bench_figure(const StudyResults& study) {
                : curves_of(study, [](const MeshTimings& mesh, const EngineTiming& engine) {
                      return engine.median() / mesh.elements * 1e9;
                  });
-    const report::FigureAxis elements{"tetrahedra"};
-    return report::svg_figure(
-        legend(study),
-        {{.title = fmt::format("Time per step, {}", scene), .x = elements, .y = {"µs per step"}, .curves = times},
-         {.left = 570,
-          .title = ratios ? "Times faster than scalar C++" : "Time per element and step",
-          .x = elements,
-          .y = {ratios ? "ratio" : "ns per element-step"},
-          .curves = beside}});
+    std::vector<report::FigurePanel> panels(2);  // member by member: GCC 12 warns of uninitialised strings otherwise
+    panels[0].title = fmt::format("Time per step, {}", scene);
+    panels[0].y.label = "µs per step";
+    panels[0].curves = times;
+    panels[1].left = 570;
+    panels[1].title = ratios ? "Times faster than scalar C++" : "Time per element and step";
+    panels[1].y.label = ratios ? "ratio" : "ns per element-step";
+    panels[1].curves = beside;
+    for (report::FigurePanel& panel : panels) panel.x.label = "tetrahedra";
+    return report::svg_figure(legend(study), panels);
 }
 
 }  // namespace tissuewarp::apps

@@ -106,7 +106,7 @@ std::vector<study::NamedProblem> problems_of(const StudyOptions& options) {
 
 /// The base's processor first. A software rasteriser counts only where it was asked for.
 std::vector<tled::Processor> processors_of(const std::string& name, const std::optional<BenchDevice>& device) {
-    if (!device || (name == "auto" && !device->gpu.hardware)) return {tled::Processor::Cpu};
+    if (!device || (name == "auto" && !device->hardware)) return {tled::Processor::Cpu};
     if (name == "auto") return {tled::Processor::Cpu, tled::Processor::Gpu};
     return {tled::Processor::Gpu, tled::Processor::Cpu};
 }
@@ -118,7 +118,7 @@ study::Provenance provenance_of(const StudyOptions& options, const std::optional
     model.materials[1] = study::material_of({});
     study::Provenance provenance{{"processor", tled::make_cpu_engine(tled::rest_state(model))->description()},
                                  {"plan", options.quick ? "quick" : "full"}};
-    if (device) provenance["GPU"] = device->gpu.name;
+    if (device) provenance["GPU"] = device->name;
     for (const auto& [name, version] : versions()) provenance["version of " + name] = version;
     return provenance;
 }

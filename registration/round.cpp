@@ -60,6 +60,7 @@ tled::NodalConditions RoundSolver::linearised(const RoundPlan& plan, Standing& s
     record.mean_residual_mm = sum.mean_residual_mm;
     tled::Conditions all;
     for (const PulledNode& pulled : sum.springs) all.springs.push_back(pulled.spring);
+    if (sum.forces.cols() == 0) sum.forces.setZero(3, prepared_.rest.node_count);
     all.external_force = sum.forces;
     standing.result.pulls = {std::move(sum.springs),  state.placement,      std::move(sum.forces), terms_.energy(),
                              terms_.free_placement(), terms_.parts_alone(), state.load_size};

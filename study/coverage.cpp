@@ -3,6 +3,7 @@
 #include "core/cancel_only.hpp"
 #include "core/errors.hpp"
 #include "meshing/point_location.hpp"
+#include "registration/update.hpp"
 
 #include <chrono>
 #include <string>

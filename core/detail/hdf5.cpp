@@ -18,6 +18,8 @@ template <class T>
 hid_t memory_type() {
     if constexpr (std::is_same_v<T, double>)
         return H5T_NATIVE_DOUBLE;
+    else if constexpr (std::is_same_v<T, float>)
+        return H5T_NATIVE_FLOAT;
     else
         return H5T_NATIVE_INT;
 }
@@ -27,6 +29,8 @@ template <class T>
 hid_t stored_type() {
     if constexpr (std::is_same_v<T, double>)
         return H5T_IEEE_F64LE;
+    else if constexpr (std::is_same_v<T, float>)
+        return H5T_IEEE_F32LE;
     else
         return H5T_STD_I32LE;
 }
@@ -284,7 +288,7 @@ template <class T>
 void Hdf5Input::array(const std::string& name, T* values, const std::vector<hsize_t>& wanted) const {
     const Hdf5Handle data = dataset(name);
     const Hdf5Handle type(H5Dget_type(data), H5Tclose);
-    const H5T_class_t kind = std::is_same_v<T, double> ? H5T_FLOAT : H5T_INTEGER;
+    const H5T_class_t kind = std::is_floating_point_v<T> ? H5T_FLOAT : H5T_INTEGER;
     if (H5Tget_class(type) != kind || H5Tget_size(type) != sizeof(T)) refuse(name, "another type than the format's");
     require_shape(name, wanted);
     const hsize_t count = count_of(wanted);
@@ -347,6 +351,8 @@ std::string Hdf5Input::text(const std::string& name) const {
 
 template void Hdf5Output::array<double>(const std::string&, const double*, const std::vector<hsize_t>&,
                                         const std::string&);
+template void Hdf5Output::array<float>(const std::string&, const float*, const std::vector<hsize_t>&,
+                                       const std::string&);
 template void Hdf5Output::array<int>(const std::string&, const int*, const std::vector<hsize_t>&, const std::string&);
 template void Hdf5Output::columns<double>(const std::string&, const Eigen::MatrixXd&, const std::string&);
 template void Hdf5Output::columns<int>(const std::string&, const Eigen::MatrixXi&, const std::string&);
@@ -355,6 +361,7 @@ template void Hdf5Output::vector<int>(const std::string&, const Eigen::VectorXi&
 template void Hdf5Output::scalar<double>(const std::string&, double, const std::string&);
 template void Hdf5Output::scalar<int>(const std::string&, int, const std::string&);
 template void Hdf5Input::array<double>(const std::string&, double*, const std::vector<hsize_t>&) const;
+template void Hdf5Input::array<float>(const std::string&, float*, const std::vector<hsize_t>&) const;
 template void Hdf5Input::array<int>(const std::string&, int*, const std::vector<hsize_t>&) const;
 template Eigen::MatrixXd Hdf5Input::columns<double>(const std::string&, int) const;
 template Eigen::MatrixXi Hdf5Input::columns<int>(const std::string&, int) const;

@@ -49,7 +49,7 @@ private:
     void* data_ = nullptr;
 };
 
-/// T is double or int. Large arrays are shuffled, deflated and carry a checksum. Throws IoError.
+/// T is double or int, of arrays also float. Large arrays are shuffled, deflated and carry a checksum. Throws IoError.
 class Hdf5Output {
 public:
     Hdf5Output(const std::filesystem::path& path, const std::string& format, int version);

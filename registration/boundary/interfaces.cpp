@@ -1,5 +1,7 @@
 #include "registration/boundary/interfaces.hpp"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <array>
 #include <set>

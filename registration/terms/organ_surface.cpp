@@ -2,6 +2,8 @@
 
 #include "core/errors.hpp"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -1,5 +1,6 @@
 /// Points along vessels as data: the pull across a line, the pose, the tissue that follows, and what says so.
 #include "registration/terms/curves.hpp"
+#include "registration/update.hpp"
 
 #include "core/errors.hpp"
 #include "registration/field.hpp"

@@ -58,7 +58,7 @@ TEST(Series, HoldsEveryFrameInEveryFormat) {
     EXPECT_THAT(probes, HasSubstr("\n0,\"a \"\"low\"\" one\",50,50,25,0,0,0\n"));
     EXPECT_THAT(probes, HasSubstr("\n1,\"high\",50,50,75,nan,nan,nan\n"));
 
-    const Hdf5Input record(folder / "displacement.h5", "tissuewarp simulation", 1);
+    const Hdf5Input record(folder / "displacement.h5", "tissuewarp simulation", 1, 1);
     EXPECT_EQ(record.columns<double>("mesh/nodes", 3), built.mesh.nodes);
     EXPECT_EQ(record.vector<double>("time", 3), Eigen::Vector3d(0, 0.5, 1));
     EXPECT_EQ(record.vector<int>("stage", 3), Eigen::Vector3i(0, 0, 1));
