@@ -62,8 +62,8 @@ struct PrepareOptions {
     /// cm², near a voxel's. Chosen by hand before anything was measured; a third and an eighth are worse on the lung's
     /// and the brain sag's masks (docs/decisions/label_weights.md).
     double data_stiffness = 3.0;
-    double tangential_ratio = 0.02;  ///< stiffness along the surface over that along the normal. Chosen by hand; on
-                                     ///< which data is not recorded
+    double tangential_ratio = 0.02;     ///< stiffness along the surface over that along the normal. Chosen by hand; on
+                                        ///< which data is not recorded
     std::vector<int> anchors;           ///< labels of tissue that stays where the rigid placement has it
     std::vector<int> rigid_neighbours;  ///< labels of bodies that move with the placement and are not meshed; the
                                         ///< organ slides along them and comes off, but does not enter them

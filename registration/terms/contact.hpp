@@ -14,7 +14,7 @@ namespace tissuewarp::registration::detail {
 struct ContactOptions {
     double tolerance_mm = 0.05;  ///< of a gap: far below a voxel
     double deviation_mm = 0.1;   ///< of the spring of a node that touches, over the area that the ground takes for
-                                ///< independent: decides how fast pushes converge, not where
+                                 ///< independent: decides how fast pushes converge, not where
     double most_depth_mm = 0.5;  ///< of any node in a neighbour, beyond which the result is doubted
 };
 inline constexpr ContactOptions contact_options{};
