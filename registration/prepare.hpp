@@ -59,7 +59,7 @@ struct PrepareOptions {
                                                                          ///< phantoms have 0.45 to 0.47 themselves
     std::optional<tled::Element> element;                                ///< default: tled::suggested_element
     /// kPa/mm along the normal per interface area, at full weight: in units of the prior a deviation of 0.38 mm over 1
-    /// cm², near a voxel's. Chosen by hand before anything was measured; a third and an eighth are worse on the lung's
+    /// cm², near a voxel's. Chosen by hand with the first interface; a third and an eighth are worse on the lung's
     /// and the brain sag's masks (docs/decisions/label_weights.md).
     double data_stiffness = 3.0;
     double tangential_ratio = 0.02;     ///< stiffness along the surface over that along the normal. Chosen by hand; on
