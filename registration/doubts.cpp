@@ -16,11 +16,11 @@ std::string percent(double share) {
 }
 
 std::vector<Doubt> doubts_of_course(const UpdateResult& result) {
-    constexpr double most_held_back = 0.02, least_jacobian = 0.1;
+    constexpr CourseDoubtLimits limits = course_doubt_limits;
     std::vector<Doubt> doubts;
     const Round& last = result.rounds.back();
-    if (last.held_back > last.matched / 50)
-        doubts.push_back({"rounds.held_back", last.held_back / double(last.matched), most_held_back,
+    if (last.held_back > limits.most_held_back * last.matched)
+        doubts.push_back({"rounds.held_back", last.held_back / double(last.matched), limits.most_held_back,
                           std::to_string(last.held_back) + " of " + std::to_string(last.matched) +
                               " matches are still far from where they belong; allow more rounds"});
     if (result.cut_short)
@@ -28,8 +28,8 @@ std::vector<Doubt> doubts_of_course(const UpdateResult& result) {
                           "the time budget ended the registration after " + std::to_string(result.rounds.size()) +
                               " rounds, the last of which still moved tissue by " + to_text(last.largest_change_mm) +
                               " mm; allow more time, or a coarser mesh"});
-    if (result.min_jacobian < least_jacobian)
-        doubts.push_back({"tissue.compressed", result.min_jacobian, least_jacobian,
+    if (result.min_jacobian < limits.least_jacobian)
+        doubts.push_back({"tissue.compressed", result.min_jacobian, limits.least_jacobian,
                           "tissue is compressed to " + to_text(result.min_jacobian) + " of its volume in one element"});
     return doubts;
 }

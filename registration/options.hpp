@@ -1,5 +1,7 @@
 #pragma once
-/// What an update may be told, with the defaults that were chosen on phantoms (docs/method.md).
+/// What an update may be told. Each default says what it was chosen on; those that say nothing were chosen by hand, on
+/// which data is not recorded (docs/decisions/constants.md). Numbers that a user does not choose stand beside the code
+/// that uses them.
 
 #include "tled/equilibrium.hpp"
 
@@ -44,8 +46,9 @@ enum class FinestGrid { AllPoints, UndescribedPoints };
 struct BlockMatchingOptions {
     int skipped_levels = 0;  ///< coarse levels left out: a prediction good to a few mm needs none of them
     FinestGrid finest = FinestGrid::AllPoints;
-    double search_mm = 16.0;       ///< range of the first level about the predicted position, along each axis
-    double least_share = 0.05;     ///< share of a block that both images must show
+    double search_mm = 16.0;    ///< range of the first level about the predicted position, along each axis
+    double least_share = 0.05;  ///< share of a block that both images must show. Chosen on the stripped heads, of whose
+                                ///< rim a third lost three points in ten (docs/results.md, "Block matching")
     double back_match_voxels = 1;  ///< standard deviation of the back-match error in the confidence
     Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< moving → fixed, that the predicted positions contain
 };
@@ -65,23 +68,31 @@ struct ImageOptions {
     BlockMatchingOptions matching;
     ConsistencyOptions consistency;
     /// After the search for blocks, dense searches on grids so many times doubled from the blocks' finest. Templates of
-    /// grey values have none.
+    /// grey values have none. Chosen among some 35 settings on brain shift, both brain sags and lung (docs/results.md).
     std::vector<int> dense_coarsening{1, 1, 0};
-    double expected_motion_mm = 100;  ///< of the organ's surface in the field of view of the intraoperative image
+    double expected_motion_mm = 100;  ///< of the organ's surface in the field of view of the intraoperative image: free
     double unseen_motion_mm = 0.8;    ///< and out of it, along its normal: what is around holds it there, …
-    double unseen_slide_mm = 4;       ///< … and lets it slide along itself
-    double headers_within_mm = 15;    ///< the headers place an organ, part of which is out of view, closer than this
+    double unseen_slide_mm = 4;  ///< … and lets it slide along itself. Both chosen on the degraded brain shift, with
+                                 ///< the degraded sag beside it
+    double headers_within_mm = 15;  ///< the headers place an organ, part of which is out of view, closer than this. The
+                                    ///< rule was found on the degraded sag
 };
 
 /// What is expected of tissue before anything is seen. It weighs strain energy against matches and points, and holds
 /// what no datum shows.
 struct TissuePrior {
-    double expected_strain = 0.12;  ///< deviation of the strain of pieces of tissue …
-    double strain_length_mm = 10;   ///< … of this size
-    double free_motion_mm = 20;     ///< of the organ's surface, from where the organ lies as a whole
-    double held_motion_mm = 5;      ///< the same where the images are in one frame: what is around holds the organ
-    int load_shapes = 48;  ///< of unknown loads that move what points do not show, where the placement is free; 0:
-                           ///< none, and no unknown weight where labels are seen
+    /// Deviation of the strain of pieces of tissue. Chosen between what the clean and the degraded brain sag like best,
+    /// with the brain shift beside them (docs/results.md, "Stiffer or softer").
+    double expected_strain = 0.12;
+    double strain_length_mm = 10;  ///< size of these pieces
+    double free_motion_mm = 20;    ///< of the organ's surface, from where the organ lies as a whole; not chosen on the
+                                   ///< liver's surface, where 40 and 80 do as well
+    double held_motion_mm = 5;  ///< the same where the images are in one frame: what is around holds the organ. Chosen
+                                ///< on the brain shift's surface
+    /// Of unknown loads that move what points do not show, where the placement is free; 0: none, and no unknown weight
+    /// where labels are seen. Chosen on the liver's surface, where more change nothing
+    /// (docs/decisions/unknown_loads.md).
+    int load_shapes = 48;
 };
 
 /// What acts on the tissue in the operating room and did not when the preoperative image was taken. Only its size

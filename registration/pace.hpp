@@ -6,6 +6,11 @@
 
 namespace tissuewarp::registration::detail {
 
+struct PaceOptions {
+    double longest = 4.0 / 3.0;  ///< that a round may take, over the one before. Chosen by hand; data not recorded
+};
+inline constexpr PaceOptions pace_options{};
+
 class Pace {
 public:
     /// The clock runs from now; 0: there is always room.
@@ -22,7 +27,7 @@ public:
 
     /// Whether so many rounds more fit, each at most a third longer than the last one.
     [[nodiscard]] bool room_for(int rounds) const {
-        return budget_s_ <= 0 || elapsed() + rounds * 4.0 / 3.0 * last_round_s_ <= budget_s_;
+        return budget_s_ <= 0 || elapsed() + rounds * pace_options.longest * last_round_s_ <= budget_s_;
     }
 
     /// Of the budget; 1 without one.

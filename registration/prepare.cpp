@@ -30,10 +30,10 @@ tled::Model model_of(meshing::TetMesh mesh, const PrepareOptions& options) {
 /// registration of an image to itself is the identity. NaN marks faces that are no tissue boundary: cuts by the image's
 /// border.
 void measure_offsets(Interfaces& interfaces, const meshing::TetMesh& mesh, const LabelBoundaryField& moving) {
-    constexpr double range_mm = 4.0, max_angle_deg = 60.0;
+    constexpr OffsetOptions options;
     for (InterfaceNode& node : interfaces.nodes())
-        node.offset =
-            moving.crossing(mesh.nodes.col(node.node), node.normal, node.inner, node.outer, range_mm, max_angle_deg);
+        node.offset = moving.crossing(mesh.nodes.col(node.node), node.normal, node.inner, node.outer, options.range_mm,
+                                      options.max_angle_deg);
 }
 
 tled::NodalConditions label_conditions(const Interfaces& interfaces, const PrepareOptions& options, int nodes) {
@@ -77,11 +77,11 @@ double organ_size(const imaging::Volume& labels) {
 }
 
 double suggested_edge_length(const imaging::Volume& labels) {
-    return organ_size(labels) / 18;
+    return organ_size(labels) / EdgeOptions().with_labels;
 }
 
 double suggested_edge_length_without_labels(const imaging::Volume& labels) {
-    return organ_size(labels) / 12;
+    return organ_size(labels) / EdgeOptions().without_labels;
 }
 
 PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions& given, Observer& observer) {

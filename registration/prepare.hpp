@@ -19,6 +19,22 @@ namespace tissuewarp::registration {
 /// Edge (mm) of a cube of the labelled voxels' volume.
 double organ_size(const imaging::Volume& labels);
 
+/// Edges of the mesh, per edge of a cube of the organ's volume.
+struct EdgeOptions {
+    /// With labels of the operation, into about 50 000 tetrahedra. 8 mm in place of 6 cost the brain shift accuracy
+    /// (docs/results.md, "What it says"); the random phantoms 5001–5008 need no more than 6 (docs/accuracy-time.md).
+    double with_labels = 18;
+    /// Without, into about 15 000. Chosen on images of the brain shift, both sags and the lung and on surfaces of the
+    /// brain shift and the liver (docs/results.md, "How fine a mesh").
+    double without_labels = 12;
+};
+
+/// Where a mesh's own boundary is looked for in the labels it was made of. Chosen by hand; on which data is not
+/// recorded.
+struct OffsetOptions {
+    double range_mm = 4.0, max_angle_deg = 60.0;  ///< along the normal either way; between normals
+};
+
 /// Edge length (mm) that cuts an organ of the map's volume into about 50 000 tetrahedra: organ_size over 18. Boundaries
 /// of a label map pull at every node of the surface, which should lie on it.
 double suggested_edge_length(const imaging::Volume& labels);
@@ -38,13 +54,19 @@ inline meshing::MeshingOptions automatic_edge_length() {
 struct PrepareOptions {
     meshing::MeshingOptions meshing = automatic_edge_length();
     tled::MaterialTable materials;  ///< labels without an entry take `default_material`
-    tled::Material default_material = tled::neo_hookean_lnj(3.0, 0.45);
-    std::optional<tled::Element> element;  ///< default: tled::suggested_element
-    double data_stiffness = 3.0;           ///< kPa/mm along the normal per interface area, at full weight
-    double tangential_ratio = 0.02;        ///< stiffness along the surface over stiffness along the normal
-    std::vector<int> anchors;              ///< labels of tissue that stays where the rigid placement has it
-    std::vector<int> rigid_neighbours;     ///< labels of bodies that move with the placement and are not meshed; the
-                                           ///< organ slides along them and comes off, but does not enter them
+    tled::Material default_material = tled::neo_hookean_lnj(3.0, 0.45);  ///< soft tissue: Young's modulus kPa (only its
+                                                                         ///< ratios tell), Poisson's ratio. The made
+                                                                         ///< phantoms have 0.45 to 0.47 themselves
+    std::optional<tled::Element> element;                                ///< default: tled::suggested_element
+    /// kPa/mm along the normal per interface area, at full weight: in units of the prior a deviation of 0.38 mm over 1
+    /// cm², near a voxel's. Chosen by hand with the first interface; a third and an eighth are worse on the lung's
+    /// and the brain sag's masks (docs/decisions/label_weights.md).
+    double data_stiffness = 3.0;
+    double tangential_ratio = 0.02;     ///< stiffness along the surface over that along the normal. Chosen by hand; on
+                                        ///< which data is not recorded
+    std::vector<int> anchors;           ///< labels of tissue that stays where the rigid placement has it
+    std::vector<int> rigid_neighbours;  ///< labels of bodies that move with the placement and are not meshed; the
+                                        ///< organ slides along them and comes off, but does not enter them
 };
 
 /// Throws InvalidInput, naming the label and those present, unless the map holds every anchor and rigid neighbour, none

@@ -51,7 +51,8 @@ struct Registration {
         pace.begin_rounds();
         const int last = schedule.count() - 1;
         int round = 0;
-        for (int done = 0; done < 2 * schedule.count() && round < schedule.count(); ++done) {
+        for (int done = 0; done < course_options.rounds_over_planned * schedule.count() && round < schedule.count();
+             ++done) {
             const Round record = solve(schedule.round(round));
             observer.checkpoint("registration", double(round + 1) / schedule.count());
             pace.lap();
@@ -65,10 +66,10 @@ struct Registration {
     /// Tissue that blocks misplaced comes nearer by a voxel and a half with each dense search: searches go on while
     /// they bring the images into better agreement, each with two rounds that weigh what it found.
     void search_on() {
-        constexpr int most_searches = 4;
-        for (int more = 1; terms.gains() && more <= most_searches; ++more) {
-            if (at.result.cut_short || !pace.room_for(2)) return;
-            for (int round = 0; round < 2; ++round) solve(schedule.last_with_more_searches(more));
+        for (int more = 1; terms.gains() && more <= course_options.more_searches; ++more) {
+            if (at.result.cut_short || !pace.room_for(course_options.rounds_of_search)) return;
+            for (int round = 0; round < course_options.rounds_of_search; ++round)
+                solve(schedule.last_with_more_searches(more));
             pace.lap();
         }
     }
@@ -76,8 +77,7 @@ struct Registration {
     /// What data show was done by loads that nobody stated; these also move what they do not show. A second time, since
     /// the first brings more points within reach. Where tissue does not bear them, all stays as it was without.
     void explain_by_loads() {
-        constexpr int times = 2;
-        for (int time = 0; time < times && terms.unknown_loads(); ++time) {
+        for (int time = 0; time < course_options.load_searches && terms.unknown_loads(); ++time) {
             if (at.result.cut_short || !loads.worth_while(*terms.unknown_loads(), pace.share_left())) return;
             const Standing before = at;
             try {
@@ -100,16 +100,14 @@ struct Registration {
     }
 
     void settle_loads() {
-        constexpr int most_rounds = 4;
         solve(schedule.last_but_one());
-        for (int done = 1; done < most_rounds; ++done)
+        for (int done = 1; done < course_options.load_rounds; ++done)
             if (solve(schedule.last()).largest_change_mm < options.settled_mm) return;
     }
 
     /// Rounds that change the contact alone, until it is in balance.
     void settle_contact() {
-        constexpr int most_rounds = 10;
-        for (int done = 0; !terms.settled(at.state) && done < most_rounds; ++done)
+        for (int done = 0; !terms.settled(at.state) && done < course_options.contact_rounds; ++done)
             at.result.rounds.push_back(rounds.solve(schedule.last(), at));
     }
 

@@ -22,7 +22,6 @@ RoundSolver::RoundSolver(const PreparedModel& prepared, Terms& terms, tled::Engi
       solver_(prepared, engine, options, terms.take_own_metric()) {}
 
 Round RoundSolver::solve(const RoundPlan& plan, Standing& standing) {
-    constexpr int most_passes = 4;
     State& state = standing.state;
     Stopwatch stopwatch;
     Round record;
@@ -39,7 +38,7 @@ Round RoundSolver::solve(const RoundPlan& plan, Standing& standing) {
         add_time(standing.result.times, stages::equilibrium, stopwatch.lap());
         record.force_evaluations += solved.force_evaluations;
         record.estimated_error_mm = solved.estimated_error_mm;
-        if (terms_.follow({state.placement, solved.displacement}) && pass < most_passes) {
+        if (terms_.follow({state.placement, solved.displacement}) && pass < course_options.passes) {
             solver_.springs_changed();
             continue;
         }
@@ -61,6 +60,7 @@ tled::NodalConditions RoundSolver::linearised(const RoundPlan& plan, Standing& s
     record.mean_residual_mm = sum.mean_residual_mm;
     tled::Conditions all;
     for (const PulledNode& pulled : sum.springs) all.springs.push_back(pulled.spring);
+    if (sum.forces.cols() == 0) sum.forces.setZero(3, prepared_.rest.node_count);
     all.external_force = sum.forces;
     standing.result.pulls = {std::move(sum.springs),  state.placement,      std::move(sum.forces), terms_.energy(),
                              terms_.free_placement(), terms_.parts_alone(), state.load_size};

@@ -17,12 +17,13 @@ double range_of(const UpdateOptions& options, int round) {
 }  // namespace
 
 Schedule::Schedule(const UpdateOptions& options, int searches) : settled_mm_(options.settled_mm) {
-    constexpr double no_scale = 1e6;  // mm: the first round trusts everything
+    constexpr RoundLimits limits;
     const int count = std::max(1, options.rematches);
     for (int search = 0; search < searches; ++search) searches_.push_back(search * count / searches);
     for (int n = 0; n < count; ++n) {
         const double range = range_of(options, n);
-        const double scale = n == 0 ? no_scale : std::max(options.residual_scale_mm, range / 3);
+        const double scale =
+            n == 0 ? limits.first_scale_mm : std::max(options.residual_scale_mm, range / limits.scales_of_range);
         const auto due = std::upper_bound(searches_.begin(), searches_.end(), n) - searches_.begin();
         rounds_.push_back({n, n == count - 1, range, scale, options.most_step_mm, static_cast<int>(due)});
     }
@@ -35,12 +36,12 @@ RoundPlan Schedule::last_with_more_searches(int more) const {
 }
 
 int Schedule::after(int number, const Round& record) const {
-    constexpr double settled_before_search_mm = 1;  // a search looks farther than what is left to settle before it
-    if (50 * record.held_back > record.matched) return number;
+    constexpr RoundLimits limits;
+    if (record.held_back > limits.most_held_back * record.matched) return number;
     const int last_number = count() - 1;
     const auto due = static_cast<std::size_t>(round(number).searches_due);
     const bool searches_left = due < searches_.size();
-    const double limit = searches_left ? std::max(settled_mm_, settled_before_search_mm) : settled_mm_;
+    const double limit = searches_left ? std::max(settled_mm_, limits.settled_before_search_mm) : settled_mm_;
     if (record.largest_change_mm >= limit) return number + 1;
     if (searches_left) return std::max(number + 1, std::min(last_number, searches_[due]));
     return number < last_number ? last_number : count();

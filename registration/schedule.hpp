@@ -19,6 +19,28 @@ struct RoundPlan {
     int searches_due = 0;     ///< of an image, this round's included
 };
 
+/// When a round counts as done, and by how much the next one looks. Chosen by hand; on which data is not recorded.
+struct RoundLimits {
+    double most_held_back = 0.02;         ///< share of the matches: with more beyond its step bound a round is repeated
+    double settled_before_search_mm = 1;  ///< largest change: a search looks farther than what is left to settle
+    double scales_of_range = 3;           ///< a round's search range over the scale of its robust weights
+    double first_scale_mm = 1e6;          ///< the first round trusts everything
+};
+
+/// When the steps of register.cpp end. Chosen by hand, but for the searches; on which data is not recorded.
+struct CourseOptions {
+    int rounds_over_planned = 2;  ///< rounds at most, over those planned: the step bound repeats some
+    int passes = 4;               ///< of a round at most, while following an equilibrium changes what is asked for
+    /// Searches of an image beyond those planned, at most. The brain shift, both sags, the lung and the liver from
+    /// their images were looked at while this and SearchGain were chosen (docs/results.md, "Searching on").
+    int more_searches = 4;
+    int rounds_of_search = 2;  ///< weigh what such a search found
+    int load_searches = 2;     ///< unknown loads are looked for so often: the first brings more points within reach
+    int load_rounds = 4;       ///< under the loads found, at most
+    int contact_rounds = 10;   ///< that change the contact alone, at most
+};
+inline constexpr CourseOptions course_options{};
+
 /// Ranges fall geometrically from the first round's to the last's, scales with them. The searches of an image are
 /// spread over the rounds: those between only weigh the matches anew.
 class Schedule {

@@ -16,13 +16,12 @@ Solver::Solver(const PreparedModel& prepared, tled::Engine& engine, const Update
 
 tled::EquilibriumResult Solver::solve(const StepBoundConditions& conditions, const Eigen::Matrix3Xd& start,
                                       Observer& observer) {
-    constexpr int most_halvings = 4;
     for (int halving = 0;; ++halving) {
         const tled::NodalConditions here = conditions(step_mm_);
         try {
             return try_to_solve(here, start, observer);
         } catch (const SolverFailure& failure) {
-            if (halving == most_halvings) throw;
+            if (halving == retry_options.halvings) throw;
             relaxation_failed_ |= equilibrium_.method == tled::EquilibriumMethod::SelfCheckedRelaxation;
             equilibrium_.method = asked_for_;
             step_mm_ /= 2;

@@ -11,6 +11,11 @@
 
 namespace tissuewarp::registration::detail {
 
+struct RetryOptions {
+    int halvings = 4;  ///< of the step where an equilibrium fails, at most. Chosen by hand; data not recorded
+};
+inline constexpr RetryOptions retry_options{};
+
 /// What pulls at the tissue where nothing is asked to move farther than so many mm.
 using StepBoundConditions = std::function<tled::NodalConditions(double most_step_mm)>;
 

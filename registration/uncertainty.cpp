@@ -18,9 +18,7 @@ namespace {
 
 using Covariances = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 
-/// Of random phantoms (docs/accuracy-time.md, "Does the interval hold?"): the size of the unknown loads is known as a
-/// variance is from so many numbers.
-constexpr double freedom_of_size = 6;
+constexpr double freedom_of_size = detail::error_model.freedom_of_size;
 
 void require_related(const PreparedModel& prepared, const UpdateResult& result) {
     const Eigen::Index nodes = prepared.model.mesh.nodes.cols();
@@ -103,7 +101,7 @@ ErrorEstimate estimate_of(const Eigen::Vector3d& algebraic, const std::optional<
     if (discretisation) result.covariance += *discretisation * discretisation->transpose();
     result.deviation_mm = std::sqrt(result.covariance.trace());
     result.interval_mm = interval_mm(result, 0.95);
-    result.shown = unexplained < detail::shown_below;
+    result.shown = unexplained < detail::error_model.shown_below;
     return result;
 }
 
@@ -216,7 +214,7 @@ Uncertainty uncertainty(const PreparedModel& prepared, const UpdateResult& resul
         tled::discretisation_error(prepared.model, open.stiffness, conditions, displacement);
     if (!mesh.error) observer.note("no estimate of the error of the mesh: " + mesh.reason);
     Eigen::VectorXd unexplained = open.data.unexplained;
-    if (place_is_uncertain(result)) unexplained.setConstant(2 * detail::shown_below);
+    if (place_is_uncertain(result)) unexplained.setConstant(2 * detail::error_model.shown_below);
     observer.checkpoint("error estimate", 1.0);
     return {prepared.model.mesh, algebraic, mesh.error, open.data.covariance, unexplained, open.data.expected};
 }

@@ -153,7 +153,7 @@ std::string svg_figure(const std::vector<LegendEntry>& legend, const std::vector
     }
     return fmt::format(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:g} {1:g}\" width=\"{0:g}\" height=\"{1:g}\">\n"
-        "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n{2}{3}</svg>\n",
+        "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n<g class=\"legend\">\n{2}</g>\n{3}</svg>\n",
         width, height, drawn(legend, width), content);
 }
 

@@ -288,7 +288,7 @@ template <class T>
 void Hdf5Input::array(const std::string& name, T* values, const std::vector<hsize_t>& wanted) const {
     const Hdf5Handle data = dataset(name);
     const Hdf5Handle type(H5Dget_type(data), H5Tclose);
-    const H5T_class_t kind = std::is_same_v<T, double> ? H5T_FLOAT : H5T_INTEGER;
+    const H5T_class_t kind = std::is_floating_point_v<T> ? H5T_FLOAT : H5T_INTEGER;
     if (H5Tget_class(type) != kind || H5Tget_size(type) != sizeof(T)) refuse(name, "another type than the format's");
     require_shape(name, wanted);
     const hsize_t count = count_of(wanted);

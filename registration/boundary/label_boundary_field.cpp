@@ -18,8 +18,7 @@ using imaging::Volume;
 
 namespace {
 
-constexpr double most_smoothing = 1.0, least_smoothing = 0.5;  // voxels
-constexpr double smoothing_share = 0.25;                       // of a label's thickness
+constexpr BoundaryFieldOptions options;
 
 /// A smoothed indicator on the bounding box of its label: zero outside, which clamped sampling gives for nothing
 /// because the box has a margin wider than the Gaussian.
@@ -63,7 +62,7 @@ struct LabelBoundaryField::Impl {
     /// Both labels meet here and hardly anything else does, and the boundary faces along `normal`.
     [[nodiscard]] bool is_boundary(const Eigen::Vector3d& point, const Eigen::Vector3d& normal, int inner, int outer,
                                    double least_cosine) const {
-        if (presence(inner, point) + presence(outer, point) < 0.6) return false;
+        if (presence(inner, point) + presence(outer, point) < options.least_presence) return false;
         Eigen::Vector3d gradient;
         for (int axis = 0; axis < 3; ++axis) {
             const Eigen::Vector3d offset = step * Eigen::Vector3d::Unit(axis);
@@ -87,13 +86,13 @@ LabelBoundaryField::LabelBoundaryField(const Volume& label_map, const std::map<i
         }
         const auto thickness = thickness_mm.find(label);
         if (thickness == thickness_mm.end()) continue;
-        const double bearable = smoothing_share * thickness->second / voxel_mm;
-        const double smoothing = std::clamp(bearable, least_smoothing, most_smoothing);
+        const double bearable = options.smoothing_share * thickness->second / voxel_mm;
+        const double smoothing = std::clamp(bearable, options.least_smoothing, options.most_smoothing);
         impl_->of_label[label] = indicator(imaging::mask_of(map, label), box, smoothing);
     }
     if (statistics.empty()) throw InvalidInput("the label map is empty: there is no boundary to match");
-    impl_->of_all = indicator(imaging::mask_of_all(map), everything, most_smoothing);
-    impl_->step = 0.5 * voxel_mm;
+    impl_->of_all = indicator(imaging::mask_of_all(map), everything, options.most_smoothing);
+    impl_->step = options.step_voxels * voxel_mm;
 }
 
 LabelBoundaryField::~LabelBoundaryField() = default;

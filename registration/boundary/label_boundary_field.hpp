@@ -10,6 +10,17 @@
 
 namespace tissuewarp::registration {
 
+/// How label indicators are smoothed, and where they say that a boundary lies.
+struct BoundaryFieldOptions {
+    /// Standard deviation, voxels, at most and at least, and as a share of a label's mean thickness in between. Chosen
+    /// on the brain sag with 45 labels, where thin ones folded, and looked at on the sag's and the lung's masks, liver
+    /// and brain shift (docs/decisions/label_weights.md).
+    double most_smoothing = 1.0, least_smoothing = 0.5, smoothing_share = 0.25;
+    double least_presence =
+        0.6;                   ///< of both labels together at a boundary. Chosen by hand; on which data is not recorded
+    double step_voxels = 0.5;  ///< of the walk along a normal, and of differences. Chosen by hand; data not recorded
+};
+
 /// Smoothed label indicators of an image, sampled anywhere: a sub-voxel boundary from voxel labels.
 class LabelBoundaryField {
 public:

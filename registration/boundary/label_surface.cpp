@@ -20,10 +20,9 @@ using Index = Eigen::Vector3i;
 
 /// Smoothed indicator of the organ, in voxels along each axis whatever the spacing.
 Volume smoothed_indicator(const Volume& labels) {
-    constexpr double smoothing_voxels = 0.8;
     Volume indicator = imaging::mask_of_all(labels).as(CV_32F);
     indicator.geometry.spacing.setOnes();
-    Volume smoothed = imaging::smooth(indicator, smoothing_voxels);
+    Volume smoothed = imaging::smooth(indicator, LabelSurfaceOptions().smoothing_voxels);
     smoothed.geometry = labels.geometry;
     return smoothed;
 }

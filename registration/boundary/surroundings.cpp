@@ -16,10 +16,9 @@ bool is_one_of(int label, const std::vector<int>& labels) {
 
 /// The distance to midpoints between voxels is rough where the boundary is oblique to the grid: normals would be, too.
 imaging::Volume smooth_distance(const imaging::Volume& neighbours) {
-    constexpr double smoothing_voxels = 0.7;
     imaging::Volume distance = imaging::signed_distance(imaging::mask_of_all(neighbours));
     distance.geometry.spacing.setOnes();
-    distance = imaging::smooth(distance, smoothing_voxels);
+    distance = imaging::smooth(distance, detail::NeighbourOptions().smoothing_voxels);
     distance.geometry = neighbours.geometry;
     return distance;
 }

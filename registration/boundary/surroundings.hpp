@@ -9,6 +9,12 @@
 
 namespace tissuewarp::registration::detail {
 
+struct NeighbourOptions {
+    double smoothing_voxels =
+        0.7;  ///< standard deviation, of the distance to rigid neighbours: where their boundary is
+              ///< oblique to the grid its steps turn normals. Chosen by hand; data not recorded
+};
+
 /// The bodies of these labels, none where no label is given. Precondition: require_surroundings.
 std::optional<RigidNeighbours> rigid_neighbours(const imaging::Volume& map, const std::vector<int>& labels);
 

@@ -15,10 +15,7 @@ namespace {
 
 using Vec4 = Eigen::Array4f;  // x, y, z and an unused fourth lane, so that one node is one SIMD register
 
-constexpr double finest_spacing = 2.5;   // mm; finer grids change the field by less than the layer corrects
-constexpr double most_nodes = 1.2e6;     // larger organs get a coarser grid
-constexpr double stiffening = 0.2;       // |∇u| from which the continuation resists steeper gradients
-constexpr double blend_spacings = 1.25;  // thickness of the correcting layer at the surface, in grid spacings
+constexpr ContinuationOptions options;
 
 /// Why a node is fixed; 0 is free.
 enum : std::uint8_t { in_mesh = 1, on_sheet, at_rest };
@@ -77,7 +74,8 @@ void for_each_free(const Level& level, int colour, const Visit& visit) {
 /// without which the alternation of weights and values oscillates.
 void update_stiffness(Level& level) {
     const auto neighbours = level.neighbours();
-    const float scale = static_cast<float>(0.5 / (level.spacing * level.spacing * stiffening * stiffening));
+    const float scale =
+        static_cast<float>(0.5 / (level.spacing * level.spacing * options.stiffening * options.stiffening));
     level.stiffness.resize(level.value.size(), 0.0F);
     for_each_free(level, -1, [&](std::size_t n) {
         const Vec4* v = level.value.data() + n;
@@ -159,16 +157,16 @@ void prolong(const Level& coarse, Level& fine) {
 /// (Bornemann and Deuflhard 1996): solved coarse to fine, each level starting from the one below. A few sweeps a level
 /// suffice, because what is left is small and smooth.
 void solve(Level& level) {
-    const bool coarsest = *std::min_element(level.size.begin(), level.size.end()) < 16;
+    const bool coarsest = *std::min_element(level.size.begin(), level.size.end()) < options.coarsest_nodes;
     if (!coarsest) {
         Level coarse = coarsened(level);
         solve(coarse);
         prolong(coarse, level);
     }
-    const int rounds = coarsest ? 20 : 4;
+    const int rounds = coarsest ? options.coarsest_rounds : options.rounds;
     for (int round = 0; round < rounds; ++round) {
         update_stiffness(level);
-        for (int sweep = 0; sweep < 3; ++sweep) relax(level, 1.4F);
+        for (int sweep = 0; sweep < options.sweeps; ++sweep) relax(level, options.relaxation);
     }
 }
 
@@ -184,7 +182,7 @@ struct Continuation::Impl {
          const Eigen::Matrix3Xd& values, double fade_mm)
         : spacing(spacing_for(nodes, fade_mm)),
           grid(size_for(nodes, fade_mm), spacing),
-          surface(nodes, boundary, values, blend_spacings * spacing) {
+          surface(nodes, boundary, values, options.blend_spacings * spacing) {
         lower = nodes.rowwise().minCoeff().array() - fade_mm - 2.0 * spacing;
         const Eigen::Matrix3Xd index = (nodes.colwise() - lower) / spacing;
         fix_inside(index, tets, values);
@@ -198,8 +196,8 @@ struct Continuation::Impl {
         return (nodes.rowwise().maxCoeff() - nodes.rowwise().minCoeff()).array() + 2.0 * fade_mm;
     }
     static double spacing_for(const Eigen::Matrix3Xd& nodes, double fade_mm) {
-        return std::max(std::min(finest_spacing, fade_mm / 4.0),
-                        std::cbrt(extent_for(nodes, fade_mm).prod() / most_nodes));
+        return std::max(std::min(options.finest_spacing_mm, fade_mm / options.spacings_of_fade),
+                        std::cbrt(extent_for(nodes, fade_mm).prod() / options.most_nodes));
     }
     [[nodiscard]] std::array<int, 3> size_for(const Eigen::Matrix3Xd& nodes, double fade_mm) const {
         const Eigen::Array3d extent = extent_for(nodes, fade_mm) / spacing;

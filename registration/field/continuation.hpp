@@ -7,6 +7,18 @@
 
 namespace tissuewarp::registration::detail {
 
+/// The grid outside the organ and how it is solved on. Chosen by hand; on which data is not recorded.
+struct ContinuationOptions {
+    double finest_spacing_mm = 2.5;  ///< finer grids change the field by less than the layer corrects
+    double spacings_of_fade = 4.0;   ///< in the fade distance, at least
+    double most_nodes = 1.2e6;       ///< larger organs get a coarser grid
+    double stiffening = 0.2;         ///< |∇u| from which the continuation resists steeper gradients
+    double blend_spacings = 1.25;    ///< thickness of the correcting layer at the surface, in grid spacings
+    int coarsest_nodes = 16;         ///< along the shortest side of a grid that is not coarsened any more
+    int coarsest_rounds = 20, rounds = 4, sweeps = 3;  ///< of weights, there and elsewhere; sweeps under each
+    float relaxation = 1.4F;                           ///< factor of over-relaxation
+};
+
 /// Continues nodal vectors (mm) outward from the surface of a mesh, down to zero `fade_mm` away.
 ///
 /// The continuation minimises ∫ ½ |∇u|² + |∇u|⁴ / (4 s²): harmonic where gradients are small against s = 0.2, and of

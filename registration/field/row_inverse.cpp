@@ -21,7 +21,7 @@ struct Inverse {
 /// outside the mesh is close to a rank-one matrix, ∂u/∂n ⊗ n, which one update learns. `negligible` mm are left to a
 /// last step that is not checked.
 Inverse inverted(const Continuation& forward, const Eigen::Vector3d& z, Eigen::Vector3d w, double negligible) {
-    constexpr int most_steps = 6, most_halvings = 3;
+    constexpr int most_steps = row_inverse_options.steps, most_halvings = row_inverse_options.halvings;
     Eigen::Matrix3d inverse_gradient = Eigen::Matrix3d::Identity();
     Eigen::Vector3d residual = w + forward(z + w);
     for (int step = 0; step < most_steps && residual.squaredNorm() > negligible * negligible; ++step) {
@@ -51,7 +51,7 @@ Eigen::Vector3d LazyContinuation::operator()(const Eigen::Vector3d& point) {
 }
 
 Eigen::Vector3d RowInverse::operator()(int i, const Eigen::Vector3d& z) {
-    constexpr double negligible = 0.01, exact = 1e-3;  // mm
+    constexpr double negligible = row_inverse_options.negligible_mm, exact = row_inverse_options.exact_mm;
     known_ = i == last_ + 1 ? std::min(known_ + 1, 2) : 0;
     Inverse found{Eigen::Vector3d::Zero(), false};
     if (known_ == 2) found = inverted(forward_, z, 2.0 * before_ - two_before_, negligible);

@@ -10,6 +10,14 @@
 
 namespace tissuewarp::registration::detail {
 
+/// How far a continued field is inverted. Chosen by hand; on which data is not recorded.
+struct RowInverseOptions {
+    double negligible_mm = 0.01;  ///< residual before a last step, along a row
+    double exact_mm = 1e-3;       ///< the same from rest, which a row begins with
+    int steps = 6, halvings = 3;  ///< at most
+};
+inline constexpr RowInverseOptions row_inverse_options{};
+
 /// A continuation that is made when first asked for, by whichever thread asks.
 class LazyContinuation {
 public:

@@ -9,7 +9,7 @@ namespace tissuewarp::registration::detail {
 
 namespace {
 
-constexpr int most_nodes_for_loads = 6000;
+constexpr int most_nodes_for_loads = coarse_twin_options.most_nodes_for_loads;
 
 PrepareOptions coarse_options(const PreparedModel& prepared, double edge_length) {
     PrepareOptions options = prepared.options;
@@ -22,8 +22,9 @@ PrepareOptions coarse_options(const PreparedModel& prepared, double edge_length)
 
 /// Near, or as far outside as coarse meshes cut corners off.
 std::optional<meshing::Location> place_of(const meshing::PointLocator& locator, const Eigen::Vector3d& point) {
-    for (const double tolerance : {0.5, 1.0, 2.0, 4.0}) {
-        auto found = tolerance > 0.5 ? locator.find(point, tolerance) : locate_near(locator, point);
+    for (const double tolerance : coarse_twin_options.outside) {
+        auto found =
+            tolerance > place_options.outside.back() ? locator.find(point, tolerance) : locate_near(locator, point);
         if (!found) continue;
         found->barycentric = found->barycentric.cwiseMax(0.0);
         found->barycentric /= found->barycentric.sum();

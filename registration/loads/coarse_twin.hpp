@@ -6,7 +6,18 @@
 
 #include <Eigen/Core>
 
+#include <array>
+
 namespace tissuewarp::registration::detail {
+
+/// When loads are found on a coarser model, and how points of one mesh are found in the other. Chosen by hand; on which
+/// data is not recorded.
+struct CoarseTwinOptions {
+    int most_nodes_for_loads = 6000;  ///< of the model itself: a factor of a larger one takes long
+    /// As PlaceOptions::outside: coarse meshes cut corners off.
+    std::array<double, 4> outside{0.5, 1.0, 2.0, 4.0};
+};
+inline constexpr CoarseTwinOptions coarse_twin_options{};
 
 /// Tissue, what pulled at it last, and where it went.
 struct CoarseTwin {

@@ -25,10 +25,9 @@ LoadFit::LoadFit(const LoadShapes& shapes, const Posterior& seen)
 }
 
 double LoadFit::likeliest_size(const Eigen::VectorXd& shown) const {
-    constexpr int least = -6, most = 15;  // powers of √2: loads that strain tissue by nothing, and by far too much
     const Eigen::ArrayXd b = axes_.transpose() * (shapes_.forces_.transpose() * shown) / shapes_.energy_;
     double best = -std::numeric_limits<double>::infinity(), size = 0;
-    for (int power = least; power <= most; ++power) {
+    for (int power = load_sizes.least_power; power <= load_sizes.most_power; ++power) {
         const double squared = std::pow(2.0, power);
         const double evidence =
             0.5 * (b.square() / (information_ + 1 / squared) - (1 + squared * information_).log()).sum();

@@ -15,6 +15,14 @@
 
 namespace tissuewarp::registration::detail {
 
+/// The sizes of loads that are tried, as powers of √2: from such as strain tissue by nothing to such as strain it by
+/// far too much. Chosen by hand; the largest was reached by loads that the lung's masks do not take
+/// (docs/decisions/unknown_loads.md).
+struct LoadSizes {
+    int least_power = -6, most_power = 15;
+};
+inline constexpr LoadSizes load_sizes{};
+
 /// Shapes of loads and what they do to tissue that no data hold.
 class LoadShapes {
 public:

@@ -10,10 +10,6 @@ namespace tissuewarp::registration::detail {
 
 namespace {
 
-/// Motions of the organ as a whole that no datum shows, such as one along a straight vessel, are known no worse: their
-/// variance stays finite.
-constexpr double least_known_mm = 100;
-
 using Columns = Eigen::MatrixXd;  // 3N × k, nodes' vectors one after the other
 
 tled::RestStiffness stiffness_with(const PreparedModel& prepared, const WeighedSprings& springs) {
@@ -76,7 +72,7 @@ Posterior::Posterior(const PreparedModel& prepared, const WeighedSprings& spring
     const Columns motions = rigid_motions(prepared.model.mesh.nodes), held = times(springs.ground, motions);
     freed_ = stiffness_.solve_columns(held);
     middle_ = bounded_inverse(motions.transpose() * held - held.transpose() * freed_,
-                              energy_ / (least_known_mm * least_known_mm));
+                              energy_ / (posterior_options.least_known_mm * posterior_options.least_known_mm));
 }
 
 std::vector<Eigen::Matrix3d> Posterior::covariances(const std::vector<int>& nodes) const {

@@ -12,6 +12,13 @@
 
 namespace tissuewarp::registration::detail {
 
+struct PosteriorOptions {
+    /// Motions of the organ as a whole that no datum shows, such as one along a straight vessel, are known no worse:
+    /// their variance stays finite. Chosen by hand; on which data is not recorded.
+    double least_known_mm = 100;
+};
+inline constexpr PosteriorOptions posterior_options{};
+
 /// Springs of the data and of the prior, each weighed so that `energy` (mN mm) is one standard deviation.
 struct WeighedSprings {
     std::vector<tled::Spring> data, ground;

@@ -18,9 +18,7 @@ namespace {
 
 using Columns = Eigen::MatrixXd;  // 3N × k, nodes' vectors one after the other
 
-constexpr int waves = 20;            // of each component of a smooth traction
-constexpr double smooth_over = 0.5;  // of the organ's radius
-constexpr int draws = 256;           // whose principal shapes are taken
+constexpr int waves = load_draws.waves, draws = load_draws.draws;
 
 /// mm³ of each node's share of its elements.
 Eigen::VectorXd nodal_volumes(const meshing::TetMesh& mesh) {
@@ -86,7 +84,7 @@ Columns unknown_loads(const PreparedModel& prepared, int count, std::uint64_t se
     std::vector<SmoothField> tractions;
     for (int k = 0; k < count; ++k) {
         bodies.emplace_back(white_noise(3, 1, generator) / radius);
-        tractions.emplace_back(smooth_over * radius, generator);
+        tractions.emplace_back(load_draws.smooth_over * radius, generator);
     }
     Columns loads(nodes.size(), count);
     tbb::parallel_for(0, count, [&](int k) {
@@ -112,8 +110,7 @@ namespace {
 
 /// The same on every mesh of an organ.
 Columns draws_of(const PreparedModel& prepared) {
-    constexpr std::uint64_t seed = 0x10ad5;  // an error estimate draws others
-    return unknown_loads(prepared, draws, seed);
+    return unknown_loads(prepared, draws, load_draws.seed);
 }
 
 }  // namespace

@@ -20,6 +20,12 @@ struct FeaturePoints {
     std::vector<Eigen::Matrix3d> structure;
 };
 
+/// Beside FeatureOptions.
+struct FeaturePointRules {
+    double least_score = 0.05;  ///< flat tissue lies below. Chosen by hand; on which data is not recorded
+    double packing = 0.38;      ///< of space by balls about points taken at random until none fits (mathematics)
+};
+
 /// Points of high structure in and near the mask (voxels != 0, any grid), spread evenly: in the order of the score
 /// Σ λᵢ/(λᵢ + λ₀), λ₀ the median of the mean eigenvalue in the mask, each point that lies far enough from those taken.
 /// Corners (three strong eigenvalues, Rohr 1997) score close to 3 and come first, plane edges up to 1; flat tissue is

@@ -12,6 +12,12 @@
 
 namespace tissuewarp::registration::detail {
 
+/// Whether an image is searched on. Chosen together with CourseOptions::more_searches and on the same images.
+struct SearchGain {
+    double least_agreement = 0.01;  ///< gained by a search on a grid that had been searched before
+};
+inline constexpr SearchGain search_gain{};
+
 class ImageSearch {
 public:
     /// `prepared.image` is there. Model, options and tools outlive this.
@@ -26,8 +32,8 @@ public:
     /// How many there are to be.
     [[nodiscard]] int count() const { return 1 + static_cast<int>(options_.dense_coarsening.size()); }
     /// Whether another dense search on the last grid may bring the images nearer: the last search on a grid that had
-    /// been searched before found them to agree better by a hundredth or more.
-    [[nodiscard]] bool gains() const { return gain_ >= 0.01; }
+    /// been searched before found them to agree better by SearchGain::least_agreement or more.
+    [[nodiscard]] bool gains() const { return gain_ >= search_gain.least_agreement; }
     /// Of both images, in the last dense search: DenseForces::agreement.
     [[nodiscard]] std::optional<double> agreement() const { return agreement_; }
     /// Blocks that the first search found.

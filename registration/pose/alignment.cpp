@@ -23,9 +23,8 @@ using imaging::Geometry;
 using imaging::Volume;
 
 constexpr int union_label = 0;  // stands for the boundary of all labels together
-constexpr int most_labels = 4;  // the largest ones; many small structures add time, not certainty
-constexpr double map_spacing =
-    2.0;  // mm, of the distance maps: linear interpolation in them is good to a fraction of it
+constexpr int most_labels = LabelPoseOptions().most_labels;
+constexpr double map_spacing = LabelPoseOptions().map_spacing_mm;
 
 /// Copies a label map to int32 whatever its integer type.
 Volume as_int(const Volume& labels) {

@@ -12,6 +12,12 @@
 
 namespace tissuewarp::registration {
 
+/// What of labels is aligned. Chosen by hand; on which data is not recorded.
+struct LabelPoseOptions {
+    int most_labels = 4;          ///< beside all together, the largest: many small ones add time, not certainty
+    double map_spacing_mm = 2.0;  ///< of the distance maps: linear interpolation in them is good to a fraction of it
+};
+
 /// Minimises the symmetric mean truncated distance between moving and fixed boundaries (distance maps), of all labels
 /// together and of the four largest that both maps hold, by BOBYQA (Powell 2009) from several starts: as the headers
 /// say, centroids matched, and rotations about them. A change of size is fitted along with the pose and then left to

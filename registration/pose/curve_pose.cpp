@@ -54,7 +54,6 @@ Weighed weigh(const std::vector<CurveMatch>& matches, const CurvePoints& points,
 /// The small motion of the lines, in the moving frame: δ = (shift, turn · radius) of
 /// (Σ w JᵀJ + λ) δ = Σ w Jᵀ across with J = P [1, −[q − c]×/radius], P the projection across the line.
 Eigen::Isometry3d step(const std::vector<CurveMatch>& matches, const Weighed& weighed) {
-    constexpr double damping = 1e-4;  // of the mean eigenvalue: what the points do not tell does not move
     Matrix6d normal = Matrix6d::Zero();
     Vector6d right = Vector6d::Zero();
     for (std::size_t n = 0; n < matches.size(); ++n) {
@@ -66,7 +65,7 @@ Eigen::Isometry3d step(const std::vector<CurveMatch>& matches, const Weighed& we
         normal += weighed.weights[n] * jacobian.transpose() * jacobian;
         right += weighed.weights[n] * jacobian.transpose() * matches[n].across;
     }
-    normal.diagonal().array() += damping * normal.trace() / 6 + std::numeric_limits<double>::min();
+    normal.diagonal().array() += curve_pose_options.damping * normal.trace() / 6 + std::numeric_limits<double>::min();
     const Vector6d delta = normal.ldlt().solve(right);
     const Eigen::Vector3d turn = delta.tail<3>() / weighed.radius;
     const Eigen::Vector3d shift = delta.head<3>();
@@ -78,13 +77,12 @@ Eigen::Isometry3d step(const std::vector<CurveMatch>& matches, const Weighed& we
 
 Alignment closest_curve_pose(const meshing::CurveTree& lines, const CurvePoints& points, const Eigen::Isometry3d& start,
                              double last_scale_mm, double max_angle_deg) {
-    constexpr int passes = 60;
-    constexpr double scale_ratio = 0.9;
+    constexpr CurvePoseOptions rules = curve_pose_options;
     Alignment result{start, 0};
     double scale = 0;
-    for (int pass = 0; pass < passes; ++pass) {
+    for (int pass = 0; pass < rules.passes; ++pass) {
         const auto matches = match_curves(lines, points, result.placement, everywhere, max_angle_deg);
-        scale = pass == 0 ? 3 * median_distance(matches) : scale_ratio * scale;
+        scale = pass == 0 ? rules.first_of_median * median_distance(matches) : rules.falling * scale;
         scale = std::max(scale, last_scale_mm);
         if (!std::isfinite(scale)) return result;
         const Weighed weighed = weigh(matches, points, scale);

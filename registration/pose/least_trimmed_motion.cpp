@@ -7,8 +7,7 @@
 namespace tissuewarp::registration::detail {
 
 Eigen::Isometry3d least_trimmed_motion(const Eigen::Matrix3Xd& moving, const Eigen::Matrix3Xd& fixed) {
-    constexpr double kept_share = 0.7;
-    constexpr int concentrations = 10;
+    const auto& [kept_share, concentrations] = least_trimmed_options;
     std::vector<Eigen::Index> order(static_cast<std::size_t>(moving.cols()));
     std::iota(order.begin(), order.end(), Eigen::Index{0});
     const auto kept = static_cast<std::ptrdiff_t>(kept_share * double(order.size()));

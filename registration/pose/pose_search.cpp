@@ -14,9 +14,7 @@ namespace {
 
 constexpr std::size_t most_parameters = 7;
 
-/// mm of cost per mm that the rotation carries the boundary: decides where the boundaries do not, as for a ball, and is
-/// far below the slope of a cost that does.
-constexpr double rotation_penalty = 5e-3;
+constexpr PoseSearchOptions rules;
 
 /// Similarity from seven numbers, all in mm: translation, rotation vector about `centre` times `radius`, and logarithm
 /// of the scale times `radius`.
@@ -54,7 +52,7 @@ struct Problem {
 
     [[nodiscard]] double operator()(const Pose& pose) const {
         return cost(space.similarity(pose.x.data()), trim, stride) +
-               rotation_penalty * std::hypot(pose.x[3], pose.x[4], pose.x[5]);
+               rules.rotation_penalty * std::hypot(pose.x[3], pose.x[4], pose.x[5]);
     }
 };
 
@@ -67,8 +65,8 @@ Pose minimise(const Problem& problem, Pose start, int evaluations) {
     };
     Problem copy = problem;  // NLopt takes a pointer to mutable data
     optimiser.set_min_objective(objective, &copy);
-    optimiser.set_initial_step(std::max(0.5, problem.trim / 4));
-    optimiser.set_xtol_abs(0.01);
+    optimiser.set_initial_step(std::max(rules.least_first_step_mm, problem.trim / rules.trims_of_first_step));
+    optimiser.set_xtol_abs(rules.tolerance_mm);
     optimiser.set_maxeval(evaluations);
     std::vector<double> x(start.x.begin(), start.x.begin() + problem.parameters);
     try {
@@ -104,13 +102,15 @@ Alignment search_pose(const PoseCost& cost, const Eigen::Matrix3Xd& moving_point
     const auto parameters = static_cast<unsigned>(freedom);
 
     std::vector<Pose> poses = starting_poses(space, fixed_centroid, options.start_angle_deg * EIGEN_PI / 180);
-    const Problem coarse{cost, space, parameters, 10 * options.trim_mm, 4};
-    tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t i) { poses[i] = minimise(coarse, poses[i], 200); });
+    const Problem coarse{cost, space, parameters, rules.coarse_trims * options.trim_mm, rules.coarse_stride};
+    tbb::parallel_for(std::size_t{0}, poses.size(),
+                      [&](std::size_t i) { poses[i] = minimise(coarse, poses[i], rules.coarse_evaluations); });
     observer.checkpoint("rigid alignment", 0.6);
     std::stable_sort(poses.begin(), poses.end(), [](const Pose& a, const Pose& b) { return a.cost < b.cost; });
-    poses.resize(2);
+    poses.resize(rules.finalists);
     const Problem fine{cost, space, parameters, options.trim_mm, 1};
-    tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t i) { poses[i] = minimise(fine, poses[i], 600); });
+    tbb::parallel_for(std::size_t{0}, poses.size(),
+                      [&](std::size_t i) { poses[i] = minimise(fine, poses[i], rules.fine_evaluations); });
     observer.checkpoint("rigid alignment", 1.0);
     const Pose& best = poses[1].cost < poses[0].cost ? poses[1] : poses[0];
     return {space.rigid(best.x.data()), cost(space.similarity(best.x.data()), options.trim_mm, 1)};

@@ -7,6 +7,19 @@
 
 namespace tissuewarp::registration::detail {
 
+/// How a pose is searched beside AlignmentOptions. Chosen by hand; on which data is not recorded.
+struct PoseSearchOptions {
+    /// mm of cost per mm that the rotation carries the boundary: decides where the boundaries do not, as for a ball,
+    /// and is far below the slope of a cost that does.
+    double rotation_penalty = 5e-3;
+    double coarse_trims = 10;                              ///< of the first searches, over AlignmentOptions::trim_mm
+    int coarse_stride = 4;                                 ///< of their samples
+    int coarse_evaluations = 200, fine_evaluations = 600;  ///< of the cost, at most
+    std::size_t finalists = 2;                             ///< that are searched finely: precondition of the choice
+    double least_first_step_mm = 0.5, trims_of_first_step = 4;  ///< first step, at least; trim over it
+    double tolerance_mm = 0.01;                                 ///< of each parameter
+};
+
 /// Mean over every `stride`-th sample of the distance between what is aligned after `map`, each truncated at `trim_mm`.
 using PoseCost = std::function<double(const Eigen::Affine3d& map, double trim_mm, int stride)>;
 

@@ -35,7 +35,8 @@ std::vector<Eigen::Index> one_per_cell(const Eigen::Matrix3Xd& points, double si
 std::vector<Eigen::Index> thinned(const Eigen::Matrix3Xd& points, int most) {
     std::vector<Eigen::Index> kept(static_cast<std::size_t>(points.cols()));
     for (std::size_t n = 0; n < kept.size(); ++n) kept[n] = static_cast<Eigen::Index>(n);
-    for (double side = 0.25; kept.size() > static_cast<std::size_t>(most); side *= 1.25)
+    for (double side = SurfaceDataOptions().first_cell_mm; kept.size() > static_cast<std::size_t>(most);
+         side *= SurfaceDataOptions().cell_growth)
         kept = one_per_cell(points, side);
     return kept;
 }
@@ -49,7 +50,9 @@ Eigen::Vector3d plane_normal(const Eigen::Matrix3Xd& points) {
 
 SurfaceData surface_data(const SurfacePoints& surface, int most_points) {
     require_usable(surface);
-    constexpr Eigen::Index area_neighbours = 8, least_neighbours = 16, most_neighbours = 100;
+    constexpr SurfaceDataOptions rules;
+    constexpr Eigen::Index area_neighbours = rules.area_neighbours, least_neighbours = rules.least_neighbours,
+                           most_neighbours = rules.most_neighbours;
     const std::vector<Eigen::Index> kept = thinned(surface.points, most_points);
     SurfaceData data;
     data.points = surface.points(Eigen::all, kept);
@@ -60,7 +63,7 @@ SurfaceData surface_data(const SurfacePoints& surface, int most_points) {
     else
         data.normals.resize(3, data.count());
     data.areas.resize(data.count());
-    const double within = std::pow(4 * surface.deviation_mm, 2);
+    const double within = std::pow(rules.normal_deviations * surface.deviation_mm, 2);
     const Eigen::Index sorted = std::min(most_neighbours + 1, data.count());
     const meshing::PointTree tree(data.points);
     tbb::parallel_for(Eigen::Index{0}, data.count(), [&](Eigen::Index n) {
@@ -77,7 +80,7 @@ SurfaceData surface_data(const SurfacePoints& surface, int most_points) {
     });
     std::vector<double> areas(data.areas.begin(), data.areas.end());
     std::nth_element(areas.begin(), areas.begin() + data.count() / 2, areas.end());
-    data.areas = data.areas.cwiseMin(2 * areas[areas.size() / 2]);
+    data.areas = data.areas.cwiseMin(rules.most_area * areas[areas.size() / 2]);
     return data;
 }
 

@@ -13,12 +13,7 @@ namespace tissuewarp::registration::detail {
 
 namespace {
 
-constexpr double least_cosine = 0.5;   // between the normals of a point and its triangle
-constexpr double same_pose_mm = 8;     // mean over the surface: poses closer than this are one
-constexpr double start_rotation = 25;  // degrees
-constexpr int start_places = 40;       // on the surface
-constexpr int coarse_points = 150, fine_points = 800;
-constexpr std::size_t finalists = 12;
+constexpr SurfacePoseOptions rules;
 
 struct Pose {
     Eigen::Isometry3d placement;
@@ -50,7 +45,7 @@ public:
             const Eigen::Vector3d facing = rotation.transpose() * mean_normal(middle);
             for (const int place : places) {
                 const double cosine = facing.dot(normals.col(place));
-                if ((data_.oriented ? cosine : std::abs(cosine)) < least_cosine) continue;
+                if ((data_.oriented ? cosine : std::abs(cosine)) < rules.least_cosine) continue;
                 Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();
                 placement.linear() = rotation;
                 placement.translation() = data_.points.col(middle) - rotation * surface_.nodes.col(place);
@@ -86,7 +81,7 @@ private:
 
     [[nodiscard]] std::optional<meshing::SurfaceTree::Hit> match(const Eigen::Vector3d& point,
                                                                  const Eigen::Vector3d& normal, double scale) const {
-        return model_.closest(point, 4 * scale, {normal, least_cosine, data_.oriented});
+        return model_.closest(point, rules.reach * scale, {normal, rules.least_cosine, data_.oriented});
     }
 
     [[nodiscard]] double cost(const Eigen::Isometry3d& placement, Eigen::Index stride) const {
@@ -122,8 +117,7 @@ private:
             weights += weight;
         }
         if (weights <= 0) return false;
-        constexpr double damping = 1e-3;  // of what the points do not show
-        matrix.diagonal().array() += damping * weights;
+        matrix.diagonal().array() += rules.damping * weights;
         const Eigen::Matrix<double, 6, 1> step = matrix.ldlt().solve(right);
         const Eigen::Vector3d rotation = step.tail<3>() / radius_;
         Eigen::Isometry3d moved = Eigen::Isometry3d::Identity();
@@ -132,7 +126,7 @@ private:
         moved.translation() = centre_ + step.head<3>() - moved.linear() * centre_;
         placement = placement * moved;
         placement.linear() = Eigen::Quaterniond(placement.linear()).normalized().toRotationMatrix();
-        return step.norm() > 1e-3;
+        return step.norm() > rules.least_step_mm;
     }
 
     /// The point closest to the coordinates' medians.
@@ -154,7 +148,7 @@ private:
     [[nodiscard]] Eigen::Vector3d mean_normal(Eigen::Index middle) const {
         const Eigen::RowVectorXd squared = (data_.points.colwise() - data_.points.col(middle)).colwise().squaredNorm();
         std::vector<double> sorted(squared.begin(), squared.end());
-        const auto tenth = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 10);
+        const auto tenth = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / rules.facing_one_of);
         std::nth_element(sorted.begin(), tenth, sorted.end());
         Eigen::Vector3d sum = Eigen::Vector3d::Zero();
         for (Eigen::Index n = 0; n < data_.count(); ++n)
@@ -170,7 +164,7 @@ private:
         Eigen::Index node = 0;
         std::vector<int> chosen;
         Eigen::RowVectorXd nearest = Eigen::RowVectorXd::Constant(surface_.node_count(), 1e30);
-        for (int n = 0; n < std::min(start_places, surface_.node_count()); ++n) {
+        for (int n = 0; n < std::min(rules.start_places, surface_.node_count()); ++n) {
             chosen.push_back(static_cast<int>(node));
             nearest = nearest.cwiseMin((surface_.nodes.colwise() - surface_.nodes.col(node)).colwise().squaredNorm());
             nearest.maxCoeff(&node);
@@ -189,7 +183,8 @@ private:
                     corner[(axis + 1) % 3] = a;
                     corner[(axis + 2) % 3] = b;
                     rotations.emplace_back(
-                        Eigen::AngleAxisd(start_rotation * EIGEN_PI / 180, corner.normalized()).toRotationMatrix());
+                        Eigen::AngleAxisd(rules.start_rotation_deg * EIGEN_PI / 180, corner.normalized())
+                            .toRotationMatrix());
                 }
         return rotations;
     }
@@ -206,7 +201,7 @@ std::vector<Pose> distinct(const PoseSearch& search, const std::vector<Pose>& po
     std::vector<Pose> kept;
     for (const Pose& pose : poses) {
         if (kept.size() == most) break;
-        const auto same = [&](const Pose& other) { return search.distance(pose, other) < same_pose_mm; };
+        const auto same = [&](const Pose& other) { return search.distance(pose, other) < rules.same_pose_mm; };
         if (std::none_of(kept.begin(), kept.end(), same)) kept.push_back(pose);
     }
     return kept;
@@ -216,13 +211,16 @@ std::vector<Pose> distinct(const PoseSearch& search, const std::vector<Pose>& po
 
 SurfacePose search_surface_pose(const meshing::SurfaceTree& model, const meshing::SurfaceMesh& surface,
                                 const SurfaceData& data, const AlignmentOptions& options, Observer& observer) {
-    const double scale = std::max(options.trim_mm / 2, 3 * data.deviation_mm);
+    const double scale =
+        std::max(options.trim_mm / rules.scales_of_trim, rules.least_scale_deviations * data.deviation_mm);
     const PoseSearch search(model, surface, data, scale);
     std::vector<Pose> poses = search.starts();
-    descend_all(search, poses, {coarse_points, 15, 6 * scale, 1.5 * scale});
+    descend_all(
+        search, poses,
+        {rules.coarse_points, rules.coarse_steps, rules.coarse_first_scale * scale, rules.coarse_last_scale * scale});
     observer.checkpoint("rigid alignment", 0.6);
-    poses = distinct(search, poses, finalists);
-    descend_all(search, poses, {fine_points, 40, 2 * scale, scale});
+    poses = distinct(search, poses, rules.finalists);
+    descend_all(search, poses, {rules.fine_points, rules.fine_steps, rules.fine_first_scale * scale, scale});
     poses = distinct(search, poses, 2);
     observer.checkpoint("rigid alignment", 1.0);
     SurfacePose result{poses[0].placement, poses[0].cost, scale};

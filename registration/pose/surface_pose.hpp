@@ -11,6 +11,25 @@
 
 namespace tissuewarp::registration::detail {
 
+/// How the pose of a surface is searched beside AlignmentOptions. Chosen by hand; on which data is not recorded.
+struct SurfacePoseOptions {
+    double least_cosine = 0.5;          ///< between the normals of a point and its triangle
+    double start_rotation_deg = 25;     ///< about the corners of an icosahedron
+    int start_places = 40;              ///< on the surface
+    std::size_t facing_one_of = 10;     ///< points about the middle one, whose mean normal says how a start faces
+    double scales_of_trim = 2;          ///< AlignmentOptions::trim_mm over the final robust scale …
+    double least_scale_deviations = 3;  ///< … which is at least so many deviations of a point
+    double reach = 4;                   ///< of matches, over a step's scale
+    int coarse_points = 150, coarse_steps = 15;              ///< of the descent of each start
+    double coarse_first_scale = 6, coarse_last_scale = 1.5;  ///< over the final scale
+    std::size_t finalists = 12;                              ///< that go on
+    int fine_points = 800, fine_steps = 40;                  ///< of their descent
+    double fine_first_scale = 2;                             ///< over the final scale
+    double damping = 1e-3;        ///< of the weights' sum: what the points do not show does not move
+    double least_step_mm = 1e-3;  ///< a descent ends below it
+    double same_pose_mm = 8;      ///< mean over the surface: poses closer than this are one, others rivals
+};
+
 struct SurfacePose {
     Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();  ///< moving → fixed
     double cost = 0;  ///< mean of d²/(d² + s²) over the area of the points, s = `scale_mm`; 1 where no triangle fits

@@ -19,7 +19,6 @@ double strain_energy_unit(const PreparedModel& prepared, const TissuePrior& tiss
 
 std::vector<tled::Spring> ground_springs(const PreparedModel& prepared, double energy,
                                          const std::function<ExpectedMotion(const InterfaceNode&)>& expected) {
-    constexpr double independent_area = 100.0;  // mm², that moves on its own
     std::vector<tled::Spring> springs;
     for (const InterfaceNode& node : prepared.interfaces.nodes()) {
         if (node.outer != 0) continue;
@@ -28,7 +27,8 @@ std::vector<tled::Spring> ground_springs(const PreparedModel& prepared, double e
                               along = Eigen::Matrix3d::Identity() - across,
                               information = across / (motion.across_mm * motion.across_mm) +
                                             along / (motion.along_mm * motion.along_mm);
-        springs.push_back({node.node, energy * node.area / independent_area * information, Eigen::Vector3d::Zero()});
+        springs.push_back(
+            {node.node, energy * node.area / ground_options.independent_area * information, Eigen::Vector3d::Zero()});
     }
     return springs;
 }

@@ -13,6 +13,11 @@ namespace tissuewarp::registration::detail {
 /// ε of pieces of tissue of size ℓ.
 double strain_energy_unit(const PreparedModel& prepared, const TissuePrior& tissue);
 
+struct GroundOptions {
+    double independent_area = 100.0;  ///< mm² that move on their own. Chosen by hand; on which data is not recorded
+};
+inline constexpr GroundOptions ground_options{};
+
 /// How far a surface is expected to move, mm: standard deviations along its normal at rest, and in its tangent plane.
 struct ExpectedMotion {
     double across_mm, along_mm;

@@ -22,7 +22,7 @@ Eigen::Vector3d least_norm_solution(const Eigen::Matrix3d& stiffness, const Eige
 }  // namespace
 
 std::optional<meshing::Location> locate_near(const meshing::PointLocator& locator, const Eigen::Vector3d& point) {
-    for (const double tolerance : {1e-9, 0.1, 0.25, 0.5}) {
+    for (const double tolerance : place_options.outside) {
         if (auto found = locator.find(point, tolerance)) {
             found->barycentric = found->barycentric.cwiseMax(0.0);
             found->barycentric /= found->barycentric.sum();

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include <array>
 #include <optional>
 #include <span>
 #include <vector>
@@ -18,6 +19,14 @@ struct Pull {
     Eigen::Vector3d target = Eigen::Vector3d::Zero();     ///< displacement, mm, moving frame
     Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero();  ///< K, mN/mm, symmetric positive semi-definite
 };
+
+struct PlaceOptions {
+    /// How far outside of the mesh a point may lie, as the least barycentric coordinate, one after the other: the
+    /// nearest element first. Half an element: data on a surface lie beside the mesh. Chosen by hand; on which data is
+    /// not recorded.
+    std::array<double, 4> outside{1e-9, 0.1, 0.25, 0.5};
+};
+inline constexpr PlaceOptions place_options{};
 
 /// The place in the mesh of a point in it, or of one up to about half an element outside, drawn to the surface.
 std::optional<meshing::Location> locate_near(const meshing::PointLocator& locator, const Eigen::Vector3d& point);

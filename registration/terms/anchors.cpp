@@ -23,8 +23,8 @@ bool is_held(const PreparedModel& prepared) {
 }
 
 AnchorTerm::AnchorTerm(const PreparedModel& prepared, double energy) {
-    constexpr double deviation_mm = 0.1;
-    const Eigen::Matrix3d stiffness = energy / (deviation_mm * deviation_mm) * Eigen::Matrix3d::Identity();
+    constexpr double deviation = anchor_options.deviation_mm;
+    const Eigen::Matrix3d stiffness = energy / (deviation * deviation) * Eigen::Matrix3d::Identity();
     for (const int node : anchored_nodes(prepared))
         springs_.push_back({{node, stiffness, Eigen::Vector3d::Zero()}, Origin::Support});
 }
@@ -34,7 +34,7 @@ Contribution AnchorTerm::linearise(const RoundPlan& /*plan*/, const State& /*sta
 }
 
 void AnchorTerm::judge(const State& state, UpdateResult& result) {
-    constexpr double most_mm = 0.5;
+    constexpr double most_mm = anchor_options.most_pull_mm;
     AnchorFit fit;
     for (const PulledNode& pulled : springs_) {
         ++fit.nodes;

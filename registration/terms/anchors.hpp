@@ -14,6 +14,13 @@ std::vector<int> anchored_nodes(const PreparedModel& prepared);
 /// Anchors or rigid neighbours say where the organ lies as a whole.
 bool is_held(const PreparedModel& prepared);
 
+/// How anchors hold and what is said of it. Chosen by hand; on which data is not recorded.
+struct AnchorOptions {
+    double deviation_mm = 0.1;  ///< of an anchored node from the placement: it hardly moves
+    double most_pull_mm = 0.5;  ///< of any node, beyond which data and anchors contradict each other
+};
+inline constexpr AnchorOptions anchor_options{};
+
 class AnchorTerm : public Term {
 public:
     /// Springs hold every anchored node to 0.1 mm: `energy` (mN mm) is the strain energy that weighs as much as one

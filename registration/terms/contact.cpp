@@ -1,6 +1,7 @@
 #include "registration/terms/contact.hpp"
 
 #include "registration/doubts.hpp"
+#include "registration/springs/ground_springs.hpp"
 
 #include <algorithm>
 #include <map>
@@ -9,14 +10,14 @@ namespace tissuewarp::registration::detail {
 
 namespace {
 
-constexpr double tolerance_mm = 0.05;  // of a gap
+constexpr double tolerance_mm = contact_options.tolerance_mm;
 
 }  // namespace
 
 ContactTerm::ContactTerm(const PreparedModel& prepared, double energy)
     : prepared_(prepared), distance_(prepared.neighbours->distance) {
-    constexpr double deviation_mm = 0.1, independent_area = 100.0;  // mm², as of the ground
-    stiffness_ = energy / (deviation_mm * deviation_mm) / independent_area;
+    constexpr double deviation = contact_options.deviation_mm;
+    stiffness_ = energy / (deviation * deviation) / ground_options.independent_area;
     std::map<int, double> areas;
     for (const InterfaceNode& node : prepared.interfaces.nodes())
         if (node.outer == 0) areas[node.node] += node.area;
@@ -76,7 +77,7 @@ ContactFit ContactTerm::fit(const State& state) const {
 }
 
 void ContactTerm::judge(const State& state, UpdateResult& result) {
-    constexpr double most_mm = 0.5;
+    constexpr double most_mm = contact_options.most_depth_mm;
     result.contact = fit(state);
     if (result.contact->deepest_mm > most_mm)
         result.doubts.push_back({"contact.entered", result.contact->deepest_mm, most_mm,

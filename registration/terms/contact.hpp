@@ -10,6 +10,15 @@
 
 namespace tissuewarp::registration::detail {
 
+/// How contact is solved and what is said of it. Chosen by hand; on which data is not recorded.
+struct ContactOptions {
+    double tolerance_mm = 0.05;  ///< of a gap: far below a voxel
+    double deviation_mm = 0.1;   ///< of the spring of a node that touches, over the area that the ground takes for
+                                 ///< independent: decides how fast pushes converge, not where
+    double most_depth_mm = 0.5;  ///< of any node in a neighbour, beyond which the result is doubted
+};
+inline constexpr ContactOptions contact_options{};
+
 /// Unilateral contact of surface nodes without friction, by the augmented Lagrangian with an active set [Simo and
 /// Laursen 1992]. The gap g of a node is its distance to the neighbours, plus how deep it lay in them at rest, so that
 /// nothing moves an organ that did not move. Where a node touches, a spring of stiffness k along the normal alone draws

@@ -15,8 +15,8 @@ namespace tissuewarp::registration::detail {
 
 namespace {
 
-constexpr Eigen::Index most_points = 20000;
-constexpr int chord_reach = 2;  // samples to either side of a segment
+constexpr Eigen::Index most_points = curve_sampling.most_points;
+constexpr int chord_reach = curve_sampling.chord_reach;
 
 /// Every k-th, so that no more than `most_points` are left.
 std::vector<Eigen::Index> thinned(Eigen::Index count) {
@@ -48,7 +48,7 @@ CurvePoints made_ready(const Curves& curves, const CurveOptions& options) {
 
 /// Across a line an unbiased point lies √2 deviations off in root mean square.
 void doubt(const CurveFit& fit, double deviation_mm, std::vector<Doubt>& doubts) {
-    constexpr double least_inliers = 0.5, most_residual = 1.7;
+    const auto& [least_inliers, most_residual] = curve_doubt_limits;
     if (fit.inlier_share < least_inliers)
         doubts.push_back({"curves.outliers", fit.inlier_share, least_inliers,
                           "only " + percent(fit.inlier_share) +
@@ -112,8 +112,7 @@ std::vector<CurveMatch> CurveTerm::matches(const State& state, double reach_mm) 
 }
 
 Alignment CurveTerm::pose(const Eigen::Isometry3d& start, Observer& /*observer*/) {
-    constexpr double bending_mm = 5;  // what a rigid motion does not follow
-    return closest_curve_pose({samples_, segments_}, data_, start, bending_mm + final_scale_mm(),
+    return closest_curve_pose({samples_, segments_}, data_, start, curve_pose_options.bending_mm + final_scale_mm(),
                               options_.max_angle_deg);
 }
 
@@ -137,13 +136,14 @@ void CurveTerm::add_pulls(const CurveMatch& match, double stiffness, const State
 /// No match counts as held back by the step bound, for which the round would be repeated: among few points outliers
 /// alone would repeat it for ever. The inlier share says in the end what was not reached.
 Contribution CurveTerm::linearise(const RoundPlan& plan, const State& state, Observer& /*observer*/) {
-    const double reach = std::max(4 * final_scale_mm(), 3 * plan.range_mm);
+    const double reach =
+        std::max(robust_rounds.reach_of_scale * final_scale_mm(), robust_rounds.reach_of_range * plan.range_mm);
     const std::vector<CurveMatch> found = matches(state, reach);
     const double typical = median_distance(found);
     if (plan.number == 0 && !std::isfinite(typical))
         throw InvalidInput("no intraoperative point along vessels lies within " + to_text(reach) +
                            " mm of the preoperative curves; check the frame and the unit of the points");
-    if (plan.number == 0) scale_.begin_at(3 * typical);
+    if (plan.number == 0) scale_.begin_at(robust_rounds.first_of_median * typical);
     const double scale = scale_.of(plan, final_scale_mm());
     const double stiffness = energy_ / (data_.deviation_mm * data_.deviation_mm);
     Contribution result;

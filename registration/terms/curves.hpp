@@ -12,6 +12,21 @@
 
 namespace tissuewarp::registration::detail {
 
+/// How lines and points along vessels are sampled beside CurveOptions. Chosen by hand; on which data is not recorded.
+struct CurveSampling {
+    Eigen::Index most_points = 20000;  ///< more are thinned to every second, third …: neighbours share their weight
+    int chord_reach = 2;               ///< samples to either side of a segment, whose chord is its tangent
+};
+inline constexpr CurveSampling curve_sampling{};
+
+/// What points along vessels may show without a doubt. Chosen by hand; on which data is not recorded.
+struct CurveDoubtLimits {
+    double least_inliers = 0.5;  ///< share of the points within the scale of the last round of a line
+    double most_residual =
+        1.7;  ///< root mean square across the lines over the stated deviation; unbiased points have √2
+};
+inline constexpr CurveDoubtLimits curve_doubt_limits{};
+
 class CurveTerm : public Term {
 public:
     /// `energy` is the strain energy (mN mm) that weighs as much as one standard deviation. Throws InvalidInput for

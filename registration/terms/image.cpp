@@ -26,23 +26,23 @@ double median_distance(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
 }
 
 void doubt(const ImageFit& fit, std::vector<Doubt>& doubts) {
-    constexpr double least_matched = 0.1, least_shown = 0.5, most_residual_mm = 1.0, least_agreement = 0.1;
-    if (fit.matched < least_matched * fit.blocks)
-        doubts.push_back({"image.blocks_lost", fit.matched / double(fit.blocks), least_matched,
+    constexpr ImageDoubtLimits limits = image_doubt_limits;
+    if (fit.matched < limits.least_matched * fit.blocks)
+        doubts.push_back({"image.blocks_lost", fit.matched / double(fit.blocks), limits.least_matched,
                           "only " + std::to_string(fit.matched) + " of " + std::to_string(fit.blocks) +
                               " blocks of the moving image were found in the fixed one"});
-    if (fit.shown_share < least_shown)
-        doubts.push_back({"image.out_of_view", fit.shown_share, least_shown,
+    if (fit.shown_share < limits.least_shown)
+        doubts.push_back({"image.out_of_view", fit.shown_share, limits.least_shown,
                           "the fixed image shows only " + percent(fit.shown_share) +
                               " of the organ; the rest is where mechanics alone put it"});
-    if (fit.agreement && *fit.agreement < least_agreement)
-        doubts.push_back({"image.disagree", *fit.agreement, least_agreement,
+    if (fit.agreement && *fit.agreement < limits.least_agreement)
+        doubts.push_back({"image.disagree", *fit.agreement, limits.least_agreement,
                           "the images agree where the organ lies hardly better than by chance (" +
                               to_text(*fit.agreement) +
                               "; 0 is chance, 1 the same image): check that they show the same organ"});
-    if (fit.residual_mm > most_residual_mm)
+    if (fit.residual_mm > limits.most_residual_mm)
         doubts.push_back(
-            {"image.apart", fit.residual_mm, most_residual_mm,
+            {"image.apart", fit.residual_mm, limits.most_residual_mm,
              "blocks found in the fixed image lie " + to_text(fit.residual_mm) + " mm from where the tissue went"});
 }
 
@@ -73,8 +73,7 @@ Alignment ImageTerm::pose(const Eigen::Isometry3d& /*start*/, Observer& observer
 }
 
 Eigen::Isometry3d ImageTerm::rigid_motion() const {
-    constexpr std::size_t fewest = 10;
-    if (matches_.matches.size() < fewest)
+    if (matches_.matches.size() < image_pose_options.fewest_blocks)
         throw InvalidInput("only " + std::to_string(matches_.matches.size()) +
                            " blocks of the moving image were found in the fixed one; check that they show the same "
                            "organ, and bring them within the search range of each other");
@@ -84,7 +83,8 @@ Eigen::Isometry3d ImageTerm::rigid_motion() const {
         moving.col(n) = matches_.matches[static_cast<std::size_t>(n)].moving;
         fixed.col(n) = matches_.matches[static_cast<std::size_t>(n)].fixed;
     }
-    if (prior_.share_in_view() < 0.9 && median_distance(moving, fixed) < options_.headers_within_mm)
+    if (prior_.share_in_view() < image_pose_options.whole_view &&
+        median_distance(moving, fixed) < options_.headers_within_mm)
         return Eigen::Isometry3d::Identity();
     return least_trimmed_motion(moving, fixed);
 }
@@ -136,7 +136,6 @@ Contribution ImageTerm::linearise(const RoundPlan& plan, const State& state, Obs
 }
 
 ImageFit ImageTerm::fit(const State& state) {
-    constexpr double near_mm = 15;
     const Eigen::Matrix3Xd& nodes = prepared_.model.mesh.nodes;
     ImageFit fit;
     fit.blocks = static_cast<int>(prepared_.image->blocks.points().cols());
@@ -149,7 +148,7 @@ ImageFit ImageTerm::fit(const State& state) {
         tbb::blocked_range<Eigen::Index>(0, nodes.cols()), Eigen::Index{0},
         [&](const tbb::blocked_range<Eigen::Index>& range, Eigen::Index count) {
             for (Eigen::Index node = range.begin(); node < range.end(); ++node)
-                count += matched.any_within(nodes.col(node), near_mm);
+                count += matched.any_within(nodes.col(node), image_doubt_limits.shown_within_mm);
             return count;
         },
         std::plus<>());

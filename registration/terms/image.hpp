@@ -8,6 +8,27 @@
 
 namespace tissuewarp::registration::detail {
 
+/// How an image places the organ beside ImageOptions::headers_within_mm.
+struct ImagePoseOptions {
+    std::size_t fewest_blocks = 10;  ///< that a motion is fitted to. Chosen by hand; on which data is not recorded
+    /// Share of the organ's surface in view, below which the headers' placement stays: the part in view would turn the
+    /// organ by its deformation. The rule was found on the degraded sag (docs/method.md, 8.1), the number by hand.
+    double whole_view = 0.9;
+};
+inline constexpr ImagePoseOptions image_pose_options{};
+
+/// What an image may show without a doubt. Chosen by hand, but for the agreement; on which data is not recorded.
+struct ImageDoubtLimits {
+    double least_matched = 0.1;     ///< share of the blocks that were found
+    double least_shown = 0.5;       ///< share of the nodes with a match near
+    double shown_within_mm = 15;    ///< a match so near shows a node
+    double most_residual_mm = 1.0;  ///< of the matches, mean, as the scale of the last round
+    /// Of the images where the organ lies (DenseForces::agreement). It was below 0.02 in noise, and 0.29 on the
+    /// degraded head, the lowest of the images of one organ: chosen on these (docs/method.md, 11.5).
+    double least_agreement = 0.1;
+};
+inline constexpr ImageDoubtLimits image_doubt_limits{};
+
 class ImageTerm : public Term {
 public:
     /// `prepared.image` is there. `energy` (mN mm) weighs as much as one standard deviation of a match. Model, options

@@ -32,7 +32,6 @@ std::vector<Match> match_interfaces(const PreparedModel& prepared, const LabelBo
 void leave_out_strays(std::vector<Match>& matches, const Interfaces& interfaces,
                       const std::vector<std::vector<int>>& neighbours, const Eigen::Matrix3Xd& nodes,
                       const Eigen::Matrix3Xd& displacement, const Eigen::Matrix3Xd& normals) {
-    constexpr double steepest = 0.75;  // change of displacement per distance
     std::vector<char> stray(matches.size(), 0);
     tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t i) {
         if (!matches[i].found) return;
@@ -48,7 +47,7 @@ void leave_out_strays(std::vector<Match>& matches, const Interfaces& interfaces,
             distances += (nodes.col(other) - nodes.col(node)).norm();
         }
         if (moves.empty()) return;
-        const double limit = steepest * distances / static_cast<double>(moves.size());
+        const double limit = stray_options.steepest * distances / static_cast<double>(moves.size());
         const double move = normal.dot(displacement.col(node)) + matches[i].distance_mm;
         stray[i] = std::abs(move - percentile(moves, 50)) > limit;
     });

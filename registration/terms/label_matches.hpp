@@ -12,6 +12,14 @@ namespace tissuewarp::registration::detail {
 std::vector<Match> match_interfaces(const PreparedModel& prepared, const LabelBoundaryField& fixed, const State& state,
                                     const Eigen::Matrix3Xd& normals, const RoundPlan& plan, double max_angle_deg);
 
+struct StrayOptions {
+    /// Change of displacement per distance at rest, from which on a match is taken for another fold of the surface.
+    /// Chosen among 0.5 to 1.5 and none on the brain sag with 45 labels and the lung's masks
+    /// (docs/decisions/label_weights.md).
+    double steepest = 0.75;
+};
+inline constexpr StrayOptions stray_options{};
+
 /// Leaves out each match that would part its node from those about it (Interfaces::neighbours): along its normal the
 /// node would lie further on than the median of them, by more than three quarters of their mean distance at rest.
 /// Tissue is hardly strained so within two edges; a search that runs into the next fold of the surface asks for it.

@@ -68,20 +68,20 @@ Contribution LabelTerm::linearise(const RoundPlan& plan, const State& state, Obs
 }
 
 void LabelTerm::judge(const State& /*state*/, UpdateResult& result) {
-    constexpr double least_matched = 0.5, most_growth = 0.1, tissue_resists = 0.4;
-    const double spacing = prepared_.labels.geometry.spacing.maxCoeff();
-    if (2 * last_.matched < last_.candidates)
-        result.doubts.push_back({"labels.unmatched", last_.matched / double(last_.candidates), least_matched,
+    constexpr LabelDoubtLimits limits = label_doubt_limits;
+    const double most_residual = limits.most_residual_voxels * prepared_.labels.geometry.spacing.maxCoeff();
+    if (last_.matched < limits.least_matched * last_.candidates)
+        result.doubts.push_back({"labels.unmatched", last_.matched / double(last_.candidates), limits.least_matched,
                                  "only " + std::to_string(last_.matched) + " of " + std::to_string(last_.candidates) +
                                      " boundary nodes found their boundary in the fixed labels"});
-    if (last_.mean_residual_mm > spacing)
+    if (last_.mean_residual_mm > most_residual)
         result.doubts.push_back(
-            {"labels.apart", last_.mean_residual_mm, spacing,
+            {"labels.apart", last_.mean_residual_mm, most_residual,
              "the surfaces still differ by " + to_text(last_.mean_residual_mm) + " mm on average, more than a voxel"});
     const double growth = labelled_volume(labels_) / labelled_volume(prepared_.labels);
     const double poisson = largest_poisson_ratio(prepared_.model.materials);
-    if (std::abs(growth - 1) > most_growth && poisson > tissue_resists)
-        result.doubts.push_back({"labels.volume_changed", growth, most_growth,
+    if (std::abs(growth - 1) > limits.most_growth && poisson > limits.resisting_poisson)
+        result.doubts.push_back({"labels.volume_changed", growth, limits.most_growth,
                                  "the labelled volume changed by the factor " + to_text(growth) +
                                      ", which tissue of Poisson's ratio " + to_text(poisson) +
                                      " resists; for lungs and other tissue that changes volume take 0.3 or less"});

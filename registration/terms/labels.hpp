@@ -8,6 +8,15 @@
 
 namespace tissuewarp::registration::detail {
 
+/// What labels may show without a doubt. Chosen by hand; on which data is not recorded.
+struct LabelDoubtLimits {
+    double least_matched = 0.5;       ///< share of the boundary nodes that found their boundary
+    double most_residual_voxels = 1;  ///< mean distance of the boundaries after the last round, largest spacing
+    double most_growth = 0.1;         ///< of the labelled volume, relative, either way; the lung's masks have 0.15
+    double resisting_poisson = 0.4;   ///< Poisson's ratio above which tissue resists such a change
+};
+inline constexpr LabelDoubtLimits label_doubt_limits{};
+
 class LabelTerm : public Term {
 public:
     /// Model, labels and options outlive this. Throws InvalidInput where the labels hold none of the model's.

@@ -39,7 +39,7 @@ double median(const Eigen::RowVectorXd& given) {
 }
 
 void doubt(const PointFit& fit, std::vector<Doubt>& doubts) {
-    constexpr double most_outliers = 0.2;
+    constexpr double most_outliers = point_doubt_limits.most_outliers;
     if (fit.outliers > most_outliers * fit.used)
         doubts.push_back({"points.outliers", fit.outliers / double(fit.used), most_outliers,
                           std::to_string(fit.outliers) + " of " + std::to_string(fit.used) +
@@ -68,24 +68,23 @@ PointTerm::PointTerm(const PreparedModel& prepared, const PointPairs& pairs, con
 }
 
 bool PointTerm::show_rotation() const {
-    return moving_.cols() >= 3 && width(moving_) > 3 * deviation_mm_;
+    return moving_.cols() >= 3 && width(moving_) > point_pose_options.least_width_deviations * deviation_mm_;
 }
 
 Alignment PointTerm::pose(const Eigen::Isometry3d& /*start*/, Observer& /*observer*/) {
-    constexpr int passes = 10;
-    constexpr double scale_ratio = 0.6, bending_mm = 10;  // what a rigid motion does not follow
+    constexpr PointPoseOptions rules = point_pose_options;
     Eigen::VectorXd weights = Eigen::VectorXd::Ones(moving_.cols());
     Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
     Eigen::RowVectorXd distances;
     double scale = 0;
-    for (int pass = 0; pass < passes; ++pass) {
+    for (int pass = 0; pass < rules.passes; ++pass) {
         if (show_rotation())
             motion = closest_motion(moving_, fixed_, weights);
         else
             motion.translation() = (fixed_ - moving_) * weights / weights.sum();
         distances = ((motion * moving_) - fixed_).colwise().norm();
-        scale = pass == 0 ? 2 * distances.maxCoeff() : scale_ratio * scale;
-        scale = std::max(scale, bending_mm + final_scale_mm());
+        scale = pass == 0 ? rules.first_of_largest * distances.maxCoeff() : rules.falling * scale;
+        scale = std::max(scale, rules.bending_mm + final_scale_mm());
         for (Eigen::Index n = 0; n < weights.size(); ++n) weights[n] = robust_weight(distances[n], scale);
     }
     return {motion, distances.dot(weights.transpose()) / weights.sum()};
@@ -101,7 +100,7 @@ Eigen::Matrix3Xd PointTerm::residuals(const State& state) const {
 
 Contribution PointTerm::linearise(const RoundPlan& plan, const State& state, Observer& /*observer*/) {
     const Eigen::Matrix3Xd away = residuals(state);
-    if (plan.number == 0) scale_.begin_at(3 * median(away.colwise().norm()));
+    if (plan.number == 0) scale_.begin_at(robust_rounds.first_of_median * median(away.colwise().norm()));
     const double scale = scale_.of(plan, final_scale_mm());
     const double stiffness = energy_ / (deviation_mm_ * deviation_mm_);
     Contribution result;
@@ -113,7 +112,7 @@ Contribution PointTerm::linearise(const RoundPlan& plan, const State& state, Obs
         const double step = std::min(1.0, plan.most_step_mm / std::max(distance, 1e-9));
         pulls.push_back({places_[n], displacement_at(prepared_.model.mesh, state.displacement, places_[n]) + step * e,
                          weight * stiffness * Eigen::Matrix3d::Identity()});
-        result.held_back += weight > 0.5 && distance > plan.most_step_mm;
+        result.held_back += weight > robust_rounds.held_back_weight && distance > plan.most_step_mm;
         result.mean_residual_mm += weight * distance;
         weights += weight;
     }

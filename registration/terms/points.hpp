@@ -11,6 +11,22 @@
 
 namespace tissuewarp::registration::detail {
 
+/// How pairs of points place the organ. Chosen by hand; on which data is not recorded.
+struct PointPoseOptions {
+    int passes = 10;                    ///< of the weighted fit: the scale has come down by then
+    double falling = 0.6;               ///< the robust scale of a pass over that of the pass before
+    double first_of_largest = 2;        ///< the first scale over the largest distance: nothing is let go at first
+    double bending_mm = 10;             ///< added to the last scale: what a rigid motion does not follow
+    double least_width_deviations = 3;  ///< width of the pairs from which they show a turn, in their deviations
+};
+inline constexpr PointPoseOptions point_pose_options{};
+
+/// What pairs of points may show without a doubt. Chosen by hand; on which data is not recorded.
+struct PointDoubtLimits {
+    double most_outliers = 0.2;  ///< share of the pairs beyond the scale of the last round
+};
+inline constexpr PointDoubtLimits point_doubt_limits{};
+
 class PointTerm : public Term {
 public:
     /// `energy` is the strain energy (mN mm) that weighs as much as one standard deviation. Throws InvalidInput for

@@ -11,10 +11,10 @@ namespace tissuewarp::registration::detail {
 
 namespace {
 
-constexpr double least_deviation_mm = 0.3;  // the model's own surface is no better
+constexpr double least_deviation_mm = surface_pull_options.least_deviation_mm;
 
 void doubt(const SurfaceFit& fit, double deviation_mm, std::vector<Doubt>& doubts) {
-    constexpr double least_inliers = 0.5, most_residual = 1.4, most_rival_support = 0.95, least_coverage = 0.25;
+    const auto& [least_inliers, most_residual, most_rival_support, least_coverage] = surface_doubt_limits;
     const double residual_limit = most_residual * std::max(deviation_mm, least_deviation_mm);
     if (fit.inlier_share < least_inliers)
         doubts.push_back({"surface.outliers", fit.inlier_share, least_inliers,
@@ -93,7 +93,8 @@ Pull SurfaceTerm::pull_of(const Match& match, double area, double weight, const 
 }
 
 Contribution SurfaceTerm::linearise(const RoundPlan& plan, const State& state, Observer& /*observer*/) {
-    const double reach = std::max(4 * final_scale_mm(), 3 * plan.range_mm);
+    const double reach =
+        std::max(robust_rounds.reach_of_scale * final_scale_mm(), robust_rounds.reach_of_range * plan.range_mm);
     const std::vector<Match> found = matches(state, reach);
     if (plan.number == 0) {
         std::vector<double> distances;
@@ -102,9 +103,10 @@ Contribution SurfaceTerm::linearise(const RoundPlan& plan, const State& state, O
         if (distances.empty())
             throw InvalidInput("no point of the intraoperative surface lies within " + to_text(reach) +
                                " mm of the model; check the frame and the unit of the points");
-        const auto high = distances.begin() + static_cast<std::ptrdiff_t>(double(distances.size() - 1) * 0.9);
+        const auto high = distances.begin() +
+                          static_cast<std::ptrdiff_t>(double(distances.size() - 1) * robust_rounds.first_percentile);
         std::nth_element(distances.begin(), high, distances.end());
-        scale_.begin_at(2 * *high);
+        scale_.begin_at(robust_rounds.first_of_percentile * *high);
     }
     const double scale = scale_.of(plan, final_scale_mm());
     Contribution result;
@@ -115,7 +117,7 @@ Contribution SurfaceTerm::linearise(const RoundPlan& plan, const State& state, O
         if (!match.found) continue;
         const double weight = robust_weight(match.distance_mm, scale), area = data_.areas[static_cast<Eigen::Index>(n)];
         pulls.push_back(pull_of(match, area, weight, state, plan.most_step_mm));
-        result.held_back += weight > 0.5 && std::abs(match.distance_mm) > plan.most_step_mm;
+        result.held_back += weight > robust_rounds.held_back_weight && std::abs(match.distance_mm) > plan.most_step_mm;
         result.mean_residual_mm += area * weight * std::abs(match.distance_mm);
         weights += area * weight;
     }
@@ -131,7 +133,7 @@ SurfaceFit SurfaceTerm::fit(const State& state) const {
     SurfaceFit fit;
     double area = 0, squared = 0;
     int inliers = 0;
-    const std::vector<Match> found = matches(state, 4 * limit);
+    const std::vector<Match> found = matches(state, robust_rounds.reach_of_scale * limit);
     for (std::size_t n = 0; n < found.size(); ++n) {
         if (!found[n].found || std::abs(found[n].distance_mm) > limit) continue;
         ++inliers;

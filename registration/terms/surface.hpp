@@ -13,6 +13,25 @@
 
 namespace tissuewarp::registration::detail {
 
+/// How points of a surface pull beside SurfaceOptions. Chosen by hand; on which data is not recorded.
+struct SurfacePullOptions {
+    double least_deviation_mm = 0.3;  ///< that points are taken for: the model's own surface is no better
+};
+inline constexpr SurfacePullOptions surface_pull_options{};
+
+/// What points of a surface may show without a doubt. Chosen by hand, but for the coverage; on which data is not
+/// recorded.
+struct SurfaceDoubtLimits {
+    double least_inliers = 0.5;        ///< share of the points within the scale of the last round of the surface
+    double most_residual = 1.4;        ///< root mean square along the normals over the stated deviation
+    double most_rival_support = 0.95;  ///< of what the best pose explains, by one 8 mm or more away
+    /// Share of the organ's surface that the points show. On less of a smooth organ another pose may fit as well.
+    /// Chosen on draws 441 to 1160 of the liver phantom's surface, where 0.18 had missed two failures; reported on
+    /// others from 1281 on (docs/results.md).
+    double least_coverage = 0.25;
+};
+inline constexpr SurfaceDoubtLimits surface_doubt_limits{};
+
 class SurfaceTerm : public Term {
 public:
     /// `energy` is the strain energy (mN mm) that weighs as much as one standard deviation. Throws InvalidInput for

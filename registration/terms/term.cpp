@@ -33,8 +33,7 @@ Alignment Term::pose(const Eigen::Isometry3d& start, Observer& /*observer*/) {
 }
 
 double FallingScale::of(const RoundPlan& plan, double final_mm) const {
-    constexpr double ratio = 0.6;  // from round to round
-    return plan.last ? final_mm : std::max(final_mm, first_mm_ * std::pow(ratio, plan.number));
+    return plan.last ? final_mm : std::max(final_mm, first_mm_ * std::pow(robust_rounds.falling, plan.number));
 }
 
 }  // namespace tissuewarp::registration::detail

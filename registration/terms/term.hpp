@@ -81,6 +81,19 @@ public:
     virtual void judge(const State& /*state*/, UpdateResult& /*result*/) {}
 };
 
+/// How points of a surface, pairs and points along vessels are matched and weighed from round to round. Chosen by hand;
+/// on which data is not recorded.
+struct RobustRounds {
+    double falling = 0.6;            ///< the scale of a round over that of the round before, down to the final one
+    double first_percentile = 0.9;   ///< of a surface's first distances, as a share; robust against fewer outliers
+    double first_of_percentile = 2;  ///< the first scale of a surface over that distance
+    double first_of_median = 3;      ///< the first scale of pairs and curves over their median distance
+    double reach_of_scale = 4;       ///< matches are sought so many final scales far, where a weight is 1/289 …
+    double reach_of_range = 3;       ///< … and as many search ranges of the round
+    double held_back_weight = 0.5;   ///< a match counts as held back where it weighs more
+};
+inline constexpr RobustRounds robust_rounds{};
+
 /// Points after their robust scale: from a wide one in the first round, falling by 0.6 a round to the final one.
 class FallingScale {
 public:

@@ -11,14 +11,13 @@ ViewPrior::ViewPrior(const PreparedModel& prepared, const imaging::Volume& seen,
     : prepared_(prepared), options_(options), view_(seen), energy_(energy) {}
 
 std::vector<char> ViewPrior::surface_in_view(const Eigen::Isometry3d& placement) const {
-    constexpr double margin_mm = 10;  // tissue may have come from outside of what is shown now
     const std::vector<InterfaceNode>& interfaces = prepared_.interfaces.nodes();
     std::vector<char> result(static_cast<std::size_t>(prepared_.model.mesh.node_count()));
     tbb::parallel_for(std::size_t{0}, interfaces.size(), [&](std::size_t n) {
         const int node = interfaces[n].node;
         if (interfaces[n].outer != 0) return;
         const Eigen::Vector3d place = placement * Eigen::Vector3d(prepared_.model.mesh.nodes.col(node));
-        result[static_cast<std::size_t>(node)] = view_.distance(place) < margin_mm;
+        result[static_cast<std::size_t>(node)] = view_.distance(place) < view_prior_options.margin_mm;
     });
     return result;
 }

@@ -12,6 +12,12 @@
 
 namespace tissuewarp::registration::detail {
 
+struct ViewPriorOptions {
+    /// About what is shown: tissue may have come from outside of it. Chosen by hand; on which data is not recorded.
+    double margin_mm = 10;
+};
+inline constexpr ViewPriorOptions view_prior_options{};
+
 class ViewPrior {
 public:
     /// `seen`: where the image shows something (mask, fixed frame); `energy` is the strain energy (mN mm) that weighs

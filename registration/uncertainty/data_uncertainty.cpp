@@ -22,10 +22,6 @@ namespace {
 
 using Covariances = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 
-/// Of random phantoms (docs/accuracy-time.md, "Does the interval hold?"). The noise of a datum is far less than its
-/// pull admits, since neighbours share what they say.
-constexpr double noise_share = 0.05, least_energy = 0.2;
-
 /// xx, yy, zz, xy, xz, yz of every node's displacement over the samples (3N × k of mean 0).
 Covariances covariances_of(const Eigen::MatrixXd& samples) {
     Covariances result(6, samples.rows() / 3);
@@ -56,7 +52,7 @@ double load_size(const PreparedModel& prepared, double energy, const Eigen::Matr
                  const Eigen::MatrixXd& visible) {
     const auto stiffness = tled::tangent_stiffness(prepared.rest, Eigen::Matrix3Xd::Zero(3, found.cols()));
     const double drawn = 0.5 * visible.cwiseProduct(stiffness * visible).sum() / double(visible.cols());
-    return (tled::elastic_energy(prepared.rest, found) + least_energy * energy) / drawn;
+    return (tled::elastic_energy(prepared.rest, found) + error_model.least_energy * energy) / drawn;
 }
 
 /// What part of the variance of bending under the loads drawn the data leave, at each node: of all motion left, or with
@@ -95,7 +91,7 @@ DataUncertainty data_uncertainty(const PreparedModel& prepared, const Posteriors
     const Eigen::MatrixXd noise = posteriors.seen.inverse(noise_forces(springs, loads.rows(), samples, seed + 1));
     DataUncertainty result;
     result.covariance = load_size(prepared, springs.energy, displacement, free - hidden) * covariances_of(hidden) +
-                        noise_share * covariances_of(noise);
+                        error_model.noise_share * covariances_of(noise);
     result.unexplained = unexplained_share(prepared.model.mesh.nodes, hidden, free);
     if (posteriors.parts_alone) result.expected = expected_error(prepared.model.mesh.nodes, posteriors.seen);
     return result;

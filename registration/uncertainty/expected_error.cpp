@@ -10,7 +10,7 @@ namespace tissuewarp::registration {
 
 namespace {
 
-constexpr int places = 16;
+constexpr int places = detail::expected_error_options.places;
 
 std::vector<int> spread_nodes(const Eigen::Matrix3Xd& nodes) {
     std::vector<int> chosen;
@@ -52,10 +52,8 @@ ExpectedError expected_error(const PreparedModel& prepared, const UpdateResult& 
                                   detail::Posterior(prepared, detail::with_data(result.pulls)));
 }
 
-/// Tissue 5 mm off is a registration that failed. The expected error is a root mean square over patients like this one:
-/// one in twenty-five is 1.7 times as far off (docs/results.md).
 std::optional<Doubt> doubt_of_data(const ExpectedError& expected) {
-    constexpr double most_mm = 5.0 / 1.7;
+    constexpr double most_mm = data_doubt_limits.failed_mm / data_doubt_limits.error_of_expected;
     if (expected.mean_mm <= most_mm) return std::nullopt;
     char text[256];
     std::snprintf(text, sizeof text,

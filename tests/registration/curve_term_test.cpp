@@ -6,6 +6,7 @@
 #include "registration/field.hpp"
 #include "registration/pose/curve_pose.hpp"
 #include "registration/uncertainty.hpp"
+#include "registration/update.hpp"
 #include "tests/registration/shapes.hpp"
 #include "tests/support/label_shapes.hpp"
 #include "tests/support/numbers.hpp"

@@ -52,14 +52,21 @@ public:
 /// Template and image outlive the engine.
 std::unique_ptr<BlockEngine> make_cpu_block_engine(const TemplateImages& moving, const SeenImage& fixed);
 
-constexpr int first_look_stride = 3;  ///< every third row of a block, over the whole lattice
-
-constexpr std::size_t most_candidates = 27;    ///< of a first look, to be compared by all rows
-constexpr std::size_t candidates_one_of = 20;  ///< places: all candidates are among these, the lowest
+/// How a block is looked for. Chosen by hand; on which data is not recorded. Shaders have the same numbers.
+struct BlockLookOptions {
+    int first_stride = 3;                ///< every third row of a block, over the whole lattice
+    std::size_t most_candidates = 27;    ///< of a first look, to be compared by all rows
+    std::size_t candidates_one_of = 20;  ///< places: all candidates are among these, the lowest
+    int walk_steps = 8;                  ///< downhill at most, one voxel along each axis at a time
+};
+inline constexpr BlockLookOptions block_look_options{};
+constexpr int first_look_stride = block_look_options.first_stride;
+constexpr std::size_t most_candidates = block_look_options.most_candidates,
+                      candidates_one_of = block_look_options.candidates_one_of;
 
 /// The places that a first look puts lowest, one of those that adjoin, the lowest first; entries of the lattice.
 std::vector<std::size_t> candidates(const CostLattice& first);
 
-constexpr int most_walk_steps = 8;  ///< downhill, one voxel along each axis at a time
+constexpr int most_walk_steps = block_look_options.walk_steps;
 
 }  // namespace tissuewarp::registration::detail

@@ -26,9 +26,9 @@ using imaging::Volume;
 
 namespace {
 
-constexpr int least_searched = 1000;  // points on a coarse grid: from there on, every second, fourth … is left out
-constexpr double independent_share = 0.1;  // of a block's voxels: the others repeat them (docs/method.md)
-constexpr double least_deviation = 0.05;   // voxels: what interpolation leaves of the best match
+constexpr detail::BlockInformationRules rules;
+constexpr int least_searched = rules.least_searched;
+constexpr double independent_share = rules.independent_share, least_deviation = rules.least_deviation;
 
 Voxel nearest_voxel(const imaging::Geometry& grid, const Eigen::Vector3d& point) {
     const Eigen::Vector3d index = grid.index(point);
@@ -100,11 +100,11 @@ double back_error(const Minimum& back, const Voxel& block, const Minimum& forwar
 /// edge too. What interpolation leaves is added to the covariance.
 Eigen::Matrix3d information(const Minimum& minimum, const imaging::Geometry& grid, int radius) {
     const double independent = independent_share * std::pow(2 * radius + 1, 3), h = grid.spacing[0];
-    const double chance = 1.5 * std::sqrt(2 * independent);
+    const double chance = rules.chance * std::sqrt(2 * independent);
     const Eigen::Matrix3d raw = independent / (2 * std::max(minimum.cost, 1e-6)) * minimum.fit.hessian;
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
     axes.computeDirect(raw);
-    const double leakage = 0.05 * axes.eigenvalues()[2];
+    const double leakage = rules.leakage * axes.eigenvalues()[2];
     const Eigen::Array3d strength = (axes.eigenvalues().array() - chance - leakage).max(0.0);
     const Eigen::Vector3d bounded = strength / (1 + strength * least_deviation * least_deviation) / (h * h);
     const Eigen::Matrix3d turn = grid.direction * axes.eigenvectors();
@@ -326,7 +326,7 @@ private:
         });
         const auto vouched = [&](const std::vector<int>& others) {
             return std::any_of(others.begin(), others.end(), [&](int other) {
-                return motion.weights[static_cast<std::size_t>(other)].trace() > 0.1;
+                return motion.weights[static_cast<std::size_t>(other)].trace() > rules.least_voucher;
             });
         };
         const std::vector<detail::LocalMotion> found =

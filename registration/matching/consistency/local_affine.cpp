@@ -134,7 +134,7 @@ private:
 
     /// Concentration steps until no lane uses others than before, where further ones change nothing.
     void concentrate() {
-        constexpr int concentration_steps = 4;
+        constexpr int concentration_steps = LocalAffineOptions().concentration_steps;
         solve();
         for (int step = 0; step < concentration_steps; ++step) {
             find_residuals();
@@ -180,7 +180,9 @@ private:
     void stiffen() {
         const Vec trace = hn::Add(hn::Add(load(matrix_[0][0]), load(matrix_[1][1])), load(matrix_[2][2]));
         for (int i = 0; i < unknowns; ++i) {
-            const Vec more = hn::MulAdd(trace, of((i < 3 ? 1e-6 : 0.02) / 3), of(1e-12));
+            const Vec more = hn::MulAdd(
+                trace, of((i < 3 ? LocalAffineOptions().shift_stiffness : LocalAffineOptions().stretch_stiffness) / 3),
+                of(1e-12));
             store(hn::Add(load(matrix_[i][i]), more), matrix_[i][i]);
         }
     }

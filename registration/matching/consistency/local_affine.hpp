@@ -9,6 +9,13 @@
 
 namespace tissuewarp::registration::detail {
 
+/// Chosen by hand; on which data is not recorded.
+struct LocalAffineOptions {
+    int concentration_steps = 4;                              ///< at most, of least trimmed squares
+    double shift_stiffness = 1e-6, stretch_stiffness = 0.02;  ///< of the weights' sum: few or collinear neighbours do
+                                                              ///< not extrapolate
+};
+
 /// Displacements at points, each known along some directions only.
 struct ScatteredMotion {
     Eigen::Matrix3Xd points;               ///< LPS mm

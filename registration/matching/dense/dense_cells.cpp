@@ -41,7 +41,7 @@ CellSums sums_of(const Spread& s) {
 /// Spreads each cell's sums over a window of one cell's deviation, (1, 4, 6, 4, 1)/16 along each axis; their total
 /// stays, but for what leaves the grid.
 const std::vector<Spread>& windowed(const std::vector<CellSums>& sums, const CellGrid& cells, WindowMemory& memory) {
-    constexpr std::array<double, 3> weights{6.0 / 16, 4.0 / 16, 1.0 / 16};
+    constexpr std::array<double, 3> weights = Rules::window;
     std::vector<Spread>&from = memory.from, &to = memory.to;
     from.resize(sums.size());
     to.resize(sums.size());

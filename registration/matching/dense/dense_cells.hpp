@@ -4,8 +4,13 @@
 #include "registration/matching/dense/dense_force.hpp"
 #include "registration/matching/dense/descriptor_products.hpp"
 
+#include <array>
+
 namespace tissuewarp::registration::detail {
 
+/// What a dense force says (docs/method.md, 11). Chosen together with the grids of ImageOptions::dense_coarsening and
+/// the window among some 35 settings on the brain shift, both brain sags and the lung; the degraded brain shift and the
+/// liver were not looked at (docs/results.md, "A bare volume of the operation").
 struct DenseForceRules {
     static constexpr double independent_share = 0.2;  ///< of the voxels: descriptors and what they miss agree with
                                                       ///< those beside them
@@ -14,12 +19,14 @@ struct DenseForceRules {
     static constexpr double leakage = 0.05;           ///< of the strongest axis: what a plane edge seems to show along
                                                       ///< itself
     static constexpr double most_shift = 1.5;         ///< voxels
+    /// Of a cell and those one and two away along each axis: a deviation of one cell.
+    static constexpr std::array<double, 3> window{6.0 / 16, 4.0 / 16, 1.0 / 16};
 };
 
 /// Cells of a grid: the voxels that have neighbours on all sides, by cubes.
 class CellGrid {
 public:
-    static constexpr int side = 4;  ///< voxels
+    static constexpr int side = 4;  ///< voxels; chosen with DenseForceRules
 
     explicit CellGrid(const imaging::Geometry& grid);
 

@@ -5,7 +5,7 @@
 
 namespace tissuewarp::registration::detail {
 
-constexpr int octahedron_radius = 2;  ///< voxels from the centre to the six neighbours
+constexpr int octahedron_radius = 2;  ///< voxels from the centre to the six neighbours. By hand; data not recorded
 
 /// Where a channel's patch distance is kept: in that of a pair, at a voxel `shift` away.
 struct Channel {

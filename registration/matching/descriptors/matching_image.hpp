@@ -25,9 +25,13 @@ struct MatchingImage {
 MatchingImage matching_image(const imaging::Volume& image, const imaging::Volume& seen, const imaging::Geometry& grid,
                              const SearchRegion& region);
 
-/// Standard deviation (mm) of the Gaussian that smooths an image for a working grid: 0.4 of its spacing.
+struct WorkingImageOptions {
+    double smoothing_spacings = 0.4;  ///< standard deviation. Chosen by hand; on which data is not recorded
+};
+
+/// Standard deviation (mm) of the Gaussian that smooths an image for a working grid.
 constexpr double working_deviation(double spacing_mm) {
-    return 0.4 * spacing_mm;
+    return WorkingImageOptions().smoothing_spacings * spacing_mm;
 }
 
 /// An image so smoothed.

@@ -49,7 +49,8 @@ double mean_squared_difference(const GridSamples& samples, const imaging::Geomet
 Descriptors self_similarity_context(const GridSamples& samples, const imaging::Geometry& grid,
                                     const SearchRegion& region) {
     const double mean = std::max(mean_squared_difference(samples, grid, region), 1e-30);
-    const VarianceBounds bounds{static_cast<float>(1e-3 * mean), static_cast<float>(1e3 * mean)};
+    const VarianceBounds bounds{static_cast<float>(SelfSimilarityOptions().least_variance * mean),
+                                static_cast<float>(SelfSimilarityOptions().most_variance * mean)};
     const auto voxels = static_cast<std::size_t>(grid.voxel_count());
     Descriptors result{std::make_unique_for_overwrite<std::uint8_t[]>(voxels * descriptor_channels),
                        std::vector<std::uint8_t>(voxels)};

@@ -10,8 +10,13 @@ constexpr int descriptor_channels = 12;
 /// Voxels around one that its descriptor reads.
 constexpr int descriptor_extent = 8;
 
-/// And those that must be seen for it to count: the rest weighs little.
+/// And those that must be seen for it to count: the rest weighs little. Chosen by hand; on which data is not recorded.
 constexpr int descriptor_reach = 3;
+
+/// Bounds of V, over its mean where the image is seen. Chosen by hand; on which data is not recorded.
+struct SelfSimilarityOptions {
+    double least_variance = 1e-3, most_variance = 1e3;
+};
 
 struct Descriptors {
     std::unique_ptr<std::uint8_t[]>

@@ -18,7 +18,7 @@ using imaging::Volume;
 
 namespace {
 
-constexpr double least_score = 0.05;  // flat tissue lies below
+constexpr FeaturePointRules rules;
 
 /// The six products of a symmetric tensor, smoothed.
 using TensorField = std::array<Volume, 6>;
@@ -77,7 +77,7 @@ std::vector<std::pair<double, std::int64_t>> ranked(const TensorField& field, co
         const Eigen::Array3d strength = axes.eigenvalues().array().max(0.0);
         scored[n] = {(strength / (strength + half)).sum(), voxels[n]};
     });
-    std::erase_if(scored, [](const auto& entry) { return entry.first < least_score; });
+    std::erase_if(scored, [](const auto& entry) { return entry.first < rules.least_score; });
     std::sort(scored.begin(), scored.end(), [](const auto& a, const auto& b) {
         return a.first != b.first ? a.first > b.first : a.second < b.second;
     });
@@ -127,7 +127,7 @@ FeaturePoints select_feature_points(const Volume& image, const Volume& mask, con
 
     // Balls about points taken at random until none fits fill 0.38 of space (random sequential adsorption).
     const double volume = double(near.size()) * grid.voxel_volume();
-    SpreadPoints spread(std::cbrt(6 / EIGEN_PI * 0.38 * volume / options.count));
+    SpreadPoints spread(std::cbrt(6 / EIGEN_PI * rules.packing * volume / options.count));
     FeaturePoints result{Eigen::Matrix3Xd(3, options.count), {}};
     for (const auto& [score, n] : ranked(field, near)) {
         if (static_cast<int>(result.structure.size()) == options.count) break;

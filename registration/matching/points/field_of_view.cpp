@@ -17,7 +17,7 @@ namespace {
 /// Directions spread evenly over the sphere (Fibonacci lattice), then the axes of a grid both ways, where fields of
 /// view are mostly cut.
 Eigen::Matrix3Xd directions_for(const Eigen::Matrix3d& axes) {
-    constexpr int spread = 300;
+    constexpr int spread = FieldOfViewOptions().directions;
     const double golden_angle = EIGEN_PI * (3 - std::sqrt(5.0));
     Eigen::Matrix3Xd directions(3, spread + 6);
     for (int n = 0; n < spread; ++n) {

@@ -7,6 +7,10 @@
 
 namespace tissuewarp::registration::detail {
 
+struct FieldOfViewOptions {
+    int directions = 300;  ///< of half-spaces, beside a grid's axes. Chosen by hand; on which data is not recorded
+};
+
 /// The convex hull of what an image shows (its mask, uint8) from outside: the half-spaces of a few hundred directions.
 /// Air beside the tissue lies in it when there is tissue around; padding beyond a plane does not.
 class FieldOfView {

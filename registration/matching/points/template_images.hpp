@@ -5,7 +5,7 @@
 
 namespace tissuewarp::registration::detail {
 
-constexpr int refinement_reach = 3;  ///< voxels of the level, about the neighbours' story
+constexpr int refinement_reach = 3;  ///< voxels of the level, about the neighbours' story. By hand; data not recorded
 constexpr int back_reach = 2;        ///< voxels about the block, of the way back: confidence ends at an error of two
 
 /// Voxels about a point that a search of a given reach may look at: it walks on
