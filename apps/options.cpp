@@ -286,8 +286,14 @@ struct Parser {
         verb.path("-o,--output", o.output, "Folder for measurements and page; a study interrupted there goes on")
             ->type_name("FOLDER");
         verb.list("--problems", o.problems, "NAME",
-                  "Of cube, brain, brainshift, liver, phantom:SEED; coverage and dial: phantom:FIRST-LAST")
+                  "Of cube, brain, brainshift, liver, phantom:SEED; dial: phantom:FIRST-LAST; coverage: that, "
+                  "bent:FIRST-LAST or organ:FIRST-LAST")
             ->delimiter(',');
+        verb.list("--evidence", o.evidence, "KIND",
+                  "What coverage registers to, of labels, surface, surface-and-points, points, curves, image, "
+                  "degraded-image, partial-image, other-contrast; otherwise all of them")
+            ->delimiter(',');
+        verb.path("--organs", o.organs, "Label map whose organs organ:FIRST-LAST takes");
         verb.path("--data", o.data, "Folder that holds phantom-liver, for the liver")->type_name("FOLDER");
         verb.number("--most-elements", o.most_elements, "COUNT", 1000, 2000000, "Leave larger meshes out");
         verb.number("--repeats", o.repeats, "COUNT", 0, 1000, "Runs of each point; 0: 5, with --quick 2");

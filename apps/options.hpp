@@ -148,6 +148,8 @@ struct StudyOptions {
     std::string name;                    ///< of the study
     std::filesystem::path output, data;  ///< folder of results, which an interrupted study goes on in; shared phantoms
     std::vector<std::string> problems;  ///< "cube", "brain", "brainshift", "liver", "phantom:SEED"; empty: of the study
+    std::vector<std::string> evidence;  ///< what coverage registers to; empty: every kind
+    std::filesystem::path organs;       ///< label map whose organs "organ:SEED" takes
     int most_elements = 500000;         ///< of a mesh
     int repeats = 0;                    ///< 0: of the study
     bool quick = false;

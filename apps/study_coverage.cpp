@@ -5,16 +5,55 @@
 #include "apps/update_device.hpp"
 #include "core/atomic_file.hpp"
 #include "core/errors.hpp"
+#include "imaging/image_io.hpp"
 #include "study/coverage_summary.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <string>
 #include <tuple>
+#include <utility>
+#include <vector>
 
 namespace tissuewarp::apps {
 
 namespace {
+
+/// "bent:7-9" → Bent and "phantom:7-9", which phantom_seeds() reads.
+std::pair<study::Family, std::vector<std::string>> family_of(std::vector<std::string> problems) {
+    using study::Family;
+    for (const auto& [name, family] : {std::pair{"bent:", Family::Bent}, std::pair{"organ:", Family::Labelled}})
+        if (problems.size() == 1 && problems.front().starts_with(name)) {
+            problems.front().replace(0, std::string(name).size(), "phantom:");
+            return {family, std::move(problems)};
+        }
+    return {Family::Solved, std::move(problems)};
+}
+
+study::Evidence evidence_of(const std::string& name) {
+    std::vector<std::string> names;
+    for (const study::Evidence each : study::all_evidence) {
+        if (name == name_of(each)) return each;
+        names.emplace_back(name_of(each));
+    }
+    throw InvalidInput(fmt::format("--evidence '{}' is no kind of data; there are: {}", name, fmt::join(names, ", ")));
+}
+
+study::CoverageOptions plan_of(const StudyOptions& options) {
+    study::CoverageOptions plan;
+    plan.update = on_device(options.device);
+    const auto [family, problems] = family_of(options.problems);
+    plan.phantom.family = family;
+    std::tie(plan.first_seed, plan.last_seed) = phantom_seeds(problems, {plan.first_seed, plan.last_seed});
+    if (options.quick) plan.last_seed = std::min(plan.last_seed, plan.first_seed + 1);
+    if (!options.evidence.empty()) plan.evidence.clear();
+    for (const std::string& name : options.evidence) plan.evidence.push_back(evidence_of(name));
+    if (family != study::Family::Labelled) return plan;
+    if (options.organs.empty()) throw InvalidInput("give --organs, the label map whose organs are bent");
+    plan.phantom.organs = imaging::read_labels(options.organs);
+    return plan;
+}
 
 std::vector<study::CoverageRow> measured(const StudyOptions& options, const study::CoverageOptions& plan,
                                          ProgressLine& progress) {
@@ -30,10 +69,7 @@ std::vector<study::CoverageRow> measured(const StudyOptions& options, const stud
 
 void run_coverage_study(const StudyOptions& options) {
     if (options.output.empty()) throw InvalidInput("give --output, the folder that keeps each phantom's measurements");
-    study::CoverageOptions plan;
-    plan.update = on_device(options.device);
-    std::tie(plan.first_seed, plan.last_seed) = phantom_seeds(options.problems, {plan.first_seed, plan.last_seed});
-    if (options.quick) plan.last_seed = std::min(plan.last_seed, plan.first_seed + 1);
+    const study::CoverageOptions plan = plan_of(options);
     ProgressLine progress(options.common.quiet);
     progress.begin("registering phantoms", 0.0, 1.0);
     const auto coverage = study::coverage_of(measured(options, plan, progress));

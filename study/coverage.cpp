@@ -15,25 +15,85 @@ namespace {
 namespace fs = std::filesystem;
 using registration::PreparedModel;
 
-registration::Intraoperative seen_of(const Phantom& phantom, Evidence evidence) {
-    registration::Intraoperative seen;
-    if (evidence == Evidence::Labels) seen.labels = phantom.fixed_labels;
-    if (evidence == Evidence::Surface || evidence == Evidence::SurfaceAndPoints) seen.surface = phantom.surface;
-    if (evidence == Evidence::Points || evidence == Evidence::SurfaceAndPoints) seen.points = phantom.points;
-    return seen;
+bool is_image(Evidence evidence) {
+    return evidence >= Evidence::Image;
 }
 
-/// As `tissuewarp register` would, which knows nothing of the tissue.
-PreparedModel prepared_for(const Phantom& phantom, bool labels, Observer& observer) {
-    registration::PrepareOptions options;
-    options.meshing.edge_length = labels ? registration::suggested_edge_length(phantom.moving_labels)
-                                         : registration::suggested_edge_length_without_labels(phantom.moving_labels);
-    return registration::prepare(phantom.moving_labels, options, observer);
-}
+/// A phantom, its images once they are needed, and models made of it.
+class Patient {
+public:
+    explicit Patient(const Phantom& phantom) : phantom_(phantom) {}
 
-std::vector<CoverageRow> rows_of(const Phantom& phantom, Evidence evidence, const PreparedModel& prepared,
+    registration::Intraoperative seen(Evidence evidence) {
+        registration::Intraoperative seen;
+        switch (evidence) {
+            case Evidence::Labels:
+                seen.labels = phantom_.fixed_labels;
+                break;
+            case Evidence::Surface:
+                seen.surface = phantom_.surface;
+                break;
+            case Evidence::Points:
+                seen.points = phantom_.points;
+                break;
+            case Evidence::SurfaceAndPoints:
+                seen.surface = phantom_.surface;
+                seen.points = phantom_.points;
+                break;
+            case Evidence::Curves:
+                seen.curves = phantom_.curves;
+                break;
+            case Evidence::Image:
+                seen.image = images().fixed;
+                break;
+            case Evidence::DegradedImage:
+                seen.image = images().degraded;
+                break;
+            case Evidence::PartialImage:
+                seen.image = images().partial;
+                break;
+            case Evidence::OtherContrast:
+                seen.image = images().other_contrast;
+                break;
+        }
+        return seen;
+    }
+
+    /// As `tissuewarp register` would, which knows nothing of the tissue.
+    const PreparedModel& prepared(Evidence evidence, Observer& observer) {
+        std::optional<PreparedModel>& model = evidence == Evidence::Labels ? for_labels_ : for_others_;
+        if (!model) {
+            registration::PrepareOptions options;
+            options.meshing.edge_length =
+                evidence == Evidence::Labels
+                    ? registration::suggested_edge_length(phantom_.moving_labels)
+                    : registration::suggested_edge_length_without_labels(phantom_.moving_labels);
+            model = registration::prepare(phantom_.moving_labels, options, observer);
+        }
+        if (is_image(evidence) && !model->image) registration::prepare_image(*model, images().moving, {}, observer);
+        return *model;
+    }
+
+    /// Of a partial image: whether it shows where the target is. Of everything else yes.
+    bool in_view(Evidence evidence, Eigen::Index target) {
+        return evidence != Evidence::PartialImage || images().view.holds(phantom_.targets.fixed.col(target));
+    }
+
+private:
+    const PhantomImages& images() {
+        if (!images_) images_ = phantom_.images();
+        return *images_;
+    }
+
+    const Phantom& phantom_;
+    std::optional<PhantomImages> images_;
+    std::optional<PreparedModel> for_labels_, for_others_;
+};
+
+std::vector<CoverageRow> rows_of(const Phantom& phantom, Patient& patient, Evidence evidence,
                                  const CoverageOptions& options, Observer& observer) {
-    const auto result = registration::update(prepared, seen_of(phantom, evidence), options.update, observer);
+    const PreparedModel& prepared = patient.prepared(evidence, observer);
+    const auto result = registration::update(prepared, patient.seen(evidence), options.update, observer);
     const registration::Uncertainty uncertainty =
         registration::uncertainty(prepared, result, options.uncertainty, observer);
     const auto estimates = uncertainty.at(phantom.targets.moving);
@@ -50,7 +110,7 @@ std::vector<CoverageRow> rows_of(const Phantom& phantom, Evidence evidence, cons
         if (!estimates[k] || !place) continue;  // in the organ, out of its mesh
         const Eigen::Vector3d u = meshing::interpolate(prepared.model.mesh, nodal, *place);
         rows.push_back({phantom.seed, evidence, static_cast<int>(k), X + u - is.col(column), static_cast<int>(doubts),
-                        u.norm(), *estimates[k]});
+                        u.norm(), patient.in_view(evidence, column), *estimates[k]});
     }
     return rows;
 }
@@ -92,19 +152,17 @@ private:
 }  // namespace
 
 const char* name_of(Evidence evidence) {
-    constexpr std::array names{"labels", "surface", "surface-and-points", "points"};
+    constexpr std::array names{"labels", "surface",        "surface-and-points", "points",        "curves",
+                               "image",  "degraded-image", "partial-image",      "other-contrast"};
     return names[static_cast<std::size_t>(evidence)];
 }
 
 std::vector<CoverageRow> measured_coverage(const Phantom& phantom, const CoverageOptions& options, Observer& observer) {
     std::vector<CoverageRow> rows;
-    std::optional<PreparedModel> for_labels, for_points;
+    Patient patient(phantom);
     for (const Evidence evidence : options.evidence) {
-        const bool labels = evidence == Evidence::Labels;
-        std::optional<PreparedModel>& prepared = labels ? for_labels : for_points;
         try {
-            if (!prepared) prepared = prepared_for(phantom, labels, observer);
-            const auto here = rows_of(phantom, evidence, *prepared, options, observer);
+            const auto here = rows_of(phantom, patient, evidence, options, observer);
             rows.insert(rows.end(), here.begin(), here.end());
         } catch (const SolverFailure& failure) {
             observer.note("phantom " + std::to_string(phantom.seed) + ", " + name_of(evidence) + ": " + failure.what());

@@ -17,9 +17,22 @@
 namespace tissuewarp::study {
 
 /// What a registration is given of a phantom.
-enum class Evidence { Labels, Surface, SurfaceAndPoints, Points };
-constexpr std::array all_evidence{Evidence::Labels, Evidence::Surface, Evidence::SurfaceAndPoints, Evidence::Points};
-/// "labels", "surface", "surface-and-points", "points".
+enum class Evidence {
+    Labels,
+    Surface,
+    SurfaceAndPoints,
+    Points,
+    Curves,
+    Image,
+    DegradedImage,
+    PartialImage,
+    OtherContrast
+};
+constexpr std::array all_evidence{Evidence::Labels,        Evidence::Surface,      Evidence::SurfaceAndPoints,
+                                  Evidence::Points,        Evidence::Curves,       Evidence::Image,
+                                  Evidence::DegradedImage, Evidence::PartialImage, Evidence::OtherContrast};
+/// "labels", "surface", "surface-and-points", "points", "curves", "image", "degraded-image", "partial-image",
+/// "other-contrast".
 const char* name_of(Evidence evidence);
 
 struct CoverageOptions {
@@ -38,6 +51,7 @@ struct CoverageRow {
     Eigen::Vector3d error = Eigen::Vector3d::Zero();  ///< where it was put less where it is, moving frame, mm
     int doubts = 0;                                   ///< of the registration as a whole, which the program names
     double moved_mm = 0;                              ///< elastic displacement that the registration gave it
+    bool in_view = true;                              ///< where it truly is lies in what was seen
     registration::ErrorEstimate estimate;
 };
 

@@ -14,12 +14,15 @@ using report::Mark;
 using report::Scale;
 
 FigureCurve curve_of(const Coverage& coverage) {
-    constexpr std::array colours{"#1d4ed8", "#c2410c", "#047857", "#a21caf"};
+    constexpr std::array<const char*, all_evidence.size()> colours{
+        "#1d4ed8", "#c2410c", "#047857", "#a21caf", "#0e7490", "#111827", "#b91c1c", "#a16207", "#6d28d9"};
     return {colours[static_cast<std::size_t>(coverage.evidence)]};
 }
 
 std::string label_of(const Coverage& c) {
-    constexpr std::array words{"labels", "part of the surface", "surface and points", "points alone"};
+    constexpr std::array<const char*, all_evidence.size()> words{
+        "labels", "part of the surface", "surface and points", "points alone",  "vessels",
+        "image",  "degraded image",      "part of an image",   "other contrast"};
     return std::string(words[static_cast<std::size_t>(c.evidence)]) + " (" + std::to_string(c.phantoms) + " phantoms" +
            (c.shown_share > 0 ? ")" : ", not trusted)");
 }

@@ -30,8 +30,8 @@ struct Coverage {
     /// Share of phantoms whose error, root mean square over these targets, is within the mean of their intervals of
     /// 95 %, by which an accuracy is promised.
     double phantoms_within = 0;
-    std::vector<double> phantom_shares;    ///< at 95 %, of each phantom, ascending
-    std::vector<ReliabilityBin> bins;      ///< a tenth of the targets each, by falling trust
+    std::vector<double> phantom_shares;  ///< at 95 %, of each phantom, ascending
+    std::vector<ReliabilityBin> bins;    ///< a tenth of the targets each, by falling trust
 };
 
 /// By kind of evidence; kinds without rows are left out.

@@ -9,7 +9,8 @@ namespace tissuewarp::study {
 namespace {
 
 constexpr const char* header =
-    "seed,evidence,target,doubts,error_x,error_y,error_z,moved,algebraic,discretisation,data,deviation,interval,shown,"
+    "seed,evidence,target,doubts,error_x,error_y,error_z,moved,in_view,algebraic,discretisation,data,deviation,"
+    "interval,shown,"
     "xx,yy,zz,xy,xz,yz";
 
 CoverageRow parsed(detail::TableLine& line) {
@@ -23,8 +24,9 @@ CoverageRow parsed(detail::TableLine& line) {
     row.target = static_cast<int>(line.number());
     row.doubts = static_cast<int>(line.number());
     registration::ErrorEstimate& e = row.estimate;
-    for (double* value : {&row.error[0], &row.error[1], &row.error[2], &row.moved_mm, &e.algebraic_mm,
-                          &e.discretisation_mm, &e.data_mm, &e.deviation_mm, &e.interval_mm})
+    for (double* value : {&row.error[0], &row.error[1], &row.error[2], &row.moved_mm}) *value = line.number();
+    row.in_view = line.number() != 0;
+    for (double* value : {&e.algebraic_mm, &e.discretisation_mm, &e.data_mm, &e.deviation_mm, &e.interval_mm})
         *value = line.number();
     e.shown = line.number() != 0;
     Eigen::Matrix3d& c = e.covariance;
@@ -42,8 +44,9 @@ void write_coverage(const std::filesystem::path& path, const std::vector<Coverag
         const registration::ErrorEstimate& e = row.estimate;
         const Eigen::Matrix3d& c = e.covariance;
         out << row.seed << ',' << name_of(row.evidence) << ',' << row.target << ',' << row.doubts;
-        for (const double value : {row.error[0], row.error[1], row.error[2], row.moved_mm, e.algebraic_mm,
-                                   e.discretisation_mm, e.data_mm, e.deviation_mm, e.interval_mm})
+        for (const double value : {row.error[0], row.error[1], row.error[2], row.moved_mm}) out << ',' << value;
+        out << ',' << row.in_view;
+        for (const double value : {e.algebraic_mm, e.discretisation_mm, e.data_mm, e.deviation_mm, e.interval_mm})
             out << ',' << value;
         out << ',' << e.shown;
         for (const double value : {c(0, 0), c(1, 1), c(2, 2), c(0, 1), c(0, 2), c(1, 2)}) out << ',' << value;

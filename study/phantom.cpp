@@ -1,8 +1,11 @@
 #include "study/phantom.hpp"
 
 #include "core/errors.hpp"
+#include "study/detail/bent_map.hpp"
+#include "study/detail/label_organ.hpp"
 #include "study/detail/organ_shape.hpp"
 #include "study/detail/phantom_data.hpp"
+#include "study/detail/phantom_image.hpp"
 #include "study/detail/quadratic_map.hpp"
 #include "study/detail/random.hpp"
 #include "study/detail/random_loads.hpp"
@@ -12,7 +15,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <memory>
 #include <string>
+#include <utility>
 
 namespace tissuewarp::study {
 
@@ -33,12 +38,18 @@ void require_valid(const PhantomOptions& options) {
     require_between("the deviation of boundaries in mm", options.boundary_deviation_mm, 0, 3);
     require_between("the deviation of points in mm", options.point_deviation_mm, 0.01, 5);
     require_between("the number of targets", options.targets, 1, 100000);
+    if (options.family == Family::Labelled && options.organs.voxels.empty())
+        throw InvalidInput("phantom: give the label map whose organs are to be bent");
 }
 
-Eigen::Isometry3d random_motion(const Vector3d& centre, detail::Random& random) {
-    constexpr double most_deg = 10, most_mm = 10;
-    const double angle = random.uniform(0, most_deg) * EIGEN_PI / 180;
-    const Vector3d axis = random.direction(), shift = random.uniform(0, most_mm) * random.direction();
+struct Motion {
+    double most_deg, most_mm;
+};
+constexpr Motion solved_motion{10, 10}, bent_motion{20, 20};
+
+Eigen::Isometry3d random_motion(const Vector3d& centre, const Motion& most, detail::Random& random) {
+    const double angle = random.uniform(0, most.most_deg) * EIGEN_PI / 180;
+    const Vector3d axis = random.direction(), shift = random.uniform(0, most.most_mm) * random.direction();
     Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
     motion.linear() = Eigen::AngleAxisd(angle, axis).toRotationMatrix();
     motion.translation() = centre + shift - motion.linear() * centre;
@@ -67,7 +78,47 @@ std::string told(const detail::RandomOrgan& organ, const detail::Truth& truth, d
     return text;
 }
 
-Phantom drawn_phantom(std::uint64_t seed, const PhantomOptions& options, Observer& observer) {
+constexpr double pair_depth_mm = 3, target_depth_mm = 1;
+constexpr int least_pairs = 4, more_pairs = 7;
+constexpr double least_seen = 0.25, most_seen = 0.5;  // share of the surface
+
+/// What all families have in common: vessels and images, drawn from numbers of their own.
+void add_vessels_and_images(Phantom& phantom, const detail::TrueTissue& tissue, std::uint64_t seed,
+                            const PhantomOptions& options) {
+    constexpr std::uint64_t of_vessels = 101, of_images = 102;
+    detail::Random random(derived(seed, of_vessels));
+    phantom.curves = detail::vessels(tissue, options.point_deviation_mm, random);
+    phantom.images = [tissue, seed] {
+        detail::Random of_its_own(derived(seed, of_images));
+        return detail::drawn_images(tissue, of_its_own);
+    };
+}
+
+/// The tissue of a truth, which both share.
+detail::TrueTissue tissue_of(const std::shared_ptr<const detail::Truth>& truth, const detail::OrganShape& shape,
+                             const Eigen::Isometry3d& placement) {
+    const auto& mesh = truth->mesh.quadratic;
+    auto there = std::make_shared<const detail::QuadraticMap>(mesh, truth->displacement);
+    tled::QuadraticMesh deformed = mesh;
+    deformed.nodes += truth->displacement;
+    auto back = std::make_shared<const detail::QuadraticMap>(std::move(deformed), -truth->displacement);
+    detail::TrueTissue tissue;
+    tissue.label = [shape](const Vector3d& X) { return shape.label(X); };
+    tissue.outer_distance = [shape](const Vector3d& X) { return shape.outer_distance(X); };
+    tissue.forward = [there, placement](const Vector3d& X) -> std::optional<Vector3d> {
+        const auto moved = (*there)(X);
+        if (!moved) return std::nullopt;
+        return Vector3d(placement * *moved);
+    };
+    tissue.backward = [back, placement](const Vector3d& x) { return (*back)(placement.inverse() * x); };
+    tissue.placement = placement;
+    tissue.centre = shape.centre();
+    tissue.reach = shape.reach();
+    tissue.length = shape.length();
+    return tissue;
+}
+
+Phantom solved_phantom(std::uint64_t seed, const PhantomOptions& options, Observer& observer) {
     constexpr int least_elements = 2500, most_elements = 4000;
     constexpr double strain = 0.12;  // largest motion over the organ's length, at most
     detail::Random random(seed);
@@ -75,33 +126,79 @@ Phantom drawn_phantom(std::uint64_t seed, const PhantomOptions& options, Observe
     const detail::OrganShape& shape = organ.shape;
     const double motion_mm = random.uniform(3, std::min(15.0, strain * shape.length()));
     const int elements = least_elements + random.index(most_elements - least_elements);
-    const Eigen::Isometry3d placement = random_motion(shape.centre(), random);
-    const double seen_share = random.uniform(0.25, 0.5);
-    const int pairs = 4 + random.index(7);
+    const Eigen::Isometry3d placement = random_motion(shape.centre(), solved_motion, random);
+    const double seen_share = random.uniform(least_seen, most_seen);
+    const int pairs = least_pairs + random.index(more_pairs);
 
     observer.checkpoint("Truth", 0);
     detail::TruthMesh mesh = detail::truth_mesh(shape, elements, observer);
     organ.loads = detail::sized_loads(organ, mesh, motion_mm);
-    const detail::Truth truth = detail::equilibrium(organ, std::move(mesh), observer);
-    const detail::QuadraticMap deform(truth.mesh.quadratic, truth.displacement);
-    const auto map = [&](const Vector3d& point) -> std::optional<Vector3d> {
-        const auto moved = deform(point);
-        if (!moved) return std::nullopt;
-        return Vector3d(placement * *moved);
-    };
-    const detail::DeformedOrgan deformed{truth.mesh, placement * (truth.mesh.quadratic.nodes + truth.displacement)};
+    const auto truth = std::make_shared<const detail::Truth>(detail::equilibrium(organ, std::move(mesh), observer));
+    const detail::TrueTissue tissue = tissue_of(truth, shape, placement);
+    const detail::DeformedOrgan deformed{truth->mesh, placement * (truth->mesh.quadratic.nodes + truth->displacement)};
 
     observer.checkpoint("Drawing", 0.8);
     Phantom phantom;
     phantom.moving_labels = detail::draw(shape, options.voxel_mm);
     phantom.fixed_labels = detail::drawn_labels(deformed, options.voxel_mm, options.boundary_deviation_mm, random);
     phantom.surface = detail::seen_surface(deformed, seen_share, options.point_deviation_mm, random);
-    constexpr double pair_depth_mm = 3, target_depth_mm = 1;
-    phantom.points = detail::found_again(detail::places(shape, map, pairs, pair_depth_mm, random),
-                                         options.point_deviation_mm, random);
-    phantom.targets = detail::places(shape, map, options.targets, target_depth_mm, random);
-    phantom.story = told(organ, truth, seen_share, pairs);
+    phantom.points =
+        detail::found_again(detail::places(tissue, pairs, pair_depth_mm, random), options.point_deviation_mm, random);
+    phantom.targets = detail::places(tissue, options.targets, target_depth_mm, random);
+    phantom.story = told(organ, *truth, seen_share, pairs);
+    add_vessels_and_images(phantom, tissue, seed, options);
     return phantom;
+}
+
+/// An organ that a smooth map bends, whatever gives its shape.
+Phantom bent_phantom(detail::TrueTissue tissue, imaging::Volume moving_labels, const std::string& kind,
+                     std::uint64_t seed, const PhantomOptions& options, detail::Random& random) {
+    constexpr double strain = 0.12;
+    const double motion_mm = random.uniform(3, std::min(15.0, strain * tissue.length));
+    const double seen_share = random.uniform(least_seen, most_seen);
+    const int pairs = least_pairs + random.index(more_pairs);
+    const detail::BentMap bend(tissue.centre, tissue.length, motion_mm, random);
+    const Eigen::Isometry3d placement = random_motion(tissue.centre, bent_motion, random);
+    tissue.forward = [=](const Vector3d& X) { return Vector3d(placement * bend.forward(X)); };
+    tissue.backward = [=](const Vector3d& x) { return bend.backward(placement.inverse() * x); };
+    tissue.placement = placement;
+    Phantom phantom;
+    phantom.moving_labels = std::move(moving_labels);
+    phantom.fixed_labels = detail::drawn_labels(tissue, options.voxel_mm, options.boundary_deviation_mm, random);
+    phantom.surface = detail::seen_surface(tissue, seen_share, options.point_deviation_mm, random);
+    phantom.points =
+        detail::found_again(detail::places(tissue, pairs, pair_depth_mm, random), options.point_deviation_mm, random);
+    phantom.targets = detail::places(tissue, options.targets, target_depth_mm, random);
+    char text[200];
+    std::snprintf(text, sizeof text, "%s, %.0f mm; bent by up to %.1f mm; %.0f %% of the surface and %d places seen",
+                  kind.c_str(), tissue.length, motion_mm, 100 * seen_share, pairs);
+    phantom.story = text;
+    add_vessels_and_images(phantom, tissue, seed, options);
+    return phantom;
+}
+
+Phantom drawn_phantom(std::uint64_t seed, const PhantomOptions& options, Observer& observer) {
+    if (options.family == Family::Solved) return solved_phantom(seed, options, observer);
+    detail::Random random(seed);
+    detail::TrueTissue tissue;
+    const auto of_shape = [&](auto shape) {
+        tissue.label = [shape](const Vector3d& X) { return shape->label(X); };
+        tissue.outer_distance = [shape](const Vector3d& X) { return shape->outer_distance(X); };
+        tissue.centre = shape->centre();
+        tissue.reach = shape->reach();
+        tissue.length = shape->length();
+    };
+    if (options.family == Family::Labelled) {
+        constexpr double least_ml = 45;
+        const auto organ =
+            std::make_shared<const detail::LabelOrgan>(detail::random_label_organ(options.organs, least_ml, random));
+        of_shape(organ);
+        return bent_phantom(std::move(tissue), organ->voxels(), organ->kind(), seed, options, random);
+    }
+    const auto shape = std::make_shared<const detail::OrganShape>(random);
+    of_shape(shape);
+    return bent_phantom(std::move(tissue), detail::draw(*shape, options.voxel_mm), shape->kind() + "-like", seed,
+                        options, random);
 }
 
 }  // namespace

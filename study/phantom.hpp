@@ -1,33 +1,64 @@
 #pragma once
-/// Random organs whose deformation is known: made with quadratic tetrahedra and tissue that the registration does not
-/// know, on a mesh of their own.
+/// Random organs whose deformation is known.
 
 #include "core/observer.hpp"
 #include "imaging/volume.hpp"
 #include "registration/evaluation.hpp"
 #include "registration/intraoperative.hpp"
 
+#include <Eigen/Core>
+
 #include <cstdint>
+#include <functional>
 #include <string>
 
 namespace tissuewarp::study {
 
+/// Where the truth comes from.
+enum class Family {
+    Solved,   ///< drawn organs; quadratic tetrahedra of tissue that the registration does not know, on a mesh of their
+              ///< own
+    Bent,     ///< drawn organs; a smooth map that conserves volume and solves no equation
+    Labelled  ///< organs of a real label map; such a map
+};
+
 struct PhantomOptions {
+    Family family = Family::Solved;
+    imaging::Volume organs = {};         ///< label map whose organs are taken, where they are Labelled
     double voxel_mm = 2;                 ///< of both label maps
     double boundary_deviation_mm = 0.5;  ///< of the boundaries drawn in the intraoperative map, smooth over 10 mm
     double point_deviation_mm = 0.7;     ///< of surface points and pairs, along each axis
     int targets = 150;                   ///< places all over the organ
 };
 
+struct Ball {
+    Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+    double radius_mm = 0;
+
+    [[nodiscard]] bool holds(const Eigen::Vector3d& point) const { return (point - middle).norm() < radius_mm; }
+};
+
+/// Grey values, float32, each on a grid of its own orientation.
+struct PhantomImages {
+    imaging::Volume moving;
+    imaging::Volume fixed;           ///< of the same contrast, with a little noise and bias
+    imaging::Volume partial;         ///< the same within `view`, 0 outside
+    imaging::Volume other_contrast;  ///< dark where the moving one is bright, with a little noise
+    imaging::Volume degraded;        ///< of other contrast, with slices three voxels thick and much noise
+    Ball view;                       ///< fixed frame; holds 35 to 70 % of the organ
+};
+
 /// One patient: what a registration is given, and what is true.
 struct Phantom {
     std::uint64_t seed = 0;
-    std::string story;                    ///< shape, tissue, what moves it, one line
-    imaging::Volume moving_labels;        ///< 0 outside, 1 organ, 2 inclusion; moving frame
-    imaging::Volume fixed_labels;         ///< the same drawn anew in the fixed frame, with boundary noise
-    registration::SurfacePoints surface;  ///< of a part of the organ's surface, fixed frame
-    registration::PointPairs points;      ///< a few places in the organ
-    registration::Landmarks targets;      ///< moving and true fixed positions, LPS mm
+    std::string story;                      ///< shape, tissue, what moves it, one line
+    imaging::Volume moving_labels;          ///< 0 outside, 1 organ, 2 inclusion; moving frame
+    imaging::Volume fixed_labels;           ///< the same drawn anew in the fixed frame, with boundary noise
+    registration::SurfacePoints surface;    ///< of a part of the organ's surface, fixed frame
+    registration::PointPairs points;        ///< a few places in the organ
+    registration::Curves curves;            ///< vessels through it
+    registration::Landmarks targets;        ///< moving and true fixed positions, LPS mm
+    std::function<PhantomImages()> images;  ///< drawn when asked for: they take seconds
 };
 
 /// The same seed gives the same phantom, bit for bit on one machine; others round differently. Throws SolverFailure

@@ -1,11 +1,14 @@
 #include "study/detail/phantom_data.hpp"
 
+#include "core/errors.hpp"
 #include "meshing/tet_mesh.hpp"
+#include "study/detail/smooth_noise.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <string>
 #include <vector>
 
 namespace tissuewarp::study::detail {
@@ -15,35 +18,16 @@ using Eigen::Vector3d;
 
 namespace {
 
-/// A smooth Gaussian field of vectors by random waves: covariance σ² exp(−r²/(2ℓ²)) of each component (Rahimi and Recht
-/// 2007).
-class SmoothNoise {
-public:
-    SmoothNoise(double deviation, double length, Random& random) : scale_(deviation * std::sqrt(2.0 / waves)) {
-        for (Eigen::Index w = 0; w < 3 * waves; ++w) {
-            wave_.col(w) = random.normal3() / length;
-            phase_[w] = random.uniform(0, 2 * EIGEN_PI);
-        }
-    }
-    Vector3d operator()(const Vector3d& point) const {
-        const Eigen::Array<double, 1, 3 * waves> value = (point.transpose() * wave_ + phase_).array().cos();
-        return scale_ * Vector3d(value.segment<waves>(0).sum(), value.segment<waves>(waves).sum(),
-                                 value.segment<waves>(2 * waves).sum());
-    }
+constexpr double boundary_correlation_mm = 10;
 
-private:
-    static constexpr int waves = 40;  // of each component
-    double scale_;
-    Eigen::Matrix<double, 3, 3 * waves> wave_;
-    Eigen::Matrix<double, 1, 3 * waves> phase_;
-};
+}  // namespace
 
-/// A grid of random orientation that holds points with some margin.
-imaging::Geometry random_grid(const Matrix3Xd& points, double voxel_mm, Random& random) {
+imaging::Geometry random_grid(const Matrix3Xd& points, const Eigen::Matrix3d& direction, double voxel_mm,
+                              Random& random) {
     constexpr double margin_mm = 8;
     imaging::Geometry grid;
     grid.spacing.setConstant(voxel_mm);
-    grid.direction = random.rotation();
+    grid.direction = direction;
     const Matrix3Xd turned = grid.direction.transpose() * points;
     const Vector3d shift = voxel_mm * Vector3d(random.uniform(), random.uniform(), random.uniform());
     const Vector3d lower = turned.rowwise().minCoeff() - shift - Vector3d::Constant(margin_mm);
@@ -53,6 +37,8 @@ imaging::Geometry random_grid(const Matrix3Xd& points, double voxel_mm, Random& 
     grid.origin = grid.direction * lower;
     return grid;
 }
+
+namespace {
 
 /// Six-node triangles of the outer surface.
 std::vector<std::array<int, 6>> outer_triangles(const TruthMesh& mesh) {
@@ -99,10 +85,10 @@ Matrix3Xd surface_samples(const DeformedOrgan& organ, double mm2, Random& random
 
 imaging::Volume drawn_labels(const DeformedOrgan& organ, double voxel_mm, double boundary_deviation_mm,
                              Random& random) {
-    constexpr double correlation_mm = 10;
-    const SmoothNoise noise(boundary_deviation_mm, correlation_mm, random);
+    const SmoothNoise noise(boundary_deviation_mm, boundary_correlation_mm, random);
     const FineTetrahedra tissue(organ.mesh.quadratic, organ.nodes);
-    imaging::Volume labels(random_grid(organ.nodes, voxel_mm, random), CV_32SC1);
+    const Eigen::Matrix3d direction = random.rotation();
+    imaging::Volume labels(random_grid(organ.nodes, direction, voxel_mm, random), CV_32SC1);
     const imaging::Geometry& grid = labels.geometry;
     auto* voxel = labels.data<std::int32_t>();
     for (int k = 0; k < grid.size[2]; ++k)
@@ -115,10 +101,11 @@ imaging::Volume drawn_labels(const DeformedOrgan& organ, double voxel_mm, double
     return labels;
 }
 
-registration::SurfacePoints seen_surface(const DeformedOrgan& organ, double share, double deviation_mm,
-                                         Random& random) {
-    constexpr double mm2_per_point = 6, outliers = 0.03, outlier_mm = 15;
-    const Matrix3Xd samples = surface_samples(organ, mm2_per_point, random);
+namespace {
+
+/// The share of points that faces one way, with noise and outliers.
+registration::SurfacePoints seen_of(const Matrix3Xd& samples, double share, double deviation_mm, Random& random) {
+    constexpr double outliers = 0.03, outlier_mm = 15;
     const Eigen::VectorXd height = samples.transpose() * random.direction();
     std::vector<Eigen::Index> order(std::size_t(samples.cols()));
     std::iota(order.begin(), order.end(), Eigen::Index{0});
@@ -135,24 +122,125 @@ registration::SurfacePoints seen_surface(const DeformedOrgan& organ, double shar
     return seen;
 }
 
-registration::Landmarks places(const OrganShape& shape,
-                               const std::function<std::optional<Vector3d>(const Vector3d&)>& map, int count,
-                               double depth_mm, Random& random) {
+constexpr double mm2_per_point = 6;
+
+}  // namespace
+
+registration::SurfacePoints seen_surface(const DeformedOrgan& organ, double share, double deviation_mm,
+                                         Random& random) {
+    return seen_of(surface_samples(organ, mm2_per_point, random), share, deviation_mm, random);
+}
+
+registration::SurfacePoints seen_surface(const TrueTissue& tissue, double share, double deviation_mm, Random& random) {
+    return seen_of(surface_samples(tissue, mm2_per_point, random), share, deviation_mm, random);
+}
+
+// Places in a thin shell about the surface, as dense as the surface is large, put onto it.
+Matrix3Xd surface_samples(const TrueTissue& tissue, double mm2, Random& random) {
+    constexpr double half_mm = 1, step_mm = 0.5;
+    constexpr double depth_mm = 0.2;  // elements cut off what bulges between their nodes
+    const double side = 2 * (tissue.reach + half_mm), box = side * side * side;
+    const auto tries = static_cast<int>(box / (2 * half_mm * mm2));
+    const auto slope = [&](const Vector3d& x) {
+        Vector3d g;
+        for (int axis = 0; axis < 3; ++axis) {
+            const Vector3d e = step_mm * Vector3d::Unit(axis);
+            g[axis] = (tissue.outer_distance(x + e) - tissue.outer_distance(x - e)) / (2 * step_mm);
+        }
+        return g;
+    };
+    std::vector<Vector3d> samples;
+    for (int k = 0; k < tries; ++k) {
+        Vector3d x = tissue.centre +
+                     side * (Vector3d(random.uniform(), random.uniform(), random.uniform()) - Vector3d::Constant(0.5));
+        if (std::abs(tissue.outer_distance(x)) > half_mm) continue;
+        for (int iteration = 0; iteration < 3; ++iteration) {
+            const Vector3d g = slope(x);
+            x -= (tissue.outer_distance(x) + depth_mm) / std::max(g.squaredNorm(), 0.1) * g;
+        }
+        if (const auto moved = tissue.forward(x)) samples.push_back(*moved);
+    }
+    if (samples.empty())
+        throw InvalidInput("phantom: the organ has no surface of " + std::to_string(int(mm2)) + " mm²");
+    Matrix3Xd result(3, Eigen::Index(samples.size()));
+    for (std::size_t k = 0; k < samples.size(); ++k) result.col(Eigen::Index(k)) = samples[k];
+    return result;
+}
+
+imaging::Volume drawn_labels(const TrueTissue& tissue, double voxel_mm, double boundary_deviation_mm, Random& random) {
+    const SmoothNoise noise(boundary_deviation_mm, boundary_correlation_mm, random);
+    const Matrix3Xd surface = surface_samples(tissue, 100, random);
+    const Eigen::Matrix3d direction = random.rotation();
+    imaging::Volume labels(random_grid(surface, direction, voxel_mm, random), CV_32SC1);
+    const imaging::Geometry& grid = labels.geometry;
+    auto* voxel = labels.data<std::int32_t>();
+    for (int k = 0; k < grid.size[2]; ++k)
+        for (int j = 0; j < grid.size[1]; ++j)
+            for (int i = 0; i < grid.size[0]; ++i) {
+                const Vector3d point = grid.point({double(i), double(j), double(k)});
+                const auto X = tissue.backward(point + noise(point));
+                *voxel++ = X ? tissue.label(*X) : 0;
+            }
+    return labels;
+}
+
+registration::Landmarks places(const TrueTissue& tissue, int count, double depth_mm, Random& random) {
     registration::Landmarks found;
     found.moving.resize(3, count);
     found.fixed.resize(3, count);
-    const double reach = shape.reach();
+    const double reach = tissue.reach;
     for (int k = 0; k < count;) {
         const Vector3d point =
-            shape.centre() +
+            tissue.centre +
             reach * (2 * Vector3d(random.uniform(), random.uniform(), random.uniform()) - Vector3d::Ones());
-        if (shape.label(point) == 0 || shape.outer_distance(point) > -depth_mm) continue;
-        const auto moved = map(point);
+        if (tissue.label(point) == 0 || tissue.outer_distance(point) > -depth_mm) continue;
+        const auto moved = tissue.forward(point);
         if (!moved) continue;
         found.moving.col(k) = point;
         found.fixed.col(k++) = *moved;
     }
     return found;
+}
+
+namespace {
+
+/// A smooth line of `length_mm` that starts at a place and stays in the organ; shorter where it leaves it.
+Matrix3Xd vessel(const TrueTissue& tissue, const Vector3d& start, double length_mm, Random& random) {
+    constexpr double step_mm = 1, turn = 0.15, depth_mm = 2;
+    std::vector<Vector3d> line{start};
+    Vector3d along = random.direction();
+    while (double(line.size()) * step_mm < length_mm) {
+        along = (along + turn * random.normal3()).normalized();
+        const Vector3d next = line.back() + step_mm * along;
+        if (tissue.outer_distance(next) > -depth_mm || !tissue.forward(next)) break;
+        line.push_back(next);
+    }
+    Matrix3Xd result(3, Eigen::Index(line.size()));
+    for (std::size_t k = 0; k < line.size(); ++k) result.col(Eigen::Index(k)) = line[k];
+    return result;
+}
+
+}  // namespace
+
+registration::Curves vessels(const TrueTissue& tissue, double deviation_mm, Random& random) {
+    constexpr int lines = 8, attempts = 400;
+    constexpr double least_mm = 15, depth_mm = 4, found = 0.6;  // share of the points that are seen again
+    registration::Curves curves;
+    curves.deviation_mm = deviation_mm;
+    curves.tangents.resize(3, 0);
+    std::vector<Vector3d> seen;
+    for (int k = 0; k < attempts && int(curves.moving.size()) < lines; ++k) {
+        const Vector3d start = places(tissue, 1, depth_mm, random).moving.col(0);
+        Matrix3Xd line = vessel(tissue, start, random.uniform(0.3, 0.6) * tissue.length, random);
+        if (double(line.cols()) < least_mm) continue;
+        const auto first = Eigen::Index(random.uniform(0, 1 - found) * double(line.cols()));
+        for (Eigen::Index p = first; p < first + Eigen::Index(found * double(line.cols())); ++p)
+            seen.push_back(*tissue.forward(line.col(p)) + deviation_mm * random.normal3());
+        curves.moving.push_back(std::move(line));
+    }
+    curves.fixed.resize(3, Eigen::Index(seen.size()));
+    for (std::size_t k = 0; k < seen.size(); ++k) curves.fixed.col(Eigen::Index(k)) = seen[k];
+    return curves;
 }
 
 registration::PointPairs found_again(registration::Landmarks places, double deviation_mm, Random& random) {

@@ -7,11 +7,10 @@
 #include "imaging/volume.hpp"
 #include "registration/evaluation.hpp"
 #include "registration/intraoperative.hpp"
+#include "study/detail/true_tissue.hpp"
 #include "study/detail/truth.hpp"
 
 #include <Eigen/Geometry>
-
-#include <functional>
 
 namespace tissuewarp::study::detail {
 
@@ -29,10 +28,21 @@ imaging::Volume drawn_labels(const DeformedOrgan& organ, double voxel_mm, double
 /// % are anywhere within 15 mm of where they belong.
 registration::SurfacePoints seen_surface(const DeformedOrgan& organ, double share, double deviation_mm, Random& random);
 
-/// Random places inside, at least `depth_mm` under the surface, and where they went. `map` into the fixed frame.
-registration::Landmarks places(const OrganShape& shape,
-                               const std::function<std::optional<Eigen::Vector3d>(const Eigen::Vector3d&)>& map,
-                               int count, double depth_mm, Random& random);
+/// Of tissue that is known by its maps alone.
+imaging::Volume drawn_labels(const TrueTissue& tissue, double voxel_mm, double boundary_deviation_mm, Random& random);
+registration::SurfacePoints seen_surface(const TrueTissue& tissue, double share, double deviation_mm, Random& random);
+/// Points spread evenly over the surface at rest, about one per `mm2`, where they went: 3 × P mm, fixed frame.
+Eigen::Matrix3Xd surface_samples(const TrueTissue& tissue, double mm2, Random& random);
+
+/// A grid along `direction` that holds points with some margin.
+imaging::Geometry random_grid(const Eigen::Matrix3Xd& points, const Eigen::Matrix3d& direction, double voxel_mm,
+                              Random& random);
+
+/// Up to eight smooth lines through the organ, and points of 60 % of each with noise along each axis.
+registration::Curves vessels(const TrueTissue& tissue, double deviation_mm, Random& random);
+
+/// Random places inside, at least `depth_mm` under the surface, and where they went.
+registration::Landmarks places(const TrueTissue& tissue, int count, double depth_mm, Random& random);
 
 /// The same with noise on the fixed side.
 registration::PointPairs found_again(registration::Landmarks places, double deviation_mm, Random& random);
