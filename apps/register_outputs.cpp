@@ -57,7 +57,7 @@ void append_estimates(std::vector<Column>& columns, const RegistrationRun& run, 
     column("data_mm", [](const auto& e) { return e.data_mm; });
     column("deviation_mm", [](const auto& e) { return e.deviation_mm; });
     column("interval_95_mm", [](const auto& e) { return e.interval_mm; });
-    column("trusted", [](const auto& e) { return e.shown; });
+    column("trust", [](const auto& e) { return static_cast<int>(e.trust); });
 }
 
 void write_landmarks(const RegistrationRun& run, const std::filesystem::path& path) {
@@ -107,10 +107,9 @@ std::string estimate_text(const registration::UncertaintySummary& s) {
         "estimated error (1 σ): {:.2f} mm over the tissue, of the mesh {}, the solver {:.3f}, the data {:.2f}; "
         "95 % within {:.2f} mm, where least is known within {:.2f} mm\n",
         s.deviation_mm, of_mesh, s.algebraic_mm, s.data_mm, s.interval_mm, s.worst_interval_mm);
-    if (s.unseen_share > 0)
-        text += fmt::format("not to be trusted: {:.0f} % of the tissue, of which the data say next to nothing\n",
-                            100 * s.unseen_share);
-    return text;
+    return text + fmt::format("shown by the data: {:.0f} % of the tissue, carried there by mechanics: {:.0f} %, not known "
+                              "to 5 mm: {:.0f} %\n",
+                              100 * s.shown_share, 100 * (1 - s.shown_share - s.unknown_share), 100 * s.unknown_share);
 }
 
 }  // namespace

@@ -178,7 +178,8 @@ json to_json(const registration::UncertaintySummary& s) {
             {"interval_95_mm", number(s.interval_mm)},
             {"worst_interval_95_mm", number(s.worst_interval_mm)},
             {"worst_place_mm", vector(s.worst_place)},
-            {"unseen_share", number(s.unseen_share)}};
+            {"shown_share", number(s.shown_share)},
+            {"unknown_share", number(s.unknown_share)}};
 }
 
 /// What was asked for, chosen and expected.

@@ -1,11 +1,21 @@
 #include "registration/result.hpp"
 
+#include <algorithm>
+#include <iterator>
+
 namespace tissuewarp::registration {
 
 std::vector<tled::Spring> LastPulls::of(Origin origin) const {
     std::vector<tled::Spring> result;
     for (const PulledNode& pulled : springs)
         if (pulled.origin == origin) result.push_back(pulled.spring);
+    return result;
+}
+
+std::vector<PulledNode> LastPulls::data() const {
+    std::vector<PulledNode> result;
+    std::copy_if(springs.begin(), springs.end(), std::back_inserter(result),
+                 [](const PulledNode& pulled) { return pulled.origin == Origin::Datum; });
     return result;
 }
 

@@ -85,6 +85,10 @@ enum class Origin {
 struct PulledNode {
     tled::Spring spring;
     Origin origin = Origin::Datum;
+    /// Of a datum: the deviation along each axis of the error that it shares with data within a centimetre or so.
+    double shared_mm = 0;
+    /// Of a datum: tissue no further than this from the node is shown by it; negative: not even the node is.
+    double shows_mm = 0;
 };
 
 /// What pulled at the tissue in the last round.
@@ -100,6 +104,8 @@ struct LastPulls {
 
     /// The springs of one origin.
     [[nodiscard]] std::vector<tled::Spring> of(Origin origin) const;
+    /// Those of the data, with what else is known of them.
+    [[nodiscard]] std::vector<PulledNode> data() const;
 };
 
 /// A reason not to trust a result.

@@ -1,22 +1,25 @@
 #include "registration/uncertainty.hpp"
 
 #include "core/errors.hpp"
+#include "meshing/search/point_tree.hpp"
 #include "registration/loads/coarse_twin.hpp"
 #include "registration/springs/pull.hpp"
 #include "registration/uncertainty/data_uncertainty.hpp"
+#include "registration/uncertainty/error_model.hpp"
 #include "tled/error/lifted_residual.hpp"
+#include "tled/model/internal_force.hpp"
+#include "tled/model/symmetric.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <map>
 #include <string>
 
 namespace tissuewarp::registration {
 
 namespace {
-
-using Covariances = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 
 constexpr double freedom_of_size = detail::error_model.freedom_of_size;
 
@@ -45,10 +48,6 @@ tled::NodalConditions conditions_of(const PreparedModel& prepared, const LastPul
     return tled::nodal_conditions(conditions, prepared.rest.node_count);
 }
 
-Eigen::Matrix3d matrix_of(const Eigen::Matrix<double, 6, 1>& c) {
-    return (Eigen::Matrix3d() << c[0], c[3], c[4], c[3], c[1], c[5], c[4], c[5], c[2]).finished();
-}
-
 /// Points of a part of the surface alone: where an organ of smooth shape lies may be told wrong, by more than any
 /// estimate about the place that was found says.
 bool place_is_uncertain(const UpdateResult& result) {
@@ -63,68 +62,127 @@ double normal_quantile(double probability) {
     return x;
 }
 
-/// What the data leave open, and the stiffness with their springs.
-struct OpenParts {
-    detail::DataUncertainty data;
-    tled::RestStiffness stiffness;
-};
-
-OpenParts open_here(const PreparedModel& prepared, const UpdateResult& result, const UncertaintyOptions& options) {
-    detail::Posteriors posteriors = detail::posteriors_of(prepared, result.pulls);
-    detail::DataUncertainty data =
-        detail::data_uncertainty(prepared, posteriors, result.deformation.displacement, options.samples, options.seed);
-    return {std::move(data), std::move(posteriors.seen).stiffness()};
+// ‖e‖² over its mean is a multiple of χ² (Satterthwaite, Biometrics 2 (1946) 110) whose scale is itself known from few
+// numbers: F. Its quantile is that of a normal ratio of cube roots (Paulson, Ann Math Statist 13 (1942) 233).
+double radius_mm(const Eigen::Matrix3d& covariance, double z) {
+    const double mean = covariance.trace();
+    if (!(mean > 0)) return 0;
+    const double freedom = mean * mean / covariance.squaredNorm();
+    const double a = 2 / (9 * freedom), b = 2 / (9 * freedom_of_size);
+    // ((1 − b) y − (1 − a))² = z² (b y² + a), the root on z's side
+    const double square = (1 - b) * (1 - b) - z * z * b, middle = (1 - a) * (1 - b),
+                 rest = (1 - a) * (1 - a) - z * z * a;
+    const double root = std::sqrt(std::max(0.0, middle * middle - square * rest));
+    const double y = std::max(0.0, (middle + (z < 0 ? -root : root)) / square);
+    return std::sqrt(mean * (freedom_of_size - 2) / freedom_of_size * y * y * y);
 }
 
-/// On the mesh of the size that the estimate was calibrated with: a factor of a large one would take minutes and say
-/// nothing else, since what data leave open varies smoothly.
-OpenParts open_by_twin(const PreparedModel& prepared, const UpdateResult& result, const UncertaintyOptions& options,
-                       Observer& observer) {
-    const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
-    const detail::CoarseTwin twin = detail::coarse_twin(prepared, result, observer);
-    const meshing::TetMesh& mesh = twin.prepared.model.mesh;
+/// Of so many nodes or fewer; of a finer mesh on a coarser model: a factor of a large one takes long and says nothing
+/// else, since what data leave open varies smoothly.
+detail::OpenParts open_parts(const PreparedModel& prepared, const UpdateResult& result,
+                             const UncertaintyOptions& options, Observer& observer) {
+    const Eigen::Matrix3Xd displacement = displacement_under_pulls(result);
+    const double energy = tled::elastic_energy(prepared.rest, displacement);
+    if (!detail::loads_take_coarse_model(prepared))
+        return detail::open_parts(prepared, result.pulls, displacement, energy, options);
+    std::optional<PreparedModel> made;
+    if (!prepared.coarse) made = detail::coarse_model_for_loads(prepared, observer);
+    const PreparedModel& coarse = made ? *made : *prepared.coarse;
+    const meshing::TetMesh& mesh = coarse.model.mesh;
     detail::DataUncertainty data =
-        detail::data_uncertainty(twin.prepared, detail::posteriors_of(twin.prepared, twin.pulls), twin.displacement,
-                                 options.samples, options.seed);
-    data.covariance = detail::carried(mesh, data.covariance, nodes);
-    data.unexplained = detail::carried(mesh, data.unexplained.transpose(), nodes).transpose();
+        detail::open_parts(coarse, detail::pulls_on(coarse, prepared, result.pulls),
+                           detail::carried(prepared.model.mesh, displacement, mesh.nodes), energy, options)
+            .data;
+    data.covariance = detail::carried(mesh, data.covariance, prepared.model.mesh.nodes);
     return {std::move(data), {prepared.rest, conditions_of(prepared, result.pulls), prepared.stiffness}};
 }
 
-ErrorEstimate estimate_of(const Eigen::Vector3d& algebraic, const std::optional<Eigen::Vector3d>& discretisation,
-                          const Eigen::Matrix3d& covariance, double unexplained) {
-    ErrorEstimate result;
-    result.algebraic_mm = algebraic.norm();
-    result.discretisation_mm = discretisation ? discretisation->norm() : std::numeric_limits<double>::quiet_NaN();
-    result.data_mm = std::sqrt(covariance.trace());
-    result.covariance = covariance + algebraic * algebraic.transpose();
-    if (discretisation) result.covariance += *discretisation * discretisation->transpose();
-    result.deviation_mm = std::sqrt(result.covariance.trace());
-    result.interval_mm = interval_mm(result, 0.95);
-    result.shown = unexplained < detail::error_model.shown_below;
-    return result;
+/// Whether data show the tissue about each node.
+std::vector<char> shown_nodes(const PreparedModel& prepared, const LastPulls& pulls) {
+    const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
+    std::vector<char> shown(static_cast<std::size_t>(nodes.cols()), 0);
+    std::map<double, std::vector<Eigen::Vector3d>> by_reach;
+    for (const PulledNode& pulled : pulls.data())
+        if (pulled.shows_mm >= 0 && pulled.spring.stiffness.trace() > 0)
+            by_reach[pulled.shows_mm].emplace_back(nodes.col(pulled.spring.node));
+    for (const auto& [reach, places] : by_reach) {
+        const meshing::PointTree tree(places);
+        for (Eigen::Index n = 0; n < nodes.cols(); ++n)
+            shown[static_cast<std::size_t>(n)] |= tree.any_within(nodes.col(n), std::max(reach, 1e-6));
+    }
+    return shown;
+}
+
+using Covariances = Eigen::Matrix<double, 6, Eigen::Dynamic>;
+
+/// At the nodes the mean of e eᵀ over the elements around, by four points of each.
+Covariances squares_of(const tled::DiscretisationError& error, const meshing::TetMesh& mesh) {
+    constexpr double near = 0.5854101966249685, far = 0.1381966011250105;  // exact for quadratics (Hammer et al. 1956)
+    const Eigen::VectorXd volumes = meshing::tet_volumes(mesh);
+    Covariances sum = Covariances::Zero(6, mesh.nodes.cols());
+    Eigen::VectorXd weights = Eigen::VectorXd::Zero(mesh.nodes.cols());
+    for (int tet = 0; tet < mesh.tets.cols(); ++tet) {
+        Eigen::Matrix3d square = Eigen::Matrix3d::Zero();
+        for (int point = 0; point < 4; ++point) {
+            Eigen::Vector4d barycentric = Eigen::Vector4d::Constant(far);
+            barycentric[point] = near;
+            const Eigen::Vector3d e = error.at(mesh, tet, barycentric);
+            square += 0.25 * e * e.transpose();
+        }
+        for (const int node : mesh.tets.col(tet)) {
+            sum.col(node) += volumes[tet] * tled::symmetric_entries(square);
+            weights[node] += volumes[tet];
+        }
+    }
+    return sum.array().rowwise() / weights.transpose().array();
+}
+
+Eigen::RowVectorXd traces(const Covariances& covariances) {
+    return covariances.topRows<3>().colwise().sum();
 }
 
 }  // namespace
 
-Uncertainty::Uncertainty(meshing::TetMesh mesh, Eigen::Matrix3Xd algebraic,
-                         std::optional<tled::DiscretisationError> discretisation, Covariances covariance,
-                         Eigen::VectorXd unexplained, std::optional<ExpectedError> expected)
+Uncertainty::Uncertainty(meshing::TetMesh mesh, NodalErrors nodal, std::optional<HeldOut> held_out,
+                         std::optional<ExpectedError> expected)
     : mesh_(std::move(mesh)),
       locator_(mesh_),
-      algebraic_(std::move(algebraic)),
-      discretisation_(std::move(discretisation)),
-      covariance_(std::move(covariance)),
-      unexplained_(std::move(unexplained)),
+      nodal_(std::move(nodal)),
+      held_out_(held_out),
       expected_(expected) {}
 
+ErrorEstimate Uncertainty::at(int tet, const Eigen::Vector4d& barycentric) const {
+    const auto corners = mesh_.tets.col(tet);
+    const auto root = [&](const Eigen::RowVectorXd& squares) {
+        double sum = 0;
+        for (int c = 0; c < 4; ++c) sum += barycentric[c] * squares[corners[c]];
+        return std::sqrt(sum);
+    };
+    tled::SymmetricEntries covariance = tled::SymmetricEntries::Zero();
+    for (int c = 0; c < 4; ++c) covariance += barycentric[c] * nodal_.covariance.col(corners[c]);
+    ErrorEstimate result;
+    result.algebraic_mm = root(nodal_.algebraic);
+    result.discretisation_mm = root(nodal_.discretisation);
+    result.data_mm = root(nodal_.data);
+    result.covariance = tled::symmetric_matrix(covariance);
+    result.deviation_mm = std::sqrt(result.covariance.trace());
+    static const double z_95 = normal_quantile(0.95);
+    result.interval_mm = radius_mm(result.covariance, z_95);
+    const bool shown = std::all_of(corners.begin(), corners.end(),
+                                   [&](int node) { return nodal_.shown[static_cast<std::size_t>(node)] != 0; });
+    result.trust = !nodal_.placed || result.interval_mm > detail::error_model.failed_mm ? Trust::Unknown
+                   : shown                                                              ? Trust::Shown
+                                                                                        : Trust::Carried;
+    return result;
+}
+
 std::vector<ErrorEstimate> Uncertainty::at_nodes() const {
-    std::vector<ErrorEstimate> result;
-    for (Eigen::Index n = 0; n < unexplained_.size(); ++n) {
-        std::optional<Eigen::Vector3d> of_mesh;
-        if (discretisation_) of_mesh = discretisation_->corner.col(n);
-        result.push_back(estimate_of(algebraic_.col(n), of_mesh, matrix_of(covariance_.col(n)), unexplained_[n]));
-    }
+    std::vector<ErrorEstimate> result(static_cast<std::size_t>(mesh_.nodes.cols()));
+    for (int tet = 0; tet < mesh_.tets.cols(); ++tet)
+        for (int corner = 0; corner < 4; ++corner) {
+            ErrorEstimate& here = result[static_cast<std::size_t>(mesh_.tets(corner, tet))];
+            if (here.deviation_mm == 0) here = at(tet, Eigen::Vector4d::Unit(corner));
+        }
     return result;
 }
 
@@ -133,12 +191,7 @@ std::vector<std::optional<ErrorEstimate>> Uncertainty::at(const Eigen::Matrix3Xd
     for (Eigen::Index p = 0; p < points.cols(); ++p) {
         const auto place = detail::locate_near(locator_, points.col(p));
         result.emplace_back();
-        if (!place) continue;
-        const auto here = [&](const Eigen::MatrixXd& nodal) { return meshing::interpolate(mesh_, nodal, *place); };
-        std::optional<Eigen::Vector3d> of_mesh;
-        if (discretisation_) of_mesh = discretisation_->at(mesh_, place->tet, place->barycentric);
-        result.back() =
-            estimate_of(here(algebraic_), of_mesh, matrix_of(here(covariance_)), here(unexplained_.transpose())[0]);
+        if (place) result.back() = at(place->tet, place->barycentric);
     }
     return result;
 }
@@ -160,7 +213,8 @@ UncertaintySummary summarise(const Uncertainty& uncertainty) {
         sum.data_mm += share[n] * square(here.data_mm);
         sum.deviation_mm += share[n] * square(here.deviation_mm);
         sum.interval_mm += share[n] * here.interval_mm;
-        if (!here.shown) sum.unseen_share += share[n];
+        if (here.trust == Trust::Shown) sum.shown_share += share[n];
+        if (here.trust == Trust::Unknown) sum.unknown_share += share[n];
         if (here.interval_mm <= sum.worst_interval_mm) continue;
         sum.worst_interval_mm = here.interval_mm;
         sum.worst_place = mesh.nodes.col(n);
@@ -203,8 +257,7 @@ Uncertainty uncertainty(const PreparedModel& prepared, const UpdateResult& resul
                         Observer& observer) {
     require_related(prepared, result);
     observer.checkpoint("error estimate", 0.0);
-    const OpenParts open = prepared.stiffness.is_large() ? open_by_twin(prepared, result, options, observer)
-                                                         : open_here(prepared, result, options);
+    const detail::OpenParts open = open_parts(prepared, result, options, observer);
     observer.checkpoint("error estimate", 0.6);
     const Eigen::Matrix3Xd displacement = displacement_under_pulls(result);
     const tled::NodalConditions conditions = conditions_of(prepared, result.pulls);
@@ -213,25 +266,26 @@ Uncertainty uncertainty(const PreparedModel& prepared, const UpdateResult& resul
     const tled::DiscretisationEstimate mesh =
         tled::discretisation_error(prepared.model, open.stiffness, conditions, displacement);
     if (!mesh.error) observer.note("no estimate of the error of the mesh: " + mesh.reason);
-    Eigen::VectorXd unexplained = open.data.unexplained;
-    if (place_is_uncertain(result)) unexplained.setConstant(2 * detail::error_model.shown_below);
     observer.checkpoint("error estimate", 1.0);
-    return {prepared.model.mesh, algebraic, mesh.error, open.data.covariance, unexplained, open.data.expected};
+    NodalErrors nodal;
+    nodal.algebraic = algebraic.colwise().squaredNorm();
+    nodal.data = traces(open.data.covariance);
+    nodal.covariance = open.data.covariance;
+    for (Eigen::Index n = 0; n < algebraic.cols(); ++n)
+        nodal.covariance.col(n) += tled::symmetric_entries(algebraic.col(n) * algebraic.col(n).transpose());
+    nodal.discretisation.setConstant(algebraic.cols(), std::numeric_limits<double>::quiet_NaN());
+    if (mesh.error) {
+        const Covariances squares = squares_of(*mesh.error, prepared.model.mesh);
+        nodal.discretisation = traces(squares);
+        nodal.covariance += squares;
+    }
+    nodal.shown = shown_nodes(prepared, result.pulls);
+    nodal.placed = !place_is_uncertain(result);
+    return {prepared.model.mesh, std::move(nodal), open.data.held_out, open.data.expected};
 }
 
-// ‖e‖² over its mean is a multiple of χ² (Satterthwaite, Biometrics 2 (1946) 110) whose scale is itself known from few
-// numbers: F. Its quantile is that of a normal ratio of cube roots (Paulson, Ann Math Statist 13 (1942) 233).
 double interval_mm(const ErrorEstimate& estimate, double probability) {
-    const double mean = estimate.covariance.trace();
-    if (!(mean > 0)) return 0;
-    const double freedom = mean * mean / estimate.covariance.squaredNorm();
-    const double a = 2 / (9 * freedom), b = 2 / (9 * freedom_of_size), z = normal_quantile(probability);
-    // ((1 − b) y − (1 − a))² = z² (b y² + a), the root on z's side
-    const double square = (1 - b) * (1 - b) - z * z * b, middle = (1 - a) * (1 - b),
-                 rest = (1 - a) * (1 - a) - z * z * a;
-    const double root = std::sqrt(std::max(0.0, middle * middle - square * rest));
-    const double y = std::max(0.0, (middle + (z < 0 ? -root : root)) / square);
-    return std::sqrt(mean * (freedom_of_size - 2) / freedom_of_size * y * y * y);
+    return radius_mm(estimate.covariance, normal_quantile(probability));
 }
 
 }  // namespace tissuewarp::registration

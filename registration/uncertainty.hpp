@@ -49,6 +49,14 @@ struct UncertaintyOptions {
     std::uint64_t seed = 1;  ///< of these
 };
 
+/// What the data say of a place.
+enum class Trust : unsigned char {
+    Outside = 0,  ///< no tissue of the model; the field is continued there and nothing is said of it
+    Shown = 1,    ///< data show it, and it lies within 5 mm with a probability of 95 %
+    Carried = 2,  ///< no datum is near: mechanics carried it there, and it lies within 5 mm with 95 % all the same
+    Unknown = 3   ///< do not trust: it may lie 5 mm off or more
+};
+
 /// Errors of one place, mm. Each deviation is the root of the expected square of the error vector's length.
 struct ErrorEstimate {
     double algebraic_mm = 0;       ///< of the solver: the lifted residual
@@ -58,21 +66,34 @@ struct ErrorEstimate {
     /// All together, mm², moving frame before the placement turns it.
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
     double interval_mm = 0;  ///< with a probability of 95 % the true place lies within
-    bool shown = true;       ///< false: do not trust; the data say next to nothing of this place
+    Trust trust = Trust::Unknown;
 };
 
 /// With a probability in [0.001, 0.999] the true place lies within this radius, mm.
 double interval_mm(const ErrorEstimate& estimate, double probability);
 
-/// The estimate at every node of the mesh, and anywhere between.
+/// Regions of the data were left out and predicted from the rest.
+struct HeldOut {
+    double z = 1;     ///< error of these predictions over the one that was to be expected, root mean square
+    int regions = 0;  ///< that were left out
+};
+
+/// What is estimated at the nodes.
+struct NodalErrors {
+    Eigen::RowVectorXd algebraic, discretisation, data;  ///< N, mm²: of the solver, of the mesh (NaN: no estimate) and
+                                                         ///< of the data: expected squares of the error's length
+    Eigen::Matrix<double, 6, Eigen::Dynamic> covariance;  ///< 6 × N, mm², all together: xx, yy, zz, xy, yz, zx
+    std::vector<char> shown;                              ///< N: whether data show the tissue about the node
+    bool placed = true;                                   ///< false: where the organ lies as a whole is not known
+};
+
+/// The estimate at every node of the mesh, and anywhere between: of an element's corners, linearly; an element is shown
+/// whose corners all are. Tables, volumes and summaries say the same of one place.
 class Uncertainty {
 public:
-    /// The error of the mesh, where there is an estimate of it; and at the nodes the error of the solver (3 × N mm),
-    /// covariances (6 × N mm²: xx, yy, zz, xy, xz, yz), and what part of the variance of motions under unknown loads
-    /// the data left (N). What was expected beforehand, where points alone show the organ.
-    Uncertainty(meshing::TetMesh mesh, Eigen::Matrix3Xd algebraic,
-                std::optional<tled::DiscretisationError> discretisation,
-                Eigen::Matrix<double, 6, Eigen::Dynamic> covariance, Eigen::VectorXd unexplained,
+    /// `expected`: what was expected beforehand, where points alone show the organ. `held_out`: see HeldOut, where
+    /// there were data enough.
+    Uncertainty(meshing::TetMesh mesh, NodalErrors nodal, std::optional<HeldOut> held_out = {},
                 std::optional<ExpectedError> expected = {});
 
     /// Of places of the moving frame, 3 × P mm; nothing for places farther than half an element outside the mesh.
@@ -83,14 +104,16 @@ public:
     [[nodiscard]] const meshing::TetMesh& mesh() const { return mesh_; }
     /// What data and prior alone let expect, where neither labels nor an image show the organ as a whole.
     [[nodiscard]] const std::optional<ExpectedError>& expected() const { return expected_; }
+    [[nodiscard]] const std::optional<HeldOut>& held_out() const { return held_out_; }
+    [[nodiscard]] const NodalErrors& nodal() const { return nodal_; }
+    /// At barycentric coordinates of an element.
+    [[nodiscard]] ErrorEstimate at(int tet, const Eigen::Vector4d& barycentric) const;
 
 private:
     meshing::TetMesh mesh_;
     meshing::PointLocator locator_;
-    Eigen::Matrix3Xd algebraic_;
-    std::optional<tled::DiscretisationError> discretisation_;
-    Eigen::Matrix<double, 6, Eigen::Dynamic> covariance_;
-    Eigen::VectorXd unexplained_;
+    NodalErrors nodal_;
+    std::optional<HeldOut> held_out_;
     std::optional<ExpectedError> expected_;
 };
 
@@ -100,7 +123,7 @@ struct UncertaintySummary {
     double interval_mm = 0;                                                         ///< mean
     double worst_interval_mm = 0;
     Eigen::Vector3d worst_place = Eigen::Vector3d::Zero();  ///< moving frame, LPS mm
-    double unseen_share = 0;                                ///< of the tissue: not shown
+    double shown_share = 0, unknown_share = 0;              ///< of the tissue: Trust::Shown, Trust::Unknown
 };
 UncertaintySummary summarise(const Uncertainty& uncertainty);
 
@@ -114,13 +137,6 @@ std::vector<Doubt> doubts_of(const Uncertainty& uncertainty, double tolerance_mm
 /// at fault and what would help; otherwise nothing. Of random phantoms, the error over the tissue (root mean square) of
 /// 96 to 99 in a hundred is within that radius (docs/accuracy-time.md, "Is an accuracy kept?").
 std::optional<Doubt> doubt_of_accuracy(const UncertaintySummary& summary, double accuracy_mm);
-
-/// What a voxel of the trust map says.
-enum class Trust : unsigned char {
-    Outside = 0,    ///< no tissue of the model; the field is continued there and nothing is said of it
-    Shown = 1,      ///< the data show this tissue
-    DoNotTrust = 2  ///< they say next to nothing of it
-};
 
 /// The estimate on a grid of the fixed frame.
 struct UncertaintyVolumes {

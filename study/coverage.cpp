@@ -102,6 +102,7 @@ std::vector<CoverageRow> rows_of(const Phantom& phantom, Patient& patient, Evide
     const Eigen::Matrix3Xd is = result.deformation.placement.inverse() * phantom.targets.fixed;
     const meshing::PointLocator locator(prepared.model.mesh);
     const Eigen::MatrixXd& nodal = result.deformation.displacement;
+    const double z = uncertainty.held_out() ? uncertainty.held_out()->z : 1;
     std::vector<CoverageRow> rows;
     for (std::size_t k = 0; k < estimates.size(); ++k) {
         const auto column = static_cast<Eigen::Index>(k);
@@ -109,7 +110,7 @@ std::vector<CoverageRow> rows_of(const Phantom& phantom, Patient& patient, Evide
         const auto place = locator.find(X);
         if (!estimates[k] || !place) continue;  // in the organ, out of its mesh
         const Eigen::Vector3d u = meshing::interpolate(prepared.model.mesh, nodal, *place);
-        rows.push_back({phantom.seed, evidence, static_cast<int>(k), X + u - is.col(column), static_cast<int>(doubts),
+        rows.push_back({phantom.seed, evidence, static_cast<int>(k), X + u - is.col(column), z, static_cast<int>(doubts),
                         u.norm(), patient.in_view(evidence, column), *estimates[k]});
     }
     return rows;

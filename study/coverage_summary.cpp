@@ -90,7 +90,7 @@ std::vector<Coverage> coverage_of(const std::vector<CoverageRow>& rows) {
         for (const CoverageRow& row : rows) {
             if (row.evidence != evidence) continue;
             all.push_back(&row);
-            if (row.estimate.shown) shown.push_back(&row);
+            if (row.estimate.trust == registration::Trust::Shown) shown.push_back(&row);
         }
         if (all.empty()) continue;
         result.push_back(summary_of(evidence, shown.empty() ? all : shown));

@@ -9,9 +9,9 @@ namespace tissuewarp::study {
 namespace {
 
 constexpr const char* header =
-    "seed,evidence,target,doubts,error_x,error_y,error_z,moved,in_view,algebraic,discretisation,data,deviation,"
-    "interval,shown,"
-    "xx,yy,zz,xy,xz,yz";
+    "seed,evidence,target,held_out_z,doubts,error_x,error_y,error_z,moved,in_view,algebraic,discretisation,data,deviation,"
+    "interval,trust,"
+    "xx,yy,zz,xy,yz,zx";
 
 CoverageRow parsed(detail::TableLine& line) {
     CoverageRow row;
@@ -22,15 +22,16 @@ CoverageRow parsed(detail::TableLine& line) {
     if (evidence == all_evidence.end()) line.refuse("'" + name + "' is no kind of evidence");
     row.evidence = *evidence;
     row.target = static_cast<int>(line.number());
+    row.held_out_z = line.number();
     row.doubts = static_cast<int>(line.number());
     registration::ErrorEstimate& e = row.estimate;
     for (double* value : {&row.error[0], &row.error[1], &row.error[2], &row.moved_mm}) *value = line.number();
     row.in_view = line.number() != 0;
     for (double* value : {&e.algebraic_mm, &e.discretisation_mm, &e.data_mm, &e.deviation_mm, &e.interval_mm})
         *value = line.number();
-    e.shown = line.number() != 0;
+    e.trust = static_cast<registration::Trust>(line.number());
     Eigen::Matrix3d& c = e.covariance;
-    for (double* value : {&c(0, 0), &c(1, 1), &c(2, 2), &c(0, 1), &c(0, 2), &c(1, 2)}) *value = line.number();
+    for (double* value : {&c(0, 0), &c(1, 1), &c(2, 2), &c(0, 1), &c(1, 2), &c(0, 2)}) *value = line.number();
     c.triangularView<Eigen::StrictlyLower>() = c.transpose();
     return row;
 }
@@ -43,13 +44,14 @@ void write_coverage(const std::filesystem::path& path, const std::vector<Coverag
     for (const CoverageRow& row : rows) {
         const registration::ErrorEstimate& e = row.estimate;
         const Eigen::Matrix3d& c = e.covariance;
-        out << row.seed << ',' << name_of(row.evidence) << ',' << row.target << ',' << row.doubts;
+        out << row.seed << ',' << name_of(row.evidence) << ',' << row.target << ',' << row.held_out_z << ','
+            << row.doubts;
         for (const double value : {row.error[0], row.error[1], row.error[2], row.moved_mm}) out << ',' << value;
         out << ',' << row.in_view;
         for (const double value : {e.algebraic_mm, e.discretisation_mm, e.data_mm, e.deviation_mm, e.interval_mm})
             out << ',' << value;
-        out << ',' << e.shown;
-        for (const double value : {c(0, 0), c(1, 1), c(2, 2), c(0, 1), c(0, 2), c(1, 2)}) out << ',' << value;
+        out << ',' << static_cast<int>(e.trust);
+        for (const double value : {c(0, 0), c(1, 1), c(2, 2), c(0, 1), c(1, 2), c(0, 2)}) out << ',' << value;
         out << '\n';
     }
     write_file(out.str(), path);

@@ -3,6 +3,7 @@
 #include "meshing/search/point_tree.hpp"
 #include "registration/springs/pull.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace tissuewarp::registration::detail {
@@ -68,8 +69,30 @@ std::vector<tled::Spring> sampled(const std::vector<tled::Spring>& springs, cons
     return result;
 }
 
-void add(LastPulls& pulls, Origin origin, const std::vector<tled::Spring>& springs) {
-    for (const tled::Spring& spring : springs) pulls.springs.push_back({spring, origin});
+void add(LastPulls& pulls, const PulledNode& like, const std::vector<tled::Spring>& springs) {
+    for (const tled::Spring& spring : springs)
+        pulls.springs.push_back({spring, like.origin, like.shared_mm, like.shows_mm});
+}
+
+/// Data of one kind after the other: what is known of them beside their springs is the same.
+std::vector<std::vector<PulledNode>> by_kind(const std::vector<PulledNode>& data) {
+    std::vector<std::vector<PulledNode>> kinds;
+    for (const PulledNode& pulled : data) {
+        const auto same = std::find_if(kinds.begin(), kinds.end(), [&](const auto& kind) {
+            return kind.front().shared_mm == pulled.shared_mm && kind.front().shows_mm == pulled.shows_mm;
+        });
+        if (same == kinds.end())
+            kinds.push_back({pulled});
+        else
+            same->push_back(pulled);
+    }
+    return kinds;
+}
+
+std::vector<tled::Spring> springs_of(const std::vector<PulledNode>& pulled) {
+    std::vector<tled::Spring> result;
+    for (const PulledNode& each : pulled) result.push_back(each.spring);
+    return result;
 }
 
 }  // namespace
@@ -110,11 +133,13 @@ LastPulls pulls_on(const PreparedModel& coarse, const PreparedModel& prepared, c
     const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
     const meshing::PointLocator locator(mesh);
     LastPulls pulls;
-    const std::vector<tled::Spring> data = given.of(Origin::Datum);
     const bool labels = !given.of(Origin::Hold).empty();
-    add(pulls, Origin::Datum, labels ? sampled(data, nodes, coarse) : moved(data, nodes, mesh, locator));
+    for (const std::vector<PulledNode>& kind : by_kind(given.data())) {
+        const std::vector<tled::Spring> springs = springs_of(kind);
+        add(pulls, kind.front(), labels ? sampled(springs, nodes, coarse) : moved(springs, nodes, mesh, locator));
+    }
     for (const Origin origin : {Origin::Prior, Origin::Support})
-        add(pulls, origin, moved(given.of(origin), nodes, mesh, locator));
+        add(pulls, {{}, origin}, moved(given.of(origin), nodes, mesh, locator));
     pulls.energy = given.energy;
     pulls.free_placement = given.free_placement;
     pulls.parts_alone = given.parts_alone;

@@ -1,5 +1,6 @@
 #include "registration/loads/unknown_loads.hpp"
 
+#include "registration/loads/smooth_field.hpp"
 #include "registration/loads/white_noise.hpp"
 #include "registration/pose/rigid_part.hpp"
 
@@ -18,7 +19,7 @@ namespace {
 
 using Columns = Eigen::MatrixXd;  // 3N × k, nodes' vectors one after the other
 
-constexpr int waves = load_draws.waves, draws = load_draws.draws;
+constexpr int draws = load_draws.draws;
 
 /// mm³ of each node's share of its elements.
 Eigen::VectorXd nodal_volumes(const meshing::TetMesh& mesh) {
@@ -55,24 +56,6 @@ Columns in_equilibrium(const Columns& loads, const Eigen::Matrix3Xd& nodes, cons
     return loads - held * (motions.transpose() * held).ldlt().solve(motions.transpose() * loads);
 }
 
-/// A smooth Gaussian field of vectors by random waves (Rahimi and Recht 2007), each component of variance 1.
-class SmoothField {
-public:
-    SmoothField(double length_mm, std::mt19937_64& generator)
-        : wave_(white_noise(3, 3 * waves, generator) / length_mm) {
-        for (double& phase : phase_) phase = 2 * EIGEN_PI * uniform(generator);
-    }
-    Eigen::Vector3d operator()(const Eigen::Vector3d& point) const {
-        Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-        for (int w = 0; w < 3 * waves; ++w) sum[w / waves] += std::cos(wave_.col(w).dot(point) + phase_[w]);
-        return std::sqrt(2.0 / waves) * sum;
-    }
-
-private:
-    Eigen::Matrix<double, 3, 3 * waves> wave_;
-    Eigen::Matrix<double, 3 * waves, 1> phase_;
-};
-
 }  // namespace
 
 Columns unknown_loads(const PreparedModel& prepared, int count, std::uint64_t seed) {
@@ -95,6 +78,21 @@ Columns unknown_loads(const PreparedModel& prepared, int count, std::uint64_t se
         }
     });
     return in_equilibrium(loads, nodes, areas);
+}
+
+Columns unknown_body_forces(const PreparedModel& prepared, int count, std::uint64_t seed) {
+    const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
+    const Eigen::VectorXd volumes = nodal_volumes(prepared.model.mesh);
+    const double radius = radius_of(nodes);
+    std::mt19937_64 generator(seed);
+    std::vector<SmoothField> bodies;
+    for (int k = 0; k < count; ++k) bodies.emplace_back(load_draws.smooth_over * radius, generator);
+    Columns loads(nodes.size(), count);
+    tbb::parallel_for(0, count, [&](int k) {
+        for (Eigen::Index n = 0; n < nodes.cols(); ++n)
+            loads.block<3, 1>(3 * n, k) = volumes[n] / radius * bodies[static_cast<std::size_t>(k)](nodes.col(n));
+    });
+    return in_equilibrium(loads, nodes, volumes);
 }
 
 Columns unknown_weights(const PreparedModel& prepared) {

@@ -14,7 +14,6 @@ namespace tissuewarp::registration::detail {
 /// over unchanged.
 struct LoadDraws {
     double smooth_over = 0.5;  ///< of the organ's radius, length over which tractions vary. Chosen there
-    int waves = 20;            ///< of each component of a traction. Chosen by hand; on which data is not recorded
     int draws = 256;           ///< whose principal shapes are taken: those of the liver's surface did not depend on …
     std::uint64_t seed = 0x10ad5;  ///< … the seed. An error estimate draws others
 };
@@ -23,6 +22,9 @@ inline constexpr LoadDraws load_draws{};
 /// Random forces on the nodes, 3N × count, mN, in equilibrium: a uniform body force and tractions on the outer surface
 /// that vary smoothly over half the organ's radius, of about 1 kPa. Only their shape tells; their size is arbitrary.
 Eigen::MatrixXd unknown_loads(const PreparedModel& prepared, int count, std::uint64_t seed);
+
+/// The same in the organ alone: body forces that vary as smoothly.
+Eigen::MatrixXd unknown_body_forces(const PreparedModel& prepared, int count, std::uint64_t seed);
 
 /// Unknown weight: the three uniform body forces of such loads, of variance 1 each, 3N × 3, mN.
 Eigen::MatrixXd unknown_weights(const PreparedModel& prepared);

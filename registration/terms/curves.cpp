@@ -161,7 +161,7 @@ Contribution CurveTerm::linearise(const RoundPlan& plan, const State& state, Obs
     }
     if (weights > 0) result.mean_residual_mm /= weights;
     result.candidates = static_cast<int>(found.size());
-    result.springs = pulled_by(Origin::Datum, lumped_springs(prepared_.model.mesh, pulls, state.displacement));
+    result.springs = pulled_by(curve_kind, lumped_springs(prepared_.model.mesh, pulls, state.displacement));
     return result;
 }
 

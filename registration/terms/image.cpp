@@ -54,7 +54,8 @@ ImageTerm::ImageTerm(const PreparedModel& prepared, const imaging::Volume& fixed
       options_(options),
       energy_(energy),
       search_(prepared, fixed, options, tools),
-      prior_(prepared, search_.seen(), options, energy) {}
+      prior_(prepared, search_.seen(), options, energy),
+      kind_(image_kind(prepared.image->image.geometry, fixed.geometry)) {}
 
 void ImageTerm::search(const State& state, Observer& observer) {
     matches_ = search_.search(state, observer);
@@ -129,7 +130,11 @@ Contribution ImageTerm::linearise(const RoundPlan& plan, const State& state, Obs
         std::max(static_cast<int>(prepared_.image->blocks.points().cols()), static_cast<int>(matches.size()));
     result.matched = static_cast<int>(matches.size());
     result.mean_residual_mm = mean_residual(matches);
-    result.springs = pulled_by(Origin::Datum, lumped_springs(shares_, forces_, state.displacement));
+    result.springs = pulled_by(kind_, lumped_springs(shares_, forces_, state.displacement));
+    for (PulledNode& pulled : result.springs)
+        if (!prior_.in_view(state.placement * (prepared_.model.mesh.nodes.col(pulled.spring.node) +
+                                               state.displacement.col(pulled.spring.node))))
+            pulled.shows_mm = -1;
     for (const tled::Spring& spring : prior_.springs(state.placement))
         result.springs.push_back({spring, Origin::Prior});
     return result;

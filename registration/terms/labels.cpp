@@ -61,7 +61,8 @@ Contribution LabelTerm::linearise(const RoundPlan& plan, const State& state, Obs
                            " mm; check that the images show the same organ");
     Contribution result = last_;
     result.springs =
-        pulled_by(Origin::Datum, matched_springs(interfaces, matches, normals, state.displacement, prepared_.options));
+        pulled_by(label_kind(prepared_.labels.geometry, labels_.geometry),
+                  matched_springs(interfaces, matches, normals, state.displacement, prepared_.options));
     const auto holds = pulled_by(Origin::Hold, holding_springs(interfaces, state.displacement, prepared_.options));
     std::copy(holds.begin(), holds.end(), std::back_inserter(result.springs));
     return result;

@@ -118,7 +118,7 @@ Contribution PointTerm::linearise(const RoundPlan& plan, const State& state, Obs
     }
     if (weights > 0) result.mean_residual_mm /= weights;
     result.candidates = result.matched = static_cast<int>(places_.size());
-    result.springs = pulled_by(Origin::Datum, lumped_springs(prepared_.model.mesh, pulls, state.displacement));
+    result.springs = pulled_by(point_kind, lumped_springs(prepared_.model.mesh, pulls, state.displacement));
     return result;
 }
 

@@ -28,6 +28,15 @@ std::vector<PulledNode> pulled_by(Origin origin, const std::vector<tled::Spring>
     return result;
 }
 
+std::vector<PulledNode> pulled_by(const DatumKind& kind, const std::vector<tled::Spring>& springs) {
+    std::vector<PulledNode> result = pulled_by(Origin::Datum, springs);
+    for (PulledNode& pulled : result) {
+        pulled.shared_mm = kind.shared_mm;
+        pulled.shows_mm = kind.shows_mm;
+    }
+    return result;
+}
+
 Alignment Term::pose(const Eigen::Isometry3d& start, Observer& /*observer*/) {
     return {start, 0};
 }

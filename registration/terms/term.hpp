@@ -8,6 +8,7 @@
 #include "registration/result.hpp"
 #include "registration/schedule.hpp"
 #include "registration/state.hpp"
+#include "registration/terms/datum_kind.hpp"
 
 #include <optional>
 #include <vector>
@@ -29,6 +30,9 @@ void add(Contribution& sum, Contribution more);
 
 /// Springs with what they stand for.
 std::vector<PulledNode> pulled_by(Origin origin, const std::vector<tled::Spring>& springs);
+
+/// Springs of data.
+std::vector<PulledNode> pulled_by(const DatumKind& kind, const std::vector<tled::Spring>& springs);
 
 /// What a term shows of the organ; decides what else a registration needs (terms.hpp).
 enum class Shows {

@@ -26,6 +26,8 @@ public:
 
     /// Springs of the outer surface, by what is expected of it in view and out of it, with the organ placed so.
     [[nodiscard]] const std::vector<tled::Spring>& springs(const Eigen::Isometry3d& placement);
+    /// Whether the image shows a place of the fixed frame.
+    [[nodiscard]] bool in_view(const Eigen::Vector3d& point) const { return view_.distance(point) < 0; }
     /// Share of the organ's outer surface, by area, that could be in view where the headers place it.
     [[nodiscard]] double share_in_view() const;
 

@@ -1,0 +1,32 @@
+#pragma once
+/// A smooth Gaussian field of vectors by random waves (Rahimi and Recht 2007).
+
+#include "registration/loads/white_noise.hpp"
+
+#include <Eigen/Core>
+
+#include <cmath>
+#include <random>
+
+namespace tissuewarp::registration::detail {
+
+/// Each component of variance 1, its covariance exp(−r²/(2ℓ²)).
+class SmoothField {
+public:
+    SmoothField(double length_mm, std::mt19937_64& generator)
+        : wave_(white_noise(3, 3 * waves, generator) / length_mm) {
+        for (double& phase : phase_) phase = 2 * EIGEN_PI * uniform(generator);
+    }
+    [[nodiscard]] Eigen::Vector3d operator()(const Eigen::Vector3d& point) const {
+        Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+        for (int w = 0; w < 3 * waves; ++w) sum[w / waves] += std::cos(wave_.col(w).dot(point) + phase_[w]);
+        return std::sqrt(2.0 / waves) * sum;
+    }
+
+private:
+    static constexpr int waves = 20;  // of each component. Chosen by hand; on which data is not recorded
+    Eigen::Matrix<double, 3, 3 * waves> wave_;
+    Eigen::Matrix<double, 3 * waves, 1> phase_;
+};
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,42 @@
+#pragma once
+/// What is known of each kind of data beside the deviation that is stated for it: errors that data share with their
+/// neighbours, which no number of them averages out, and how far about them tissue counts as shown.
+
+#include "imaging/geometry.hpp"
+
+#include <algorithm>
+
+namespace tissuewarp::registration::detail {
+
+struct DatumKind {
+    double shared_mm = 0;  ///< see PulledNode
+    double shows_mm = 0;   ///< see PulledNode
+};
+
+/// Chosen on the random patients 1 to 9 of all three families (docs/decisions/error_model.md), but for the distances,
+/// which are a matter of words.
+struct SharedErrors {
+    double label_voxels = 0.2;     ///< of labels, of the larger voxel of both maps
+    double surface_voxels = 0.2;   ///< of points of a surface, of the voxel of the map that the model came from
+    double image_voxels = 0.08;    ///< of images, of the larger voxel of both
+    double points_mm = 0.3, curves_mm = 0.3;
+    double shows_mm = 10;  ///< about data that lie apart; about an image's, which lie dense, none
+};
+inline constexpr SharedErrors shared_errors{};
+
+inline double larger_voxel(const imaging::Geometry& a, const imaging::Geometry& b) {
+    return std::max(a.spacing.maxCoeff(), b.spacing.maxCoeff());
+}
+inline DatumKind label_kind(const imaging::Geometry& moving, const imaging::Geometry& fixed) {
+    return {shared_errors.label_voxels * larger_voxel(moving, fixed), shared_errors.shows_mm};
+}
+inline DatumKind image_kind(const imaging::Geometry& moving, const imaging::Geometry& fixed) {
+    return {shared_errors.image_voxels * larger_voxel(moving, fixed), 0};
+}
+inline DatumKind surface_kind(const imaging::Geometry& moving) {
+    return {shared_errors.surface_voxels * moving.spacing.maxCoeff(), shared_errors.shows_mm};
+}
+inline constexpr DatumKind point_kind{shared_errors.points_mm, shared_errors.shows_mm};
+inline constexpr DatumKind curve_kind{shared_errors.curves_mm, shared_errors.shows_mm};
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,126 @@
+#include "registration/uncertainty/held_out.hpp"
+
+#include "core/errors.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <vector>
+
+namespace tissuewarp::registration::detail {
+
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+
+namespace {
+
+/// Of each datum the region it belongs to: that of the nearest of so many data, each the farthest from those before,
+/// so that regions whose numbers follow each other lie apart. −1 where it does not pull.
+std::vector<int> regions_of(const std::vector<PulledNode>& data, const Eigen::Matrix3Xd& nodes, int count) {
+    std::vector<int> region(data.size(), -1);
+    std::vector<double> distance(data.size(), std::numeric_limits<double>::infinity());
+    for (int r = 0; r < count; ++r) {
+        std::size_t farthest = data.size();
+        for (std::size_t n = 0; n < data.size(); ++n) {
+            if (!(data[n].spring.stiffness.trace() > 0)) continue;
+            if (farthest == data.size() || distance[n] > distance[farthest]) farthest = n;
+        }
+        if (farthest == data.size() || !(distance[farthest] > 0)) break;
+        const Vector3d centre = nodes.col(data[farthest].spring.node);
+        for (std::size_t n = 0; n < data.size(); ++n) {
+            if (!(data[n].spring.stiffness.trace() > 0)) continue;
+            const double here = (nodes.col(data[n].spring.node) - centre).squaredNorm();
+            if (here >= distance[n]) continue;
+            distance[n] = here;
+            region[n] = r;
+        }
+    }
+    return region;
+}
+
+/// The pulls without the data of a fold.
+LastPulls without_fold(const LastPulls& pulls, const std::vector<PulledNode>& kept) {
+    LastPulls result = pulls;
+    std::erase_if(result.springs, [](const PulledNode& pulled) { return pulled.origin == Origin::Datum; });
+    result.springs.insert(result.springs.end(), kept.begin(), kept.end());
+    return result;
+}
+
+/// ½ of what springs hold of displacements away from their targets, mean over columns.
+double energy_of(const tled::Spring& spring, const MatrixXd& away) {
+    return away.cwiseProduct(spring.stiffness * away).sum() / double(away.cols());
+}
+
+/// Sums over regions, each weighed by what was to be expected of it.
+struct Sums {
+    double missed = 0, expected = 0;
+    int regions = 0;
+};
+
+struct Fold {
+    std::vector<PulledNode> kept, left_out;
+    DataErrors errors_of_kept, errors_of_left_out;
+    std::vector<int> region;  // of those left out
+};
+
+Fold fold_of(int number, int folds, const std::vector<PulledNode>& data, const DataErrors& errors,
+             const std::vector<int>& region) {
+    Fold fold;
+    for (std::size_t n = 0; n < data.size(); ++n) {
+        const bool out = region[n] >= 0 && region[n] % folds == number;
+        (out ? fold.left_out : fold.kept).push_back(data[n]);
+        (out ? fold.errors_of_left_out : fold.errors_of_kept).push_back(errors[n]);
+        if (out) fold.region.push_back(region[n]);
+    }
+    return fold;
+}
+
+// With r the residuals of the data left out, taking their springs away moves the tissue by −A₋⁻¹ K r: they are missed by
+// r + A₋⁻¹ K r. To be expected is ε + u − û₋ of truths u and errors ε.
+void add_fold(const Fold& fold, const LinearRegistration& rest, const Eigen::Matrix3Xd& displacement,
+              const Truths& truths, std::vector<Sums>& regions) {
+    const auto nodes = static_cast<int>(displacement.cols());
+    DataErrors residuals;
+    for (const PulledNode& pulled : fold.left_out)
+        residuals.emplace_back(pulled.spring.target - displacement.col(pulled.spring.node));
+    const MatrixXd moved = rest.inverse(forces_of(fold.left_out, residuals, nodes)),
+                   off = rest.missed(truths) - rest.inverse(forces_of(fold.kept, fold.errors_of_kept, nodes));
+    for (std::size_t n = 0; n < fold.left_out.size(); ++n) {
+        const tled::Spring& spring = fold.left_out[n].spring;
+        Sums& sums = regions[std::size_t(fold.region[n])];
+        sums.missed += energy_of(spring, residuals[n] + moved.middleRows<3>(3 * spring.node));
+        sums.expected += energy_of(spring, fold.errors_of_left_out[n] + off.middleRows<3>(3 * spring.node));
+    }
+}
+
+}  // namespace
+
+std::optional<HeldOut> held_out(const PreparedModel& prepared, const LastPulls& pulls, const LastPulls& unseen,
+                                const Eigen::Matrix3Xd& displacement, const Truths& truths, const DataErrors& errors) {
+    const auto& [count, folds, draws] = held_out_options;
+    const std::vector<PulledNode> data = pulls.data();
+    const std::vector<int> region = regions_of(data, prepared.model.mesh.nodes, count);
+    if (data.empty() || *std::max_element(region.begin(), region.end()) + 1 < folds) return std::nullopt;
+    std::vector<Sums> regions(static_cast<std::size_t>(count));
+    for (int number = 0; number < folds; ++number) {
+        const Fold fold = fold_of(number, folds, data, errors, region);
+        try {
+            const LinearRegistration rest(prepared, without_fold(pulls, fold.kept), unseen);
+            add_fold(fold, rest, displacement, truths, regions);
+        } catch (const InvalidInput&) {  // the rest holds the tissue no longer
+        }
+    }
+    HeldOut result;
+    double sum = 0;
+    for (const Sums& each : regions) {
+        if (!(each.expected > 0)) continue;
+        ++result.regions;
+        sum += each.missed / each.expected;
+    }
+    if (result.regions == 0) return std::nullopt;
+    result.z = std::sqrt(sum / result.regions);
+    return result;
+}
+
+}  // namespace tissuewarp::registration::detail
