@@ -1,7 +1,6 @@
 #pragma once
 /// Mesh files. VTU is written by hand (appended raw binary, little-endian) so that ParaView and Slicer read it.
 
-#include "meshing/hex_cells.hpp"
 #include "meshing/tet_mesh.hpp"
 
 #include <filesystem>
@@ -20,16 +19,11 @@ struct MeshArray {
 /// Complete or absent: written to a temporary name and renamed. Throws IoError.
 void write_vtu(const TetMesh& mesh, const std::filesystem::path& path, const std::vector<MeshArray>& point_arrays = {},
                const std::vector<MeshArray>& cell_arrays = {});
-/// The same for tetrahedra and hexahedra; cell arrays have the columns of the tetrahedra before those of the hexahedra.
-void write_vtu(const MixedMesh& mesh, const std::filesystem::path& path,
-               const std::vector<MeshArray>& point_arrays = {}, const std::vector<MeshArray>& cell_arrays = {});
 
 /// Reads a .vtu of tetrahedra: what write_vtu makes, and the variants that VTK and meshio write, ascii, inline or
 /// appended, uncompressed or compressed by zlib, little-endian and in one piece. A missing `label` array means label 1.
 /// Throws IoError or InvalidInput.
 TetMesh read_vtu(const std::filesystem::path& path);
-/// The same for a mesh of tetrahedra, hexahedra (VTK types 10 and 12) or both.
-MixedMesh read_mixed_vtu(const std::filesystem::path& path);
 
 /// A cell array of a .vtu, components × cells in the order of the file. Throws IoError or, naming those that there are,
 /// InvalidInput.

@@ -7,8 +7,7 @@ import math
 import pathlib
 import sys
 
-COLOURS = {"T4": "#c2410c", "averaged pressure": "#1d4ed8", "T10": "#6b7280", "T10 mixed": "#047857",
-           "H8": "#a21caf"}
+COLOURS = {"T4": "#c2410c", "averaged pressure": "#1d4ed8", "T10": "#6b7280", "T10 mixed": "#047857"}
 PANELS = [("p1_cube_stretch", "iso", "force z", "Cube pulled by 20 %: force"),
           ("p2_cube_shear", "iso", "force x", "Cube sheared by 50 %: force"),
           ("p4_cook_plane_strain, nu 0.499", "iso", "tip y", "Cook's membrane, ν = 0.499: tip"),

@@ -29,30 +29,6 @@ void add_law(ProgramSource& source, Law law) {
     source.chunks.emplace_back(law_chunk.at(static_cast<std::size_t>(law)));
 }
 
-std::string kinematics_chunk(Cell cell) {
-    return cell == Cell::Tetrahedron ? "element" : "element.hexahedron";
-}
-
-/// Kinematics, law and viscosity of an element pass; the pressure follows.
-ProgramSource law_program(std::string kernel, Cell cell, const ElementForces& forces) {
-    ProgramSource source{std::move(kernel),
-                         {"index", "bindings", "numbers", "deformation", kinematics_chunk(cell), "material",
-                          "isochoric.first", "isochoric"},
-                         {},
-                         {}};
-    if (has_fibres(forces.law)) source.chunks.emplace_back("element.fibre");
-    add_law(source, forces.law);
-    const bool viscous = forces.viscosity != Viscosity::None;
-    source.defines = {{"WORKGROUP_SIZE", workgroup_size}, {"USES_SHEAR", "1"}, {"HAS_VISCOSITY", flag(viscous)}};
-    if (viscous) {
-        source.chunks.emplace_back("viscosity");
-        source.chunks.emplace_back("viscosity.prony");
-        source.defines["PRONY_TERMS"] = std::to_string(forces.prony_terms) + "u";
-        source.defines["ADVANCES_TIME"] = flag(forces.viscosity == Viscosity::Advance);
-    }
-    return source;
-}
-
 /// An effect's chunk where the scene has it, and its flag either way.
 void add_effect(ProgramSource& source, const char* chunk, const char* name, bool present) {
     if (present) source.chunks.emplace_back(chunk);
@@ -167,19 +143,27 @@ const std::array<MatchKernel, match_pass_count> match_kernels{{
 }  // namespace
 
 ProgramSource element_force_program(const ElementForces& forces) {
-    ProgramSource source = law_program("element_force", Cell::Tetrahedron, forces);
+    ProgramSource source{
+        "element_force",
+        {"index", "bindings", "numbers", "deformation", "element", "material", "isochoric.first", "isochoric"},
+        {},
+        {}};
+    if (has_fibres(forces.law)) source.chunks.emplace_back("element.fibre");
+    add_law(source, forces.law);
+    const bool viscous = forces.viscosity != Viscosity::None;
+    source.defines = {{"WORKGROUP_SIZE", workgroup_size}, {"USES_SHEAR", "1"}, {"HAS_VISCOSITY", flag(viscous)}};
+    if (viscous) {
+        source.chunks.emplace_back("viscosity");
+        source.chunks.emplace_back("viscosity.prony");
+        source.defines["PRONY_TERMS"] = unsigned_number(forces.prony_terms);
+        source.defines["ADVANCES_TIME"] = flag(forces.viscosity == Viscosity::Advance);
+    }
     if (forces.pressure == PressureRule::Element) {
         source.chunks.emplace_back("pressure.element");
     } else {
         source.chunks.emplace_back("pressure.averaged");
         source.defines["HAS_ELEMENT_PRESSURE"] = flag(forces.pressure == PressureRule::AveragedWithElementPart);
     }
-    return source;
-}
-
-ProgramSource hexahedron_force_program(const ElementForces& forces) {
-    ProgramSource source = law_program("hexahedron_force", Cell::Hexahedron, forces);
-    source.chunks.emplace_back("pressure.element");
     return source;
 }
 
@@ -293,11 +277,11 @@ ProgramSource observe_nodes_program() {
             {}};
 }
 
-ProgramSource observe_elements_program(Cell cell) {
+ProgramSource observe_elements_program() {
     ProgramSource source = observe_nodes_program();
     source.kernel = "observe_elements";
     source.chunks.emplace_back("deformation");
-    source.chunks.emplace_back(kinematics_chunk(cell));
+    source.chunks.emplace_back("element");
     return source;
 }
 

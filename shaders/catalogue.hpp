@@ -38,9 +38,6 @@ struct ElementForces {
     int prony_terms = 0;  ///< of the scene's materials, the most; at least 1 with viscosity
 };
 
-/// The kinematics of the element passes: chunks element*.glsl.
-enum class Cell { Tetrahedron, Hexahedron };
-
 /// Effects that act on nodes; what is absent costs no read and no instruction.
 struct NodeEffects {
     bool springs = false;
@@ -66,8 +63,6 @@ enum class StoreResidual { No, Yes };
 enum class MaskConstrained { No, Yes };
 
 ProgramSource element_force_program(const ElementForces& forces);
-/// Of hexahedra, whose pressure rule is Element.
-ProgramSource hexahedron_force_program(const ElementForces& forces);
 ProgramSource element_volume_program();
 ProgramSource nodal_pressure_program(Law law);
 ProgramSource surface_force_program(const SurfaceForces& forces);
@@ -110,7 +105,7 @@ ProgramSource previous_displacement_program();
 /// Workgroups of the observing programs, each of which leaves one partial result.
 inline constexpr int observe_partials = 128;
 ProgramSource observe_nodes_program();
-ProgramSource observe_elements_program(Cell cell = Cell::Tetrahedron);
+ProgramSource observe_elements_program();
 
 /// The warp of an image (registration/gpu_warp.hpp), in the order of its passes. Outside the mesh the tissue follows a
 /// field that the host left, or the placement alone.

@@ -87,17 +87,14 @@ void add_patch_steps(std::vector<ProgramSource>& all) {
 }  // namespace
 
 std::vector<ProgramSource> every_program() {
-    std::vector<ProgramSource> all{element_volume_program(),        impose_program(),
-                                   previous_displacement_program(), observe_nodes_program(),
-                                   observe_elements_program(),      observe_elements_program(Cell::Hexahedron)};
+    std::vector<ProgramSource> all{element_volume_program(), impose_program(), previous_displacement_program(),
+                                   observe_nodes_program(), observe_elements_program()};
     for (int index = 0; index < law_count; ++index) {
         const auto law = static_cast<Law>(index);
         for (const PressureRule rule :
              {PressureRule::Element, PressureRule::Averaged, PressureRule::AveragedWithElementPart})
             for (const Viscosity viscosity : {Viscosity::None, Viscosity::Hold, Viscosity::Advance})
                 all.push_back(element_force_program({law, rule, viscosity, 3}));
-        for (const Viscosity viscosity : {Viscosity::None, Viscosity::Hold, Viscosity::Advance})
-            all.push_back(hexahedron_force_program({law, PressureRule::Element, viscosity, 3}));
         all.push_back(nodal_pressure_program(law));
     }
     add_node_passes(all);

@@ -174,7 +174,6 @@ Body stretched_cube() {
         const int cells = cells_for(tetrahedra);
         return meshing::box_mesh({edge, edge, edge}, {cells, cells, cells});
     };
-    body.cells = true;
     body.pull = [](const Vector3d& X) -> Pull {
         if (X.z() < 1e-6) return {1, Vector3d::Zero()};
         if (X.z() > edge - 1e-6) return {1, Vector3d(0, 0, stretch)};

@@ -35,7 +35,6 @@ struct Body {
     std::string name, story;
     std::function<meshing::TetMesh(int tetrahedra, Observer&)> mesh;  ///< nearly so many
     Hold hold = Hold::Hard;  ///< of the base: hard where the held part ends where meshes can follow it
-    bool cells = false;      ///< its tetrahedra are those of box_mesh, six to a hexahedron
     std::function<Pull(const Eigen::Vector3d& X)> pull;  ///< at a rest position of the surface, mm
     Eigen::Matrix3Xd samples;                            ///< rest positions inside, mm, where errors are measured
     std::optional<Symmetry> symmetry;
@@ -51,7 +50,7 @@ Body stretched_cube();
 /// lower than 100 mm all lengths shrink alike.
 Body indented_organ(const imaging::Volume& label_map);
 
-/// What acts on linear tetrahedra, or on hexahedra that share their nodes: imposed displacements on boundary faces
+/// What acts on linear tetrahedra: imposed displacements on boundary faces
 /// pulled at in their corners and their middle, or springs there of 3 kPa/mm times the weight.
 tled::Conditions conditions_of(const Body& body, Hold hold, const meshing::TetMesh& mesh);
 /// The same on quadratic tetrahedra with straight edges, of the symmetric part where there is one; `linear` is the mesh

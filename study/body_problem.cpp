@@ -21,24 +21,6 @@ namespace {
 using detail::Clock;
 using Eigen::Matrix3Xd;
 
-/// Six tetrahedra of box_mesh as the cell that they fill.
-meshing::HexCells cells_of(const meshing::TetMesh& box) {
-    constexpr int tets_of_cell = 6;
-    constexpr std::array<std::size_t, 8> vtk_corner{0, 1, 3, 2, 4, 5, 7, 6};  // of corners with x fastest, z slowest
-    meshing::HexCells cells;
-    cells.hexes.resize(8, box.tet_count() / tets_of_cell);
-    cells.labels.setOnes(cells.hexes.cols());
-    for (int cell = 0; cell < cells.count(); ++cell) {
-        const auto nodes = box.tets.middleCols(tets_of_cell * cell, tets_of_cell).reshaped();
-        std::vector<int> corner(nodes.begin(), nodes.end());
-        std::sort(corner.begin(), corner.end());
-        corner.erase(std::unique(corner.begin(), corner.end()), corner.end());
-        for (std::size_t c = 0; c < vtk_corner.size(); ++c)
-            cells.hexes(static_cast<Eigen::Index>(c), cell) = corner[vtk_corner[c]];
-    }
-    return cells;
-}
-
 /// A nodal displacement at fixed places.
 class Sampling {
 public:
@@ -78,7 +60,7 @@ struct Meshed {
 /// What settings with the same mesh, element and physics share.
 struct Prepared {
     int wanted = 0;
-    Element element = Element::T4;
+    tled::Element element = tled::Element::T4;
     Physics physics;
     tled::RestState rest;
     tled::NodalConditions conditions;
@@ -138,7 +120,6 @@ public:
 
     [[nodiscard]] std::string refusal(const Setting& setting) const override {
         const bool gpu = setting.processor == tled::Processor::Gpu;
-        if (setting.element == Element::Hexahedra && !body_.cells) return "its meshes are tetrahedra";
         if (gpu && setting.arithmetic == tled::Scalar::Float64) return "the GPU's engine computes in float32";
         if (gpu && (setting.solver == Solver::Newton || setting.physics.law == Law::Linear))
             return "factors are solved on the processor";
@@ -169,12 +150,7 @@ private:
         tled::Model model;
         model.mesh = meshed_.mesh;
         model.materials[1] = material_of(setting.physics);
-        model.element = setting.element == Element::T4 ? tled::Element::T4 : tled::Element::AveragedPressureT4;
-        if (setting.element == Element::Hexahedra) {
-            model.hexahedra = cells_of(meshed_.mesh);
-            model.mesh.tets.resize(4, 0);
-            model.mesh.labels.resize(0);
-        }
+        model.element = setting.element;
         prepared_.rest = tled::rest_state(model);
         prepared_.rest_seconds = rest_clock.seconds();
         prepared_.conditions =
@@ -189,7 +165,7 @@ private:
 
     void solve(const Setting& setting, int runs, Point& point, Observer& observer) {
         const tled::RestState& rest = prepared_.rest;
-        point.elements = rest.element_count() + rest.hexahedra.count();
+        point.elements = rest.element_count();
         point.nodes = rest.node_count;
         point.stages = {{"mesh", Phase::Preparation, {meshed_.seconds}},
                         {"rest state", Phase::Preparation, {prepared_.rest_seconds}}};

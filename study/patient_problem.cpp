@@ -47,13 +47,12 @@ public:
     [[nodiscard]] Setting base() const override {
         Setting setting;
         setting.elements = 20000;
-        setting.element = Element::T4;
+        setting.element = tled::Element::T4;
         setting.physics = {Law::LnJ, 0.45, Hold::Soft};
         return setting;
     }
 
     [[nodiscard]] std::string refusal(const Setting& setting) const override {
-        if (setting.element == Element::Hexahedra) return "its meshes are tetrahedra";
         if (setting.solver == Solver::Newton) return "Newton's method is no part of a registration";
         if (setting.arithmetic == tled::Scalar::Float64) return "registrations compute in float32";
         return {};
@@ -75,7 +74,7 @@ private:
         reg::PrepareOptions options;
         options.meshing.edge_length = edge_length_for(patient_.labels, setting.elements);
         options.default_material = material_of(setting.physics);
-        options.element = setting.element == Element::T4 ? tled::Element::T4 : tled::Element::AveragedPressureT4;
+        options.element = setting.element;
         if (setting.physics.hold == Hold::Hard) options.data_stiffness *= stiffer;
         prepared_ = std::make_shared<const reg::PreparedModel>(reg::prepare(patient_.labels, options, observer));
         shared_ = setting;

@@ -12,7 +12,6 @@ struct Axes {
     std::vector<int> elements, gpu_elements;
     std::vector<double> tolerances;       ///< against all meshes
     std::vector<double> base_tolerances;  ///< on the base's mesh alone
-    std::vector<Element> element_kinds;
     std::vector<Law> laws;
     std::vector<double> poissons_ratios;
     std::vector<Solver> solvers;
@@ -24,7 +23,6 @@ Axes axes_of(Extent extent, bool registration) {
                 {1300},
                 {1, 0.01},
                 {},
-                {Element::T4, Element::AveragedPressure, Element::Hexahedra},
                 {Law::Linear},
                 {},
                 {Solver::Lbfgs, Solver::DynamicRelaxation, Solver::SelfCheckedRelaxation}};
@@ -32,7 +30,6 @@ Axes axes_of(Extent extent, bool registration) {
             {20000, 50000, 100000, 200000, 500000, 1000000},
             {1, 0.1, 0.01},
             {0.3, 0.03, 0.003, 0.001},
-            {Element::T4, Element::AveragedPressure, Element::Hexahedra},
             {Law::Linear, Law::Iso, Law::Stable, Law::MooneyRivlin, Law::Ogden},
             {0.3, 0.4, 0.45, 0.49, 0.495},
             {Solver::Lbfgs, Solver::DynamicRelaxation, Solver::SelfCheckedRelaxation, Solver::Newton}};
@@ -59,7 +56,7 @@ public:
                     s.tolerance_mm = tolerance;
                 });
         }
-        for (const Element element : axes.element_kinds) add([&](Setting& s) { s.element = element; });
+        for (const tled::Element element : every_element) add([&](Setting& s) { s.element = element; });
         for (const Law law : axes.laws) add([&](Setting& s) { s.physics.law = law; });
         for (const double ratio : axes.poissons_ratios) add([&](Setting& s) { s.physics.poissons_ratio = ratio; });
         for (const Hold hold : {Hold::Hard, Hold::Soft}) add([&](Setting& s) { s.physics.hold = hold; });

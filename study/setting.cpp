@@ -30,9 +30,8 @@ std::string number(double value) {
 
 }  // namespace
 
-std::string name_of(Element element) {
-    constexpr const char* names[] = {"T4", "averaged pressure", "hexahedra"};
-    return names[static_cast<int>(element)];
+std::string name_of(tled::Element element) {
+    return element == tled::Element::T4 ? "T4" : "averaged pressure";
 }
 
 std::string name_of(Law law) {
@@ -57,7 +56,7 @@ std::string name_of(tled::Processor processor) {
     return processor == tled::Processor::Cpu ? "CPU" : "GPU";
 }
 
-Element element_named(const std::string& name) {
+tled::Element element_named(const std::string& name) {
     return named(name, every_element, "element");
 }
 Law law_named(const std::string& name) {

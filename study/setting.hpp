@@ -10,8 +10,6 @@
 
 namespace tissuewarp::study {
 
-enum class Element { T4, AveragedPressure, Hexahedra };
-
 enum class Law {
     Linear,  ///< the answer at small strain, K₀ u = f, in one triangular solve; in registrations one such step a round
     LnJ,     ///< neo-Hookean with ln J, and so on as tled/material.hpp says
@@ -38,7 +36,7 @@ struct Physics {
 
 struct Setting {
     int elements = 20000;  ///< wanted; the mesh comes near
-    Element element = Element::AveragedPressure;
+    tled::Element element = tled::Element::AveragedPressureT4;
     Physics physics;
     Solver solver = Solver::Automatic;
     double tolerance_mm = 0.05;
@@ -47,13 +45,13 @@ struct Setting {
     bool operator==(const Setting&) const = default;
 };
 
-inline constexpr std::array every_element{Element::T4, Element::AveragedPressure, Element::Hexahedra};
+inline constexpr std::array every_element{tled::Element::T4, tled::Element::AveragedPressureT4};
 inline constexpr std::array every_law{Law::Linear, Law::LnJ, Law::Iso, Law::Stable, Law::MooneyRivlin, Law::Ogden};
 inline constexpr std::array every_solver{Solver::Automatic, Solver::Lbfgs, Solver::DynamicRelaxation,
                                          Solver::SelfCheckedRelaxation, Solver::Newton};
 
 /// Names of files and of people: "averaged pressure", "neo-Hookean, ln J", "L-BFGS", …
-std::string name_of(Element element);
+std::string name_of(tled::Element element);
 std::string name_of(Law law);
 std::string name_of(Solver solver);
 std::string name_of(Hold hold);
@@ -61,7 +59,7 @@ std::string name_of(tled::Scalar scalar);
 std::string name_of(tled::Processor processor);
 
 /// Inverse of name_of. Throws InvalidInput for a text that names nothing of the kind.
-Element element_named(const std::string& name);
+tled::Element element_named(const std::string& name);
 Law law_named(const std::string& name);
 Solver solver_named(const std::string& name);
 Hold hold_named(const std::string& name);

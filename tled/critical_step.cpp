@@ -63,7 +63,6 @@ MassScaling scaled_mass(const RestState& rest, double density, double step) {
     if (!(step > 0) || !(density > 0))
         throw InvalidInput("mass scaling needs a positive time step and density, not " + std::to_string(step) +
                            " s and " + std::to_string(density) + " kg/mm3");
-    if (rest.hexahedra.count() > 0) throw InvalidInput("mass scaling knows tetrahedra only; this model has hexahedra");
     const Eigen::VectorXd bounds = element_step_bounds(rest, density);
     Eigen::VectorXd added = Eigen::VectorXd::Zero(rest.node_count);
     MassScaling result;

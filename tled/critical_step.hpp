@@ -34,7 +34,7 @@ struct MassScaling {
 };
 
 /// Raises the density of every element whose bound is below `step` (s) until it reaches it. Statics is not changed,
-/// dynamics is: report the fraction. Throws InvalidInput for models with hexahedra.
+/// dynamics is: report the fraction.
 MassScaling scaled_mass(const RestState& rest, double density, double step);
 
 }  // namespace tissuewarp::tled

@@ -198,7 +198,7 @@ private:
         if (!seen.finite) return "a displacement or force is not finite";
         if (seen.min_jacobian > 0) return {};
         if (engine_.admits_inversion()) return {};
-        return name_of_element(seen.min_jacobian_tet, seen.min_jacobian_hex) +
+        return "tetrahedron " + std::to_string(seen.min_jacobian_tet) +
                " has det F = " + std::to_string(seen.min_jacobian);
     }
 

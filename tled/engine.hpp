@@ -31,21 +31,15 @@ struct Observation {
     double increment_stiffness =
         0;  ///< Σ (u − u⁻)·(r⁻ − r): with increment_mass the Rayleigh quotient of the last step
     double min_jacobian = 1;    ///< smallest det F of an element
-    int min_jacobian_tet = -1;  ///< its tetrahedron in the mesh, −1 where it is a hexahedron
-    int min_jacobian_hex = -1;  ///< its hexahedron in Model::hexahedra, −1 where it is a tetrahedron
+    int min_jacobian_tet = -1;  ///< its tetrahedron in the mesh
     bool finite = true;         ///< false when any displacement is not finite
 };
 
-/// Smallest det F of an element and its tetrahedron in the mesh or its hexahedron in Model::hexahedra, the other −1; −∞
-/// where none can be computed.
+/// Smallest det F of an element and its tetrahedron in the mesh; −∞ where none can be computed.
 struct SmallestJacobian {
     double value = 1;
     int tet = -1;
-    int hex = -1;
 };
-
-/// "tetrahedron 12" or "hexahedron 3", for messages, from the two numbers of either structure above.
-std::string name_of_element(int tet, int hex);
 
 enum class Processor { Cpu, Gpu };
 

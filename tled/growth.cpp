@@ -48,9 +48,6 @@ Eigen::Matrix3Xi surface_of(const std::vector<meshing::InterfaceFace>& faces, in
 Grown grown(const Model& model, const std::map<int, double>& stretch) {
     Grown result{model, {}};
     if (stretch.empty()) return result;
-    if (model.hexahedra.count() > 0)
-        throw InvalidInput(
-            "growth is not known for hexahedra, whose surface is not made of triangles: mesh tetrahedra");
     const std::vector<meshing::InterfaceFace> faces = meshing::interface_faces(model.mesh);
     for (const auto& [label, g] : stretch) {
         const auto material = result.model.materials.find(label);

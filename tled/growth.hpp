@@ -23,8 +23,8 @@ struct Grown {
 /// constant pressure in a region is a pressure on its deformed surface, exactly so in every mesh of linear tetrahedra.
 /// Growth costs nothing in an element (docs/decisions/growth.md).
 ///
-/// Throws InvalidInput for a label without a material or tetrahedra, a stretch that is not positive and finite, a law
-/// whose energy is not of that form (lnJ, stable, Arruda–Boyce), or a model with hexahedra.
+/// Throws InvalidInput for a label without a material or tetrahedra, a stretch that is not positive and finite, or a
+/// law whose energy is not of that form (lnJ, stable, Arruda–Boyce).
 Grown grown(const Model& model, const std::map<int, double>& stretch);
 
 }  // namespace tissuewarp::tled

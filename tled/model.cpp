@@ -18,23 +18,16 @@ void require_positive(double value, const std::string& what, const std::string& 
 }  // namespace
 
 void require_valid(const Model& model) {
-    const int hexahedra = model.hexahedra.count(), elements = model.mesh.tet_count() + hexahedra;
-    if (hexahedra > 0) {
-        meshing::require_valid(model.mesh.nodes, model.hexahedra, "the model's hexahedra");
-        require_positive(model.hourglass_coefficient, "hourglass coefficient", "");
-    }
-    if (model.mesh.tet_count() > 0 || hexahedra == 0) meshing::require_valid(model.mesh, "the model's mesh");
+    meshing::require_valid(model.mesh, "the model's mesh");
     require_positive(model.density, "density", "kg/mm3");
-    if (model.fibre.size() > 0 && model.fibre.cols() != elements)
+    if (model.fibre.size() > 0 && model.fibre.cols() != model.mesh.tet_count())
         throw InvalidInput("the model has " + std::to_string(model.fibre.cols()) + " fibre directions for " +
-                           std::to_string(elements) + " elements; give one for each or none");
+                           std::to_string(model.mesh.tet_count()) + " elements; give one for each or none");
     for (Eigen::Index t = 0; t < model.fibre.cols(); ++t)
         if (!(std::abs(model.fibre.col(t).norm() - 1) < 1e-6))
             throw InvalidInput("the fibre direction of element " + std::to_string(t) + " has length " +
                                std::to_string(model.fibre.col(t).norm()) + "; it must be a unit vector");
-    std::set<int> labels(model.mesh.labels.begin(), model.mesh.labels.end());
-    labels.insert(model.hexahedra.labels.begin(), model.hexahedra.labels.end());
-    for (const int label : labels) {
+    for (const int label : std::set<int>(model.mesh.labels.begin(), model.mesh.labels.end())) {
         const auto material = model.materials.find(label);
         if (material == model.materials.end())
             throw InvalidInput("label " + std::to_string(label) + " of the mesh has no material; add it to the table");

@@ -1,7 +1,6 @@
 #pragma once
 /// What is simulated: tissue, without loads and without a place to run it.
 
-#include "meshing/hex_cells.hpp"
 #include "meshing/tet_mesh.hpp"
 #include "tled/material.hpp"
 #include "tled/viscosity.hpp"
@@ -19,11 +18,7 @@ struct Model {
     Element element = Element::AveragedPressureT4;
     double density = 1e-6;     ///< kg/mm³
     ViscosityTable viscosity;  ///< of labels that are not elastic; for dynamics
-    Eigen::Matrix3Xd fibre;    ///< 3 × elements, unit vectors that replace those of the materials, tetrahedra before
-                               ///< hexahedra; or empty
-    /// One-point hexahedra on the nodes of `mesh`, beside its tetrahedra or without any (docs/decisions/hexahedra.md).
-    meshing::HexCells hexahedra{};
-    double hourglass_coefficient = 0.04;  ///< c of the hourglass stiffness c μ V Σ|∇N|², without dimension
+    Eigen::Matrix3Xd fibre;    ///< 3 × elements, unit vectors that replace those of the materials; or empty
 };
 
 /// Throws InvalidInput when a label has no material, a modulus is not positive, or the mesh is invalid.

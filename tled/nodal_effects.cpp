@@ -145,8 +145,6 @@ Eigen::VectorXd nodal_volumes(const RestState& rest) {
     Eigen::VectorXd volume = Eigen::VectorXd::Zero(rest.node_count);
     for (int e = 0; e < rest.element_count(); ++e)
         for (const int node : rest.nodes.col(e)) volume[node] += rest.volume[e] / 4;
-    for (int e = 0; e < rest.hexahedra.count(); ++e)
-        for (const int node : rest.hexahedra.nodes.col(e)) volume[node] += rest.hexahedra.volume[e] / 8;
     return volume;
 }
 

@@ -1,7 +1,6 @@
 #include "tled/rest_state.hpp"
 
 #include "core/errors.hpp"
-#include "tled/model/hexahedra.hpp"
 
 #include <Eigen/LU>
 
@@ -26,8 +25,7 @@ PronySeries viscosity_of(const Model& model, int label) {
 }
 
 DistinctMaterials distinct_materials(const Model& model) {
-    std::set<int> labels(model.mesh.labels.begin(), model.mesh.labels.end());
-    labels.insert(model.hexahedra.labels.begin(), model.hexahedra.labels.end());
+    const std::set<int> labels(model.mesh.labels.begin(), model.mesh.labels.end());
     std::vector<int> by_law(labels.begin(), labels.end());
     std::stable_sort(by_law.begin(), by_law.end(),
                      [&](int a, int b) { return model.materials.at(a).index() < model.materials.at(b).index(); });
@@ -52,9 +50,9 @@ void set_materials(const DistinctMaterials& distinct, RestState& rest) {
 }
 
 /// Groups elements by material, keeping the mesh's order within a group.
-void order_by_material(const Eigen::VectorXi& labels, const std::map<int, int>& material_of_label,
-                       std::vector<int>& order, std::vector<MaterialBlock>& blocks) {
+void order_by_material(const Eigen::VectorXi& labels, const std::map<int, int>& material_of_label, RestState& rest) {
     const auto material_of = [&](int element) { return material_of_label.at(labels[element]); };
+    std::vector<int>& order = rest.tet;
     order.resize(static_cast<std::size_t>(labels.size()));
     std::iota(order.begin(), order.end(), 0);
     std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return material_of(a) < material_of(b); });
@@ -63,26 +61,24 @@ void order_by_material(const Eigen::VectorXi& labels, const std::map<int, int>& 
         const int material = material_of(order[static_cast<std::size_t>(begin)]);
         int end = begin;
         while (end < count && material_of(order[static_cast<std::size_t>(end)]) == material) ++end;
-        blocks.push_back({material, begin, end});
+        rest.blocks.push_back({material, begin, end});
         begin = end;
     }
 }
 
-/// Directions of the elements `order` of the model where it has them, else of the material; zero in tissue without
-/// fibres. `first` is the place of the first element of this kind in Model::fibre.
-Eigen::Matrix3Xd fibres(const Model& model, const std::vector<Material>& materials,
-                        const std::vector<MaterialBlock>& blocks, const std::vector<int>& order, int first) {
+/// Directions of the elements where the model has them, else of the material; zero in tissue without fibres.
+Eigen::Matrix3Xd fibres(const Model& model, const RestState& rest) {
     const auto has_fibres = [](const Material& material) {
         return std::holds_alternative<TransverselyIsotropic>(material);
     };
-    if (std::none_of(materials.begin(), materials.end(), has_fibres)) return {};
-    Eigen::Matrix3Xd result = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(order.size()));
-    for (const MaterialBlock& block : blocks) {
-        const auto* law = std::get_if<TransverselyIsotropic>(&materials[static_cast<std::size_t>(block.material)]);
+    if (std::none_of(rest.materials.begin(), rest.materials.end(), has_fibres)) return {};
+    Eigen::Matrix3Xd result = Eigen::Matrix3Xd::Zero(3, rest.element_count());
+    for (const MaterialBlock& block : rest.blocks) {
+        const auto* law = std::get_if<TransverselyIsotropic>(&rest.materials[static_cast<std::size_t>(block.material)]);
         if (law == nullptr) continue;
         for (int e = block.begin; e < block.end; ++e) {
-            const int element = first + order[static_cast<std::size_t>(e)];
-            result.col(e) = model.fibre.size() > 0 ? Eigen::Vector3d(model.fibre.col(element)) : law->fibre;
+            const int tet = rest.tet[static_cast<std::size_t>(e)];
+            result.col(e) = model.fibre.size() > 0 ? Eigen::Vector3d(model.fibre.col(tet)) : law->fibre;
         }
     }
     return result;
@@ -112,7 +108,7 @@ void precompute_elements(const Model& model, RestState& rest) {
     }
 }
 
-Incidence incidence_of(const Eigen::Ref<const Eigen::MatrixXi>& of_element, int count) {
+Incidence incidence_of(const Eigen::Matrix4Xi& of_element, int count) {
     Incidence lists;
     lists.offset.assign(static_cast<std::size_t>(count) + 1, 0);
     for (const int target : of_element.reshaped()) ++lists.offset[static_cast<std::size_t>(target) + 1];
@@ -165,17 +161,10 @@ RestState rest_state(const Model& model) {
     rest.position = model.mesh.nodes;
     const DistinctMaterials distinct = distinct_materials(model);
     set_materials(distinct, rest);
-    order_by_material(model.mesh.labels, distinct.of_label, rest.tet, rest.blocks);
+    order_by_material(model.mesh.labels, distinct.of_label, rest);
     precompute_elements(model, rest);
     rest.incidence = incidence_of(rest.nodes, rest.node_count);
-    rest.fibre = fibres(model, rest.materials, rest.blocks, rest.tet, 0);
-    if (model.hexahedra.count() > 0) {
-        HexState& hexahedra = rest.hexahedra;
-        order_by_material(model.hexahedra.labels, distinct.of_label, hexahedra.hex, hexahedra.blocks);
-        detail::precompute_hexahedra(model, rest.materials, hexahedra, rest.lumped_mass);
-        hexahedra.incidence = incidence_of(hexahedra.nodes, rest.node_count);
-        hexahedra.fibre = fibres(model, rest.materials, hexahedra.blocks, hexahedra.hex, model.mesh.tet_count());
-    }
+    rest.fibre = fibres(model, rest);
     if ((rest.lumped_mass.array() <= 0).any())
         throw InvalidInput("the model's mesh has nodes that belong to no element; remove them");
     if (model.element == Element::AveragedPressureT4) rest.pressure = pressure_nodes(rest);
@@ -191,14 +180,10 @@ bool admits_inversion(const RestState& rest) {
                        [](const Material& material) { return admits_inversion(material); });
 }
 
-std::vector<int> material_of_elements(const std::vector<MaterialBlock>& blocks) {
-    std::vector<int> result;
-    for (const MaterialBlock& block : blocks) result.resize(static_cast<std::size_t>(block.end), block.material);
-    return result;
-}
-
 std::vector<int> material_of_elements(const RestState& rest) {
-    return material_of_elements(rest.blocks);
+    std::vector<int> result;
+    for (const MaterialBlock& block : rest.blocks) result.resize(static_cast<std::size_t>(block.end), block.material);
+    return result;
 }
 
 }  // namespace tissuewarp::tled

@@ -2,7 +2,6 @@
 /// What total Lagrangian dynamics computes once, in the rest configuration (Miller et al. 2007, section 3):
 /// shape-function derivatives, volumes, lumped mass, and the lists by which nodes gather forces.
 
-#include "tled/hex_state.hpp"
 #include "tled/model.hpp"
 
 #include <Eigen/Core>
@@ -10,6 +9,18 @@
 #include <vector>
 
 namespace tissuewarp::tled {
+
+/// Elements [begin, end) of the internal order share one material.
+struct MaterialBlock {
+    int material = 0;  ///< index into RestState::materials
+    int begin = 0, end = 0;
+};
+
+/// Node-to-element lists in compressed form: entries [offset[a], offset[a+1]), ascending, in the internal element
+/// order, are 4·element + corner where nothing else is said.
+struct Incidence {
+    std::vector<int> offset, entry;
+};
 
 /// Nodes of the averaged pressure: one for each (node, material) pair, so that pressure may jump at an interface. In
 /// the order of their materials, then of the nodes.
@@ -22,11 +33,11 @@ struct PressureNodes {
     [[nodiscard]] int count() const { return static_cast<int>(volume.size()); }
 };
 
-/// Per-element arrays are of the tetrahedra, in the internal order: grouped by material, otherwise as in the mesh.
+/// Per-element arrays are in the internal order: grouped by material, otherwise as in the mesh.
 struct RestState {
     std::vector<Material> materials;     ///< without repetition (viscosity included), equal laws adjacent
     std::vector<PronySeries> viscosity;  ///< of each material; empty where none is viscous
-    std::vector<MaterialBlock> blocks;   ///< one for each material that has tetrahedra
+    std::vector<MaterialBlock> blocks;   ///< one for each material that has elements
     std::vector<int> tet;                ///< M, internal position → tetrahedron of the mesh
     Eigen::Matrix4Xi nodes;              ///< 4 × M
     Eigen::Matrix<double, 9, Eigen::Dynamic>
@@ -38,17 +49,14 @@ struct RestState {
     Eigen::VectorXd lumped_mass;         ///< N, kg
     Incidence incidence;                 ///< node → 4·element + corner
     PressureNodes pressure;              ///< empty for T4
-    HexState hexahedra;                  ///< empty where the model has none
     Eigen::Matrix3Xd position;           ///< 3 × N, mm
     int node_count = 0;
 
     [[nodiscard]] int element_count() const { return static_cast<int>(tet.size()); }
 };
 
-/// Index into RestState::materials of every tetrahedron.
+/// Index into RestState::materials of every element.
 std::vector<int> material_of_elements(const RestState& rest);
-/// The same for the elements of any blocks.
-std::vector<int> material_of_elements(const std::vector<MaterialBlock>& blocks);
 
 /// Element::AveragedPressureT4 where the model averages its pressure.
 Element element_of(const RestState& rest);

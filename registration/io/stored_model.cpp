@@ -85,10 +85,9 @@ meshing::TetMesh read_mesh(const Hdf5Input& file, const std::string& group) {
 }
 
 void write_model(Hdf5Output& file, const tled::Model& model) {
-    if (model.hexahedra.count() > 0 || !model.viscosity.empty() || model.fibre.size() > 0)
+    if (!model.viscosity.empty() || model.fibre.size() > 0)
         throw InvalidInput(
-            "a record holds tetrahedra and elastic materials only: this model has hexahedra, viscosity or fibre "
-            "directions by element");
+            "a record holds elastic materials only: this model has viscosity or fibre directions by element");
     write_mesh(file, "mesh", model.mesh);
     write_materials(file, "materials", model.materials);
     file.texts("element", {element_names[static_cast<int>(model.element)]});

@@ -87,11 +87,24 @@ TEST_F(Vtu, RefusesWhatItCannotUse) {
     EXPECT_THROW(read_vtu(file("flat.vtu", ascii_tet("0 1 2 2"))), InvalidInput);
     EXPECT_THROW(read_vtu(file("word.vtu", ascii_tet("0 1 2 x"))), IoError);
     const std::string good = ascii_tet();
-    EXPECT_THROW(read_vtu(file("hexa.vtu", replaced(good, ">10<", ">12<"))), InvalidInput);
     EXPECT_THROW(read_vtu(file("poly.vtu", replaced(good, "'UnstructuredGrid'", "'PolyData'"))), IoError);
     EXPECT_THROW(read_vtu(file("many.vtu", replaced(good, "\"4\"", "\"99999999999999\""))), IoError);
     EXPECT_THROW(read_vtu(file("lz4.vtu", replaced(good, "version='0.1'", "compressor='vtkLZ4DataCompressor'"))),
                  IoError);
+}
+
+TEST_F(Vtu, OtherCellsAreRefusedWithTheFileTheirTypeAndARemedy) {
+    for (const char* type : {"12", "24"}) {  // linear hexahedra, quadratic tetrahedra
+        const auto path = file("cells.vtu", replaced(ascii_tet(), ">10<", std::string(">") + type + "<"));
+        try {
+            read_vtu(path);
+            ADD_FAILURE() << "accepted " << type;
+        } catch (const InvalidInput& error) {
+            using ::testing::HasSubstr;
+            EXPECT_THAT(error.what(), ::testing::AllOf(HasSubstr("cells.vtu"), HasSubstr(std::string("type ") + type),
+                                                       HasSubstr("only linear tetrahedra (10)")));
+        }
+    }
 }
 
 TEST_F(Vtu, EveryTruncationIsAnErrorAndNamesTheFile) {

@@ -182,11 +182,10 @@ TEST_F(Records, HoldEveryLaw) {
 }
 
 TEST_F(Records, RefuseModelsThatTheyCannotHold) {
-    tled::Model viscous = prepared().model, fibrous = viscous, mixed = viscous;
+    tled::Model viscous = prepared().model, fibrous = viscous;
     viscous.viscosity[1] = {{{0.3, 1.0}}};
     fibrous.fibre = Eigen::Matrix3Xd::Constant(3, fibrous.mesh.tet_count(), std::sqrt(1.0 / 3));
-    mixed.hexahedra.hexes = Eigen::Matrix<int, 8, 1>::Zero();
-    for (const tled::Model& model : {viscous, fibrous, mixed}) {
+    for (const tled::Model& model : {viscous, fibrous}) {
         Hdf5Output file(path, "model", 1);
         EXPECT_THROW(detail::write_model(file, model), InvalidInput);
     }

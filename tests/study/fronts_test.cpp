@@ -64,7 +64,7 @@ TEST(Percentile, IsLinearBetweenNeighbours) {
     EXPECT_NEAR(percentile({0, 100}, 0.95), 95, 1e-12);
 }
 
-/// Refuses hexahedra.
+/// Refuses soft holds.
 class Dummy final : public Problem {
 public:
     [[nodiscard]] std::string name() const override { return "dummy"; }
@@ -72,7 +72,7 @@ public:
     [[nodiscard]] Setting base() const override { return {}; }
     [[nodiscard]] bool is_registration() const override { return false; }
     [[nodiscard]] std::string refusal(const Setting& setting) const override {
-        return setting.element == Element::Hexahedra ? "no" : "";
+        return setting.physics.hold == Hold::Soft ? "no" : "";
     }
     Point measure(const Setting&, int, Observer&) override { return {}; }
 };
@@ -87,7 +87,7 @@ TEST(Plan, HoldsEverySettingOnceAndTheBase) {
         for (const Setting& setting : settings) {
             EXPECT_EQ(std::count(settings.begin(), settings.end(), setting), 1) << words_of(setting);
             EXPECT_NE(factor_of(setting, base), "several") << words_of(setting);
-            EXPECT_NE(setting.element, Element::Hexahedra);
+            EXPECT_NE(setting.physics.hold, Hold::Soft);
             EXPECT_LE(setting.elements, 100000);
         }
     }

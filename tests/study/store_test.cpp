@@ -32,7 +32,7 @@ protected:
         Point point;
         point.problem = "phantom:7";
         point.setting.elements = 12345;
-        point.setting.element = Element::T4;
+        point.setting.element = tled::Element::T4;
         point.setting.physics = {Law::Ogden, 0.4, Hold::Soft};
         point.setting.solver = Solver::DynamicRelaxation;
         point.setting.tolerance_mm = 0.003;

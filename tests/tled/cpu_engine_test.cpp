@@ -35,7 +35,7 @@ std::vector<std::int64_t> targets() {
     return result;
 }
 
-class CpuEngines : public ::testing::TestWithParam<std::tuple<Cells, Laws>> {
+class CpuEngines : public ::testing::TestWithParam<std::tuple<Element, Laws>> {
 protected:
     Model model = cube(5, std::get<0>(GetParam()), std::get<1>(GetParam()));
     RestState rest = rest_state(model);
@@ -44,7 +44,7 @@ protected:
 };
 
 INSTANTIATE_TEST_SUITE_P(All, CpuEngines,
-                         ::testing::Combine(::testing::Values(Cells::T4, Cells::AveragedPressure, Cells::Mixed),
+                         ::testing::Combine(::testing::Values(Element::T4, Element::AveragedPressureT4),
                                             ::testing::Values(Laws::LnJ, Laws::Iso, Laws::Stable, Laws::ArrudaBoyce,
                                                               Laws::Ogden, Laws::Fibres)),
                          [](const auto& each) {
@@ -83,7 +83,7 @@ TEST_P(CpuEngines, StepsHaveTheSameBitsOnAnyNumberOfThreads) {
 // The float32 logarithm of the CPU's laws, on both sides of the powers of two where its argument is split. A failure
 // looks like: a pressure that is wrong for compressed or much expanded tissue only.
 TEST(CpuEngine, PressureOfAUniformExpansionIsTheReferences) {
-    const Model model = cube(2, Cells::T4, Laws::LnJ);
+    const Model model = cube(2, Element::T4, Laws::LnJ);
     const RestState rest = rest_state(model);
     const auto engine = make_cpu_engine(rest);
     for (double J = 0.05; J < 20; J *= 1.07) {
@@ -98,7 +98,7 @@ TEST(CpuEngine, PressureOfAUniformExpansionIsTheReferences) {
 // tissue the pressure would hide an error of the shear stress. A failure looks like: stiffness that jumps with the
 // volume.
 TEST(CpuEngine, ShearStressOfExpandedTissueIsTheReferences) {
-    Model model = cube(2, Cells::T4, Laws::Iso);
+    Model model = cube(2, Element::T4, Laws::Iso);
     model.materials = {{1, neo_hookean_iso(3.0, 0.0)}, {2, neo_hookean_iso(6.0, 0.0)}};
     const RestState rest = rest_state(model);
     Matrix3d stretch = Eigen::Vector3d(1.3, 1.0, 1 / 1.3).asDiagonal();

@@ -88,7 +88,7 @@ struct Scene {
     Conditions plain;
     RestState rest;
 
-    explicit Scene(Cells cells) : model(cube(4, cells, Laws::Iso)), local(model.mesh.nodes) {
+    explicit Scene(Element element) : model(cube(4, element, Laws::Iso)), local(model.mesh.nodes) {
         plain = mixed_conditions(model.mesh);
         model.mesh.nodes.colwise() += corner;
         rest = rest_state(model);
@@ -214,7 +214,7 @@ void plain_steps(const RestState& rest, const NodalConditions& conditions, int s
     }
 }
 
-class EffectsInEngines : public ::testing::TestWithParam<std::tuple<EngineUnderTest, Cells, unsigned>> {
+class EffectsInEngines : public ::testing::TestWithParam<std::tuple<EngineUnderTest, Element, unsigned>> {
 protected:
     EffectsInEngines() { coefficients.time_step = 1e-3; }  // in which the wall goes 0.07 mm
 
@@ -236,13 +236,13 @@ std::string name_of_case(const ::testing::TestParamInfo<EffectsInEngines::ParamT
 }
 
 INSTANTIATE_TEST_SUITE_P(T4, EffectsInEngines,
-                         ::testing::Combine(::testing::ValuesIn(engines), ::testing::Values(Cells::T4),
+                         ::testing::Combine(::testing::ValuesIn(engines), ::testing::Values(Element::T4),
                                             ::testing::ValuesIn(combinations())),
                          name_of_case);
-// Other dispatches of patches, and elements that gather in another way.
-INSTANTIATE_TEST_SUITE_P(OtherCells, EffectsInEngines,
+// Other dispatches of patches.
+INSTANTIATE_TEST_SUITE_P(AveragedPressure, EffectsInEngines,
                          ::testing::Combine(::testing::ValuesIn(engines),
-                                            ::testing::Values(Cells::AveragedPressure, Cells::Mixed),
+                                            ::testing::Values(Element::AveragedPressureT4),
                                             ::testing::Values(Fluids | Contacts, every_effect)),
                          name_of_case);
 
@@ -388,7 +388,8 @@ TEST_P(EffectsInEngines, StepPassesNameWhatTheSceneHasAndNothingElse) {
         const bool gpu = engine->processor() == Processor::Gpu,
                    on_surface = (effect & (Pressures | Membranes | Sliding | Parting)) != 0;
         const std::string part = !gpu ? word : std::string(on_surface ? "surface." : "node.") + word;
-        if (part == "pressure" && std::get<1>(GetParam()) != Cells::T4) continue;  // averaged pressure is another thing
+        if (part == "pressure" && std::get<1>(GetParam()) != Element::T4)
+            continue;  // averaged pressure is another thing
         EXPECT_EQ(names(passes, part), (effects & effect) != 0) << part;
     }
     for (const StepPass& pass : passes) {
@@ -401,7 +402,7 @@ TEST_P(EffectsInEngines, StepPassesNameWhatTheSceneHasAndNothingElse) {
 }
 
 TEST(GpuEffects, SurfaceEffectsTakeTwoPassesWhileTheyLast) {
-    const Scene scene(Cells::T4);
+    const Scene scene(Element::T4);
     const auto engine = make_engine(Kind::GpuPatches, scene.rest);
     EXPECT_THAT(engine->description(), HasSubstr("patches"));
     for (const unsigned effect : {Pressures, Membranes, Sliding, Parting}) {

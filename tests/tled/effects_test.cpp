@@ -29,7 +29,7 @@ Matrix3Xi boundary_faces(const meshing::TetMesh& mesh) {
 
 /// A jittered cube of 30 mm that is bent.
 struct Organ {
-    Model model = cube(4, Cells::T4, Laws::Iso);
+    Model model = cube(4, Element::T4, Laws::Iso);
     RestState rest = rest_state(model);
     Matrix3Xi faces = boundary_faces(model.mesh);
     Matrix3Xd u = wavy(model.mesh.nodes);

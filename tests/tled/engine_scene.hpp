@@ -1,7 +1,6 @@
 #pragma once
 /// The scenes of the engines' tests, and the step in plain float64.
 
-#include "meshing/hex_primitives.hpp"
 #include "meshing/primitives.hpp"
 #include "tled/engine.hpp"
 #include "tled/material/stress_clock.hpp"
@@ -71,40 +70,23 @@ inline std::array<Material, 2> materials_of(Laws laws) {
     return {};
 }
 
-/// Elements of a scene; `Mixed` are hexahedra in front of averaged-pressure tetrahedra.
-enum class Cells { T4, AveragedPressure, Hexahedra, Mixed };
-
-inline const char* name_of(Cells cells) {
-    constexpr const char* names[] = {"T4", "AveragedPressure", "Hexahedra", "Mixed"};
-    return names[static_cast<int>(cells)];
+inline const char* name_of(Element element) {
+    return element == Element::T4 ? "T4" : "AveragedPressure";
 }
 
 /// A jittered cube of 30 mm, label 1 in front and 2 behind a diagonal plane, so that blocks and pressure nodes mix.
-inline Model cube(int edge_cells, Cells cells, Laws laws) {
-    const auto is_hexahedron = [&](int i, int j, int k) {
-        return cells == Cells::Hexahedra || (cells == Cells::Mixed && 2 * i + j + k < 2 * edge_cells);
-    };
-    meshing::MixedMesh box =
-        meshing::mixed_box({30, 30, 30}, {edge_cells, edge_cells, edge_cells}, is_hexahedron, 0.1, 3);
-    const auto label = [&](const auto& nodes) {
-        double sum = 0;  // x + y of the centre
-        for (const int node : nodes)
-            sum += box.mesh.nodes.col(node).head<2>().sum() / static_cast<double>(nodes.size());
-        return sum < 27.5 ? 1 : 2;
-    };
-    for (int t = 0; t < box.mesh.tet_count(); ++t) box.mesh.labels[t] = label(box.mesh.tets.col(t));
-    for (int h = 0; h < box.hexahedra.count(); ++h) box.hexahedra.labels[h] = label(box.hexahedra.hexes.col(h));
+inline Model cube(int edge_cells, Element element, Laws laws) {
     Model model;
-    model.mesh = box.mesh;
-    model.hexahedra = box.hexahedra;
+    model.mesh = meshing::box_mesh({30, 30, 30}, {edge_cells, edge_cells, edge_cells}, 0.1, 3);
+    for (int t = 0; t < model.mesh.tet_count(); ++t) {
+        double sum = 0;  // x + y of the centre
+        for (const int node : model.mesh.tets.col(t)) sum += model.mesh.nodes.col(node).head<2>().sum() / 4;
+        model.mesh.labels[t] = sum < 27.5 ? 1 : 2;
+    }
     const std::array<Material, 2> materials = materials_of(laws);
     model.materials = {{1, materials[0]}, {2, materials[1]}};
-    model.element = cells == Cells::T4 ? Element::T4 : Element::AveragedPressureT4;
+    model.element = element;
     return model;
-}
-
-inline Model cube(int edge_cells, Element element, Laws laws) {
-    return cube(edge_cells, element == Element::T4 ? Cells::T4 : Cells::AveragedPressure, laws);
 }
 
 /// Smooth, with strains of about 10 %; mm.
@@ -136,20 +118,15 @@ inline Conditions mixed_conditions(const meshing::TetMesh& mesh) {
     return conditions;
 }
 
-/// c well inside the stability bound c ω² < 4 by ω² ≤ n (λ + 2μ)/ρ Σ |grad N|² of an element with n corners.
+/// c well inside the stability bound c ω² < 4 by ω² ≤ 4 (λ + 2μ)/ρ Σ |grad N|² of an element.
 inline StepCoefficients stable_coefficients(const Model& model, const RestState& rest) {
     double omega_squared = 0;
-    const auto visit = [&](int label, int corners, const auto& gradient) {
+    for (int e = 0; e < rest.element_count(); ++e) {
+        const int label = model.mesh.labels[rest.tet[static_cast<std::size_t>(e)]];
+        const auto gradient = rest.gradient.col(e).reshaped(3, 3);
         const double sum = gradient.squaredNorm() + gradient.rowwise().sum().squaredNorm();
-        omega_squared =
-            std::max(omega_squared, corners * p_wave_modulus(model.materials.at(label)) / model.density * sum);
-    };
-    const HexState& hexahedra = rest.hexahedra;
-    for (int e = 0; e < rest.element_count(); ++e)
-        visit(model.mesh.labels[rest.tet[static_cast<std::size_t>(e)]], 4, rest.gradient.col(e).reshaped(3, 3));
-    for (int e = 0; e < hexahedra.count(); ++e)
-        visit(model.hexahedra.labels[hexahedra.hex[static_cast<std::size_t>(e)]], 8,
-              hexahedra.gradient.col(e).reshaped(3, 7));
+        omega_squared = std::max(omega_squared, 4 * p_wave_modulus(model.materials.at(label)) / model.density * sum);
+    }
     return {0.98, 2 / omega_squared};
 }
 

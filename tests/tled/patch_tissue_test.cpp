@@ -22,9 +22,9 @@ const char* name_of(Tissue tissue) {
     return names[static_cast<int>(tissue)];
 }
 
-Model model_of(int edge_cells, Cells cells, Tissue tissue) {
+Model model_of(int edge_cells, Element element, Tissue tissue) {
     const bool fibres = tissue == Tissue::Fibres || tissue == Tissue::Both;
-    Model model = cube(edge_cells, cells, fibres ? Laws::TwoFibres : Laws::LnJ);
+    Model model = cube(edge_cells, element, fibres ? Laws::TwoFibres : Laws::LnJ);
     if (tissue != Tissue::Fibres) model.viscosity[1] = {{{0.2, 0.002}, {0.1, 0.02}, {0.3, 0.2}}};
     if (tissue == Tissue::Viscosity || tissue == Tissue::Both) model.viscosity[2] = {{{0.3, 0.01}}};
     if (fibres) {
@@ -38,7 +38,7 @@ Model model_of(int edge_cells, Cells cells, Tissue tissue) {
 /// Of what stresses that rest do to displacements: they are rounded by 2⁻¹² at most.
 constexpr double half_precision = 2e-5;
 
-class PatchTissue : public ::testing::TestWithParam<std::tuple<Cells, Tissue>> {
+class PatchTissue : public ::testing::TestWithParam<std::tuple<Element, Tissue>> {
 protected:
     Model model = model_of(5, std::get<0>(GetParam()), std::get<1>(GetParam()));
     RestState rest = rest_state(model);
@@ -67,14 +67,14 @@ protected:
     }
 };
 
-INSTANTIATE_TEST_SUITE_P(All, PatchTissue,
-                         ::testing::Values(std::tuple{Cells::T4, Tissue::Fibres}, std::tuple{Cells::T4, Tissue::Partly},
-                                           std::tuple{Cells::T4, Tissue::Both},
-                                           std::tuple{Cells::AveragedPressure, Tissue::Viscosity},
-                                           std::tuple{Cells::AveragedPressure, Tissue::Both}),
-                         [](const auto& each) {
-                             return std::string(name_of(std::get<0>(each.param))) + name_of(std::get<1>(each.param));
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    All, PatchTissue,
+    ::testing::Values(std::tuple{Element::T4, Tissue::Fibres}, std::tuple{Element::T4, Tissue::Partly},
+                      std::tuple{Element::T4, Tissue::Both}, std::tuple{Element::AveragedPressureT4, Tissue::Viscosity},
+                      std::tuple{Element::AveragedPressureT4, Tissue::Both}),
+    [](const auto& each) {
+        return std::string(scene::name_of(std::get<0>(each.param))) + name_of(std::get<1>(each.param));
+    });
 
 // Everything below would pass, slowly, over two passes.
 TEST_P(PatchTissue, RunsOverPatches) {
@@ -251,7 +251,7 @@ TEST_P(PatchTissue, EveryElementHasOnePlace) {
 }
 
 TEST(PlainTissue, HasNoPlaces) {
-    const RestState rest = rest_state(cube(3, Cells::T4, Laws::LnJ));
+    const RestState rest = rest_state(cube(3, Element::T4, Laws::LnJ));
     EXPECT_TRUE(detail::patch_layout(rest, detail::cut_into_patches(rest, {100, 3})).element_of_place.empty());
 }
 

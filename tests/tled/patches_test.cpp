@@ -33,7 +33,7 @@ Tet sorted(Tet tet) {
 }
 
 RestState two_materials() {
-    return rest_state(cube(6, Cells::T4, Laws::Iso));
+    return rest_state(cube(6, Element::T4, Laws::Iso));
 }
 
 // A fan in the wrong sense, or a tetrahedron twice or not at all, would be a wrong force in every step.
@@ -62,7 +62,7 @@ TEST(Patches, FansHoldEveryTetrahedronOnceAndTurnTheRightWay) {
 
 // Short fans would load and leave each node several times: correct, but slow.
 TEST(Patches, FansAreLong) {
-    const std::vector<Patch> patches = cut_into_patches(rest_state(cube(8, Cells::T4, Laws::Iso)), {1000, 5});
+    const std::vector<Patch> patches = cut_into_patches(rest_state(cube(8, Element::T4, Laws::Iso)), {1000, 5});
     double nodes = 0, tets = 0;
     for (const Patch& patch : patches) {
         tets += static_cast<double>(patch.tet.size());
@@ -101,7 +101,7 @@ TEST(Patches, RefusesMoreSharersThanTheTableHolds) {
     EXPECT_THROW(detail::patch_layout(rest, tiny), InvalidInput);
 }
 
-class GpuSteps : public ::testing::TestWithParam<Cells> {
+class GpuSteps : public ::testing::TestWithParam<Element> {
 protected:
     Model model = cube(5, GetParam(), Laws::LnJ);
     RestState rest = rest_state(model);
@@ -119,7 +119,7 @@ protected:
     }
 };
 
-INSTANTIATE_TEST_SUITE_P(All, GpuSteps, ::testing::Values(Cells::T4, Cells::AveragedPressure),
+INSTANTIATE_TEST_SUITE_P(All, GpuSteps, ::testing::Values(Element::T4, Element::AveragedPressureT4),
                          [](const auto& each) { return std::string(name_of(each.param)); });
 
 // Floating-point sums in the order in which invocations happen to run would differ from run to run.
@@ -202,7 +202,7 @@ TEST_P(GpuSteps, AnOrganFarFromTheOriginMovesTheSame) {
 // A patch has one material, and a node room for 16 patches. A failure looks like: patches that grow until their size
 // overflows.
 TEST(GpuStepsOfManyMaterials, AreThoseOfTwoPassesWhereMoreMeetThanANodeHasRoomFor) {
-    Model model = cube(3, Cells::T4, Laws::Iso);
+    Model model = cube(3, Element::T4, Laws::Iso);
     model.materials.clear();
     for (int t = 0; t < model.mesh.tet_count(); ++t) {
         const int label = 1 + t % 29;

@@ -126,18 +126,18 @@ INSTANTIATE_TEST_SUITE_P(All, RenderPasses, ::testing::Values(Laws::Iso, Laws::L
 
 // A wrong law, a corner's force in another's texture or a material read of another texel fails at the first step.
 TEST_P(RenderPasses, OneStepIsTheCpuEngines) {
-    expect_follows(Scene(cube(5, Cells::T4, GetParam())), 1);
+    expect_follows(Scene(cube(5, Element::T4, GetParam())), 1);
 }
 
 // What one step hides: the pair of textures that is read, momentum, and drift in float32.
 TEST_P(RenderPasses, TwoHundredStepsFollowTheCpuEngine) {
-    const Scene scene(cube(5, Cells::T4, GetParam()));
+    const Scene scene(cube(5, Element::T4, GetParam()));
     expect_follows(scene, 200);
 }
 
 // More elements than the longest side of a texture on many devices (16384): the lists lie in rows.
 TEST(RenderPassEngine, TakesMoreElementsThanATextureIsWide) {
-    const Scene scene(cube(14, Cells::T4, Laws::LnJ));
+    const Scene scene(cube(14, Element::T4, Laws::LnJ));
     ASSERT_GT(scene.rest.element_count(), 16384);
     expect_follows(scene, 1);
 }
@@ -159,7 +159,7 @@ TEST(RenderPassEngine, FollowsTheCpuEngineOnAnIrregularMesh) {
 /// One engine on a small cube with two materials.
 class RenderPassesInUse : public ::testing::Test {
 protected:
-    Scene scene{cube(4, Cells::T4, Laws::LnJ)};
+    Scene scene{cube(4, Element::T4, Laws::LnJ)};
     RenderPassEngine engine = engine_of(scene.rest, scene.conditions);
 
     static RenderPassEngine engine_of(const RestState& rest, const NodalConditions& conditions) {
@@ -228,21 +228,20 @@ std::string refusal(const Model& model, const Conditions& conditions = {}) {
 // Whatever is accepted without being computed would be a wrong answer without a word.
 TEST(RenderPassEngine, RefusesInWordsWhatItDoesNotKnow) {
     using ::testing::HasSubstr;
-    EXPECT_EQ(refusal(cube(3, Cells::T4, Laws::Iso)), "");
-    EXPECT_THAT(refusal(cube(3, Cells::T4, Laws::Mixed)), HasSubstr("several laws"));
-    EXPECT_THAT(refusal(cube(3, Cells::T4, Laws::Ogden)), HasSubstr("ogden"));
-    EXPECT_THAT(refusal(cube(3, Cells::T4, Laws::Fibres)), HasSubstr("transversely_isotropic"));
-    EXPECT_THAT(refusal(cube(3, Cells::AveragedPressure, Laws::Iso)), HasSubstr("averaged pressure"));
-    EXPECT_THAT(refusal(cube(3, Cells::Hexahedra, Laws::Iso)), HasSubstr("hexahedra"));
-    Model viscous = cube(3, Cells::T4, Laws::Iso);
+    EXPECT_EQ(refusal(cube(3, Element::T4, Laws::Iso)), "");
+    EXPECT_THAT(refusal(cube(3, Element::T4, Laws::Mixed)), HasSubstr("several laws"));
+    EXPECT_THAT(refusal(cube(3, Element::T4, Laws::Ogden)), HasSubstr("ogden"));
+    EXPECT_THAT(refusal(cube(3, Element::T4, Laws::Fibres)), HasSubstr("transversely_isotropic"));
+    EXPECT_THAT(refusal(cube(3, Element::AveragedPressureT4, Laws::Iso)), HasSubstr("averaged pressure"));
+    Model viscous = cube(3, Element::T4, Laws::Iso);
     viscous.viscosity[1] = {{{0.3, 0.01}}};
     EXPECT_THAT(refusal(viscous), HasSubstr("viscosity"));
     Conditions spring;
     spring.springs.push_back({0, Matrix3d::Identity(), Vector3d::Zero()});
-    EXPECT_THAT(refusal(cube(3, Cells::T4, Laws::Iso), spring), HasSubstr("springs"));
+    EXPECT_THAT(refusal(cube(3, Element::T4, Laws::Iso), spring), HasSubstr("springs"));
     Conditions force;
     force.external_force = Matrix3Xd::Constant(3, 64, 0.1);
-    EXPECT_THAT(refusal(cube(3, Cells::T4, Laws::Iso), force), HasSubstr("external forces"));
+    EXPECT_THAT(refusal(cube(3, Element::T4, Laws::Iso), force), HasSubstr("external forces"));
 }
 
 TEST_F(RenderPassesInUse, RefuseWrongShapesMassesAndDevices) {

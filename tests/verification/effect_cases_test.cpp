@@ -39,7 +39,7 @@ TEST(Contact, RoundsOfSpringsFindTheActiveSetsSolution) {
     const Problem problem = half_ball_contact(Law::Iso, 5);
     const Solution expected = solve(problem, Elements::T4, 6);
     const tled::RestState rest = tled::rest_state(linear_model(problem, Elements::T4, expected.mesh));
-    tled::NodalConditions conditions = nodal_conditions_of(problem, Elements::T4, expected.mesh);
+    tled::NodalConditions conditions = nodal_conditions_of(problem, expected.mesh);
     tled::RigidContact contact;
     for (int a = 0; a < rest.node_count; ++a)
         if (problem.may_touch(rest.position.col(a))) contact.nodes.push_back(a);
@@ -67,7 +67,7 @@ TEST(Contact, RoundsOfSpringsFindTheActiveSetsSolution) {
 TEST(Contact, FrictionIsRefusedInAnEquilibrium) {
     const Problem problem = half_ball_contact(Law::Iso, 5);
     const tled::RestState rest = tled::rest_state(linear_model(problem, Elements::T4, problem.mesh(4)));
-    tled::NodalConditions conditions = nodal_conditions_of(problem, Elements::T4, problem.mesh(4));
+    tled::NodalConditions conditions = nodal_conditions_of(problem, problem.mesh(4));
     const auto engine = tled::make_cpu_engine(rest);
     EXPECT_THROW(tled::equilibrium_in_contact(*engine, rest, conditions), InvalidInput);
     tled::Effects effects;

@@ -25,7 +25,7 @@ tled::DistributedLoads distributed_loads(const Problem& problem, const meshing::
 
 tled::DiscretisationEstimate estimate(const Problem& problem, Elements elements, const Solution& linear) {
     const tled::Model model = linear_model(problem, elements, linear.mesh);
-    const tled::NodalConditions conditions = nodal_conditions_of(problem, elements, linear.mesh);
+    const tled::NodalConditions conditions = nodal_conditions_of(problem, linear.mesh);
     return tled::discretisation_error(model, tled::RestStiffness(tled::rest_state(model), conditions), conditions,
                                       linear.displacement, distributed_loads(problem, linear.mesh));
 }

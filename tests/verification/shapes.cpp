@@ -3,7 +3,6 @@
 #include "meshing/primitives.hpp"
 
 #include <cmath>
-#include <set>
 
 namespace tissuewarp::verification {
 
@@ -54,24 +53,6 @@ meshing::TetMesh symmetric_box(const std::array<std::vector<double>, 3>& coordin
         if (mirrored) std::swap(mesh.tets(2, t), mesh.tets(3, t));
     }
     return mesh;
-}
-
-meshing::HexCells hexahedra_of(const meshing::TetMesh& mesh) {
-    constexpr int tets_of_cell = 6;
-    constexpr std::array<std::size_t, 8> vtk_corner{0, 1, 3, 2, 4, 5, 7, 6};  // of corners with x fastest, z slowest
-    meshing::HexCells cells;
-    cells.hexes.resize(8, mesh.tet_count() / tets_of_cell);
-    cells.labels.resize(cells.hexes.cols());
-    for (int cell = 0; cell < cells.count(); ++cell) {
-        const auto tets = mesh.tets.middleCols(tets_of_cell * cell, tets_of_cell).reshaped();
-        const std::set<int> distinct(tets.begin(), tets.end());  // nodes are numbered with x fastest, z slowest
-        const std::vector<int> corner(distinct.begin(), distinct.end());
-        for (std::size_t c = 0; c < vtk_corner.size(); ++c) {
-            cells.hexes(static_cast<Eigen::Index>(c), cell) = corner[vtk_corner[c]];
-        }
-        cells.labels[cell] = mesh.labels[tets_of_cell * cell];
-    }
-    return cells;
 }
 
 Vector3d sphere_point(const Vector3d& on_cube, const Rims& rims) {

@@ -1,7 +1,6 @@
 #pragma once
 /// Structured meshes mapped onto the shapes of the problems.
 
-#include "meshing/hex_cells.hpp"
 #include "meshing/tet_mesh.hpp"
 
 #include <Eigen/Core>
@@ -24,9 +23,6 @@ std::vector<double> graded_both_ways(double length, int cells, double grading);
 /// box_mesh between the planes with every cell's long diagonal pointing away from the origin: symmetric in the planes
 /// of coordinates, which must be among the given ones where the box lies on both sides.
 meshing::TetMesh symmetric_box(const std::array<std::vector<double>, 3>& coordinates);
-
-/// The cells of box_mesh or symmetric_box as one hexahedron each, wherever their nodes have been moved.
-meshing::HexCells hexahedra_of(const meshing::TetMesh& mesh);
 
 /// Polar angles (from +z) of the circles on the unit sphere onto which the edges of the top and the bottom face of the
 /// cube [−1, 1]³ are mapped, so that a mesh follows the rims of two patches.

@@ -1,7 +1,6 @@
 #include "tests/verification/solution.hpp"
 
 #include "core/errors.hpp"
-#include "tests/verification/shapes.hpp"
 #include "tled/reference/discrete_energy.hpp"
 #include "tled/reference/newton.hpp"
 
@@ -30,7 +29,6 @@ std::unique_ptr<Discretisation> discretise(const Problem& problem, Elements elem
     auto result = std::make_unique<Discretisation>();
     if (!is_quadratic(elements)) {
         const tled::Model model = linear_model(problem, elements, solution.mesh);
-        solution.hexahedra = model.hexahedra;
         result->rest = tled::rest_state(model);
         result->energy = std::make_unique<tled::LinearTetrahedra>(result->rest);
         return result;
@@ -51,33 +49,12 @@ void add_linear_traction(const meshing::TetMesh& mesh, const std::array<int, 3>&
     for (const int node : face) load.col(node) += area / 3.0 * traction;
 }
 
-// A quarter of the whole on each corner: exact where the face is a parallelogram.
-void add_hexahedral_traction(const Solution& solution, const Traction& traction, Matrix3Xd& load) {
-    for (const auto& corners : solution.hexahedra.hexes.colwise()) {
-        for (const std::array<int, 4>& face : meshing::hex_faces) {
-            std::array<Vector3d, 4> X;
-            for (std::size_t c = 0; c < 4; ++c) X[c] = solution.mesh.nodes.col(corners[face[c]]);
-            if (!std::all_of(X.begin(), X.end(), traction.on)) continue;
-            const double area = 0.5 * (X[2] - X[0]).cross(X[3] - X[1]).norm();
-            for (const int c : face) load.col(corners[c]) += 0.25 * area * traction.value;
-        }
-    }
-}
-
 // Equal parts of what acts on each element to its corners.
-Matrix3Xd linear_body_load(const Solution& solution, const Vector3d& body_force) {
-    Matrix3Xd load = Matrix3Xd::Zero(3, solution.mesh.node_count());
-    const auto add = [&](const auto& elements, const Eigen::VectorXd& volume) {
-        for (Eigen::Index e = 0; e < elements.cols(); ++e) {
-            for (const int node : elements.col(e)) {
-                load.col(node) += volume[e] / static_cast<double>(elements.rows()) * body_force;
-            }
-        }
-    };
-    if (solution.hexahedra.count() > 0) {
-        add(solution.hexahedra.hexes, meshing::hex_volumes(solution.mesh.nodes, solution.hexahedra));
-    } else {
-        add(solution.mesh.tets, meshing::tet_volumes(solution.mesh));
+Matrix3Xd linear_body_load(const meshing::TetMesh& mesh, const Vector3d& body_force) {
+    Matrix3Xd load = Matrix3Xd::Zero(3, mesh.node_count());
+    const Eigen::VectorXd volume = meshing::tet_volumes(mesh);
+    for (int e = 0; e < mesh.tet_count(); ++e) {
+        for (const int node : mesh.tets.col(e)) load.col(node) += volume[e] / 4.0 * body_force;
     }
     return load;
 }
@@ -85,11 +62,7 @@ Matrix3Xd linear_body_load(const Solution& solution, const Vector3d& body_force)
 Matrix3Xd load_of(const Problem& problem, const Solution& solution) {
     Matrix3Xd load = Matrix3Xd::Zero(3, solution.nodes().cols());
     if (!problem.body_force.isZero() && solution.curved) load = tled::body_load(*solution.curved, problem.body_force);
-    if (!problem.body_force.isZero() && !solution.curved) load = linear_body_load(solution, problem.body_force);
-    if (solution.hexahedra.count() > 0) {
-        for (const Traction& traction : problem.tractions) add_hexahedral_traction(solution, traction, load);
-        return load;
-    }
+    if (!problem.body_force.isZero() && !solution.curved) load = linear_body_load(solution.mesh, problem.body_force);
     if (problem.tractions.empty()) return load;
     for (const meshing::InterfaceFace& face : meshing::interface_faces(solution.mesh)) {
         for (const Traction& traction : problem.tractions) {
@@ -150,8 +123,6 @@ const char* name_of(Elements elements) {
             return "T10";
         case Elements::QuadraticMixed:
             return "T10 mixed";
-        case Elements::Hexahedra:
-            return "H8";
     }
     return "";
 }
@@ -161,18 +132,12 @@ tled::Model linear_model(const Problem& problem, Elements elements, const meshin
     model.mesh = mesh;
     model.materials = problem.materials;
     model.element = elements == Elements::T4 ? tled::Element::T4 : tled::Element::AveragedPressureT4;
-    if (elements == Elements::Hexahedra) {
-        model.hexahedra = hexahedra_of(mesh);
-        model.mesh.tets.resize(4, 0);
-        model.mesh.labels.resize(0);
-    }
     return model;
 }
 
-tled::NodalConditions nodal_conditions_of(const Problem& problem, Elements elements, const meshing::TetMesh& mesh) {
+tled::NodalConditions nodal_conditions_of(const Problem& problem, const meshing::TetMesh& mesh) {
     Solution part;
     part.mesh = mesh;
-    if (elements == Elements::Hexahedra) part.hexahedra = hexahedra_of(mesh);
     return tled::nodal_conditions(conditions_of(problem, part, problem.stages, {}), mesh.node_count());
 }
 
@@ -256,7 +221,6 @@ double Solution::deformed_volume() const {
     if (!curved) {
         meshing::TetMesh deformed = mesh;
         deformed.nodes += displacement;
-        if (hexahedra.count() > 0) return meshing::hex_volumes(deformed.nodes, hexahedra).sum();
         return meshing::tet_volumes(deformed).sum();
     }
     tled::QuadraticMesh deformed = *curved;

@@ -16,7 +16,6 @@ enum class Elements {
     AveragedPressure,
     Quadratic,       ///< T10, pressure in the elements
     QuadraticMixed,  ///< T10 with a linear continuous pressure
-    Hexahedra,       ///< one point each, one for the six tetrahedra of a cell
 };
 const char* name_of(Elements elements);
 inline bool is_quadratic(Elements elements) {
@@ -27,7 +26,6 @@ inline bool is_quadratic(Elements elements) {
 class Solution {
 public:
     meshing::TetMesh mesh;                      ///< of the corners
-    meshing::HexCells hexahedra;                ///< instead of its tetrahedra, which then interpolate only
     std::optional<tled::QuadraticMesh> curved;  ///< with middle nodes, for T10
     Eigen::Matrix3Xd displacement, force;       ///< u (mm) and ∂E/∂u (mN) of all nodes
     double energy = 0;                          ///< mN mm
@@ -45,11 +43,11 @@ public:
     [[nodiscard]] double deformed_volume() const;
 };
 
-/// The problem's tissue in linear elements: the tetrahedra of a mesh, or the hexahedra of its cells.
+/// The problem's tissue in linear elements.
 tled::Model linear_model(const Problem& problem, Elements elements, const meshing::TetMesh& mesh);
 
 /// Loads and prescribed displacements of the last stage on linear elements, without contact.
-tled::NodalConditions nodal_conditions_of(const Problem& problem, Elements elements, const meshing::TetMesh& mesh);
+tled::NodalConditions nodal_conditions_of(const Problem& problem, const meshing::TetMesh& mesh);
 
 /// Newton's method, in the stages of the problem; with a rigid plane, by an exact nodal active set around it.
 Solution solve(const Problem& problem, Elements elements, int level);

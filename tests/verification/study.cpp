@@ -21,7 +21,6 @@ double highest_order(Elements elements) {
 
 std::vector<Elements> elements_for(const Problem& problem) {
     std::vector<Elements> result{Elements::T4, Elements::AveragedPressure};
-    if (problem.materials.size() == 1) result.push_back(Elements::Hexahedra);
     if (problem.plane_height) return result;
     const bool soft = tled::poisson_ratio(problem.materials.at(1)) < 0.4, cook = problem.name.starts_with("p4_cook");
     if (soft || cook) result.push_back(Elements::Quadratic);

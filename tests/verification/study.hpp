@@ -24,8 +24,7 @@ bool expected_to_lock(const Problem& problem, Elements elements);
 /// vanishes only as ν → ½.
 double highest_order(Elements elements);
 
-/// T4, averaged pressure and one-point hexahedra, these without the stiff ball, between whose shells and the surface
-/// hexahedra fold at the rims; quadratic tetrahedra, with averaged pressure from ν = 0.4 on, both for Cook's membrane,
+/// T4 and averaged pressure; quadratic tetrahedra, with averaged pressure from ν = 0.4 on, both for Cook's membrane,
 /// none for contact: at corners of a flat face under uniform pressure their consistent nodal forces are zero, so that
 /// no nodal contact set can be told from them.
 std::vector<Elements> elements_for(const Problem& problem);

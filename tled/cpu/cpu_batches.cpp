@@ -35,22 +35,19 @@ AlignedVector<T> slotted(const Eigen::VectorXd& values, const BatchLayout& layou
     return result;
 }
 
-/// Four times the internal numbers of nodes.
-template <class Matrix>
-Eigen::MatrixXi record_offsets(const Matrix& nodes, const std::vector<std::uint32_t>& internal) {
-    return nodes.unaryExpr(
-        [&](int node) { return record * static_cast<int>(internal[static_cast<std::size_t>(node)]); });
-}
-
-/// The same matrices with each element's corners in the order of its fan.
-Eigen::Matrix4Xi turned_nodes(const RestState& rest, const FanLayout& layout) {
-    Eigen::Matrix4Xi nodes(4, rest.element_count());
+/// Four times the internal numbers of each element's nodes, in the order of its fan.
+Eigen::Matrix4Xi record_offsets(const RestState& rest, const FanLayout& layout) {
+    Eigen::Matrix4Xi offsets(4, rest.element_count());
     for (int e = 0; e < rest.element_count(); ++e)
-        for (int c = 0; c < 4; ++c)
-            nodes(c, e) = rest.nodes(layout.corner[static_cast<std::size_t>(e)][static_cast<std::size_t>(c)], e);
-    return nodes;
+        for (int c = 0; c < 4; ++c) {
+            const int corner = layout.corner[static_cast<std::size_t>(e)][static_cast<std::size_t>(c)];
+            const auto node = static_cast<std::size_t>(rest.nodes(corner, e));
+            offsets(c, e) = record * static_cast<int>(layout.internal[node]);
+        }
+    return offsets;
 }
 
+/// ∇N with the corners in the same order.
 Eigen::Matrix<double, 9, Eigen::Dynamic> turned_gradients(const RestState& rest, const FanLayout& layout) {
     Eigen::Matrix<double, 9, Eigen::Dynamic> turned(9, rest.element_count());
     for (int e = 0; e < rest.element_count(); ++e) {
@@ -86,20 +83,6 @@ SourceLists joined(const std::vector<std::vector<std::uint32_t>>& sources) {
 
 }  // namespace
 
-BatchLayout batch_layout(const std::vector<MaterialBlock>& blocks) {
-    BatchLayout layout;
-    for (const MaterialBlock& block : blocks) {
-        const std::size_t begin = layout.element.size() / batch_width;
-        for (int e = block.begin; e < block.end; ++e) {
-            layout.slot.push_back(layout.element.size());
-            layout.element.push_back(e);
-        }
-        while (layout.element.size() % batch_width != 0) layout.element.push_back(-1);
-        layout.blocks.push_back({block.material, begin, layout.element.size() / batch_width});
-    }
-    return layout;
-}
-
 template <class T>
 ElementBatches<T> element_batches(const RestState& rest, const FanLayout& layout) {
     ElementBatches<T> batches;
@@ -114,8 +97,7 @@ ElementBatches<T> element_batches(const RestState& rest, const FanLayout& layout
         batches.most_nodes = std::max(batches.most_nodes, patch.node_count);
         batches.most_places = std::max(batches.most_places, places);
     }
-    batches.node =
-        batched<std::vector<std::int32_t>>(record_offsets(turned_nodes(rest, layout), layout.internal), layout.batches);
+    batches.node = batched<std::vector<std::int32_t>>(record_offsets(rest, layout), layout.batches);
     batches.gradient = batched<AlignedVector<T>>(turned_gradients(rest, layout), layout.batches);
     batches.fibre = batched<AlignedVector<T>>(rest.fibre, layout.batches);
     batches.volume = slotted<T>(rest.volume, layout.batches);
@@ -123,24 +105,8 @@ ElementBatches<T> element_batches(const RestState& rest, const FanLayout& layout
     return batches;
 }
 
-template <class T>
-HexBatches<T> hex_batches(const HexState& hexahedra, const BatchLayout& layout,
-                          const std::vector<std::uint32_t>& internal) {
-    HexBatches<T> batches;
-    batches.node = batched<std::vector<std::int32_t>>(record_offsets(hexahedra.nodes, internal), layout);
-    batches.gradient = batched<AlignedVector<T>>(hexahedra.gradient, layout);
-    batches.fibre = batched<AlignedVector<T>>(hexahedra.fibre, layout);
-    batches.volume = slotted<T>(hexahedra.volume, layout);
-    batches.volumetric_modulus = slotted<T>(hexahedra.volumetric_modulus, layout);
-    batches.rest_hourglass = batched<AlignedVector<T>>(hexahedra.rest_hourglass, layout);
-    batches.hourglass_stiffness = slotted<T>(hexahedra.hourglass_stiffness, layout);
-    return batches;
-}
-
 template ElementBatches<float> element_batches(const RestState&, const FanLayout&);
 template ElementBatches<double> element_batches(const RestState&, const FanLayout&);
-template HexBatches<float> hex_batches(const HexState&, const BatchLayout&, const std::vector<std::uint32_t>&);
-template HexBatches<double> hex_batches(const HexState&, const BatchLayout&, const std::vector<std::uint32_t>&);
 
 template <class T>
 std::vector<KernelMaterial<T>> kernel_materials(const RestState& rest) {
@@ -164,21 +130,11 @@ SourceLists pressure_sources(const PressureNodes& pressure, const FanLayout& lay
     return joined(sources);
 }
 
-SourceLists force_sources(const RestState& rest, const FanLayout& layout, const BatchLayout& hexahedra) {
-    const auto hex_records = static_cast<std::uint32_t>(layout.nodes.node.size());
+SourceLists force_sources(const FanLayout& layout) {
     std::vector<std::vector<std::uint32_t>> sources(layout.mesh_node.size() - layout.own_nodes);
     for (std::size_t i = 0; i < layout.nodes.node.size(); ++i)
         if (layout.nodes.node[i] >= layout.own_nodes)
             sources[layout.nodes.node[i] - layout.own_nodes].push_back(static_cast<std::uint32_t>(i));
-    const HexState& hexes = rest.hexahedra;
-    for (int e = 0; e < hexes.count(); ++e)
-        for (int corner = 0; corner < 8; ++corner) {
-            const std::size_t node = layout.internal[static_cast<std::size_t>(hexes.nodes(corner, e))];
-            const std::size_t slot = hexahedra.slot[static_cast<std::size_t>(e)];
-            const std::size_t first = (slot / batch_width * 8 + static_cast<std::size_t>(corner)) * batch_width;
-            sources[node - layout.own_nodes].push_back(hex_records +
-                                                       static_cast<std::uint32_t>(first + slot % batch_width));
-        }
     return joined(sources);
 }
 

@@ -20,16 +20,11 @@ struct BatchLayout {
     std::vector<std::size_t> slot;  ///< element → batch·width + lane
     std::vector<int> element;       ///< slot → element, −1 for padding
 };
-BatchLayout batch_layout(const std::vector<MaterialBlock>& blocks);
 
 struct FanLayout;
 
 template <class T>
 ElementBatches<T> element_batches(const RestState& rest, const FanLayout& layout);
-/// `internal` numbers the nodes of the mesh.
-template <class T>
-HexBatches<T> hex_batches(const HexState& hexahedra, const BatchLayout& layout,
-                          const std::vector<std::uint32_t>& internal);
 
 /// What the kernels know of each of RestState::materials.
 template <class T>
@@ -43,8 +38,7 @@ struct SourceLists {
 /// Patch × local node, for each pressure node.
 SourceLists pressure_sources(const PressureNodes& pressure, const FanLayout& layout);
 
-/// For each internal node that is no patch's own: patch × local node, then the records of its hexahedra, which follow
-/// those of all patches.
-SourceLists force_sources(const RestState& rest, const FanLayout& layout, const BatchLayout& hexahedra);
+/// For each internal node that is no patch's own: patch × local node.
+SourceLists force_sources(const FanLayout& layout);
 
 }  // namespace tissuewarp::tled::detail

@@ -1,5 +1,4 @@
-// The element pass of total Lagrangian dynamics (Miller et al. 2007, section 3) for batches of linear tetrahedra
-// and one-point hexahedra:
+// The element pass of total Lagrangian dynamics (Miller et al. 2007, section 3) for batches of linear tetrahedra:
 // displacement gradient from precomputed derivatives, first Piola–Kirchhoff stress, corner forces f_a = V P ∂N_a/∂X.
 // Included once for each instruction set (Highway's convention for -inl files).
 //
@@ -20,7 +19,6 @@
 
 #include "tled/cpu/cpu_kernels.hpp"
 #include "tled/cpu/cpu_laws-inl.hpp"
-#include "tled/hex_state.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace tissuewarp::tled::detail {
@@ -71,77 +69,6 @@ Strain<D> strain_of(D d, const ElementBatches<T>& elements, std::size_t batch, i
     displacement_gradient(d, elements, batch, lane, u, strain.H);
     finish_strain(d, strain);
     return strain;
-}
-
-/// The strain of hexahedra and their hourglass displacements q_α = Σ_I Γ_αI (u_I − u_0) − H X^Γ_α.
-template <class D>
-struct HexStrain : Strain<D> {
-    Vec<D> hourglass[4][3];
-};
-
-template <class D, class T>
-HexStrain<D> strain_of(D d, const HexBatches<T>& hexahedra, std::size_t batch, int lane, const T* u) {
-    const std::int32_t* node = &hexahedra.node[batch * 8 * batch_width + lane];
-    const T* gradient = &hexahedra.gradient[batch * 21 * batch_width + lane];
-    const T* rest_hourglass = &hexahedra.rest_hourglass[batch * 12 * batch_width + lane];
-    HexStrain<D> strain;
-    for (int i = 0; i < 3; ++i) {
-        const auto u0 = gather(d, u + i, node);
-        for (int j = 0; j < 3; ++j) strain.H[i][j] = hn::Zero(d);
-        for (int alpha = 0; alpha < 4; ++alpha) strain.hourglass[alpha][i] = hn::Zero(d);
-        for (int k = 0; k < 7; ++k) {
-            const auto difference = gather(d, u + i, node + (k + 1) * batch_width) - u0;
-            for (int j = 0; j < 3; ++j)
-                strain.H[i][j] =
-                    hn::MulAdd(difference, hn::LoadU(d, gradient + (3 * k + j) * batch_width), strain.H[i][j]);
-            for (int alpha = 0; alpha < 4; ++alpha) {
-                auto& q = strain.hourglass[alpha][i];
-                q = hourglass_base[alpha][k + 1] > 0 ? q + difference : q - difference;
-            }
-        }
-        for (int alpha = 0; alpha < 4; ++alpha)
-            for (int j = 0; j < 3; ++j)
-                strain.hourglass[alpha][i] =
-                    hn::NegMulAdd(strain.H[i][j], hn::LoadU(d, rest_hourglass + (3 * alpha + j) * batch_width),
-                                  strain.hourglass[alpha][i]);
-    }
-    finish_strain<D>(d, strain);
-    return strain;
-}
-
-/// f_I = (V P − k Σ_α q_α ⊗ X^Γ_α) ∂N_I/∂X + k Σ_α Γ_αI q_α; the first corner takes minus the sum of the others.
-template <class D, class T>
-void store_corner_forces(D d, const HexBatches<T>& hexahedra, std::size_t batch, int lane, const HexStrain<D>& strain,
-                         const Vec<D> (&P)[3][3], T* force) {
-    const T* gradient = &hexahedra.gradient[batch * 21 * batch_width + lane];
-    const T* rest_hourglass = &hexahedra.rest_hourglass[batch * 12 * batch_width + lane];
-    const auto stiffness = hn::LoadU(d, &hexahedra.hourglass_stiffness[batch * batch_width + lane]);
-    Vec<D> A[3][3], q[4][3];
-    for (int i = 0; i < 3; ++i) {
-        for (int alpha = 0; alpha < 4; ++alpha) q[alpha][i] = stiffness * strain.hourglass[alpha][i];
-        for (int j = 0; j < 3; ++j) {
-            A[i][j] = P[i][j];
-            for (int alpha = 0; alpha < 4; ++alpha)
-                A[i][j] =
-                    hn::NegMulAdd(q[alpha][i], hn::LoadU(d, rest_hourglass + (3 * alpha + j) * batch_width), A[i][j]);
-        }
-    }
-    T* out = force + (batch * 8 * batch_width + lane) * record;
-    const auto zero = hn::Zero(d);
-    Vec<D> f0[3] = {zero, zero, zero};
-    for (int k = 0; k < 7; ++k) {
-        Vec<D> f[3];
-        for (int i = 0; i < 3; ++i) {
-            f[i] = zero;
-            for (int j = 0; j < 3; ++j)
-                f[i] = hn::MulAdd(A[i][j], hn::LoadU(d, gradient + (3 * k + j) * batch_width), f[i]);
-            for (int alpha = 0; alpha < 4; ++alpha)
-                f[i] = hourglass_base[alpha][k + 1] > 0 ? f[i] + q[alpha][i] : f[i] - q[alpha][i];
-            f0[i] = f0[i] - f[i];
-        }
-        hn::StoreInterleaved4(f[0], f[1], f[2], zero, d, out + (k + 1) * batch_width * record);
-    }
-    hn::StoreInterleaved4(f0[0], f0[1], f0[2], zero, d, out);
 }
 
 /// Elastic tissue: nothing happens to the stress of a batch.
@@ -200,8 +127,9 @@ HWY_INLINE void stress(D d, std::size_t batch, int lane, const Strain<D>& strain
 }
 
 /// What the law knows of a batch.
-template <class Law, class D, class T, class Batches>
-HWY_INLINE Tissue<D> tissue_of(D d, const T* parameter, const Batches& elements, std::size_t batch, int lane) {
+template <class Law, class D, class T>
+HWY_INLINE Tissue<D> tissue_of(D d, const T* parameter, const ElementBatches<T>& elements, std::size_t batch,
+                               int lane) {
     Tissue<D> tissue;
     tissue.parameter = parameter;
     if constexpr (Response<Law>::has_fibre)
@@ -210,28 +138,8 @@ HWY_INLINE Tissue<D> tissue_of(D d, const T* parameter, const Batches& elements,
     return tissue;
 }
 
-template <class Law, class T, class AfterShear = Elastic>
-void hex_forces_of(const T* parameter, const HexBatches<T>& hexahedra, std::size_t begin, std::size_t end, const T* u,
-                   T* force, const AfterShear& after_shear = {}) {
-    const hn::CappedTag<T, batch_width> d;
-    using D = hn::CappedTag<T, batch_width>;
-    const int lanes = static_cast<int>(hn::Lanes(d));
-    for (std::size_t batch = begin; batch < end; ++batch)
-        for (int lane = 0; lane < batch_width; lane += lanes) {
-            auto strain = strain_of(d, hexahedra, batch, lane, u);
-            strain.change = admissible<Law>(d, strain.change);
-            const auto volume = hn::LoadU(d, &hexahedra.volume[batch * batch_width + lane]);
-            const auto modulus = hn::LoadU(d, &hexahedra.volumetric_modulus[batch * batch_width + lane]);
-            const auto pressure = volume * (modulus * Response<Law>::pressure_factor(d, strain.change));
-            Vec<D> P[3][3];
-            stress<Law>(d, batch, lane, strain, tissue_of<Law, D>(d, parameter, hexahedra, batch, lane), volume,
-                        pressure, after_shear, P);
-            store_corner_forces(d, hexahedra, batch, lane, strain, P, force);
-        }
-}
-
-template <class T, class Batches>
-void volume_changes_of(const Batches& elements, std::size_t begin, std::size_t end, const T* u, T* change) {
+template <class T>
+void volume_changes_of(const ElementBatches<T>& elements, std::size_t begin, std::size_t end, const T* u, T* change) {
     const hn::CappedTag<T, batch_width> d;
     const int lanes = static_cast<int>(hn::Lanes(d));
     for (std::size_t batch = begin; batch < end; ++batch)

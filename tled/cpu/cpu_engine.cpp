@@ -1,6 +1,6 @@
 // The step of total Lagrangian explicit dynamics on the CPU, in the order of Miller et al. (2007), table 1:
 // element forces, gather by node, central-difference update. A patch of tetrahedra does all three for the nodes that it
-// owns while they are in the cache; nodes that several patches or hexahedra move follow. All sums run in a fixed order.
+// owns while they are in the cache; nodes that several patches move follow. All sums run in a fixed order.
 
 #include "core/errors.hpp"
 #include "tled/cpu/cpu_contact.hpp"
@@ -164,7 +164,6 @@ public:
         const SmallestJacobian smallest = smallest_jacobian();
         seen.min_jacobian = smallest.value;
         seen.min_jacobian_tet = smallest.tet;
-        seen.min_jacobian_hex = smallest.hex;
         return seen;
     }
 

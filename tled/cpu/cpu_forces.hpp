@@ -1,5 +1,5 @@
 #pragma once
-/// Internal forces of all elements on the CPU: patches of tetrahedra over the nodes that they own, hexahedra, averaged
+/// Internal forces of all elements on the CPU: patches of tetrahedra over the nodes that they own, averaged
 /// pressure and viscous stresses. All sums run in a fixed order.
 
 #include "tled/cpu/cpu_batches.hpp"
@@ -16,7 +16,6 @@
 #include <cmath>
 #include <limits>
 #include <string>
-#include <utility>
 #include <vector>
 
 namespace tissuewarp::tled::detail {
@@ -32,16 +31,13 @@ public:
     CpuForces(const RestState& rest, const FanLayout& fans)
         : layout_(fans.batches),
           elements_(element_batches<T>(rest, fans)),
-          hex_layout_(batch_layout(rest.hexahedra.blocks)),
-          hexahedra_(hex_batches<T>(rest.hexahedra, hex_layout_, fans.internal)),
           materials_(kernel_materials<T>(rest)),
           kinematics_(rest.pressure.count() > 0 ? Kinematics::AveragedPressure : Kinematics::T4),
           node_count_(static_cast<std::size_t>(rest.node_count)),
           tet_(rest.tet),
-          hex_(rest.hexahedra.hex),
           own_nodes_(fans.own_nodes),
-          sources_(force_sources(rest, fans, hex_layout_)),
-          contribution_(first_hex_force() + hexahedra_.count() * 8 * batch_width * record, T(0)),
+          sources_(force_sources(fans)),
+          contribution_(elements_.nodes.node.size() * record, T(0)),
           pressures_(rest.pressure, fans) {
         for (const Material& material : rest.materials) law_of_.push_back(law_name(material));
         prepare_viscosity(rest);
@@ -62,7 +58,6 @@ public:
             tetrahedra(patch, u, stresses, scratch, force.data());
             after(patch.first_own, patch.first_own + patch.own_count);
         });
-        hexahedra(u, stresses);
         parallel_ranges(own_nodes_, node_count_, 512, [&](std::size_t begin, std::size_t end) {
             for (std::size_t node = begin; node != end; ++node) sum_contributions(node, &force[node * record]);
             after(begin, end);
@@ -73,7 +68,7 @@ public:
     void set_stress_interval(double interval) {
         for (std::size_t m = 0; m < viscous_.size(); ++m) {
             viscous_[m].coefficient.clear();
-            for (const auto& [a, b] : prony_coefficients(viscosity_[m % viscosity_.size()], interval))
+            for (const auto& [a, b] : prony_coefficients(viscosity_[m], interval))
                 viscous_[m].coefficient.push_back({T(a), T(b)});
         }
     }
@@ -84,16 +79,16 @@ public:
     void return_to(const std::vector<ViscousBatches<T>>& stresses) { viscous_ = stresses; }
 
     [[nodiscard]] SmallestJacobian smallest_jacobian(const T* u) {
-        change_.resize(std::max(elements_.count(), hexahedra_.count()) * batch_width);
-        SmallestJacobian smallest{std::numeric_limits<double>::infinity()};
-        for_batches(0, elements_.count(), [&](std::size_t begin, std::size_t end) {
+        change_.resize(elements_.count() * batch_width);
+        parallel_ranges(0, elements_.count(), 32, [&](std::size_t begin, std::size_t end) {
             volume_changes(elements_, begin, end, u, change_.data());
         });
-        note_smallest(layout_.slot, smallest, [&](std::size_t e) { return std::pair{tet_[e], -1}; });
-        for_batches(0, hexahedra_.count(), [&](std::size_t begin, std::size_t end) {
-            hex_volume_changes(hexahedra_, begin, end, u, change_.data());
-        });
-        note_smallest(hex_layout_.slot, smallest, [&](std::size_t e) { return std::pair{-1, hex_[e]}; });
+        SmallestJacobian smallest{std::numeric_limits<double>::infinity()};
+        for (std::size_t e = 0; e < layout_.slot.size(); ++e) {
+            const double jacobian = 1 + double(change_[layout_.slot[e]]);
+            if (std::isnan(jacobian)) return {-std::numeric_limits<double>::infinity(), tet_[e]};
+            if (jacobian < smallest.value) smallest = {jacobian, tet_[e]};
+        }
         return smallest;
     }
 
@@ -103,56 +98,40 @@ public:
             passes.push_back({"patch_volume_changes", {}, {u}, elements_.count() * batch_width});
     }
     void add_force_passes(const StepBuffer& u, std::vector<StepPass>& passes) const {
-        for (const BatchBlock& block : layout_.blocks) passes.push_back(force_pass("patch_forces", block, 0, u));
-        for (const BatchBlock& block : hex_layout_.blocks)
-            passes.push_back(force_pass("hex_forces", block, viscosity_.size(), u));
+        for (const BatchBlock& block : layout_.blocks) passes.push_back(force_pass(block, u));
     }
 
 private:
     BatchLayout layout_;
     ElementBatches<T> elements_;
-    BatchLayout hex_layout_;
-    HexBatches<T> hexahedra_;
     std::vector<KernelMaterial<T>> materials_;
     std::vector<std::string> law_of_;  // each of them
     Kinematics kinematics_;
     std::size_t node_count_;
-    std::vector<int> tet_, hex_;
+    std::vector<int> tet_;
     std::size_t own_nodes_;        // internal numbers below belong to one patch
     SourceLists sources_;          // of the other nodes: of `contribution_`
-    std::vector<T> contribution_;  // records by patch × local node, then corner forces of hexahedra
+    std::vector<T> contribution_;  // records by patch × local node
     tbb::enumerable_thread_specific<PatchScratch<T>> patch_scratch_;
     CpuPressures<T> pressures_;
 
-    // by material, for tetrahedra and then again for hexahedra; empty where none is viscous
+    // by material; empty where none is viscous
     std::vector<PronySeries> viscosity_;
     std::vector<ViscousBatches<T>> viscous_;
 
     std::vector<T> change_;  // J − 1 of elements in batches
 
-    [[nodiscard]] std::size_t first_hex_force() const { return elements_.nodes.node.size() * record; }
-
     void prepare_viscosity(const RestState& rest) {
         viscosity_ = rest.viscosity;
-        viscous_.resize(2 * viscosity_.size());
-        const auto prepare = [&](const std::vector<BatchBlock>& blocks, std::size_t first) {
-            for (const BatchBlock& block : blocks) {
+        viscous_.resize(viscosity_.size());
+        if (!viscosity_.empty())
+            for (const BatchBlock& block : layout_.blocks) {
                 const auto m = static_cast<std::size_t>(block.material);
-                viscous_[first + m].first_batch = block.begin;
-                viscous_[first + m].stress.assign(
-                    (block.end - block.begin) * viscosity_[m].terms.size() * 6 * batch_width, T(0));
+                viscous_[m].first_batch = block.begin;
+                viscous_[m].stress.assign((block.end - block.begin) * viscosity_[m].terms.size() * 6 * batch_width,
+                                          T(0));
             }
-        };
-        if (!viscosity_.empty()) {
-            prepare(layout_.blocks, 0);
-            prepare(hex_layout_.blocks, viscosity_.size());
-        }
         set_stress_interval(0);
-    }
-
-    template <class Body>
-    static void for_batches(std::size_t begin, std::size_t end, const Body& body) {
-        parallel_ranges(begin, end, 32, body);
     }
 
     /// body(patch, scratch) for all patches.
@@ -174,19 +153,6 @@ private:
                                  pressures_.pressure(), scratch, force, contribution_.data());
     }
 
-    void hexahedra(const T* u, Stresses stresses) {
-        T* hex_force = contribution_.data() + first_hex_force();
-        for (const BatchBlock& block : hex_layout_.blocks) {
-            const auto m = static_cast<std::size_t>(block.material), v = viscosity_.size() + m;
-            for_batches(block.begin, block.end, [&](std::size_t begin, std::size_t end) {
-                if (viscous_.empty() || viscous_[v].coefficient.empty())
-                    hex_forces(materials_[m], hexahedra_, begin, end, u, hex_force);
-                else
-                    viscous_hex_forces(materials_[m], viscous_[v], stresses, hexahedra_, begin, end, u, hex_force);
-            });
-        }
-    }
-
     void sum_contributions(std::size_t node, T* force) {
         std::array<T, record> sum{};
         const std::size_t list = node - own_nodes_;
@@ -197,29 +163,14 @@ private:
         std::copy(sum.begin(), sum.end(), force);
     }
 
-    /// Takes the smallest of `change_` where it is below what is known; place(e) is its tetrahedron and hexahedron.
-    template <class Place>
-    void note_smallest(const std::vector<std::size_t>& slot, SmallestJacobian& smallest, const Place& place) const {
-        for (std::size_t e = 0; e < slot.size(); ++e) {
-            const double jacobian = 1 + double(change_[slot[e]]);
-            if (jacobian >= smallest.value) continue;
-            const auto [tet, hex] = place(e);
-            const bool unknown = std::isnan(jacobian);
-            smallest = {unknown ? -std::numeric_limits<double>::infinity() : jacobian, tet, hex};
-            if (unknown) return;
-        }
-    }
-
-    [[nodiscard]] StepPass force_pass(const char* function, const BatchBlock& block, std::size_t first_viscous,
-                                      const StepBuffer& u) const {
+    [[nodiscard]] StepPass force_pass(const BatchBlock& block, const StepBuffer& u) const {
         const auto m = static_cast<std::size_t>(block.material);
-        StepPass pass{function, {law_of_[m]}, {u}, (block.end - block.begin) * batch_width};
-        if (kinematics_ == Kinematics::AveragedPressure && first_viscous == 0)
-            pass.parts.push_back("averaged pressure");
+        StepPass pass{"patch_forces", {law_of_[m]}, {u}, (block.end - block.begin) * batch_width};
+        if (kinematics_ == Kinematics::AveragedPressure) pass.parts.push_back("averaged pressure");
         pass.buffers.push_back(step_buffer("forces of shared nodes", contribution_));
         if (!viscosity_.empty() && !viscosity_[m].terms.empty()) {
             pass.parts.push_back("viscosity");
-            pass.buffers.push_back({"viscous stresses", viscous_[first_viscous + m].stress.size() * sizeof(T)});
+            pass.buffers.push_back({"viscous stresses", viscous_[m].stress.size() * sizeof(T)});
         }
         return pass;
     }

@@ -32,13 +32,6 @@ void patch_forces_any(const KernelMaterial<T>& material, Kinematics kinematics, 
 }
 
 template <class T>
-void hex_forces_any(const KernelMaterial<T>& material, const HexBatches<T>& hexahedra, std::size_t begin,
-                    std::size_t end, const T* u, T* force) {
-    with_law(material.law,
-             [&]<class Law>() { hex_forces_of<Law>(material.parameter.data(), hexahedra, begin, end, u, force); });
-}
-
-template <class T>
 void nodal_pressures_any(std::size_t law, const T* modulus, const T* change, T* pressure, std::size_t count) {
     with_law(law, [&]<class Law>() { nodal_pressures_of<Law>(modulus, change, pressure, count); });
 }
@@ -78,22 +71,6 @@ void volume_changes_f64(const ElementBatches<double>& elements, std::size_t begi
                         double* change) {
     volume_changes_of(elements, begin, end, u, change);
 }
-void hex_forces_f32(const KernelMaterial<float>& material, const HexBatches<float>& hexahedra, std::size_t begin,
-                    std::size_t end, const float* u, float* force) {
-    hex_forces_any(material, hexahedra, begin, end, u, force);
-}
-void hex_forces_f64(const KernelMaterial<double>& material, const HexBatches<double>& hexahedra, std::size_t begin,
-                    std::size_t end, const double* u, double* force) {
-    hex_forces_any(material, hexahedra, begin, end, u, force);
-}
-void hex_volume_changes_f32(const HexBatches<float>& hexahedra, std::size_t begin, std::size_t end, const float* u,
-                            float* change) {
-    volume_changes_of(hexahedra, begin, end, u, change);
-}
-void hex_volume_changes_f64(const HexBatches<double>& hexahedra, std::size_t begin, std::size_t end, const double* u,
-                            double* change) {
-    volume_changes_of(hexahedra, begin, end, u, change);
-}
 void nodal_pressures_f32(std::size_t law, const float* modulus, const float* change, float* out, std::size_t count) {
     nodal_pressures_any(law, modulus, change, out, count);
 }
@@ -119,10 +96,6 @@ HWY_EXPORT(advance_nodes_f32);
 HWY_EXPORT(advance_nodes_f64);
 HWY_EXPORT(volume_changes_f32);
 HWY_EXPORT(volume_changes_f64);
-HWY_EXPORT(hex_forces_f32);
-HWY_EXPORT(hex_forces_f64);
-HWY_EXPORT(hex_volume_changes_f32);
-HWY_EXPORT(hex_volume_changes_f64);
 HWY_EXPORT(nodal_pressures_f32);
 HWY_EXPORT(nodal_pressures_f64);
 HWY_EXPORT(target_name);
@@ -168,26 +141,6 @@ template <>
 void volume_changes(const ElementBatches<double>& elements, std::size_t begin, std::size_t end, const double* u,
                     double* change) {
     HWY_DYNAMIC_DISPATCH(volume_changes_f64)(elements, begin, end, u, change);
-}
-template <>
-void hex_forces(const KernelMaterial<float>& material, const HexBatches<float>& hexahedra, std::size_t begin,
-                std::size_t end, const float* u, float* force) {
-    HWY_DYNAMIC_DISPATCH(hex_forces_f32)(material, hexahedra, begin, end, u, force);
-}
-template <>
-void hex_forces(const KernelMaterial<double>& material, const HexBatches<double>& hexahedra, std::size_t begin,
-                std::size_t end, const double* u, double* force) {
-    HWY_DYNAMIC_DISPATCH(hex_forces_f64)(material, hexahedra, begin, end, u, force);
-}
-template <>
-void hex_volume_changes(const HexBatches<float>& hexahedra, std::size_t begin, std::size_t end, const float* u,
-                        float* change) {
-    HWY_DYNAMIC_DISPATCH(hex_volume_changes_f32)(hexahedra, begin, end, u, change);
-}
-template <>
-void hex_volume_changes(const HexBatches<double>& hexahedra, std::size_t begin, std::size_t end, const double* u,
-                        double* change) {
-    HWY_DYNAMIC_DISPATCH(hex_volume_changes_f64)(hexahedra, begin, end, u, change);
 }
 template <>
 void nodal_pressures(std::size_t law, const float* modulus, const float* change, float* pressure, std::size_t count) {

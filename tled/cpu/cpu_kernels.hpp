@@ -79,27 +79,10 @@ struct PatchScratch {
     AlignedVector<T> left;   ///< a record for each place
 };
 
-/// One-point hexahedra (tled/hex_state.hpp), in the same batches.
-template <class T>
-struct HexBatches {
-    std::vector<std::int32_t> node;        ///< batch × 8 corners × width: 4·node
-    AlignedVector<T> gradient;             ///< batch × 21 × width, 1/mm
-    AlignedVector<T> volume;               ///< batch × width, mm³
-    AlignedVector<T> volumetric_modulus;   ///< batch × width, kPa
-    AlignedVector<T> rest_hourglass;       ///< batch × 12 × width, mm
-    AlignedVector<T> hourglass_stiffness;  ///< batch × width, mN/mm
-    AlignedVector<T> fibre;                ///< batch × 3 × width; empty where no material has fibres
-    [[nodiscard]] std::size_t count() const { return volume.size() / batch_width; }
-};
-
 /// det F − 1 of each element of batches [begin, end) at displacement `u` (records).
 template <class T>
 void volume_changes(const ElementBatches<T>& elements, std::size_t begin, std::size_t end, const T* u,
                     T* jacobian_minus_1);
-template <class T>
-void hex_volume_changes(const HexBatches<T>& hexahedra, std::size_t begin, std::size_t end, const T* u,
-                        T* jacobian_minus_1);
-
 /// A material as the kernels take it: `law` indexes the alternatives of Material, the parameters are those of
 /// tled/material/kernel_parameters.hpp.
 template <class T>
@@ -125,11 +108,6 @@ template <class T>
 void advance_nodes(T momentum, T gain, const T* inverse_mass, const T* load, const T* force, const T* free, T* v, T* u,
                    std::size_t count);
 
-/// Nodal forces of the eight corners of hexahedra, a record each at batch·8·width + corner·width + lane.
-template <class T>
-void hex_forces(const KernelMaterial<T>& material, const HexBatches<T>& hexahedra, std::size_t begin, std::size_t end,
-                const T* u, T* force);
-
 /// Of viscous stresses in a pass of the elements: taken as they rest; moved on, q⁺ = a S_shear + b q; or looked at as
 /// they would be after that.
 enum class Stresses { Rest, Move, Look };
@@ -147,10 +125,6 @@ template <class T>
 void viscous_patch_forces(const KernelMaterial<T>& material, ViscousBatches<T>& viscous, Stresses stresses,
                           Kinematics kinematics, const ElementBatches<T>& elements, const FanPatch& patch, const T* u,
                           const T* pressure, PatchScratch<T>& scratch, T* force, T* shared);
-
-template <class T>
-void viscous_hex_forces(const KernelMaterial<T>& material, ViscousBatches<T>& viscous, Stresses stresses,
-                        const HexBatches<T>& hexahedra, std::size_t begin, std::size_t end, const T* u, T* force);
 
 /// M U'(J) for J = 1 + `change`, per pressure node of one law.
 template <class T>

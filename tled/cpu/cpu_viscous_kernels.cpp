@@ -85,16 +85,6 @@ void viscous_patch_forces_any(const KernelMaterial<T>& material, ViscousBatches<
     });
 }
 
-template <class T>
-void viscous_hex_forces_any(const KernelMaterial<T>& material, ViscousBatches<T>& viscous, Stresses stresses,
-                            const HexBatches<T>& hexahedra, std::size_t begin, std::size_t end, const T* u, T* force) {
-    with_law(material.law, [&]<class Law>() {
-        with_stresses(viscous, stresses, [&](const auto& after_shear) {
-            hex_forces_of<Law>(material.parameter.data(), hexahedra, begin, end, u, force, after_shear);
-        });
-    });
-}
-
 // Highway dispatches plain functions: one name for each scalar type.
 void viscous_patch_forces_f32(const KernelMaterial<float>& material, ViscousBatches<float>& viscous, Stresses stresses,
                               Kinematics kinematics, const ElementBatches<float>& elements, const FanPatch& patch,
@@ -110,17 +100,6 @@ void viscous_patch_forces_f64(const KernelMaterial<double>& material, ViscousBat
     viscous_patch_forces_any(material, viscous, stresses, kinematics, elements, patch, u, pressure, scratch, force,
                              shared);
 }
-void viscous_hex_forces_f32(const KernelMaterial<float>& material, ViscousBatches<float>& viscous, Stresses stresses,
-                            const HexBatches<float>& hexahedra, std::size_t begin, std::size_t end, const float* u,
-                            float* force) {
-    viscous_hex_forces_any(material, viscous, stresses, hexahedra, begin, end, u, force);
-}
-void viscous_hex_forces_f64(const KernelMaterial<double>& material, ViscousBatches<double>& viscous, Stresses stresses,
-                            const HexBatches<double>& hexahedra, std::size_t begin, std::size_t end, const double* u,
-                            double* force) {
-    viscous_hex_forces_any(material, viscous, stresses, hexahedra, begin, end, u, force);
-}
-
 }  // namespace HWY_NAMESPACE
 }  // namespace tissuewarp::tled::detail
 HWY_AFTER_NAMESPACE();
@@ -130,8 +109,6 @@ namespace tissuewarp::tled::detail {
 
 HWY_EXPORT(viscous_patch_forces_f32);
 HWY_EXPORT(viscous_patch_forces_f64);
-HWY_EXPORT(viscous_hex_forces_f32);
-HWY_EXPORT(viscous_hex_forces_f64);
 
 template <>
 void viscous_patch_forces(const KernelMaterial<float>& material, ViscousBatches<float>& viscous, Stresses stresses,
@@ -149,18 +126,5 @@ void viscous_patch_forces(const KernelMaterial<double>& material, ViscousBatches
     HWY_DYNAMIC_DISPATCH(viscous_patch_forces_f64)
     (material, viscous, stresses, kinematics, elements, patch, u, pressure, scratch, force, shared);
 }
-template <>
-void viscous_hex_forces(const KernelMaterial<float>& material, ViscousBatches<float>& viscous, Stresses stresses,
-                        const HexBatches<float>& hexahedra, std::size_t begin, std::size_t end, const float* u,
-                        float* force) {
-    HWY_DYNAMIC_DISPATCH(viscous_hex_forces_f32)(material, viscous, stresses, hexahedra, begin, end, u, force);
-}
-template <>
-void viscous_hex_forces(const KernelMaterial<double>& material, ViscousBatches<double>& viscous, Stresses stresses,
-                        const HexBatches<double>& hexahedra, std::size_t begin, std::size_t end, const double* u,
-                        double* force) {
-    HWY_DYNAMIC_DISPATCH(viscous_hex_forces_f64)(material, viscous, stresses, hexahedra, begin, end, u, force);
-}
-
 }  // namespace tissuewarp::tled::detail
 #endif

@@ -64,12 +64,10 @@ private:
     std::vector<std::size_t> local_;       // mesh node → its number in the patch at hand
     FanLayout layout_;
 
-    /// Counts hexahedra as a further patch.
     void number_nodes() {
         patches_of_node_.assign(index(rest_.node_count), 0);
         for (const Patch& patch : patches_)
             for (const int a : patch.node) ++patches_of_node_[index(a)];
-        for (const int a : rest_.hexahedra.nodes.reshaped()) patches_of_node_[index(a)] += 2;
         for (const Patch& patch : patches_) {
             order_.push_back(local_order(patch));
             for (const int a : order_.back())

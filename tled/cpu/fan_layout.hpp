@@ -17,7 +17,7 @@ struct FanLayout {
 
     std::vector<int> mesh_node;           ///< internal → mesh
     std::vector<std::uint32_t> internal;  ///< mesh → internal
-    std::size_t own_nodes = 0;            ///< internal numbers below belong to one patch and to no hexahedron
+    std::size_t own_nodes = 0;            ///< internal numbers below belong to one patch
 };
 
 /// Throws InvalidInput unless patches of `patch_tets` tetrahedra keep their places below 65536.

@@ -30,9 +30,8 @@ VectorXd model_pressure(const Model& model, const RestState& averaged, const Vec
     return result;
 }
 
-std::string unsupported(const Model& model, const NodalConditions& conditions) {
+std::string unsupported(const NodalConditions& conditions) {
     const NodalEffects& effects = conditions.effects;
-    if (model.hexahedra.count() > 0) return "hexahedra have no estimate";
     if (!effects.surface.empty() || effects.fluid || effects.contact) {
         return "pressures, membranes, pairs that slide or part, fluid and contact have no estimate";
     }
@@ -83,7 +82,7 @@ DiscretisationEstimate discretisation_error(const Model& model, const RestStiffn
     const auto start = std::chrono::steady_clock::now();
     require_sizes(model, conditions, displacement);
     static_cast<void>(stiffness.diagonal(conditions));  // refuses a factor of other constraints
-    if (std::string reason = unsupported(model, conditions); !reason.empty()) return {std::nullopt, std::move(reason)};
+    if (std::string reason = unsupported(conditions); !reason.empty()) return {std::nullopt, std::move(reason)};
     Model with_averages = model;
     with_averages.element = Element::AveragedPressureT4;
     const RestState rest = rest_state(with_averages);

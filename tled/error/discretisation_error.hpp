@@ -59,7 +59,7 @@ struct DiscretisationEstimate {
 /// they hold it too, by area. `stiffness` of these constraints, best of these springs, is the preconditioner on the
 /// corners.
 ///
-/// No estimate, with the reason: hexahedra; effects other than nodal forces; det F ≤ 0 somewhere; tissue that buckles
+/// No estimate, with the reason: effects other than nodal forces; det F ≤ 0 somewhere; tissue that buckles
 /// between the nodes; no convergence; loads that are not finite. Throws InvalidInput where sizes or constraints do not
 /// fit, tractions are on no face, or the model is invalid.
 DiscretisationEstimate discretisation_error(const Model& model, const RestStiffness& stiffness,

@@ -2,7 +2,7 @@
 /// Linear tetrahedra enriched by a quadratic bubble on every edge: the quadratic elements of the same straight mesh in
 /// the hierarchical basis L_a, 4 L_a L_b.
 
-#include "tled/hex_state.hpp"
+#include "tled/rest_state.hpp"
 
 #include <Eigen/Core>
 

@@ -189,7 +189,6 @@ public:
         const SmallestJacobian smallest = observation_.smallest_jacobian(force_, blocks_);
         seen.min_jacobian = smallest.value;
         seen.min_jacobian_tet = smallest.tet;
-        seen.min_jacobian_hex = smallest.hex;
         return seen;
     }
 

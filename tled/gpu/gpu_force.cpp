@@ -76,8 +76,7 @@ GpuForce::Viscous::Viscous(const shaders::Device& device, const RestState& rest)
     : series(rest.viscosity),
       terms(most_terms(series)),
       coefficients(device, series.size() * terms, "Prony coefficients"),
-      stress(device, 2 * terms * static_cast<std::size_t>(rest.element_count() + rest.hexahedra.count()),
-             "viscous stresses"),
+      stress(device, 2 * terms * static_cast<std::size_t>(rest.element_count()), "viscous stresses"),
       kept(device, stress.size(), "kept viscous stresses") {
     coefficients.upload(prony_table(series, interval));
 }
@@ -85,8 +84,7 @@ GpuForce::Viscous::Viscous(const shaders::Device& device, const RestState& rest)
 GpuForce::GpuForce(const shaders::Device& device, shaders::ProgramCache& programs, const RestState& rest,
                    BlockBuffers& blocks)
     : element_count_(static_cast<std::size_t>(rest.element_count())),
-      hex_count_(static_cast<std::size_t>(rest.hexahedra.count())),
-      corner_force_(device, 4 * element_count_ + 8 * hex_count_, "corner forces") {
+      corner_force_(device, 4 * element_count_, "corner forces") {
     const shaders::CurrentContext current = device.make_current();
     {
         const GpuElements layout = gpu_elements(rest);
@@ -154,12 +152,6 @@ Stage GpuForce::force_stage(shaders::ProgramCache& programs, const RestState& re
         stage.push_back(
             ranged(programs.get(shaders::element_force_program(forces)), run.begin, run.end, element_count_));
     }
-    forces.pressure = shaders::PressureRule::Element;
-    for (const LawRun& run : law_runs(rest, rest.hexahedra.blocks)) {
-        forces.law = run.law;
-        const shaders::Program& program = programs.get(shaders::hexahedron_force_program(forces));
-        stage.push_back(ranged_hexahedra(program, run.begin, run.end));
-    }
     return stage;
 }
 
@@ -204,15 +196,6 @@ void GpuForce::keep_viscous_stresses() {
 
 void GpuForce::return_to_kept_viscous_stresses() {
     if (viscous_) viscous_->stress.copy_from(viscous_->kept, viscous_->stress.bytes());
-}
-
-Pass GpuForce::ranged_hexahedra(const shaders::Program& program, int begin, int end) const {
-    program.set(3, unsigned_count(element_count_));
-    return ranged(program, begin, end, hex_count_);
-}
-
-void GpuForce::set_all_hexahedra(const shaders::Program& program) const {
-    static_cast<void>(ranged_hexahedra(program, 0, static_cast<int>(hex_count_)));
 }
 
 void GpuForce::set_all_elements(const shaders::Program& program) const {

@@ -60,16 +60,12 @@ public:
     void return_to_kept_viscous_stresses();
     /// Sets the range of a program over all elements, as chunks/element.glsl has it.
     void set_all_elements(const shaders::Program& program) const;
-    /// The same over all hexahedra, as chunks/element.hexahedron.glsl has it.
-    void set_all_hexahedra(const shaders::Program& program) const;
 
 private:
     void make_stages(shaders::ProgramCache& programs, const RestState& rest,
                      const std::vector<MaterialBlock>& pressure);
     [[nodiscard]] Stage force_stage(shaders::ProgramCache& programs, const RestState& rest, shaders::PressureRule rule,
                                     Advance advance) const;
-
-    [[nodiscard]] Pass ranged_hexahedra(const shaders::Program& program, int begin, int end) const;
 
     /// The buffers of the averaged pressure; absent for T4.
     struct Pressure {
@@ -80,7 +76,7 @@ private:
         shaders::Buffer<std::uint32_t> incidence;
     };
 
-    std::size_t element_count_, hex_count_;
+    std::size_t element_count_;
     std::optional<shaders::Buffer<Uint4>> nodes_;
     std::optional<shaders::Buffer<Float4>> rest_, materials_, fibre_;
     std::optional<shaders::Buffer<std::uint32_t>> incidence_;

@@ -30,61 +30,14 @@ std::vector<Float4> material_parameters(const RestState& rest) {
     return result;
 }
 
-/// Corner forces lie in four planes, one per corner, and behind them in eight planes of hexahedra. A node gathers those
-/// of its tetrahedra, then those of its hexahedra.
+/// Corner forces lie in four planes, one per corner.
 std::vector<std::uint32_t> node_incidence(const RestState& rest) {
-    const Incidence &tets = rest.incidence, &hexes = rest.hexahedra.incidence;
-    const std::int64_t tet_count = rest.element_count(), hex_count = rest.hexahedra.count();
-    const auto nodes = static_cast<std::size_t>(rest.node_count);
-    std::vector<std::uint32_t> result;
-    result.reserve(nodes + 1 + tets.entry.size() + hexes.entry.size());
-    for (std::size_t a = 0; a <= nodes; ++a)
-        result.push_back(static_cast<std::uint32_t>(tets.offset[a] + (hexes.offset.empty() ? 0 : hexes.offset[a])));
-    for (std::size_t a = 0; a < nodes; ++a) {
-        for (int k = tets.offset[a]; k < tets.offset[a + 1]; ++k) {
-            const int entry = tets.entry[static_cast<std::size_t>(k)];
-            result.push_back(static_cast<std::uint32_t>(entry % 4 * tet_count + entry / 4));
-        }
-        if (hexes.offset.empty()) continue;
-        for (int k = hexes.offset[a]; k < hexes.offset[a + 1]; ++k) {
-            const int entry = hexes.entry[static_cast<std::size_t>(k)];
-            result.push_back(static_cast<std::uint32_t>(4 * tet_count + entry % 8 * hex_count + entry / 8));
-        }
-    }
+    const std::int64_t count = rest.element_count();
+    std::vector<std::uint32_t> result(rest.incidence.offset.begin(), rest.incidence.offset.end());
+    result.reserve(result.size() + rest.incidence.entry.size());
+    for (const int entry : rest.incidence.entry)
+        result.push_back(static_cast<std::uint32_t>(entry % 4 * count + entry / 4));
     return result;
-}
-
-/// What chunks/element.hexahedron.glsl reads behind the data of tetrahedra.
-void append_hexahedra(const HexState& hexahedra, GpuElements& elements) {
-    const auto plane = static_cast<std::size_t>(hexahedra.count());
-    const std::size_t first_node = elements.nodes.size(), first_rest = elements.rest.size();
-    elements.nodes.resize(first_node + 2 * plane);
-    elements.rest.resize(first_rest + 10 * plane);
-    const std::vector<int> material = material_of_elements(hexahedra.blocks);
-    for (int e = 0; e < hexahedra.count(); ++e) {
-        const auto at = static_cast<std::size_t>(e);
-        for (int corner = 0; corner < 8; ++corner)
-            elements.nodes[first_node + static_cast<std::size_t>(corner / 4) * plane + at]
-                          [static_cast<std::size_t>(corner % 4)] =
-                static_cast<std::uint32_t>(hexahedra.nodes(corner, e));
-        const std::array<double, 7> last{hexahedra.volume[e],
-                                         static_cast<double>(material[at]),
-                                         hexahedra.volumetric_modulus[e],
-                                         hexahedra.hourglass_stiffness[e],
-                                         0,
-                                         0,
-                                         0};
-        for (std::size_t k = 0; k < 7; ++k) {
-            const auto row = static_cast<Eigen::Index>(3 * k);
-            elements.rest[first_rest + k * plane + at] = {single(hexahedra.gradient(row, e)),
-                                                          single(hexahedra.gradient(row + 1, e)),
-                                                          single(hexahedra.gradient(row + 2, e)), single(last[k])};
-        }
-        for (std::size_t j = 0; j < 3; ++j)
-            for (std::size_t alpha = 0; alpha < 4; ++alpha)
-                elements.rest[first_rest + (7 + j) * plane + at][alpha] =
-                    single(hexahedra.rest_hourglass(static_cast<Eigen::Index>(3 * alpha + j), e));
-    }
 }
 
 }  // namespace
@@ -97,8 +50,6 @@ GpuElements gpu_elements(const RestState& rest) {
     elements.rest.resize(3 * plane);
     elements.materials = material_parameters(rest);
     elements.fibre = packed(rest.fibre);
-    const std::vector<Float4> hex_fibre = packed(rest.hexahedra.fibre);
-    elements.fibre.insert(elements.fibre.end(), hex_fibre.begin(), hex_fibre.end());
     const std::vector<int> material = material_of_elements(rest);
     for (int e = 0; e < count; ++e) {
         const auto at = static_cast<std::size_t>(e);
@@ -110,7 +61,6 @@ GpuElements gpu_elements(const RestState& rest) {
                                              single(rest.gradient(row + 2, e)), single(last[k])};
         }
     }
-    append_hexahedra(rest.hexahedra, elements);
     elements.node_incidence = node_incidence(rest);
     return elements;
 }

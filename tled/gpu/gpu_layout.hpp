@@ -16,11 +16,11 @@ using Float4 = std::array<float, 4>;
 using Uint4 = std::array<std::uint32_t, 4>;
 
 struct GpuElements {
-    std::vector<Uint4> nodes;                   ///< M, then 2 of each hexahedron
-    std::vector<Float4> rest;                   ///< 3 M, then 10 of each hexahedron
+    std::vector<Uint4> nodes;                   ///< M
+    std::vector<Float4> rest;                   ///< 3 M
     std::vector<Float4> materials;              ///< two for each material
-    std::vector<Float4> fibre;                  ///< M, then those of hexahedra; or empty
-    std::vector<std::uint32_t> node_incidence;  ///< N + 1 offsets, 4 M (+ 8 hexahedra) positions of corner forces
+    std::vector<Float4> fibre;                  ///< M; or empty
+    std::vector<std::uint32_t> node_incidence;  ///< N + 1 offsets, 4 M positions of corner forces
 };
 GpuElements gpu_elements(const RestState& rest);
 

@@ -22,7 +22,6 @@ void reduce(const shaders::Program& program, BlockBuffers& blocks, const shaders
 GpuObservation::GpuObservation(const shaders::Device& device, shaders::ProgramCache& programs, const RestState& rest)
     : programs_(programs),
       tet_(rest.tet),
-      hex_(rest.hexahedra.hex),
       node_partials_(device, shaders::observe_partials, "partial results of nodes"),
       element_partials_(device, shaders::observe_partials, "partial results of elements") {}
 
@@ -48,23 +47,9 @@ Observation GpuObservation::nodes(const shaders::Program& program, BlockBuffers&
 }
 
 SmallestJacobian GpuObservation::smallest_jacobian(const GpuForce& force, BlockBuffers& blocks) const {
-    SmallestJacobian smallest{infinite};
     const shaders::Program& elements = programs_.get(shaders::observe_elements_program());
     force.set_all_elements(elements);
     reduce(elements, blocks, element_partials_);
-    if (const auto [jacobian, e] = least_partial(); jacobian < smallest.value) smallest = {jacobian, tet_[e]};
-    if (!hex_.empty()) {
-        const shaders::Program& hexahedra = programs_.get(shaders::observe_elements_program(shaders::Cell::Hexahedron));
-        force.set_all_hexahedra(hexahedra);
-        reduce(hexahedra, blocks, element_partials_);
-        if (const auto [jacobian, e] = least_partial(); jacobian < smallest.value) smallest = {jacobian, -1, hex_[e]};
-    }
-    if (std::isinf(smallest.value)) smallest.value = -smallest.value;  // no J is finite
-    return smallest;
-}
-
-/// Merges the partial results of the last reduction over elements.
-GpuObservation::LeastJacobian GpuObservation::least_partial() const {
     float least = std::numeric_limits<float>::max();
     std::uint32_t element = std::numeric_limits<std::uint32_t>::max();
     for (const ElementPartial& part : element_partials_.download())
@@ -72,8 +57,8 @@ GpuObservation::LeastJacobian GpuObservation::least_partial() const {
             least = part.volume_change;
             element = part.element;
         }
-    if (element == std::numeric_limits<std::uint32_t>::max()) return {infinite, 0};
-    return {1.0 + static_cast<double>(least), element};
+    if (element == std::numeric_limits<std::uint32_t>::max()) return {-infinite};  // no J is finite
+    return {1.0 + static_cast<double>(least), tet_[element]};
 }
 
 }  // namespace tissuewarp::tled::detail

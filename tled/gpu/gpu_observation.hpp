@@ -34,15 +34,8 @@ private:
         float volume_change;
         std::uint32_t element;
     };
-    struct LeastJacobian {
-        double value;  ///< +∞ where no J is finite
-        std::size_t element;
-    };
-
-    [[nodiscard]] LeastJacobian least_partial() const;
-
     shaders::ProgramCache& programs_;
-    std::vector<int> tet_, hex_;
+    std::vector<int> tet_;
     shaders::Buffer<NodePartial> node_partials_;
     shaders::Buffer<ElementPartial> element_partials_;
 };

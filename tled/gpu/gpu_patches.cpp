@@ -17,11 +17,6 @@ constexpr int steps_per_dispatch = 500;
 /// Of shaders/chunks/patch.state.glsl, and of patch.contact.glsl for each obstacle.
 constexpr std::size_t state_planes = 6, tangent_planes = 8;
 
-bool every_node_has_tetrahedra(const RestState& rest) {
-    const std::vector<int>& offset = rest.incidence.offset;
-    return std::adjacent_find(offset.begin(), offset.end()) == offset.end();
-}
-
 /// Patches are of one material: these meet at a node whatever their size.
 bool too_many_materials_meet(const RestState& rest) {
     const std::vector<int> material = material_of_elements(rest);
@@ -112,15 +107,13 @@ int count_of(const std::vector<StressSteps>& steps) {
 
 bool GpuPatches::suit(const RestState& rest, const shaders::Device& device) {
     const bool tissue = rest.fibre.cols() > 0 || !rest.viscosity.empty();
-    if (rest.blocks.empty() || rest.hexahedra.count() > 0 || keeps_a_part(rest) ||
-        device.limits().storage_blocks < storage_blocks(rest.pressure.count() > 0, tissue, {}))
+    if (keeps_a_part(rest) || device.limits().storage_blocks < storage_blocks(rest.pressure.count() > 0, tissue, {}))
         return false;
     const auto follows_the_law = [&](const MaterialBlock& block) {
         return rest.materials[static_cast<std::size_t>(block.material)].index() ==
                static_cast<std::size_t>(law_of(rest));
     };
-    return std::all_of(rest.blocks.begin(), rest.blocks.end(), follows_the_law) && every_node_has_tetrahedra(rest) &&
-           !too_many_materials_meet(rest);
+    return std::all_of(rest.blocks.begin(), rest.blocks.end(), follows_the_law) && !too_many_materials_meet(rest);
 }
 
 GpuPatches::GpuPatches(const shaders::Device& device, shaders::ProgramCache& programs, const RestState& rest,

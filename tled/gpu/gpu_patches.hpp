@@ -14,8 +14,8 @@ namespace tissuewarp::tled::detail {
 
 class GpuPatches {
 public:
-    /// Whether patches can compute the scene on the device: tetrahedra of one law, no hexahedra, no node outside of all
-    /// tetrahedra or of more than most_sharing_patches materials.
+    /// Whether patches can compute the scene on the device: one law, no node of more than
+    /// most_sharing_patches materials.
     static bool suit(const RestState& rest, const shaders::Device& device);
 
     GpuPatches(const shaders::Device& device, shaders::ProgramCache& programs, const RestState& rest,

@@ -1,7 +1,6 @@
 #include "tled/gpu/right_forces.hpp"
 
 #include "core/errors.hpp"
-#include "tled/model/hexahedra.hpp"
 #include "tled/model/internal_force.hpp"
 #include "tled/model/kinematics.hpp"
 
@@ -22,10 +21,7 @@ Matrix3Xd test_displacement(const RestState& rest) {
     double least_height = std::numeric_limits<double>::infinity();
     for (int e = 0; e < rest.element_count(); ++e)
         least_height = std::min(least_height, 1 / shape_gradients(rest, e).colwise().norm().maxCoeff());
-    for (int e = 0; e < rest.hexahedra.count(); ++e)
-        least_height = std::min(least_height, 1 / hex_shape_gradients(rest.hexahedra, e).colwise().norm().maxCoeff());
-    const double volume = rest.volume.sum() + rest.hexahedra.volume.sum();
-    const double edge = std::cbrt(volume / (rest.element_count() / 6.0 + rest.hexahedra.count()));
+    const double edge = std::cbrt(rest.volume.sum() / (rest.element_count() / 6.0));
     const double size = std::min(0.01 * edge, 0.05 * least_height);
     Matrix3Xd u(3, rest.node_count);
     for (Eigen::Index a = 0; a < u.cols(); ++a)

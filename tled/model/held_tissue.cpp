@@ -30,15 +30,11 @@ std::vector<int> connected_nodes(const RestState& rest, int seed, std::vector<bo
         if (!visited[node]) piece.push_back(node);
         visited[node] = true;
     };
-    const Incidence &tets = rest.incidence, &hexes = rest.hexahedra.incidence;
+    const Incidence& incidence = rest.incidence;
     for (std::size_t next = 0; next < piece.size(); ++next) {
         const int node = piece[next];
-        for (int k = tets.offset[node]; k < tets.offset[node + 1]; ++k) {
-            for (int other : rest.nodes.col(tets.entry[k] / 4)) add(other);
-        }
-        if (hexes.offset.empty()) continue;
-        for (int k = hexes.offset[node]; k < hexes.offset[node + 1]; ++k) {
-            for (int other : rest.hexahedra.nodes.col(hexes.entry[k] / 8)) add(other);
+        for (int k = incidence.offset[node]; k < incidence.offset[node + 1]; ++k) {
+            for (int other : rest.nodes.col(incidence.entry[k] / 4)) add(other);
         }
     }
     return piece;

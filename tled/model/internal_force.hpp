@@ -16,15 +16,15 @@ double elastic_energy(const RestState& rest, const Eigen::Matrix3Xd& displacemen
 /// f_int = ∂E/∂u, mN, 3 × N.
 Eigen::Matrix3Xd internal_force(const RestState& rest, const Eigen::Matrix3Xd& displacement);
 
-/// Viscous stresses q_i (second Piola–Kirchhoff, kPa) of every element, in the internal order, tetrahedra before
-/// hexahedra; elements of elastic materials have none.
+/// Viscous stresses q_i (second Piola–Kirchhoff, kPa) of every element, in the internal order; elements of elastic
+/// materials have none.
 using ViscousStresses = std::vector<std::vector<Eigen::Matrix3d>>;
 
 /// f_int with the viscous stresses taken off: P = ∂W/∂F − F Σ q_i, mN, 3 × N.
 Eigen::Matrix3Xd internal_force(const RestState& rest, const Eigen::Matrix3Xd& displacement,
                                 const ViscousStresses& stresses);
 
-/// det F of every element, tetrahedra before hexahedra, in the order of the mesh.
+/// det F of every element, in the order of the mesh.
 Eigen::VectorXd jacobians(const RestState& rest, const Eigen::Matrix3Xd& displacement);
 
 }  // namespace tissuewarp::tled

@@ -45,8 +45,8 @@ struct ElementJacobian {
 };
 ElementJacobian smallest_element_jacobian(const DiscreteEnergy& energy, const Eigen::Matrix3Xd& u);
 
-/// The elements of a RestState, linear tetrahedra with or without averaged pressure and one-point hexahedra after them:
-/// the functions of tled/model/internal_force.hpp.
+/// The elements of a RestState, linear tetrahedra with or without averaged pressure: the functions of
+/// tled/model/internal_force.hpp.
 class LinearTetrahedra final : public DiscreteEnergy {
 public:
     /// Keeps a reference: `rest` must outlive this object.

@@ -26,7 +26,6 @@ void require_columns(Eigen::Index columns, Eigen::Index node_count, const char* 
 }
 
 void require_known(const RestState& rest, const NodalConditions& conditions) {
-    refuse_if(rest.hexahedra.count() > 0, "hexahedra");
     refuse_if(rest.pressure.count() > 0, "averaged pressure");
     refuse_if(!rest.viscosity.empty(), "viscosity");
     for (const Material& material : rest.materials)

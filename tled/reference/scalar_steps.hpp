@@ -21,7 +21,7 @@ class ScalarSteps {
 public:
     /// Of the conditions `constrained` and `imposed` are taken; `mass` is diagonal, 3 × N, kg. The state is zero but
     /// for what is imposed. Throws InvalidInput for what the loops do not know (another law, averaged pressure,
-    /// hexahedra, viscosity, springs, external forces), for wrong shapes and for masses that are not positive.
+    /// viscosity, springs, external forces), for wrong shapes and for masses that are not positive.
     ScalarSteps(const RestState& rest, const NodalConditions& conditions, const Eigen::Matrix3Xd& mass);
 
     /// Imposed components keep their imposed displacement and increment zero. Throws InvalidInput for wrong shapes.

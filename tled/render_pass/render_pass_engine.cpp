@@ -43,7 +43,6 @@ bool is_neo_hookean(const Material& material) {
 }
 
 void require_known(const RestState& rest) {
-    refuse_if(rest.hexahedra.count() > 0, "hexahedra");
     refuse_if(rest.pressure.count() > 0, "averaged pressure");
     refuse_if(!rest.viscosity.empty(), "viscosity");
     for (const Material& material : rest.materials) {

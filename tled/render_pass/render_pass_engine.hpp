@@ -20,7 +20,7 @@ public:
     /// Of the conditions `constrained` and `imposed` are taken; `mass` is diagonal, 3 × N, kg; `device` counts EGL
     /// devices, −1 takes the first hardware device, or the software rasteriser when there is none. The state is zero
     /// but for what is imposed. Throws InvalidInput for what the passes do not know (another law, several laws,
-    /// averaged pressure, hexahedra, viscosity, springs, external forces), for wrong shapes and for masses that are
+    /// averaged pressure, viscosity, springs, external forces), for wrong shapes and for masses that are
     /// not positive, and GpuUnavailable.
     RenderPassEngine(const RestState& rest, const NodalConditions& conditions, const Eigen::Matrix3Xd& mass,
                      int device = -1);

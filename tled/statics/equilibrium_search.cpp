@@ -20,7 +20,7 @@ std::string text(double value) {
 }
 
 std::string place(const SmallestJacobian& smallest) {
-    return "det F = " + text(smallest.value) + " in " + name_of_element(smallest.tet, smallest.hex);
+    return "det F = " + text(smallest.value) + " in tetrahedron " + std::to_string(smallest.tet);
 }
 
 }  // namespace

@@ -12,7 +12,6 @@
 #include <string>
 
 #include "core/errors.hpp"
-#include "tled/model/hexahedra.hpp"
 #include "tled/model/kinematics.hpp"
 
 namespace tissuewarp::tled::detail {
@@ -27,30 +26,16 @@ namespace {
 using Matrix34 = Eigen::Matrix<double, 3, 4>;
 
 // The block of corners a, b is V Σ_jl ∂P_ij/∂F_kl ∂N_a/∂X_j ∂N_b/∂X_l.
-template <int corners>
-struct CellTerms {
-    Eigen::Matrix<double, 9, 9> tangent;         // times V_e
-    Eigen::Matrix<double, 3, corners> gradient;  // ∇N, a column per corner
+struct ElementTerms {
+    Eigen::Matrix<double, 9, 9> tangent;  // times V_e
+    Matrix34 gradient;                    // ∇N, a column per corner
+    Matrix34 cofactor_gradient;           // cof F ∇N
 
     [[nodiscard]] Matrix3d block(int row, int column) const {
-        Eigen::Matrix<double, 9, 3> half = gradient(0, column) * tangent.template leftCols<3>();
-        for (int l = 1; l < 3; ++l) half += gradient(l, column) * tangent.template middleCols<3>(3 * l);
-        Matrix3d result = gradient(0, row) * half.template topRows<3>();
-        for (int j = 1; j < 3; ++j) result += gradient(j, row) * half.template middleRows<3>(3 * j);
-        return result;
-    }
-};
-
-struct ElementTerms : CellTerms<4> {
-    Matrix34 cofactor_gradient;  // cof F ∇N
-};
-
-struct HexTerms : CellTerms<8> {
-    Eigen::Matrix<double, 8, 4> hourglass;  // √k γ
-
-    [[nodiscard]] Matrix3d block(int row, int column) const {
-        Matrix3d result = CellTerms<8>::block(row, column);
-        result.diagonal().array() += hourglass.row(row).dot(hourglass.row(column));
+        Eigen::Matrix<double, 9, 3> half = gradient(0, column) * tangent.leftCols<3>();
+        for (int l = 1; l < 3; ++l) half += gradient(l, column) * tangent.middleCols<3>(3 * l);
+        Matrix3d result = gradient(0, row) * half.topRows<3>();
+        for (int j = 1; j < 3; ++j) result += gradient(j, row) * half.middleRows<3>(3 * j);
         return result;
     }
 };
@@ -111,70 +96,35 @@ void build_pattern(int rows, int columns, const Gather& gather, std::vector<int>
     });
 }
 
-// Calls visit(element, corner) for the elements of `corners` corners at a node; none where the lists are empty.
-template <int corners, typename Visit>
+// Calls visit(element, corner) for the elements at a node.
+template <typename Visit>
 void for_each_at(const Incidence& incidence, int node, const Visit& visit) {
-    if (incidence.offset.empty()) return;
     for (int k = incidence.offset[node]; k < incidence.offset[node + 1]; ++k) {
-        visit(incidence.entry[k] / corners, incidence.entry[k] % corners);
+        visit(incidence.entry[k] / 4, incidence.entry[k] % 4);
     }
 }
 
-// The blocks of one row, found by column.
-struct Row {
-    const int *begin, *end;
-    Matrix3d* blocks;
-
-    template <int corners, typename Terms>
-    void add(const Eigen::Matrix<int, corners, Eigen::Dynamic>& nodes, int element, int corner, const Terms& terms) {
-        for (int other = 0; other < corners; ++other) {
-            blocks[std::lower_bound(begin, end, nodes(other, element)) - begin] += terms.block(corner, other);
-        }
-    }
-};
-
-BlockRows element_rows(const RestState& rest, const std::vector<ElementTerms>& terms,
-                       const std::vector<HexTerms>& hex_terms) {
+BlockRows element_rows(const RestState& rest, const std::vector<ElementTerms>& terms) {
     BlockRows result;
-    const HexState& hexahedra = rest.hexahedra;
     const auto gather = [&](int node, RowGatherer& gatherer) {
-        gatherer.insert(node);  // a node without elements keeps a zero block on the diagonal
-        for_each_at<4>(rest.incidence, node, [&](int e, int) {
+        for_each_at(rest.incidence, node, [&](int e, int) {
             for (int neighbour : rest.nodes.col(e)) gatherer.insert(neighbour);
-        });
-        for_each_at<8>(hexahedra.incidence, node, [&](int e, int) {
-            for (int neighbour : hexahedra.nodes.col(e)) gatherer.insert(neighbour);
         });
     };
     build_pattern(rest.node_count, rest.node_count, gather, result.offset, result.column);
 
     result.block.assign(result.column.size(), Matrix3d::Zero());
     parallel_for(0, rest.node_count, [&](int node) {
-        const int* begin = &result.column[result.offset[node]];
-        Row row{begin, begin + result.offset[node + 1] - result.offset[node], &result.block[result.offset[node]]};
-        for_each_at<4>(rest.incidence, node, [&](int e, int corner) { row.add(rest.nodes, e, corner, terms[e]); });
-        for_each_at<8>(hexahedra.incidence, node,
-                       [&](int e, int corner) { row.add(hexahedra.nodes, e, corner, hex_terms[e]); });
+        const auto begin = result.column.begin() + result.offset[node],
+                   end = result.column.begin() + result.offset[node + 1];
+        for_each_at(rest.incidence, node, [&](int e, int corner) {
+            for (int other = 0; other < 4; ++other) {
+                const auto place = std::lower_bound(begin, end, rest.nodes(other, e));
+                result.block[place - result.column.begin()] += terms[e].block(corner, other);
+            }
+        });
     });
     return result;
-}
-
-// The tangents of the hexahedra, without those of averaged pressures.
-std::vector<HexTerms> hex_terms(const RestState& rest, const Matrix3Xd& displacement) {
-    const HexState& state = rest.hexahedra;
-    require_positive_hexahedra(rest, hex_jacobians(state, displacement));
-    const std::vector<int> material_of = material_of_elements(state.blocks);
-    std::vector<HexTerms> terms(state.count());
-    parallel_for(0, state.count(), [&](int e) {
-        const Material material = hex_material(rest, material_of[e], e);
-        Tangent tangent = shear_tangent(material, hex_deformation_gradient(state, displacement, e));
-        const VolumetricFunction U = volumetric_function(material, tangent.F.determinant());
-        const double modulus = state.volumetric_modulus[e];
-        add_volumetric_tangent(tangent, modulus * U.first, modulus * U.second);
-        terms[e] = {{state.volume[e] * tangent.derivative, hex_shape_gradients(state, e)},
-                    std::sqrt(state.hourglass_stiffness[e]) * hourglass_vectors(state, e)};
-    });
-    return terms;
 }
 
 RankOneRows pressure_rows(const RestState& rest, const std::vector<ElementTerms>& terms,
@@ -246,11 +196,11 @@ Stiffness stiffness(const RestState& rest, const Matrix3Xd& displacement) {
         add_volumetric_tangent(tangent, element_pressure(rest, e, material, jacobian[e], nodal),
                                rest.volumetric_modulus[e] * volumetric_function(material, jacobian[e]).second);
         const Matrix34 gradient = shape_gradients(rest, e);
-        terms[e] = {{rest.volume[e] * tangent.derivative, gradient}, cofactor(tangent.F) * gradient};
+        terms[e] = {rest.volume[e] * tangent.derivative, gradient, cofactor(tangent.F) * gradient};
     });
 
     Stiffness result;
-    result.elements = element_rows(rest, terms, hex_terms(rest, displacement));
+    result.elements = element_rows(rest, terms);
     result.products = pressure_rows(rest, terms, nodal);
     return result;
 }
