@@ -107,9 +107,10 @@ std::string estimate_text(const registration::UncertaintySummary& s) {
         "estimated error (1 σ): {:.2f} mm over the tissue, of the mesh {}, the solver {:.3f}, the data {:.2f}; "
         "95 % within {:.2f} mm, where least is known within {:.2f} mm\n",
         s.deviation_mm, of_mesh, s.algebraic_mm, s.data_mm, s.interval_mm, s.worst_interval_mm);
-    return text + fmt::format("shown by the data: {:.0f} % of the tissue, carried there by mechanics: {:.0f} %, not known "
-                              "to 5 mm: {:.0f} %\n",
-                              100 * s.shown_share, 100 * (1 - s.shown_share - s.unknown_share), 100 * s.unknown_share);
+    return text + fmt::format(
+                      "shown by the data: {:.0f} % of the tissue, carried there by mechanics: {:.0f} %, not known "
+                      "to 5 mm: {:.0f} %\n",
+                      100 * s.shown_share, 100 * (1 - s.shown_share - s.unknown_share), 100 * s.unknown_share);
 }
 
 }  // namespace

@@ -170,6 +170,10 @@ json to_json(const registration::ExpectedError& expected) {
             {"worst_place_mm", vector(expected.worst_place)}};
 }
 
+json to_json(const registration::HeldOut& held_out) {
+    return {{"z", number(held_out.z)}, {"regions", held_out.regions}};
+}
+
 json to_json(const registration::UncertaintySummary& s) {
     return {{"algebraic_mm", number(s.algebraic_mm)},
             {"discretisation_mm", number(s.discretisation_mm)},
@@ -305,6 +309,7 @@ json report_json(const RegistrationRun& run, double total_seconds) {
     add_fits(report, run.result);
     if (run.products.uncertainty) {
         report["error_estimate"] = to_json(registration::summarise(*run.products.uncertainty));
+        if (const auto& held_out = run.products.uncertainty->held_out()) report["held_out"] = to_json(*held_out);
         if (const auto& expected = run.products.uncertainty->expected()) report["expected_error"] = to_json(*expected);
     }
     report["intraoperative_seconds"] = run.intraoperative_seconds;

@@ -291,9 +291,10 @@ double percentile(std::vector<double> values, double share) {
 /// The moving image where a deformation takes it, on the grid of the intraoperative image.
 class Warper {
 public:
-    Warper(const std::shared_ptr<const PreparedModel>& prepared, const Case& study, Device device) : moving_(study.moving) {
+    Warper(const std::shared_ptr<const PreparedModel>& prepared, const Case& study, Device device)
+        : moving_(study.moving) {
         grid_ = study.seen.image ? study.seen.image->geometry : study.moving.geometry;
-        if (device != Device::Cpu) gpu_.emplace(prepared.model.mesh, moving_.as(CV_32F), grid_);
+        if (device != Device::Cpu) gpu_.emplace(prepared->model.mesh, moving_.as(CV_32F), grid_);
     }
 
     void operator()(const Deformation& deformation) {
@@ -314,7 +315,7 @@ private:
 void time_updates(const std::string& name, const std::shared_ptr<const PreparedModel>& prepared, const Case& study,
                   const UpdateOptions& options, int repeats) {
     Updater updater(prepared, options);
-    Warper warper(*prepared, study, options.device);
+    Warper warper(prepared, study, options.device);
     std::vector<double> wall, processor;
     std::map<std::string, std::vector<double>> stages;
     for (int n = 0; n < repeats; ++n) {

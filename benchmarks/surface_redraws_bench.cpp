@@ -10,6 +10,7 @@
 #include "meshing/mesher.hpp"
 #include "registration/evaluation.hpp"
 #include "registration/field.hpp"
+#include "registration/pose/alignment.hpp"
 #include "registration/uncertainty.hpp"
 #include "registration/update.hpp"
 #include "tled/blas_threads.hpp"

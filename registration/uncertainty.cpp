@@ -89,10 +89,13 @@ detail::OpenParts open_parts(const PreparedModel& prepared, const UpdateResult& 
     if (!prepared.coarse) made = detail::coarse_model_for_loads(prepared, observer);
     const PreparedModel& coarse = made ? *made : *prepared.coarse;
     const meshing::TetMesh& mesh = coarse.model.mesh;
-    detail::DataUncertainty data =
-        detail::open_parts(coarse, detail::pulls_on(coarse, prepared, result.pulls),
-                           detail::carried(prepared.model.mesh, displacement, mesh.nodes), energy, options)
-            .data;
+    // Targets from where the tissue is: a coarse node lies elsewhere and moved otherwise than the one whose spring it
+    // has.
+    LastPulls residuals = result.pulls;
+    for (PulledNode& pulled : residuals.springs) pulled.spring.target -= displacement.col(pulled.spring.node);
+    detail::DataUncertainty data = detail::open_parts(coarse, detail::pulls_on(coarse, prepared, residuals),
+                                                      Eigen::Matrix3Xd::Zero(3, mesh.nodes.cols()), energy, options)
+                                       .data;
     data.covariance = detail::carried(mesh, data.covariance, prepared.model.mesh.nodes);
     return {std::move(data), {prepared.rest, conditions_of(prepared, result.pulls), prepared.stiffness}};
 }
@@ -145,11 +148,7 @@ Eigen::RowVectorXd traces(const Covariances& covariances) {
 
 Uncertainty::Uncertainty(meshing::TetMesh mesh, NodalErrors nodal, std::optional<HeldOut> held_out,
                          std::optional<ExpectedError> expected)
-    : mesh_(std::move(mesh)),
-      locator_(mesh_),
-      nodal_(std::move(nodal)),
-      held_out_(held_out),
-      expected_(expected) {}
+    : mesh_(std::move(mesh)), locator_(mesh_), nodal_(std::move(nodal)), held_out_(held_out), expected_(expected) {}
 
 ErrorEstimate Uncertainty::at(int tet, const Eigen::Vector4d& barycentric) const {
     const auto corners = mesh_.tets.col(tet);
@@ -233,9 +232,23 @@ std::optional<Doubt> doubt_of_solver(const UncertaintySummary& summary, double t
     return Doubt{"solver.short", summary.algebraic_mm, tolerance_mm, text};
 }
 
+std::optional<Doubt> doubt_of_held_out(const HeldOut& held_out) {
+    constexpr double most_z = held_out_doubt_limits.most_z;
+    if (held_out.z <= most_z) return std::nullopt;
+    char text[320];
+    std::snprintf(text, sizeof text,
+                  "the data contradict each other: left out in turn and predicted from the rest, %d regions of them "
+                  "were missed by %.1f times what was to be expected; the stated errors are widened by as much, look "
+                  "where data and result differ, and leave out what is not of this organ",
+                  held_out.regions, held_out.z);
+    return Doubt{"data.contradict", held_out.z, most_z, text};
+}
+
 std::vector<Doubt> doubts_of(const Uncertainty& uncertainty, double tolerance_mm) {
     std::vector<Doubt> doubts;
     if (auto doubt = doubt_of_solver(summarise(uncertainty), tolerance_mm)) doubts.push_back(std::move(*doubt));
+    if (uncertainty.held_out())
+        if (auto doubt = doubt_of_held_out(*uncertainty.held_out())) doubts.push_back(std::move(*doubt));
     if (!uncertainty.expected()) return doubts;
     if (auto doubt = doubt_of_data(*uncertainty.expected())) doubts.push_back(std::move(*doubt));
     return doubts;

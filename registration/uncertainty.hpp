@@ -130,6 +130,15 @@ UncertaintySummary summarise(const Uncertainty& uncertainty);
 /// In words, where the solver stopped farther from equilibrium than the tolerance it was given, mm; otherwise nothing.
 std::optional<Doubt> doubt_of_solver(const UncertaintySummary& summary, double tolerance_mm);
 
+/// From where on a registration that was set against what it left out is doubted.
+struct HeldOutDoubtLimits {
+    double most_z = 2;  ///< errors twice those that were to be expected
+};
+inline constexpr HeldOutDoubtLimits held_out_doubt_limits{};
+
+/// In words, where regions left out were missed by far more than was to be expected; otherwise nothing.
+std::optional<Doubt> doubt_of_held_out(const HeldOut& held_out);
+
 /// All that the estimate says against a result whose equilibria had this tolerance, mm; empty when there is nothing.
 std::vector<Doubt> doubts_of(const Uncertainty& uncertainty, double tolerance_mm);
 

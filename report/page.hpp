@@ -19,7 +19,7 @@ struct ReportInput {
     const imaging::Volume* warped_labels = nullptr;
     const imaging::Volume* moving_to_fixed = nullptr;  ///< displacement field of three channels, LPS mm, moving grid
     const imaging::Volume* uncertainty = nullptr;  ///< estimated error, 1 σ, mm, fixed frame, NaN outside the tissue
-    const imaging::Volume* trust = nullptr;        ///< beside it: 0 no tissue, 1 shown, 2 not to be trusted; one byte
+    const imaging::Volume* trust = nullptr;        ///< beside it: 0 no tissue, 1 shown, 2 carried, 3 unknown; one byte
     nlohmann::json report;  ///< report.json, docs/manual/register.md; missing keys leave sections out
 };
 

@@ -110,8 +110,8 @@ std::vector<CoverageRow> rows_of(const Phantom& phantom, Patient& patient, Evide
         const auto place = locator.find(X);
         if (!estimates[k] || !place) continue;  // in the organ, out of its mesh
         const Eigen::Vector3d u = meshing::interpolate(prepared.model.mesh, nodal, *place);
-        rows.push_back({phantom.seed, evidence, static_cast<int>(k), X + u - is.col(column), z, static_cast<int>(doubts),
-                        u.norm(), patient.in_view(evidence, column), *estimates[k]});
+        rows.push_back({phantom.seed, evidence, static_cast<int>(k), X + u - is.col(column), z,
+                        static_cast<int>(doubts), u.norm(), patient.in_view(evidence, column), *estimates[k]});
     }
     return rows;
 }

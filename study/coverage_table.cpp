@@ -9,7 +9,8 @@ namespace tissuewarp::study {
 namespace {
 
 constexpr const char* header =
-    "seed,evidence,target,held_out_z,doubts,error_x,error_y,error_z,moved,in_view,algebraic,discretisation,data,deviation,"
+    "seed,evidence,target,held_out_z,doubts,error_x,error_y,error_z,moved,in_view,algebraic,discretisation,data,"
+    "deviation,"
     "interval,trust,"
     "xx,yy,zz,xy,yz,zx";
 

@@ -146,12 +146,4 @@ LastPulls pulls_on(const PreparedModel& coarse, const PreparedModel& prepared, c
     return pulls;
 }
 
-CoarseTwin coarse_twin(const PreparedModel& prepared, const UpdateResult& result, Observer& observer) {
-    PreparedModel coarse = coarse_model(prepared, suggested_edge_length(prepared.labels), observer);
-    LastPulls pulls = pulls_on(coarse, prepared, result.pulls);
-    Eigen::Matrix3Xd displacement =
-        carried(prepared.model.mesh, result.deformation.displacement, coarse.model.mesh.nodes);
-    return {std::move(coarse), std::move(pulls), std::move(displacement)};
-}
-
 }  // namespace tissuewarp::registration::detail

@@ -19,13 +19,6 @@ struct CoarseTwinOptions {
 };
 inline constexpr CoarseTwinOptions coarse_twin_options{};
 
-/// Tissue, what pulled at it last, and where it went.
-struct CoarseTwin {
-    PreparedModel prepared;
-    LastPulls pulls;                ///< springs and prior alone, on the nodes about
-    Eigen::Matrix3Xd displacement;  ///< 3 × N, mm
-};
-
 /// The model of the same label map with other edges (mm), without anchors and rigid neighbours. Throws InvalidInput,
 /// Cancelled.
 PreparedModel coarse_model(const PreparedModel& prepared, double edge_length, Observer& observer);
@@ -40,9 +33,6 @@ PreparedModel coarse_model_for_loads(const PreparedModel& prepared, meshing::Tet
 
 /// What pulls at a model, on the nodes of its coarse model nearby: springs and prior alone.
 LastPulls pulls_on(const PreparedModel& coarse, const PreparedModel& prepared, const LastPulls& pulls);
-
-/// Of the label map, with the edges that suggested_edge_length tells. Throws InvalidInput, Cancelled.
-CoarseTwin coarse_twin(const PreparedModel& prepared, const UpdateResult& result, Observer& observer);
 
 /// Values at the nodes of `from` (C × N) at the places `to` (3 × P): between them, and of the nearest element outside.
 Eigen::MatrixXd carried(const meshing::TetMesh& from, const Eigen::MatrixXd& nodal, const Eigen::Matrix3Xd& to);

@@ -16,9 +16,9 @@ struct DatumKind {
 /// Chosen on the random patients 1 to 9 of all three families (docs/decisions/error_model.md), but for the distances,
 /// which are a matter of words.
 struct SharedErrors {
-    double label_voxels = 0.2;     ///< of labels, of the larger voxel of both maps
-    double surface_voxels = 0.2;   ///< of points of a surface, of the voxel of the map that the model came from
-    double image_voxels = 0.08;    ///< of images, of the larger voxel of both
+    double label_voxels = 0.2;    ///< of labels, of the larger voxel of both maps
+    double surface_voxels = 0.2;  ///< of points of a surface, of the voxel of the map that the model came from
+    double image_voxels = 0.08;   ///< of images, of the larger voxel of both
     double points_mm = 0.3, curves_mm = 0.3;
     double shows_mm = 10;  ///< about data that lie apart; about an image's, which lie dense, none
 };

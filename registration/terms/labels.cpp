@@ -60,9 +60,8 @@ Contribution LabelTerm::linearise(const RoundPlan& plan, const State& state, Obs
         throw InvalidInput("no boundary of the model was found in the fixed labels within " + to_text(plan.range_mm) +
                            " mm; check that the images show the same organ");
     Contribution result = last_;
-    result.springs =
-        pulled_by(label_kind(prepared_.labels.geometry, labels_.geometry),
-                  matched_springs(interfaces, matches, normals, state.displacement, prepared_.options));
+    result.springs = pulled_by(label_kind(prepared_.labels.geometry, labels_.geometry),
+                               matched_springs(interfaces, matches, normals, state.displacement, prepared_.options));
     const auto holds = pulled_by(Origin::Hold, holding_springs(interfaces, state.displacement, prepared_.options));
     std::copy(holds.begin(), holds.end(), std::back_inserter(result.springs));
     return result;

@@ -124,7 +124,8 @@ Contribution SurfaceTerm::linearise(const RoundPlan& plan, const State& state, O
     if (weights > 0) result.mean_residual_mm /= weights;
     result.candidates = static_cast<int>(found.size());
     result.matched = static_cast<int>(pulls.size());
-    result.springs = pulled_by(surface_kind(prepared_.labels.geometry), lumped_springs(prepared_.model.mesh, pulls, state.displacement));
+    result.springs = pulled_by(surface_kind(prepared_.labels.geometry),
+                               lumped_springs(prepared_.model.mesh, pulls, state.displacement));
     return result;
 }
 

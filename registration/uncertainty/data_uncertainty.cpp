@@ -33,8 +33,7 @@ Covariances covariances_of(const MatrixXd& samples) {
 /// it would be seen to move as `visible` (3N × k, mm) under those drawn.
 void give_size(Truths& truths, MatrixXd& missed, const PreparedModel& prepared, double strain_energy) {
     const MatrixXd visible = truths.displacement - missed;
-    const auto stiffness =
-        tled::tangent_stiffness(prepared.rest, Eigen::Matrix3Xd::Zero(3, prepared.rest.node_count));
+    const auto stiffness = tled::tangent_stiffness(prepared.rest, Eigen::Matrix3Xd::Zero(3, prepared.rest.node_count));
     const double drawn = 0.5 * visible.cwiseProduct(stiffness * visible).sum() / double(visible.cols());
     const double size = std::sqrt(strain_energy / drawn);
     for (MatrixXd* part : {&truths.displacement, &truths.loads, &missed}) *part *= size;
@@ -94,18 +93,20 @@ OpenParts open_parts(const PreparedModel& prepared, const LastPulls& given, cons
     auto [registration, without] = LinearRegistration::with_unseen(prepared, pulls, unseen);
     const int half = options.samples / 2;
     const double energy = strain_energy + error_model.least_energy * pulls.energy;
-    const Missed on = missed_under(unknown_loads(prepared, half, options.seed), prepared, registration, without, energy),
+    const Missed on =
+                     missed_under(unknown_loads(prepared, half, options.seed), prepared, registration, without, energy),
                  in = missed_under(unknown_body_forces(prepared, half, options.seed + 1), prepared, registration,
                                    without, energy);
     const std::vector<PulledNode> data = pulls.data();
     const DataErrors errors =
         drawn_errors(data, prepared.model.mesh.nodes, pulls.energy, options.samples, options.seed + 2);
     DataUncertainty result;
-    result.covariance =
-        covariances_of(beside(on.error, in.error)) +
-        covariances_of(registration.inverse(forces_of(data, errors, prepared.rest.node_count)));
-    result.held_out = held_out(prepared, pulls, unseen, displacement, few_of(on.truths, in.truths, held_out_options.draws),
-                               few_of(errors, held_out_options.draws));
+    result.covariance = covariances_of(beside(on.error, in.error)) +
+                        covariances_of(registration.inverse(forces_of(data, errors, prepared.rest.node_count)));
+    result.held_out =
+        held_out(prepared, pulls, unseen, displacement, few_of(on.truths, in.truths, held_out_options.draws),
+                 few_of(errors, held_out_options.draws));
+    if (result.held_out) result.covariance *= std::max(1.0, result.held_out->z * result.held_out->z);
     if (pulls.parts_alone) result.expected = expected_error(prepared.model.mesh.nodes, registration.posterior());
     return {std::move(result), std::move(registration).stiffness()};
 }

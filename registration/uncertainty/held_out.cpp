@@ -76,8 +76,8 @@ Fold fold_of(int number, int folds, const std::vector<PulledNode>& data, const D
     return fold;
 }
 
-// With r the residuals of the data left out, taking their springs away moves the tissue by −A₋⁻¹ K r: they are missed by
-// r + A₋⁻¹ K r. To be expected is ε + u − û₋ of truths u and errors ε.
+// With r the residuals of the data left out, taking their springs away moves the tissue by −A₋⁻¹ K r: they are missed
+// by r + A₋⁻¹ K r. To be expected is ε + u − û₋ of truths u and errors ε.
 void add_fold(const Fold& fold, const LinearRegistration& rest, const Eigen::Matrix3Xd& displacement,
               const Truths& truths, std::vector<Sums>& regions) {
     const auto nodes = static_cast<int>(displacement.cols());

@@ -20,7 +20,6 @@ inline constexpr HeldOutOptions held_out_options{};
 /// as the data pull: 1 where the estimate is right, more where it promises too much. Nothing where there are too few
 /// data to leave any out.
 std::optional<HeldOut> held_out(const PreparedModel& prepared, const LastPulls& pulls, const LastPulls& unseen,
-                                const Eigen::Matrix3Xd& displacement, const Truths& truths,
-                                const DataErrors& errors);
+                                const Eigen::Matrix3Xd& displacement, const Truths& truths, const DataErrors& errors);
 
 }  // namespace tissuewarp::registration::detail

@@ -123,7 +123,7 @@ cv::Mat estimated_error(const Scene& scene, int row) {
     mixed.copyTo(picture, tissue);
     for (int y = 0; y < picture.rows; ++y)
         for (int x = 0; x < picture.cols; ++x)
-            if (trust.at<int>(y, x) == 2 && (x + y) % stripes_apart < stripe) picture.at<cv::Vec3b>(y, x) *= 0.2;
+            if (trust.at<int>(y, x) == 3 && (x + y) % stripes_apart < stripe) picture.at<cv::Vec3b>(y, x) *= 0.2;
     outline(picture, labels, plane, scene, fixed_colour, 1);
     return picture;
 }
@@ -255,7 +255,7 @@ void show_errors(Scene& scene) {
     double largest = 0;
     cv::minMaxLoc(errors, nullptr, &largest, nullptr, nullptr, trust != 0);
     scene.error_limit = std::max(largest, 0.1);
-    scene.distrusts = cv::countNonZero(trust == 2) > 0;
+    scene.distrusts = cv::countNonZero(trust == 3) > 0;
 }
 
 Scene scene_of(const ReportInput& input) {

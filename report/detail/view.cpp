@@ -205,12 +205,13 @@ json summary_view(const json& report) {
                            {"folds", is_finite(folded) && folded.get<double>() > 0}};
     }
     if (const json& estimate = at(report, "error_estimate"); estimate.is_object()) {
-        const json& unseen = at(estimate, "unseen_share");
+        const json& unknown = at(estimate, "unknown_share");
         tiles["estimate"] = {{"deviation", number(at(estimate, "deviation_mm"), 2)},
                              {"interval", number(at(estimate, "interval_95_mm"), 2)},
                              {"worst", number(at(estimate, "worst_interval_95_mm"), 2)},
-                             {"unseen", percent(unseen)},
-                             {"doubtful", is_finite(unseen) && unseen.get<double>() > 0}};
+                             {"shown", percent(at(estimate, "shown_share"))},
+                             {"unknown", percent(unknown)},
+                             {"doubtful", is_finite(unknown) && unknown.get<double>() > 0}};
     } else if (is_finite(at(report, "estimated_error_mm")))
         tiles["equations"] = {{"error", number(at(report, "estimated_error_mm"), 3)}};
     return tiles;

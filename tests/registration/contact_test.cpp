@@ -120,7 +120,7 @@ TEST(Contact, SpringsPullAlongTheNormalAloneAndOnlyWhereTheOrganTouches) {
     EXPECT_TRUE(contact.follow(state));
     const auto springs = contact.linearise(plan, state, silent_observer()).springs;
     ASSERT_FALSE(springs.empty());
-    for (const auto& [spring, origin] : springs) {
+    for (const auto& [spring, origin, shared, shows] : springs) {
         EXPECT_EQ(origin, Origin::Support);
         const Matrix3Xd& u = state.displacement;
         const Vector3d force = spring.stiffness * (spring.target - u.col(spring.node));

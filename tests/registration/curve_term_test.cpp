@@ -162,7 +162,7 @@ TEST(CurveTerm, SpringsHaveTheForcesOfThePulls) {
     for (Eigen::Index n = 0; n < 5; ++n)
         expected += energy * detail::robust_weight(across.col(n).norm(), 3) *
                     across.col(n).dot(stretch * places.col(n) + shift);
-    for (const auto& [spring, origin] : data.springs)
+    for (const auto& [spring, origin, shared, shows] : data.springs)
         found += (spring.stiffness * spring.target).dot(stretch * prepared.model.mesh.nodes.col(spring.node) + shift);
     EXPECT_GT(std::abs(expected), 1000);
     EXPECT_NEAR(found / expected, 1, 1e-6);

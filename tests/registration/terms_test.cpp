@@ -153,7 +153,8 @@ TEST(Updater, ModelsThatGotTheirImageTooLateAreRefused) {
     const auto model = std::make_shared<PreparedModel>(organ());
     Updater updater(model, on_cpu());
     imaging::Volume image = model->labels.as(CV_32F).clone();
-    for (std::int64_t n = 0; n < image.geometry.voxel_count(); ++n) image.data<float>()[n] += std::sin(0.37F * float(n));
+    for (std::int64_t n = 0; n < image.geometry.voxel_count(); ++n)
+        image.data<float>()[n] += std::sin(0.37F * float(n));
     prepare_image(*model, image);
     EXPECT_THROW((void)updater.update({.image = image}), InvalidInput);
 }

@@ -301,7 +301,7 @@ TEST_F(Pages, ShowWhereTheErrorIsLargeAndWhereNothingIsKnown) {
         return p.norm() >= 40 ? std::numeric_limits<float>::quiet_NaN() : p[0] > 0 ? 2.0F : 0.1F;
     });
     const Volume trust = filled<std::uint8_t>(example.grid, CV_8UC1, [](const Vector3d& p) {
-        return std::uint8_t(p.norm() >= 40 ? 0 : p[0] > 0 && p[1] > 0 ? 2 : 1);
+        return std::uint8_t(p.norm() >= 40 ? 0 : p[0] > 0 && p[1] > 0 ? 3 : p[1] > 0 ? 2 : 1);
     });
     ReportInput input = example.input();
     input.uncertainty = &error;
