@@ -23,8 +23,8 @@ std::string label_of(const Coverage& c) {
     constexpr std::array<const char*, all_evidence.size()> words{
         "labels", "part of the surface", "surface and points", "points alone",  "vessels",
         "image",  "degraded image",      "part of an image",   "other contrast"};
-    return std::string(words[static_cast<std::size_t>(c.evidence)]) + " (" + std::to_string(c.phantoms) + " phantoms" +
-           (c.shown_share > 0 ? ")" : ", not trusted)");
+    return std::string(words[static_cast<std::size_t>(c.evidence)]) + (c.in_view ? "" : ", unseen") + " (" +
+           std::to_string(c.phantoms) + " phantoms" + (c.unknown_share < 1 ? ")" : ", not trusted)");
 }
 
 /// Where both axes agree.

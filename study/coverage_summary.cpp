@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <map>
+#include <set>
 
 namespace tissuewarp::study {
 
@@ -55,9 +57,36 @@ std::vector<ReliabilityBin> binned(Rows rows) {
     return result;
 }
 
-Coverage summary_of(Evidence evidence, const Rows& rows) {
+double percentile(std::vector<double> values, double share) {
+    const auto rank = std::min(values.size() - 1, static_cast<std::size_t>(share * double(values.size())));
+    std::nth_element(values.begin(), values.begin() + std::ptrdiff_t(rank), values.end());
+    return values[rank];
+}
+
+void add_classes(Coverage& result, const Rows& rows) {
+    Rows shown;
+    std::vector<double> errors, radii;
+    std::set<std::uint64_t> doubted;
+    int unknown = 0;
+    for (const CoverageRow* row : rows) {
+        errors.push_back(row->error.norm());
+        radii.push_back(row->estimate.interval_mm);
+        if (row->estimate.trust == registration::Trust::Shown) shown.push_back(row);
+        unknown += row->estimate.trust == registration::Trust::Unknown;
+        if (row->doubts > 0) doubted.insert(row->seed);
+    }
+    result.shown_share = double(shown.size()) / double(rows.size());
+    result.unknown_share = double(unknown) / double(rows.size());
+    result.held_95_shown =
+        shown.empty() ? std::numeric_limits<double>::quiet_NaN() : share_held(shown, nominal_shares[level_95]);
+    result.sharpness = percentile(errors, 0.95) / percentile(radii, 0.5);
+    result.doubted_share = double(doubted.size()) / double(result.phantoms);
+}
+
+Coverage summary_of(Evidence evidence, bool in_view, const Rows& rows) {
     Coverage result;
     result.evidence = evidence;
+    result.in_view = in_view;
     result.targets = int(rows.size());
     std::map<std::uint64_t, Rows> by_phantom;
     for (const CoverageRow* row : rows) by_phantom[row->seed].push_back(row);
@@ -78,6 +107,7 @@ Coverage summary_of(Evidence evidence, const Rows& rows) {
     result.estimated_mm = estimated_mm(rows);
     result.true_mm = true_mm(rows);
     result.bins = binned(rows);
+    add_classes(result, rows);
     return result;
 }
 
@@ -85,30 +115,29 @@ Coverage summary_of(Evidence evidence, const Rows& rows) {
 
 std::vector<Coverage> coverage_of(const std::vector<CoverageRow>& rows) {
     std::vector<Coverage> result;
-    for (const Evidence evidence : all_evidence) {
-        Rows all, shown;
-        for (const CoverageRow& row : rows) {
-            if (row.evidence != evidence) continue;
-            all.push_back(&row);
-            if (row.estimate.trust == registration::Trust::Shown) shown.push_back(&row);
+    for (const Evidence evidence : all_evidence)
+        for (const bool in_view : {true, false}) {
+            Rows here;
+            for (const CoverageRow& row : rows)
+                if (row.evidence == evidence && row.in_view == in_view) here.push_back(&row);
+            if (!here.empty()) result.push_back(summary_of(evidence, in_view, here));
         }
-        if (all.empty()) continue;
-        result.push_back(summary_of(evidence, shown.empty() ? all : shown));
-        result.back().shown_share = double(shown.size()) / double(all.size());
-    }
     return result;
 }
 
 std::string table_of(const std::vector<Coverage>& coverage) {
     std::string table =
-        "evidence            phantoms  targets  shown, %   within 50 %   80 %   95 %        99 %   true rms  "
-        "estimated, mm   phantoms within, %\n";
+        "evidence               phantoms targets  within 50 %   80 %   95 %        99 %  sharpness  true rms  "
+        "estimated, mm  phantoms within, %  shown, %  of these within 95 %  unknown, %  doubted, %\n";
     for (const Coverage& c : coverage) {
-        char line[200];
-        std::snprintf(line, sizeof line, "%-20s %7d %8d %9.0f %12.1f %6.1f %6.1f ±%4.1f %6.1f %9.2f %9.2f %15.0f\n",
-                      name_of(c.evidence), c.phantoms, c.targets, 100 * c.shown_share, 100 * c.held[0], 100 * c.held[1],
-                      100 * c.held[2], 100 * c.held_95_error, 100 * c.held[3], c.true_mm, c.estimated_mm,
-                      100 * c.phantoms_within);
+        char line[300];
+        std::snprintf(
+            line, sizeof line,
+            "%-22s %8d %7d %12.1f %6.1f %6.1f ±%4.1f %6.1f %10.2f %9.2f %14.2f %19.0f %9.0f %21.1f %11.0f %11.0f\n",
+            (std::string(name_of(c.evidence)) + (c.in_view ? "" : ", unseen")).c_str(), c.phantoms, c.targets,
+            100 * c.held[0], 100 * c.held[1], 100 * c.held[2], 100 * c.held_95_error, 100 * c.held[3], c.sharpness,
+            c.true_mm, c.estimated_mm, 100 * c.phantoms_within, 100 * c.shown_share, 100 * c.held_95_shown,
+            100 * c.unknown_share, 100 * c.doubted_share);
         table += line;
     }
     return table;

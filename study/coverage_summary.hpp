@@ -17,11 +17,15 @@ struct ReliabilityBin {
     double estimated_mm = 0, true_mm = 0;  ///< roots of mean squares
 };
 
-/// Of one kind of evidence: of the targets that the data show, or of all where they show none.
+/// Of one kind of evidence: of the targets in view, or of those out of it.
 struct Coverage {
     Evidence evidence = Evidence::Labels;
+    bool in_view = true;
     int phantoms = 0, targets = 0;
-    double shown_share = 1;                            ///< of all targets
+    double shown_share = 0, unknown_share = 0;  ///< of the targets, by the class that they are given
+    double held_95_shown = 0;                   ///< as `held` at 95 %, of those shown; NaN where none is
+    double sharpness = 0;  ///< 95th percentile of the errors over the median radius of 95 %: 1 where radii tell apart
+    double doubted_share = 0;                          ///< of phantoms, whose registration the program doubted
     std::array<double, nominal_shares.size()> held{};  ///< share of targets within the interval of each probability
     /// Standard error of the share at 95 %, from how it varies among phantoms: targets of one phantom are not
     /// independent.
@@ -34,7 +38,7 @@ struct Coverage {
     std::vector<ReliabilityBin> bins;    ///< a tenth of the targets each, by falling trust
 };
 
-/// By kind of evidence; kinds without rows are left out.
+/// By kind of evidence, what is out of view of an image apart; kinds without rows are left out.
 std::vector<Coverage> coverage_of(const std::vector<CoverageRow>& rows);
 
 /// A table for a terminal.

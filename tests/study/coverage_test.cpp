@@ -30,8 +30,10 @@ std::vector<CoverageRow> drawn_rows(double factor) {
         const double scale = std::sqrt((freedom - 2) / chi_square);
         CoverageRow row;
         row.seed = seed;
+        row.estimate.trust = registration::Trust::Shown;
         row.estimate.covariance = Eigen::Vector3d(1, 0.5, 0.2).asDiagonal();
         row.estimate.deviation_mm = std::sqrt(row.estimate.covariance.trace());
+        row.estimate.interval_mm = registration::interval_mm(row.estimate, 0.95);
         row.error = factor * scale * row.estimate.covariance.diagonal().cwiseSqrt().cwiseProduct(random.normal3());
         rows.push_back(row);
     }
@@ -69,16 +71,26 @@ TEST(Coverage, ErrorsHalfAsLargeAgainAreSeen) {
     EXPECT_GT(coverage[0].true_mm / coverage[0].estimated_mm, 1.3);
 }
 
-TEST(Coverage, TargetsThatTheDataDoNotShowAreNotCounted) {
+TEST(Coverage, TellsClassesAndViewsApart) {
     auto rows = drawn_rows(1);
     for (std::size_t k = 0; k < rows.size(); k += 4) {
-        rows[k].estimate.shown = false;
+        rows[k].estimate.trust = registration::Trust::Unknown;
         rows[k].error *= 100;
+        rows[k].doubts = 1;
     }
+    for (std::size_t k = 1; k < rows.size(); k += 4) rows[k].in_view = false;
     const auto coverage = coverage_of(rows);
+    ASSERT_EQ(coverage.size(), 2u);
+    EXPECT_TRUE(coverage[0].in_view && !coverage[1].in_view);
     EXPECT_EQ(coverage[0].targets, 3000);
-    EXPECT_DOUBLE_EQ(coverage[0].shown_share, 0.75);
-    EXPECT_NEAR(coverage[0].held[2], 0.95, 0.015);
+    EXPECT_NEAR(coverage[0].shown_share, 2.0 / 3, 1e-12);
+    EXPECT_NEAR(coverage[0].unknown_share, 1.0 / 3, 1e-12);
+    EXPECT_NEAR(coverage[0].doubted_share, 1.0 / 3, 1e-12);
+    EXPECT_NEAR(coverage[0].held_95_shown, 0.95, 0.015);
+    EXPECT_LT(coverage[0].held[2], 0.7);
+    EXPECT_NEAR(coverage[1].held[2], 0.95, 0.02);
+    EXPECT_NEAR(coverage[1].sharpness, 1, 0.1);  // radii of all rows are the same, and hold 95 %
+    EXPECT_GT(coverage[0].sharpness, 10);
 }
 
 TEST(Coverage, TablesAreKeptAndBrokenOnesRefused) {
@@ -88,12 +100,16 @@ TEST(Coverage, TablesAreKeptAndBrokenOnesRefused) {
     auto rows = drawn_rows(1);
     rows.resize(3);
     rows[1].evidence = Evidence::SurfaceAndPoints;
-    rows[2].estimate.shown = false;
+    rows[2].estimate.trust = registration::Trust::Carried;
+    rows[2].in_view = false;
+    rows[2].held_out_z = 1.25;
     write_coverage(folder / "phantom_1.csv", rows);
     const auto again = read_coverage(folder / "phantom_1.csv");
     ASSERT_EQ(again.size(), 3u);
     EXPECT_EQ(again[1].evidence, Evidence::SurfaceAndPoints);
-    EXPECT_FALSE(again[2].estimate.shown);
+    EXPECT_EQ(again[2].estimate.trust, registration::Trust::Carried);
+    EXPECT_FALSE(again[2].in_view);
+    EXPECT_EQ(again[2].held_out_z, 1.25);
     EXPECT_NEAR((again[0].error - rows[0].error).norm(), 0, 1e-4);
     EXPECT_LT((again[0].estimate.covariance - rows[0].estimate.covariance).norm(), 1e-5);
 
@@ -130,7 +146,7 @@ TEST(Coverage, APhantomIsMeasuredOnceAndKept) {
         EXPECT_LT(row.estimate.deviation_mm, 4.6);
         EXPECT_NEAR(row.estimate.interval_mm, registration::interval_mm(row.estimate, 0.95),
                     1e-3 * row.estimate.interval_mm);
-        EXPECT_TRUE(row.evidence != Evidence::Surface || !row.estimate.shown);
+        EXPECT_TRUE(row.evidence != Evidence::Surface || row.estimate.trust == registration::Trust::Unknown);
     }
     const auto kept = fs::last_write_time(folder / "phantom_5.csv");
     EXPECT_EQ(measured_coverage(folder, options).size(), rows.size());
