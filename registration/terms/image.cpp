@@ -55,7 +55,7 @@ ImageTerm::ImageTerm(const PreparedModel& prepared, const imaging::Volume& fixed
       energy_(energy),
       search_(prepared, fixed, options, tools),
       prior_(prepared, search_.seen(), options, energy),
-      kind_(image_kind(prepared.image->image.geometry, fixed.geometry)) {}
+      fixed_grid_(fixed.geometry) {}
 
 void ImageTerm::search(const State& state, Observer& observer) {
     matches_ = search_.search(state, observer);
@@ -130,7 +130,9 @@ Contribution ImageTerm::linearise(const RoundPlan& plan, const State& state, Obs
         std::max(static_cast<int>(prepared_.image->blocks.points().cols()), static_cast<int>(matches.size()));
     result.matched = static_cast<int>(matches.size());
     result.mean_residual_mm = mean_residual(matches);
-    result.springs = pulled_by(kind_, lumped_springs(shares_, forces_, state.displacement));
+    const DatumKind kind = image_kind(prepared_.image->image.geometry, fixed_grid_,
+                                      search_.agreement().value_or(shared_errors.full_agreement));
+    result.springs = pulled_by(kind, lumped_springs(shares_, forces_, state.displacement));
     for (PulledNode& pulled : result.springs)
         if (!prior_.in_view(state.placement * (prepared_.model.mesh.nodes.col(pulled.spring.node) +
                                                state.displacement.col(pulled.spring.node))))

@@ -60,7 +60,7 @@ private:
     double energy_;
     ImageSearch search_;
     ViewPrior prior_;
-    DatumKind kind_;
+    imaging::Geometry fixed_grid_;
     LocatedMatches matches_;         // of the last search
     std::vector<double> strongest_;  // of each of these: the largest eigenvalue of its information
     NodalShares shares_;             // of the nodes in them

@@ -2,6 +2,8 @@
 
 #include "core/errors.hpp"
 
+#include <Eigen/Eigenvalues>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -47,15 +49,34 @@ LastPulls without_fold(const LastPulls& pulls, const std::vector<PulledNode>& ke
     return result;
 }
 
-/// ½ of what springs hold of displacements away from their targets, mean over columns.
-double energy_of(const tled::Spring& spring, const MatrixXd& away) {
-    return away.cwiseProduct(spring.stiffness * away).sum() / double(away.cols());
-}
+/// What the springs of a region hold of displacements away from their targets as a whole, 3 × k: their mean, weighed as
+/// they pull. Of single data it would be their noise.
+struct Region {
+    Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero();
+    MatrixXd missed, expected;  ///< forces, 3 × 1 and 3 × k, mN
 
-/// Sums over regions, each weighed by what was to be expected of it.
-struct Sums {
-    double missed = 0, expected = 0;
-    int regions = 0;
+    void add(const tled::Spring& spring, const MatrixXd& away, const MatrixXd& expected_away) {
+        stiffness += spring.stiffness;
+        missed = missed.size() == 0 ? MatrixXd(spring.stiffness * away) : MatrixXd(missed + spring.stiffness * away);
+        expected = expected.size() == 0 ? MatrixXd(spring.stiffness * expected_away)
+                                        : MatrixXd(expected + spring.stiffness * expected_away);
+    }
+    /// Square of what was missed over its expectation.
+    [[nodiscard]] std::optional<double> ratio() const {
+        if (missed.size() == 0) return std::nullopt;
+        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(stiffness);
+        const double least = 1e-3 * axes.eigenvalues()[2];  // along the surface labels say nothing
+        const Eigen::Matrix3d flexibility =
+            axes.eigenvectors() *
+            (axes.eigenvalues().array() > least).select(axes.eigenvalues().cwiseInverse(), 0.0).matrix().asDiagonal() *
+            axes.eigenvectors().transpose();
+        const auto energy = [&](const MatrixXd& force) {
+            return force.cwiseProduct(flexibility * force).sum() / double(force.cols());
+        };
+        const double expectation = energy(expected);
+        if (!(expectation > 0)) return std::nullopt;
+        return energy(missed) / expectation;
+    }
 };
 
 struct Fold {
@@ -79,7 +100,7 @@ Fold fold_of(int number, int folds, const std::vector<PulledNode>& data, const D
 // With r the residuals of the data left out, taking their springs away moves the tissue by −A₋⁻¹ K r: they are missed
 // by r + A₋⁻¹ K r. To be expected is ε + u − û₋ of truths u and errors ε.
 void add_fold(const Fold& fold, const LinearRegistration& rest, const Eigen::Matrix3Xd& displacement,
-              const Truths& truths, std::vector<Sums>& regions) {
+              const Truths& truths, std::vector<Region>& regions) {
     const auto nodes = static_cast<int>(displacement.cols());
     DataErrors residuals;
     for (const PulledNode& pulled : fold.left_out)
@@ -88,9 +109,8 @@ void add_fold(const Fold& fold, const LinearRegistration& rest, const Eigen::Mat
                    off = rest.missed(truths) - rest.inverse(forces_of(fold.kept, fold.errors_of_kept, nodes));
     for (std::size_t n = 0; n < fold.left_out.size(); ++n) {
         const tled::Spring& spring = fold.left_out[n].spring;
-        Sums& sums = regions[std::size_t(fold.region[n])];
-        sums.missed += energy_of(spring, residuals[n] + moved.middleRows<3>(3 * spring.node));
-        sums.expected += energy_of(spring, fold.errors_of_left_out[n] + off.middleRows<3>(3 * spring.node));
+        regions[std::size_t(fold.region[n])].add(spring, residuals[n] + moved.middleRows<3>(3 * spring.node),
+                                                 fold.errors_of_left_out[n] + off.middleRows<3>(3 * spring.node));
     }
 }
 
@@ -102,7 +122,7 @@ std::optional<HeldOut> held_out(const PreparedModel& prepared, const LastPulls& 
     const std::vector<PulledNode> data = pulls.data();
     const std::vector<int> region = regions_of(data, prepared.model.mesh.nodes, count);
     if (data.empty() || *std::max_element(region.begin(), region.end()) + 1 < folds) return std::nullopt;
-    std::vector<Sums> regions(static_cast<std::size_t>(count));
+    std::vector<Region> regions(static_cast<std::size_t>(count));
     for (int number = 0; number < folds; ++number) {
         const Fold fold = fold_of(number, folds, data, errors, region);
         try {
@@ -113,10 +133,11 @@ std::optional<HeldOut> held_out(const PreparedModel& prepared, const LastPulls& 
     }
     HeldOut result;
     double sum = 0;
-    for (const Sums& each : regions) {
-        if (!(each.expected > 0)) continue;
+    for (const Region& region_left_out : regions) {
+        const auto ratio = region_left_out.ratio();
+        if (!ratio) continue;
         ++result.regions;
-        sum += each.missed / each.expected;
+        sum += *ratio;
     }
     if (result.regions == 0) return std::nullopt;
     result.z = std::sqrt(sum / result.regions);

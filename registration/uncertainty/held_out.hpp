@@ -16,8 +16,8 @@ struct HeldOutOptions {
 };
 inline constexpr HeldOutOptions held_out_options{};
 
-/// Error that regions left out were predicted with over the one that was to be expected, roots of mean squares weighed
-/// as the data pull: 1 where the estimate is right, more where it promises too much. Nothing where there are too few
+/// Error that the mean of each region left out was predicted with over the one that was to be expected, root of the
+/// mean square: 1 where the estimate is right, more where it promises too much. Nothing where there are too few
 /// data to leave any out.
 std::optional<HeldOut> held_out(const PreparedModel& prepared, const LastPulls& pulls, const LastPulls& unseen,
                                 const Eigen::Matrix3Xd& displacement, const Truths& truths, const DataErrors& errors);

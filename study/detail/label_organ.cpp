@@ -39,8 +39,10 @@ imaging::Volume piece_of(const imaging::Volume& labels, int label) {
 
 LabelOrgan::LabelOrgan(const imaging::Volume& labels, int label) : kind_("label " + std::to_string(label)) {
     const imaging::Volume piece = piece_of(labels, label);
-    voxels_ = piece.as(CV_32S);
     distance_ = imaging::smooth(imaging::signed_distance(piece), piece.geometry.spacing.maxCoeff());
+    voxels_ = imaging::Volume(piece.geometry, CV_32SC1);
+    for (std::int64_t n = 0; n < piece.geometry.voxel_count(); ++n)
+        voxels_.data<std::int32_t>()[n] = distance_.data<float>()[n] < 0;
     const auto statistics = imaging::label_statistics(voxels_).at(1);
     centre_ = statistics.centroid;
     for (std::size_t axis = 0; axis < 3; ++axis)

@@ -19,7 +19,7 @@ public:
     [[nodiscard]] int label(const Eigen::Vector3d& point) const { return outer_distance(point) < 0 ? 1 : 0; }
     /// mm to its surface, negative inside.
     [[nodiscard]] double outer_distance(const Eigen::Vector3d& point) const;
-    /// As in the label map, int32, with a margin of 10 mm.
+    /// On the grid of the label map, int32, with a margin of 10 mm.
     [[nodiscard]] const imaging::Volume& voxels() const { return voxels_; }
     [[nodiscard]] const Eigen::Vector3d& centre() const { return centre_; }
     [[nodiscard]] double reach() const { return reach_; }    ///< mm, of a ball about the centre that holds the organ
