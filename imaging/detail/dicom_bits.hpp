@@ -1,16 +1,21 @@
 #pragma once
-/// Pixels of one bit, as segmentations have them (DICOM PS3.5, annexes D and G).
+/// Packed bytes and bits of DICOM (PS3.5, annexes A.5, D and G).
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 namespace tissuewarp::imaging::detail {
 
 /// Bits from the least significant on, frames joined without padding, into bytes of 0 and 1. False where bytes are too
 /// few.
-bool unpack_bits(const std::string& bytes, std::uint64_t first, std::uint64_t count, std::uint8_t* target);
+bool unpack_bits(std::string_view bytes, std::uint64_t count, std::uint8_t* target);
 
-/// The first segment of an RLE frame, unpacked; as much of it as is sound.
-std::string unpack_rle(const std::string& frame);
+/// One frame of RLE: its segments are the bytes of every value, the most significant first. Values of `bytes_per_value`
+/// bytes, little endian; as much of it as is sound.
+std::string unpack_rle(std::string_view frame, std::size_t bytes_per_value);
+
+/// A raw deflate stream; as much of it as is sound.
+std::string unpack_deflated(std::string_view packed);
 
 }  // namespace tissuewarp::imaging::detail

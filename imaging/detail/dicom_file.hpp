@@ -30,11 +30,10 @@ struct DicomFile {
     std::filesystem::path path;
     std::string series;    ///< Series Instance UID
     std::string modality;  ///< "CT", ...
-    std::string kind;      ///< SOP Class UID
     int rows = 0, columns = 0;
     int samples = 1;         ///< a pixel: 1 grey, 3 colours
     int bits_allocated = 0;  ///< of a stored value
-    int bits_stored = 0;
+    int bits_stored = 0, high_bit = 0;
     bool is_signed = false;
     bool mosaic = false;             ///< Siemens: many slices side by side in one frame
     std::vector<DicomFrame> frames;  ///< in the order of the file
@@ -47,7 +46,8 @@ struct DicomFile {
 /// be read.
 std::optional<DicomFile> read_dicom_file(const std::filesystem::path& path);
 
-/// Frames × rows × columns, as stored, unpacked from any transfer syntax that GDCM knows; uint8 0 or 1 for bits. Throws
+/// Frames × rows × columns, as stored, unpacked from any transfer syntax that is read here (plain, deflated, RLE) or by
+/// GDCM (JPEG, JPEG-LS, JPEG 2000); uint8 0 or 1 for bits; float64 for uint32. Throws
 /// IoError when pixels are cut short or damaged, and InvalidInput when they are of no type of grey values.
 cv::Mat read_dicom_pixels(const DicomFile& file);
 

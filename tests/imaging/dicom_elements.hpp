@@ -1,6 +1,7 @@
 #pragma once
 /// DICOM files that tests write themselves, byte by byte, so that no library vouches for its own mistakes.
 
+#include <zlib.h>
 #include <Eigen/Core>
 
 #include <cstdint>
@@ -89,6 +90,22 @@ inline std::string decimals(const Eigen::VectorXd& values) {
 }
 
 constexpr const char* explicit_little_endian = "1.2.840.10008.1.2.1";
+constexpr const char* deflated = "1.2.840.10008.1.2.1.99";
+constexpr const char* run_lengths = "1.2.840.10008.1.2.5";
+
+inline std::string deflated_bytes(std::string plain) {
+    std::string packed(plain.size() + 1000, '\0');
+    z_stream stream{};
+    deflateInit2(&stream, 6, Z_DEFLATED, -MAX_WBITS, 8, Z_DEFAULT_STRATEGY);
+    stream.next_in = reinterpret_cast<Bytef*>(plain.data());
+    stream.avail_in = static_cast<uInt>(plain.size());
+    stream.next_out = reinterpret_cast<Bytef*>(packed.data());
+    stream.avail_out = static_cast<uInt>(packed.size());
+    deflate(&stream, Z_FINISH);
+    packed.resize(stream.total_out);
+    deflateEnd(&stream);
+    return packed;
+}
 
 /// The elements behind a header of their own.
 inline void write_dicom(const std::filesystem::path& path, const std::string& image_class, const std::string& instance,
@@ -100,7 +117,8 @@ inline void write_dicom(const std::filesystem::path& path, const std::string& im
     Elements length;
     length.long_value(2, 0, static_cast<std::uint32_t>(meta.bytes().size()));
     std::ofstream file(path, std::ios::binary);
-    file << std::string(128, '\0') << "DICM" << length.bytes() << meta.bytes() << data.bytes();
+    file << std::string(128, '\0') << "DICM" << length.bytes() << meta.bytes()
+         << (std::string(transfer_syntax) == deflated ? deflated_bytes(data.bytes()) : data.bytes());
 }
 
 }  // namespace tissuewarp::imaging::test

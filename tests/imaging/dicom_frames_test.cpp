@@ -30,8 +30,10 @@ struct Frame {
 
 struct FileOptions {
     std::string series = "1.2.3.4";
+    int bits_stored = 0;                                      ///< as many as a value takes when 0
     std::string image_class = "1.2.840.10008.5.1.4.1.1.2.1";  // Enhanced CT
     std::string modality = "CT";
+    const char* transfer_syntax = test::explicit_little_endian;
 };
 
 std::string one(double value) {
@@ -68,8 +70,9 @@ Elements described(const Geometry& grid, const std::vector<Frame>& frames, const
     if (options.modality == "RTDOSE")
         data.text(0x28, 0x30, "DS", decimals(Eigen::Vector2d(grid.spacing[1], grid.spacing[0])));
     data.short_value(0x28, 0x100, bits);
-    data.short_value(0x28, 0x101, bits);
-    data.short_value(0x28, 0x102, bits - 1);
+    const int stored = options.bits_stored > 0 ? options.bits_stored : bits;
+    data.short_value(0x28, 0x101, stored);
+    data.short_value(0x28, 0x102, stored - 1);
     data.short_value(0x28, 0x103, bits == 16 ? 1 : 0);
     return data;
 }
@@ -99,6 +102,24 @@ void add_groups(Elements& data, const Geometry& grid, const std::vector<Frame>& 
     data.sequence(0x5200, 0x9230, own);
 }
 
+/// RLE of values of two bytes: the high bytes and the low bytes of a frame, each in literal runs.
+std::vector<std::string> run_length_frames(const std::vector<std::int16_t>& pixels, std::size_t frames) {
+    std::vector<std::string> packed;
+    const std::size_t count = pixels.size() / frames;
+    for (std::size_t frame = 0; frame < frames; ++frame) {
+        std::array<std::string, 2> planes;
+        for (std::size_t i = 0; i < count; ++i)
+            for (std::size_t plane = 0; plane < 2; ++plane)
+                (planes[plane] += '\0') += static_cast<char>(pixels[frame * count + i] >> (plane == 0 ? 8 : 0));
+        std::string header(64, '\0');
+        header[0] = 2, header[4] = 64;
+        const auto second = static_cast<std::uint16_t>(64 + planes[0].size());
+        header[8] = static_cast<char>(second & 0xff), header[9] = static_cast<char>(second >> 8);
+        packed.push_back(header + planes[0] + planes[1]);
+    }
+    return packed;
+}
+
 void write_frames(const std::filesystem::path& path, const Volume& volume, const std::vector<Frame>& frames,
                   const FileOptions& options = {}) {
     const Geometry& grid = volume.geometry;
@@ -109,8 +130,11 @@ void write_frames(const std::filesystem::path& path, const Volume& volume, const
         const short* first = volume.data<short>() + volume.offset(0, 0, frame.k);
         pixels.insert(pixels.end(), first, first + grid.size[0] * grid.size[1]);
     }
-    data.words(0x7fe0, 0x10, pixels);
-    write_dicom(path, options.image_class, "1.2.3.9", data);
+    if (options.transfer_syntax == test::run_lengths)
+        data.fragments(run_length_frames(pixels, frames.size()));
+    else
+        data.words(0x7fe0, 0x10, pixels);
+    write_dicom(path, options.image_class, "1.2.3.9", data, options.transfer_syntax);
 }
 
 Volume ct_volume() {
@@ -156,6 +180,40 @@ TEST(DicomFrames, SeveralFilesOfOneSeriesAreOneVolume) {
                 testing::AllOf(HasSubstr("same position"), HasSubstr("frame 3 of 'b.dcm'"), HasSubstr("'c.dcm'")));
     write_frames(folder / "c.dcm", ct_volume(), {{.k = 3}}, {.series = "1.2.3.5"});
     EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(folder.path()); }), HasSubstr("2 series"));
+}
+
+TEST(DicomFrames, DeflatedAndRunLengthFilesAreRead) {
+    const TemporaryFolder folder;
+    Volume volume = ct_volume();
+    for (int i = 0; i < 100; ++i) volume.data<short>()[i] = static_cast<short>(-1000 + 37 * i);
+    for (const char* syntax : {test::deflated, test::run_lengths}) {
+        SCOPED_TRACE(syntax);
+        write_frames(folder / "mf.dcm", volume, in_order(6), {.transfer_syntax = syntax});
+        expect_same(read_volume(folder / "mf.dcm"), volume);
+        std::filesystem::resize_file(folder / "mf.dcm", std::filesystem::file_size(folder / "mf.dcm") - 40);
+        EXPECT_THROW(read_volume(folder / "mf.dcm"), IoError);
+    }
+}
+
+TEST(DicomFrames, BitsBesideTheStoredOnesDoNotCount) {
+    const TemporaryFolder folder;
+    Volume stored = ct_volume(), meant = ct_volume();
+    // 12 bits with a sign, an overlay in the bit above.
+    for (int i = 0; i < 200; ++i) {
+        meant.data<short>()[i] = static_cast<short>(i - 100);
+        stored.data<short>()[i] = static_cast<short>((meant.data<short>()[i] & 0x0fff) | (i % 2 << 12));
+    }
+    write_frames(folder / "mf.dcm", stored, in_order(6), {.bits_stored = 12});
+    expect_same(read_volume(folder / "mf.dcm"), meant);
+}
+
+TEST(DicomFrames, AFileCutWithinItsHeaderIsAnError) {
+    const TemporaryFolder folder;
+    write_frames(folder / "mf.dcm", ct_volume(), in_order(6));
+    for (const std::uintmax_t bytes : {1500U, 1000U, 600U, 300U, 200U, 140U}) {
+        std::filesystem::resize_file(folder / "mf.dcm", bytes);
+        EXPECT_THROW(read_volume(folder / "mf.dcm"), Error) << bytes;
+    }
 }
 
 TEST(DicomFrames, GapsTwoStacksAndMissingPositionsAreRefused) {
@@ -243,7 +301,7 @@ void write_segmentation(const std::filesystem::path& path, const Volume& labels,
     else
         data.bytes_value(0x7fe0, 0x10, joined);
     write_dicom(path, segmentation.image_class, "1.2.3.9", data,
-                packed ? "1.2.840.10008.1.2.5" : test::explicit_little_endian);
+                packed ? test::run_lengths : test::explicit_little_endian);
 }
 
 /// Frames where a segment has voxels, the second segment first.

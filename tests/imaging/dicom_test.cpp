@@ -30,7 +30,8 @@ struct SliceOptions {
 /// Slice k of an int16 volume as a CT image.
 void write_slice(const std::filesystem::path& path, const Volume& volume, int k, const SliceOptions& options = {}) {
     const Geometry& grid = volume.geometry;
-    const std::string instance = "1.2.3.9." + std::to_string(k + 1), image_class = "1.2.840.10008.5.1.4.1.1.2";
+    const std::string instance = std::string("1.2.3.9.") + std::to_string(k + 1),
+                      image_class = "1.2.840.10008.5.1.4.1.1.2";
     Eigen::VectorXd axes(6);
     axes << grid.direction.col(0), grid.direction.col(1);
     const Eigen::Vector3d position = grid.point({0, 0, 1.0 * k}) + options.shift;
@@ -66,7 +67,7 @@ void write_slice(const std::filesystem::path& path, const Volume& volume, int k,
 }
 
 std::string reversed_name(int k, int count) {
-    return "slice" + std::to_string(100 + count - k) + ".dcm";
+    return std::string("slice") + std::to_string(100 + count - k) + ".dcm";
 }
 
 Volume ct_volume() {
@@ -116,8 +117,8 @@ TEST(DicomSeries, AMissingSliceIsRefused) {
 TEST(DicomSeries, TwoSeriesInOneFolderAreRefused) {
     const TemporaryFolder folder;
     for (int k = 0; k < 6; ++k) {
-        write_slice(folder / ("a" + std::to_string(k) + ".dcm"), ct_volume(), k);
-        write_slice(folder / ("b" + std::to_string(k) + ".dcm"), ct_volume(), k, {.series = "1.2.3.5"});
+        write_slice(folder / (std::string("a") + std::to_string(k) + ".dcm"), ct_volume(), k);
+        write_slice(folder / (std::string("b") + std::to_string(k) + ".dcm"), ct_volume(), k, {.series = "1.2.3.5"});
     }
     EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(folder.path()); }), HasSubstr("2 series"));
 }
