@@ -2,6 +2,7 @@
 
 #include "apps/file_kind.hpp"
 #include "apps/inputs.hpp"
+#include "apps/noted_images.hpp"
 #include "apps/output_folder.hpp"
 #include "apps/point_files.hpp"
 #include "apps/progress.hpp"
@@ -24,18 +25,18 @@ using namespace registration;
 namespace fs = std::filesystem;
 using imaging::Volume;
 
-void evaluate_labels(const EvaluateOptions& options, ScoreSheet& sheet) {
-    const Volume labels = imaging::read_labels(options.labels);
-    Volume reference = imaging::read_labels(options.reference_labels);
+void evaluate_labels(const EvaluateOptions& options, Observer& observer, ScoreSheet& sheet) {
+    const Volume labels = read_noted_labels(options.labels, observer);
+    Volume reference = read_noted_labels(options.reference_labels, observer);
     require_same_grid(reference.geometry, labels.geometry, options.reference_labels.string(), options.labels.string(),
                       "resample one onto the other");
     reference.geometry = labels.geometry;
     sheet.add(overlap(labels, reference));
 }
 
-Volume read_field(const fs::path& path) {
+Volume read_field(const fs::path& path, Observer& observer) {
     if (path.empty()) return {};
-    const Volume field = imaging::read_volume(path);
+    const Volume field = read_noted_volume(path, observer);
     if (field.channels() != 3)
         throw InvalidInput(
             fmt::format("'{}' has {} components; give a displacement field of three", path.string(), field.channels()));
@@ -43,9 +44,9 @@ Volume read_field(const fs::path& path) {
     return field.as(CV_32F);
 }
 
-Volume read_organ(const fs::path& path) {
+Volume read_organ(const fs::path& path, Observer& observer) {
     if (path.empty()) return {};
-    const Volume labels = imaging::read_labels(path);
+    const Volume labels = read_noted_labels(path, observer);
     require_millimetres(labels.geometry, path);
     imaging::require_labels(labels, {}, path.string().c_str());
     return labels;
@@ -143,17 +144,17 @@ void evaluate_curves(const EvaluateOptions& options, const Volume& field, ScoreS
     sheet.add(errors);
 }
 
-void evaluate_field(const EvaluateOptions& options, const Volume& field, ScoreSheet& sheet) {
+void evaluate_field(const EvaluateOptions& options, const Volume& field, Observer& observer, ScoreSheet& sheet) {
     Volume mask;
     if (!options.mask.empty()) {
-        mask = imaging::read_labels(options.mask);
+        mask = read_noted_labels(options.mask, observer);
         require_same_grid(field.geometry, mask.geometry, options.displacement.string(), options.mask.string(),
                           "resample the mask onto the field's grid");
         mask = {field.geometry, cv::Mat(mask.voxels != 0)};
     }
     const Volume* chosen = mask.empty() ? nullptr : &mask;
     sheet.add(field_jacobians(field, chosen));
-    if (!options.inverse.empty()) sheet.add(inverse_consistency(field, read_field(options.inverse), chosen));
+    if (!options.inverse.empty()) sheet.add(inverse_consistency(field, read_field(options.inverse, observer), chosen));
 }
 
 void evaluate_held_out(const EvaluateOptions& options, const Volume& field, const Volume& organ, ScoreSheet& sheet) {
@@ -186,12 +187,14 @@ void run_evaluate(const EvaluateOptions& options) {
     progress.begin("evaluating", 0.0, 1.0);
     ScoreSheet sheet;
     std::vector<std::string> notes;
-    if (!options.labels.empty()) evaluate_labels(options, sheet);
-    const Volume field = read_field(options.displacement), organ = read_organ(options.moving_labels);
+    if (!options.labels.empty()) evaluate_labels(options, progress, sheet);
+    const Volume field = read_field(options.displacement, progress),
+                 organ = read_organ(options.moving_labels, progress);
     if (options.landmarks.given()) evaluate_landmarks(options, field, organ, notes, sheet);
     if (!options.moving_curves.empty()) evaluate_curves(options, field, sheet);
-    if (!field.empty()) evaluate_field(options, field, sheet);
+    if (!field.empty()) evaluate_field(options, field, progress, sheet);
     if (!options.held_out.empty()) evaluate_held_out(options, field, organ, sheet);
+    notes.insert(notes.begin(), progress.notes().begin(), progress.notes().end());
     sheet.add_notes(notes);
     if (!options.json.empty()) write_json(sheet.json(), options.json);
     progress.clear();

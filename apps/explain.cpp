@@ -67,7 +67,7 @@ void print_passes(const simulation::BuiltScene& built, Observer& observer) {
 void run_explain(const ExplainOptions& options) {
     ProgressLine progress(options.common.quiet);
     progress.begin("reading", 0.0, 0.05);
-    const simulation::Scene scene = read_scene(options.scene);
+    const simulation::Scene scene = read_scene(options.scene, progress);
     progress.begin("building", 0.05, 1.0);
     const simulation::BuiltScene built = simulation::build(scene, progress);
     const simulation::Plan plan = simulation::plan_of(built);

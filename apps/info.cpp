@@ -43,16 +43,29 @@ const char* type_name(int cv_depth) {
     }
 }
 
-void print_labels(const fs::path& path) {
-    const imaging::Volume labels = imaging::read_labels(path);
+void print_labels(const imaging::ReadResult& image, const fs::path& path) {
+    const imaging::ReadResult labels = imaging::as_labels(image, path);
     fmt::print("  {:<8}{:>10}{:>14}{:>8}  {}\n", "label", "voxels", "volume (mm3)", "pieces", "centroid (mm, LPS)");
-    for (const auto& [label, s] : imaging::label_statistics(labels))
-        fmt::print("  {:<8}{:>10}{:>14.1f}{:>8}  {}{}\n", label, s.voxels, s.volume_mm3, s.components,
-                   point_text(s.centroid), s.touches_border ? "  touches the border of the image" : "");
+    for (const auto& [label, s] : imaging::label_statistics(labels.volume)) {
+        const auto name = labels.label_names.find(label);
+        fmt::print("  {:<8}{:>10}{:>14.1f}{:>8}  {}{}{}\n", label, s.voxels, s.volume_mm3, s.components,
+                   point_text(s.centroid), name == labels.label_names.end() ? "" : "  '" + name->second + "'",
+                   s.touches_border ? "  touches the border of the image" : "");
+    }
+}
+
+/// Of all components.
+std::pair<double, double> value_range(const cv::Mat& voxels) {
+    const int rows = static_cast<int>(voxels.total() / static_cast<std::size_t>(voxels.size[2]));
+    const cv::Mat plane(rows, voxels.size[2], voxels.type(), voxels.data);
+    double least = 0, most = 0;
+    cv::minMaxIdx(plane.reshape(1), &least, &most);
+    return {least, most};
 }
 
 void print_image(const fs::path& path, bool labels) {
-    const auto [volume, notes] = imaging::read_volume_with_notes(path);
+    const imaging::ReadResult image = imaging::read_volume_with_notes(path);
+    const imaging::Volume& volume = image.volume;
     const imaging::Geometry& g = volume.geometry;
     fmt::print("image of {} x {} x {} voxels, {}{}\n", g.size[0], g.size[1], g.size[2],
                type_name(volume.voxels.depth()),
@@ -60,11 +73,10 @@ void print_image(const fs::path& path, bool labels) {
     fmt::print("  spacing (mm)     {}\n  origin (mm, LPS) {}\n", point_text(g.spacing), point_text(g.origin));
     for (int axis = 0; axis < 3; ++axis)
         fmt::print("  axis {} (LPS)     {}\n", "ijk"[axis], point_text(g.direction.col(axis)));
-    double least = 0, most = 0;
-    cv::minMaxIdx(volume.voxels.reshape(1, 1), &least, &most);
+    const auto [least, most] = value_range(volume.voxels);
     fmt::print("  values           {:g} to {:g}\n", least, most);
-    for (const std::string& note : notes) fmt::print("  note: {}\n", note);
-    if (labels) print_labels(path);
+    for (const std::string& note : image.notes) fmt::print("  note: {}\n", note);
+    if (labels) print_labels(image, path);
 }
 
 void print_mesh(const meshing::TetMesh& mesh) {

@@ -1,5 +1,6 @@
 #include "apps/inputs.hpp"
 
+#include "apps/noted_images.hpp"
 #include "apps/point_files.hpp"
 #include "core/sha256.hpp"
 #include "imaging/filters.hpp"
@@ -37,6 +38,17 @@ void require_common_label(const Volume& moving, const Volume& fixed, const Regis
     throw InvalidInput(fmt::format(
         "'{}' (labels {}) and '{}' (labels {}) share no label; give the same tissue the same number",
         options.moving_labels.string(), fmt::join(a, ", "), options.fixed_labels.string(), fmt::join(b, ", ")));
+}
+
+/// Segments are matched by number: one name with two numbers would match two tissues.
+void require_same_numbers(const RegistrationInputs& inputs, const RegisterOptions& options) {
+    for (const auto& [label, name] : inputs.moving_label_names)
+        for (const auto& [other, fixed_name] : inputs.fixed_label_names)
+            if (name == fixed_name && label != other)
+                throw InvalidInput(
+                    fmt::format("'{}' calls label {} '{}' and '{}' gives that name to label {}; give the same tissue "
+                                "the same number",
+                                options.moving_labels.string(), label, name, options.fixed_labels.string(), other));
 }
 
 /// Corners of the box around the labels, LPS mm.
@@ -96,6 +108,7 @@ void validate_fixed_labels(RegistrationInputs& inputs, const RegisterOptions& op
     require_millimetres(inputs.fixed_labels.geometry, options.fixed_labels);
     imaging::require_labels(inputs.fixed_labels, {}, options.fixed_labels.string().c_str());
     require_common_label(inputs.moving_labels, inputs.fixed_labels, options);
+    require_same_numbers(inputs, options);
     if (options.no_align) require_organs_meet(inputs);
 }
 
@@ -183,11 +196,11 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
     if (!options.points.empty()) inputs.points = read_points(options.points);
     observer.checkpoint("reading", 0.1);
 
-    imaging::ReadResult moving, fixed;
+    imaging::ReadResult moving, fixed, moving_labels, fixed_labels;
     tbb::task_group tasks;
-    tasks.run([&] { inputs.moving_labels = imaging::read_labels(options.moving_labels); });
+    tasks.run([&] { moving_labels = imaging::read_labels_with_notes(options.moving_labels); });
     if (!options.fixed_labels.empty())
-        tasks.run([&] { inputs.fixed_labels = imaging::read_labels(options.fixed_labels); });
+        tasks.run([&] { fixed_labels = imaging::read_labels_with_notes(options.fixed_labels); });
     if (!options.moving.empty()) tasks.run([&] { moving = imaging::read_volume_with_notes(options.moving); });
     if (!options.fixed.empty()) tasks.run([&] { fixed = imaging::read_volume_with_notes(options.fixed); });
     tasks.run([&] {
@@ -195,10 +208,17 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
             if (fs::is_regular_file(file.path)) file.sha256 = sha256_of_file(file.path);
     });
     tasks.wait();
-    for (const imaging::ReadResult* read : {&moving, &fixed})
-        inputs.notes.insert(inputs.notes.end(), read->notes.begin(), read->notes.end());
+    for (const auto& [read, path] : {std::pair{&moving, &options.moving},
+                                     {&moving_labels, &options.moving_labels},
+                                     {&fixed, &options.fixed},
+                                     {&fixed_labels, &options.fixed_labels}})
+        for (const std::string& note : notes_of(*read, *path)) inputs.notes.push_back(note);
     inputs.moving = moving.volume;
     inputs.fixed = fixed.volume;
+    inputs.moving_labels = moving_labels.volume;
+    inputs.fixed_labels = fixed_labels.volume;
+    inputs.moving_label_names = moving_labels.label_names;
+    inputs.fixed_label_names = fixed_labels.label_names;
     observer.checkpoint("reading", 1.0);
     return inputs;
 }

@@ -30,8 +30,9 @@ struct RegistrationInputs {
     std::optional<registration::PointPairs> point_pairs;
     std::optional<registration::Curves> curves;
     std::optional<registration::Landmarks> landmarks;
-    std::optional<Eigen::Matrix3Xd> points;  ///< moving frame, LPS mm
-    std::map<int, TissueEntry> materials;    ///< empty without a table
+    std::optional<Eigen::Matrix3Xd> points;                            ///< moving frame, LPS mm
+    std::map<int, TissueEntry> materials;                              ///< empty without a table
+    std::map<int, std::string> moving_label_names, fixed_label_names;  ///< of segmentations that name their segments
     std::vector<InputFile> files;
     std::vector<std::string> notes;  ///< what the readers had to decide
 

@@ -1,11 +1,11 @@
 // tissuewarp mesh: label map → tetrahedra, with the quality and the fidelity of what was made.
 
+#include "apps/noted_images.hpp"
 #include "apps/output_folder.hpp"
 #include "apps/progress.hpp"
 #include "apps/report_json.hpp"
 #include "apps/verbs.hpp"
 #include "core/atomic_file.hpp"
-#include "imaging/image_io.hpp"
 #include "imaging/labels.hpp"
 #include "meshing/mesh_io.hpp"
 #include "meshing/mesher.hpp"
@@ -47,7 +47,7 @@ void run_mesh(const MeshOptions& options) {
     require_could_write_file(options.output);
     if (!options.json.empty()) require_could_write_file(options.json);
     progress.begin("reading", 0.0, 0.05);
-    const imaging::Volume labels = imaging::read_labels(options.labels);
+    const imaging::Volume labels = read_noted_labels(options.labels, progress);
     imaging::require_labels(labels, options.only, options.labels.string().c_str());
 
     progress.begin("meshing", 0.05, 0.9);
@@ -74,7 +74,9 @@ void run_mesh(const MeshOptions& options) {
     }
     file.commit();
     progress.clear();
-    if (!options.common.quiet) print_report(mesh, quality, fidelity);
+    if (options.common.quiet) return;
+    print_report(mesh, quality, fidelity);
+    for (const std::string& note : progress.notes()) fmt::print("note: {}\n", note);
 }
 
 }  // namespace tissuewarp::apps

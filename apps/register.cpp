@@ -73,6 +73,7 @@ void print_plan(const RegistrationInputs& inputs, const RegisterOptions& options
                edge_length(options, inputs), options.no_align ? "not align" : "align rigidly", options.rounds,
                options.device.name, options.output.string());
     for (const std::string& name : output_names(options)) fmt::print("  {}\n", name);
+    for (const std::string& note : inputs.notes) fmt::print("note: {}\n", note);
 }
 
 /// Where no fixed image gives a grid: the moving one, carried along by the rigid alignment.

@@ -215,6 +215,9 @@ std::string summary_text(const RegistrationRun& run, double total_seconds) {
                             run.scores.before.contains(label) ? run.scores.before.at(label).dice : 0.0, after.dice);
     text +=
         fmt::format("det J of the mesh: minimum {:.3f}, folded {}\n", run.scores.mesh.minimum, run.scores.mesh.folded);
+    for (const std::vector<std::string>* notes : {&run.inputs.notes, &run.notes})
+        for (const std::string& note : *notes)
+            if (!run.dial || note != run.dial->reason) text += "note: " + note + "\n";  // said above
     for (const registration::Doubt& doubt : run.result.doubts) text += "doubt: " + doubt.text + "\n";
     return text + "results in " + run.options.output.string() + "\n";
 }

@@ -66,14 +66,14 @@ void read_probes(TomlReader& file, Scene& scene) {
 
 }  // namespace
 
-Scene read_scene(const std::filesystem::path& path) {
+Scene read_scene(const std::filesystem::path& path, Observer& observer) {
     const toml::table table = parse_toml_file(path);
     const std::filesystem::path folder = path.parent_path();
     TomlReader file(table, path, "");
     Scene scene;
     NameUses uses;
     scene.title = file.text("title").value_or(path.stem().string());
-    read_tissues(file, folder, scene, uses);
+    read_tissues(file, folder, scene, uses, observer);
     read_sets(file, scene, uses);
     read_loads(file, scene, uses);
     read_neighbours(file, folder, scene, uses);
@@ -87,7 +87,7 @@ Scene read_scene(const std::filesystem::path& path) {
     } catch (const InvalidInput& error) {
         throw InvalidInput("'" + path.string() + "': " + error.what());
     }
-    read_geometry(file, folder, scene, uses);
+    read_geometry(file, folder, scene, uses, observer);
     require_labels(scene, uses);
     return scene;
 }

@@ -1,6 +1,7 @@
 #pragma once
 /// Scene files (docs/manual/simulate.md).
 
+#include "core/observer.hpp"
 #include "simulation/scene.hpp"
 
 #include <filesystem>
@@ -9,7 +10,7 @@ namespace tissuewarp::apps {
 
 /// Reads a scene with the files that it names, which it looks for beside itself. Throws IoError, and InvalidInput with
 /// file and line for unknown keys, values of the wrong kind or out of range, sets and labels that do not exist; and for
-/// what simulation::require_valid() refuses.
-simulation::Scene read_scene(const std::filesystem::path& path);
+/// what simulation::require_valid() refuses. Notes to the observer: what the readers of images had to decide.
+simulation::Scene read_scene(const std::filesystem::path& path, Observer& observer = silent_observer());
 
 }  // namespace tissuewarp::apps

@@ -1,7 +1,7 @@
 // [geometry]: a label volume, a mesh, a box or shapes; and [solve].
 
+#include "apps/noted_images.hpp"
 #include "apps/scene_parts.hpp"
-#include "imaging/image_io.hpp"
 #include "meshing/mesh_io.hpp"
 
 namespace tissuewarp::apps {
@@ -59,7 +59,8 @@ void read_fibre_arrays(const std::optional<std::string>& mesh, const std::filesy
 
 }  // namespace
 
-void read_geometry(TomlReader& file, const std::filesystem::path& folder, Scene& scene, const NameUses& uses) {
+void read_geometry(TomlReader& file, const std::filesystem::path& folder, Scene& scene, const NameUses& uses,
+                   Observer& observer) {
     auto geometry = file.table("geometry");
     if (!geometry) throw InvalidInput(file.place() + ": the scene lacks [geometry]");
     const auto labels = geometry->text("labels"), mesh = geometry->text("mesh");
@@ -73,7 +74,7 @@ void read_geometry(TomlReader& file, const std::filesystem::path& folder, Scene&
     if (box) {
         scene.geometry = box_geometry(*box);
     } else if (labels) {
-        scene.geometry = LabelledVolume{imaging::read_labels(folder / *labels), edge_length, label_edge_length};
+        scene.geometry = LabelledVolume{read_noted_labels(folder / *labels, observer), edge_length, label_edge_length};
     } else if (mesh) {
         scene.geometry = meshing::read_vtu(folder / *mesh);
     } else {

@@ -2,6 +2,7 @@
 /// The parts of a scene file, each read by a function. Included by the sources of scene_file alone.
 
 #include "apps/toml_reader.hpp"
+#include "core/observer.hpp"
 #include "simulation/scene.hpp"
 
 #include <filesystem>
@@ -34,10 +35,11 @@ constexpr double largest_length = 1e4;  // mm
 inline const Range any_length{-largest_length, largest_length, "mm"};
 inline const Range positive_length{1e-6, largest_length, "mm"};
 
-void read_tissues(TomlReader& file, const std::filesystem::path& folder, simulation::Scene& scene, NameUses& uses);
+void read_tissues(TomlReader& file, const std::filesystem::path& folder, simulation::Scene& scene, NameUses& uses,
+                  Observer& observer);
 /// The fibres that `uses` names too.
 void read_geometry(TomlReader& file, const std::filesystem::path& folder, simulation::Scene& scene,
-                   const NameUses& uses);
+                   const NameUses& uses, Observer& observer);
 void read_sets(TomlReader& file, simulation::Scene& scene, NameUses& uses);
 void read_loads(TomlReader& file, simulation::Scene& scene, NameUses& uses);
 void read_neighbours(TomlReader& file, const std::filesystem::path& folder, simulation::Scene& scene, NameUses& uses);

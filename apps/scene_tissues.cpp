@@ -1,8 +1,8 @@
 // [label.<n>]: what each label is made of.
 
+#include "apps/noted_images.hpp"
 #include "apps/parameters.hpp"
 #include "apps/scene_parts.hpp"
-#include "imaging/image_io.hpp"
 #include "simulation/presets.hpp"
 
 #include <charconv>
@@ -39,7 +39,7 @@ tled::Material polynomial(TomlReader& tissue, const std::string& law) {
 
 /// `fibre` in the material, or one of the fields.
 void read_fibres(TomlReader& reader, const std::filesystem::path& folder, int label, simulation::Tissue& tissue,
-                 NameUses& uses) {
+                 NameUses& uses, Observer& observer) {
     auto* law = std::get_if<tled::TransverselyIsotropic>(&tissue.material);
     if (!law) return;
     const auto direction = reader.direction("fibre");
@@ -47,7 +47,7 @@ void read_fibres(TomlReader& reader, const std::filesystem::path& folder, int la
     if (direction) law->fibre = *direction;
     if (array) uses.fibre_arrays.push_back({label, *array, reader.place("fibre_array")});
     if (!file) return;
-    const imaging::Volume volume = imaging::read_volume(folder / *file);
+    const imaging::Volume volume = read_noted_volume(folder / *file, observer);
     if (volume.channels() != 3)
         reader.refuse("fibre_file",
                       "'" + *file + "' has one number a voxel; fibres are vectors of three components, LPS");
@@ -93,7 +93,8 @@ tled::Material material_of(TomlReader& tissue) {
     return tled::neo_hookean_lnj(youngs_modulus, poissons_ratio);
 }
 
-simulation::Tissue tissue_of(TomlReader& reader, const std::filesystem::path& folder, int label, NameUses& uses) {
+simulation::Tissue tissue_of(TomlReader& reader, const std::filesystem::path& folder, int label, NameUses& uses,
+                             Observer& observer) {
     simulation::Tissue tissue;
     tissue.name = reader.text("name").value_or("");
     tissue.growth = reader.number("growth", {0.2, 5.0}).value_or(1.0);
@@ -106,7 +107,7 @@ simulation::Tissue tissue_of(TomlReader& reader, const std::filesystem::path& fo
         (void)reader.text("preset");  // a name that misspelt keys may mean
         tissue.material = material_of(reader);
     }
-    read_fibres(reader, folder, label, tissue, uses);
+    read_fibres(reader, folder, label, tissue, uses, observer);
     if (reader.has("prony")) tissue.viscosity.terms.clear();
     for (const Eigen::Vector2d& term : reader.pairs("prony")) tissue.viscosity.terms.push_back({term[0], term[1]});
     try {
@@ -120,13 +121,14 @@ simulation::Tissue tissue_of(TomlReader& reader, const std::filesystem::path& fo
 
 }  // namespace
 
-void read_tissues(TomlReader& file, const std::filesystem::path& folder, simulation::Scene& scene, NameUses& uses) {
+void read_tissues(TomlReader& file, const std::filesystem::path& folder, simulation::Scene& scene, NameUses& uses,
+                  Observer& observer) {
     for (auto& [name, reader] : file.named_tables("label")) {
         int label = 0;
         const auto [end, failure] = std::from_chars(name.data(), name.data() + name.size(), label);
         if (failure != std::errc() || end != name.data() + name.size() || label <= 0)
             throw InvalidInput(reader.place() + ": '" + name + "' is no label; write [label.1], [label.2], ...");
-        scene.tissues[label] = tissue_of(reader, folder, label, uses);
+        scene.tissues[label] = tissue_of(reader, folder, label, uses, observer);
         reader.finish();
         require_fibres(reader, scene.tissues[label].material);
         uses.volume_labels.push_back({label, reader.place(), "has a tissue"});

@@ -87,13 +87,14 @@ void write_template(const SimulateOptions& options) {
 void run_ablation(const SimulateOptions& options) {
     ProgressLine progress(options.common.quiet);
     progress.begin("reading", 0.0, 0.02);
-    simulation::Scene scene = read_scene(options.scene);
+    simulation::Scene scene = read_scene(options.scene, progress);
     apply_device(options.device, scene.solve);
     simulation::require_supported(scene);
     progress.begin("simulating", 0.02, 1.0);
     const simulation::Ablation ablation = simulation::ablate(scene, progress);
     progress.clear();
     print_ablation(ablation, !scene.probes.empty());
+    for (const std::string& note : progress.notes()) fmt::print("note: {}\n", note);
 }
 
 }  // namespace
@@ -106,7 +107,7 @@ void run_simulate(const SimulateOptions& options) {
     if (options.output.empty()) throw InvalidInput("give --output, the folder for the frames");
     require_could_write(options.output);
     progress.begin("reading", 0.0, 0.02);
-    simulation::Scene scene = read_scene(options.scene);
+    simulation::Scene scene = read_scene(options.scene, progress);
     apply_device(options.device, scene.solve);
     simulation::require_supported(scene);
     progress.begin("building", 0.02, 0.3);
@@ -123,7 +124,9 @@ void run_simulate(const SimulateOptions& options) {
     write_json(summary_json(options, built, run, progress.notes(), building), folder.path("summary.json"));
     folder.commit();
     progress.clear();
-    if (!options.common.quiet) print_summary(built, run, options.output);
+    if (options.common.quiet) return;
+    for (const std::string& note : progress.notes()) fmt::print("note: {}\n", note);
+    print_summary(built, run, options.output);
 }
 
 }  // namespace tissuewarp::apps

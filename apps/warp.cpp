@@ -3,16 +3,18 @@
 #include "registration/warp.hpp"
 
 #include "apps/file_kind.hpp"
+#include "apps/noted_images.hpp"
 #include "apps/output_folder.hpp"
 #include "apps/point_files.hpp"
 #include "apps/progress.hpp"
 #include "apps/silenced_stderr.hpp"
 #include "apps/verbs.hpp"
 #include "core/errors.hpp"
-#include "imaging/image_io.hpp"
 #include "meshing/mesh_io.hpp"
 #include "registration/field.hpp"
 #include "registration/record.hpp"
+
+#include <fmt/format.h>
 
 namespace tissuewarp::apps {
 
@@ -20,8 +22,8 @@ namespace {
 
 using imaging::Volume;
 
-Volume read_field(const std::filesystem::path& path) {
-    const Volume field = imaging::read_volume(path);
+Volume read_field(const std::filesystem::path& path, Observer& observer) {
+    const Volume field = read_noted_volume(path, observer);
     if (field.channels() != 3)
         throw InvalidInput("'" + path.string() + "' has " + std::to_string(field.channels()) +
                            " components; give a displacement field of three");
@@ -30,15 +32,16 @@ Volume read_field(const std::filesystem::path& path) {
 
 /// The pulling field: the one that was given, or the record's on the reference grid.
 Volume fixed_to_moving(const WarpOptions& options, const Volume& image, Observer& observer) {
-    if (!options.displacement.empty()) return read_field(options.displacement);
+    if (!options.displacement.empty()) return read_field(options.displacement, observer);
     const registration::Record record = registration::read_record(options.record);
     const imaging::Geometry grid =
-        options.reference.empty() ? image.geometry : imaging::read_volume(options.reference).geometry;
+        options.reference.empty() ? image.geometry : read_noted_volume(options.reference, observer).geometry;
     return registration::displacement_fixed_to_moving(record.deformation, grid, {options.fade}, observer);
 }
 
 void warp_volume(const WarpOptions& options, Observer& observer) {
-    const Volume image = options.labels ? imaging::read_labels(options.input) : imaging::read_volume(options.input);
+    const Volume image =
+        options.labels ? read_noted_labels(options.input, observer) : read_noted_volume(options.input, observer);
     const Volume field = fixed_to_moving(options, image, observer);
     const Volume warped = options.labels ? registration::warp_labels(image, field)
                                          : registration::warp_image(image, field, options.outside);
@@ -46,8 +49,8 @@ void warp_volume(const WarpOptions& options, Observer& observer) {
     imaging::write_volume(warped, options.output);
 }
 
-Eigen::Matrix3Xd map_points(const WarpOptions& options, const Eigen::Matrix3Xd& points) {
-    if (!options.displacement.empty()) return displaced(points, read_field(options.displacement));
+Eigen::Matrix3Xd map_points(const WarpOptions& options, const Eigen::Matrix3Xd& points, Observer& observer) {
+    if (!options.displacement.empty()) return displaced(points, read_field(options.displacement, observer));
     const registration::Record record = registration::read_record(options.record);
     return registration::PointTransform(record.deformation, {options.fade})(points);
 }
@@ -68,11 +71,11 @@ void run_warp(const WarpOptions& options) {
         warp_volume(options, progress);
     } else if (kind == FileKind::Points) {
         std::vector<Column> columns;
-        append_points(columns, "", map_points(options, read_points(options.input)));
+        append_points(columns, "", map_points(options, read_points(options.input), progress));
         write_columns(columns, options.output);
     } else if (kind == FileKind::Surface) {
         meshing::SurfaceMesh surface = meshing::read_surface(options.input).mesh;
-        surface.nodes = map_points(options, surface.nodes);
+        surface.nodes = map_points(options, surface.nodes, progress);
         meshing::write_surface(surface, options.output);
     } else {
         throw InvalidInput(
@@ -80,6 +83,9 @@ void run_warp(const WarpOptions& options) {
             "' is of no kind that can be warped; give an image, points (.csv, .xyz) or a surface (.ply, .stl, "
             ".obj, .vtk, .vtp)");
     }
+    progress.clear();
+    if (options.common.quiet) return;
+    for (const std::string& note : progress.notes()) fmt::print("note: {}\n", note);
 }
 
 }  // namespace tissuewarp::apps

@@ -2,19 +2,21 @@
 
 #include "core/atomic_file.hpp"
 #include "core/errors.hpp"
-#include "imaging/detail/dicom_series.hpp"
+#include "imaging/detail/dicom.hpp"
 #include "imaging/detail/gzip.hpp"
+#include "imaging/detail/image_header.hpp"
 #include "imaging/detail/itk_image_io.hpp"
-#include "imaging/detail/nifti_header.hpp"
-#include "imaging/detail/text_headers.hpp"
 
 #include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <set>
 #include <sstream>
 
 namespace tissuewarp::imaging {
@@ -28,14 +30,18 @@ std::string lower_case_name(const fs::path& path) {
     return name;
 }
 
-detail::Format format_of(const fs::path& path, const char* verb) {
-    const std::string name = lower_case_name(path);
-    for (const char* extension : {".nii", ".nii.gz"})
+std::optional<detail::Format> format_named(const std::string& name) {
+    for (const char* extension : {".nii", ".nii.gz", ".hdr", ".hdr.gz"})
         if (name.ends_with(extension)) return detail::Format::Nifti;
     for (const char* extension : {".nrrd", ".nhdr"})
         if (name.ends_with(extension)) return detail::Format::Nrrd;
     for (const char* extension : {".mha", ".mhd"})
         if (name.ends_with(extension)) return detail::Format::MetaImage;
+    return std::nullopt;
+}
+
+detail::Format format_of(const fs::path& path, const char* verb) {
+    if (const auto format = format_named(lower_case_name(path))) return *format;
     throw InvalidInput(std::string("cannot ") + verb + " '" + path.string() +
                        "': the extension names no known format; use .nii.gz, .nii, .nrrd, .mha or, to read, the folder "
                        "of a DICOM series");
@@ -71,66 +77,47 @@ void require_finite(const Volume& volume, const fs::path& path) {
     throw InvalidInput(message.str());
 }
 
-/// Vectors of intent 1006 are in NIfTI's RAS world: x and y change sign in LPS.
-void turn_ras_vectors(Volume& volume) {
+/// Components to LPS; positions become displacements from where the voxels lie.
+template <class T>
+void turn_vectors(Volume& volume, const detail::ImageHeader& header) {
     const auto [nx, ny, nz] = volume.geometry.size;
-    for (int k = 0; k < nz; ++k) {
-        cv::Mat components(nx * ny, 3, volume.voxels.depth(), volume.voxels.ptr(k));
-        components.colRange(0, 2) *= -1.0;
-    }
+    tbb::parallel_for(0, nz, [&, nx = nx, ny = ny](int k) {
+        T* components = volume.voxels.ptr<T>(k);
+        for (int j = 0; j < ny; ++j)
+            for (int i = 0; i < nx; ++i, components += 3) {
+                Eigen::Vector3d vector =
+                    header.vector_axes * Eigen::Vector3d(components[0], components[1], components[2]);
+                if (header.positions) vector -= volume.geometry.point({1.0 * i, 1.0 * j, 1.0 * k});
+                for (int c = 0; c < 3; ++c) components[c] = static_cast<T>(vector[c]);
+            }
+    });
 }
 
-/// The geometry that a NIfTI matrix (voxel to RAS mm) states.
-Geometry geometry_of_nifti(const Eigen::Matrix4d& matrix, const std::array<int, 3>& size) {
-    const Eigen::Vector3d ras_to_lps(-1.0, -1.0, 1.0);
-    const Eigen::Matrix3d axes = ras_to_lps.asDiagonal() * matrix.topLeftCorner<3, 3>();
-    Geometry geometry;
-    geometry.size = size;
-    geometry.spacing = axes.colwise().norm().transpose();
-    geometry.direction = axes * geometry.spacing.cwiseInverse().asDiagonal();
-    geometry.origin = ras_to_lps.cwiseProduct(matrix.topRightCorner<3, 1>());
-    return geometry;
-}
-
-void note_nifti_header(const detail::NiftiHeader& header, ReadResult& result) {
-    const Geometry& used = result.volume.geometry;
-    std::ostringstream note;
-    note.precision(3);
-    if (header.qform_code <= 0 && header.sform_code <= 0) {
-        note << "neither qform nor sform is set: the header does not say where the image lies in the patient";
-        result.notes.push_back(note.str());
-    } else if (header.qform_code > 0 && header.sform_code > 0) {
-        const double to_sform = grid_distance(used, geometry_of_nifti(header.sform, used.size));
-        const double to_qform = grid_distance(used, geometry_of_nifti(header.qform, used.size));
-        if (std::max(to_sform, to_qform) > 1e-2) {
-            const bool took_sform = to_sform <= to_qform;
-            note << "sform and qform disagree by up to " << std::max(to_sform, to_qform) << " voxels; the "
-                 << (took_sform ? "sform" : "qform") << " is used, as ITK does";
-            result.notes.push_back(note.str());
-        }
-    }
-    if (header.space_unit == 1 || header.space_unit == 3)
-        result.notes.push_back(std::string("lengths are given in ") +
-                               (header.space_unit == 1 ? "metres" : "micrometres") + " and were converted to mm");
+void turn_vectors(ReadResult& result, const detail::ImageHeader& header) {
     if (result.volume.channels() != 3) return;
-    if (header.intent_code == detail::nifti_intent_displacement) {
-        turn_ras_vectors(result.volume);
-        result.notes.emplace_back(
-            "NIfTI intent 1006 (displacement): components are taken as RAS and turned to LPS, as ITK 5.3 and later do; "
-            "a file whose components are LPS already must carry intent 1007");
-    } else if (header.intent_code != detail::nifti_intent_vector) {
-        result.notes.push_back("vectors of NIfTI intent " + std::to_string(header.intent_code) +
-                               " are taken as LPS mm");
-    }
+    if (header.vector_axes.isIdentity(1e-6) && !header.positions) return;
+    if (result.volume.voxels.depth() < CV_32F) result.volume = result.volume.as(CV_32F);
+    if (result.volume.voxels.depth() == CV_32F)
+        turn_vectors<float>(result.volume, header);
+    else
+        turn_vectors<double>(result.volume, header);
 }
 
-void note_nrrd_header(const detail::TextHeader& header, ReadResult& result) {
-    std::string space = header.value("space");
-    std::transform(space.begin(), space.end(), space.begin(), [](unsigned char c) { return std::tolower(c); });
-    const bool lps = space == "lps" || space == "left-posterior-superior";
-    if (result.volume.channels() == 3 && !lps)
-        result.notes.push_back("vectors of an NRRD file of space '" + space + "' are taken as LPS mm as they are");
-    if (space.empty()) result.notes.emplace_back("the NRRD header names no space: its axes are taken as LPS");
+ReadResult read_file(const fs::path& path) {
+    const detail::ImageHeader header = detail::read_image_header(path, format_of(path, "read"));
+    require_valid(header.geometry, path.c_str());
+    ReadResult result;
+    result.volume = {header.geometry, detail::read_stored_voxels(path, header.voxels)};
+    result.notes = header.notes;
+    if (header.segments.empty()) {
+        turn_vectors(result, header);
+        return result;
+    }
+    detail::SegmentMap map = detail::collapse_layers(result.volume, header.segments, path);
+    result.volume = map.labels;
+    result.label_names = std::move(map.names);
+    result.notes.insert(result.notes.end(), map.notes.begin(), map.notes.end());
+    return result;
 }
 
 template <class T>
@@ -150,11 +137,35 @@ void copy_labels(const Volume& image, Volume& labels, const fs::path& path) {
     }
 }
 
+/// A grey image of whole numbers passes for labels value by value. In a segmentation most voxels continue the label of
+/// the one before them; in a grey image few do: 4 in 100 in a head, against 94 with 2 % of the labels drawn at random.
+void require_no_grey_image(const Volume& labels, const fs::path& path) {
+    constexpr std::int64_t least_pairs = 1000;
+    constexpr std::size_t least_values = 16;
+    const auto [nx, ny, nz] = labels.geometry.size;
+    std::int64_t pairs = 0, equal = 0;
+    std::set<int> values;
+    const int* voxel = labels.data<int>();
+    for (int row = 0; row < ny * nz; ++row, voxel += nx)
+        for (int i = 1; i < nx; ++i) {
+            if (voxel[i] == 0 || voxel[i - 1] == 0) continue;
+            ++pairs;
+            equal += voxel[i] == voxel[i - 1];
+            if (voxel[i] != voxel[i - 1]) values.insert(voxel[i]);
+        }
+    if (pairs < least_pairs || values.size() < least_values || 2 * equal >= pairs) return;
+    std::ostringstream message;
+    message << "cannot use '" << path.string() << "' as a label map: it looks like a grey image (" << values.size()
+            << " values up to " << *values.rbegin() << ", and " << 100 * equal / pairs
+            << " of 100 neighbours alike); give a segmentation";
+    throw InvalidInput(message.str());
+}
+
 /// Writes one file through ITK and makes sure that all of it arrived: ITK does not notice a full disk.
 void write_whole(const Volume& volume, const fs::path& temporary, detail::Format format, const fs::path& path) {
     detail::write_through_itk(volume, temporary, format);
     try {
-        detail::require_sound_file(temporary, format);
+        detail::require_whole(temporary, detail::read_image_header(temporary, format).voxels);
     } catch (const Error&) {
         throw IoError("cannot write '" + path.string() + "': the file did not arrive whole; free space on the disk");
     }
@@ -172,20 +183,18 @@ void write_compressed_nifti(const Volume& volume, const fs::path& path, const fs
 
 }  // namespace
 
+bool is_image(const fs::path& path) {
+    std::error_code ignored;
+    return fs::is_directory(path, ignored) || format_named(lower_case_name(path)) || detail::is_dicom_file(path);
+}
+
 ReadResult read_volume_with_notes(const fs::path& path) {
     std::error_code failure;
     const fs::file_status status = fs::status(path, failure);
     if (!fs::exists(status)) throw IoError("'" + path.string() + "' does not exist; check the path");
-    ReadResult result;
-    if (fs::is_directory(status)) {
-        result.volume = detail::read_dicom_series(path);
-    } else {
-        const detail::Format format = format_of(path, "read");
-        detail::require_sound_file(path, format);
-        result.volume = detail::read_through_itk(path, format);
-        if (format == detail::Format::Nifti) note_nifti_header(detail::read_nifti_header(path), result);
-        if (format == detail::Format::Nrrd) note_nrrd_header(detail::read_nrrd_header(path), result);
-    }
+    const bool dicom =
+        fs::is_directory(status) || (!format_named(lower_case_name(path)) && detail::is_dicom_file(path));
+    ReadResult result = dicom ? detail::read_dicom(path) : read_file(path);
     require_finite(result.volume, path);
     return result;
 }
@@ -195,7 +204,15 @@ Volume read_volume(const fs::path& path) {
 }
 
 Volume read_labels(const fs::path& path) {
-    const Volume image = read_volume(path);
+    return read_labels_with_notes(path).volume;
+}
+
+ReadResult read_labels_with_notes(const fs::path& path) {
+    return as_labels(read_volume_with_notes(path), path);
+}
+
+ReadResult as_labels(ReadResult read, const fs::path& path) {
+    const Volume image = read.volume;
     if (image.channels() != 1)
         throw InvalidInput("cannot use '" + path.string() + "' as a label map: it holds vectors; give a segmentation");
     Volume labels(image.geometry, CV_32S);
@@ -222,7 +239,9 @@ Volume read_labels(const fs::path& path) {
             copy_labels<double>(image, labels, path);
             break;
     }
-    return labels;
+    require_no_grey_image(labels, path);
+    read.volume = labels;
+    return read;
 }
 
 void write_volume(const Volume& volume, const fs::path& path) {

@@ -1,37 +1,51 @@
 #pragma once
-/// Reading and writing image files through ITK. Every format lands in LPS mm: NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd,
-/// .nhdr), MetaImage (.mha, .mhd) and a folder that holds one DICOM series.
+/// Reading and writing image files. Every format lands in LPS mm: NIfTI (.nii, .nii.gz, .hdr with .img), NRRD (.nrrd,
+/// .nhdr, segmentations of 3D Slicer), MetaImage (.mha, .mhd), a folder that holds one DICOM series, and one DICOM file
+/// of many frames.
 
 #include "imaging/volume.hpp"
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
 namespace tissuewarp::imaging {
 
-/// A volume and what the reader had to decide or doubt (for instance sform and qform that disagree).
+/// A volume, and what the reader had to decide or doubt (for instance sform and qform that disagree).
 struct ReadResult {
     Volume volume;
     std::vector<std::string> notes;
+    std::map<int, std::string> label_names;  ///< of a segmentation that names its segments (.seg.nrrd, DICOM SEG)
 };
 
-/// Reads a scalar or three-component volume. Integer types wider than OpenCV's become int32 when every value fits and
-/// float64 otherwise; NIfTI slope and intercept are applied.
-/// Vectors in NIfTI: intent 1007 (vector) holds LPS components, as ITK and ANTs write them; intent 1006 (displacement)
-/// holds RAS components, as ITK reads them from version 5.3 on, and is turned to LPS, with a note. A file of intent
-/// 1006 that holds LPS components must be relabelled 1007. When sform and qform disagree, ITK's choice is taken and
-/// noted. Throws IoError (missing, truncated, damaged, unreadable) or InvalidInput (2-D, one voxel thick, time series,
-/// zero or infinite spacing, skewed axes, non-finite voxels, more than 2^31 values, several DICOM series, missing
-/// slices).
+/// True where the name is of an image (in any case), or the file begins as DICOM files do, or it is a folder.
+bool is_image(const std::filesystem::path& path);
+
+/// Reads a scalar or three-component volume. Every voxel is read from the file: files that are cut short, lists of
+/// slices that do not fit the header, and damaged packed data are refused. Integer types wider than OpenCV's become
+/// int32 when every value fits and float64 otherwise; slope and intercept are applied. Units of length become mm, with
+/// a note where they were others. Layers of a segmentation become one label map; overlaps are refused. Vectors in
+/// NIfTI: intent 1007 (vector) holds LPS components, as ITK and ANTs write them; intent 1006 (displacement) holds RAS
+/// components, as ITK reads them from version 5.3 on, and is turned to LPS, with a note. A file of intent 1006 that
+/// holds LPS components must be relabelled 1007. Vectors in NRRD are turned from the header's space to LPS. When sform
+/// and qform disagree, ITK's choice is taken and noted. Throws IoError (missing, truncated, damaged, unreadable) or
+/// InvalidInput (2-D, one voxel thick, time series, zero or infinite spacing, unknown units, skewed axes, non-finite
+/// voxels, more than 2^31 values, several DICOM series, missing or tilted slices, frames without positions).
 ReadResult read_volume_with_notes(const std::filesystem::path& path);
 
 /// As above, without the notes.
 Volume read_volume(const std::filesystem::path& path);
 
 /// Reads a label map: integer values kept exactly as int32. A floating-point file is accepted when every voxel is an
-/// integer. Throws InvalidInput on fractional or negative labels.
+/// integer. Throws InvalidInput on fractional or negative labels, and on a grey image.
+ReadResult read_labels_with_notes(const std::filesystem::path& path);
+
+/// As above, without the notes.
 Volume read_labels(const std::filesystem::path& path);
+
+/// The image as a label map, under the conditions of `read_labels`. `path` stands for it in messages.
+ReadResult as_labels(ReadResult image, const std::filesystem::path& path);
 
 /// Writes in the format that the extension names, to a temporary name that is renamed when complete. Three-component
 /// volumes become displacement fields: NIfTI intent 1007, LPS mm, 5-D as ANTs writes; NRRD `kinds: vector`. Compressed

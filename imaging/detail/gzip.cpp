@@ -107,7 +107,13 @@ void gzip_file(const fs::path& source, const fs::path& destination, int level) {
                       "; free space on the disk");
 }
 
-std::uint64_t inflated_size(const fs::path& path, std::uint64_t offset, std::uint64_t limit) {
+bool is_gzip(const fs::path& path) {
+    const File in = open_file(path, "rb");
+    std::array<unsigned char, 2> magic{};
+    return std::fread(magic.data(), 1, 2, in.get()) == 2 && magic[0] == 0x1f && magic[1] == 0x8b;
+}
+
+std::uint64_t inflate(const fs::path& path, std::uint64_t offset, const UnpackedRange& range, char* target) {
     const File in = open_file(path, "rb");
     if (std::fseek(in.get(), static_cast<long>(offset), SEEK_SET) != 0)
         throw IoError("'" + path.string() + "' ends before byte " + std::to_string(offset) + "; copy the file again");
@@ -115,6 +121,7 @@ std::uint64_t inflated_size(const fs::path& path, std::uint64_t offset, std::uin
     z_stream stream{};
     if (inflateInit2(&stream, MAX_WBITS + 32) != Z_OK) throw IoError("zlib cannot start: out of memory");
     const std::unique_ptr<z_stream, int (*)(z_stream*)> ends(&stream, inflateEnd);
+    const std::uint64_t end = range.skip + range.count;
     std::uint64_t total = 0;
     int status = Z_OK;
     for (;;) {
@@ -130,9 +137,13 @@ std::uint64_t inflated_size(const fs::path& path, std::uint64_t offset, std::uin
         }
         stream.next_out = plain.data();
         stream.avail_out = static_cast<uInt>(plain.size());
-        status = inflate(&stream, Z_NO_FLUSH);
-        total += plain.size() - stream.avail_out;
-        if (total > limit) return total;
+        status = ::inflate(&stream, Z_NO_FLUSH);
+        const std::uint64_t out = plain.size() - stream.avail_out;
+        const std::uint64_t from = std::max(total, range.skip), to = std::min(total + out, end);
+        if (target != nullptr && from < to)
+            std::memcpy(target + (from - range.skip), plain.data() + (from - total), to - from);
+        total += out;
+        if (total > end) return total - range.skip;
         if (status != Z_OK && status != Z_STREAM_END && status != Z_BUF_ERROR)
             throw IoError("'" + path.string() + "' holds damaged compressed data after " + std::to_string(total) +
                           " bytes (" + (stream.msg ? stream.msg : "zlib error") + "); copy the file again");
@@ -140,7 +151,7 @@ std::uint64_t inflated_size(const fs::path& path, std::uint64_t offset, std::uin
     if (status != Z_STREAM_END)
         throw IoError("'" + path.string() + "' is cut short: its compressed data stop after " + std::to_string(total) +
                       " bytes; copy the file again");
-    return total;
+    return total > range.skip ? total - range.skip : 0;
 }
 
 std::string read_head(const fs::path& path, std::size_t count) {

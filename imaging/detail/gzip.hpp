@@ -12,10 +12,21 @@ namespace tissuewarp::imaging::detail {
 /// threads. `level` is zlib's, 1 (fast) to 9. Throws IoError when the disk is full or a file cannot be opened.
 void gzip_file(const std::filesystem::path& source, const std::filesystem::path& destination, int level);
 
-/// Number of bytes that the gzip or zlib stream at `offset` of a file unpacks to; checksums are verified. Stops early
-/// and returns a larger number once more than `limit` bytes have come out. Throws IoError on a stream that is cut short
-/// or damaged.
-std::uint64_t inflated_size(const std::filesystem::path& path, std::uint64_t offset, std::uint64_t limit);
+/// True when a file begins as gzip files do, whatever its name says.
+bool is_gzip(const std::filesystem::path& path);
+
+/// Part of an unpacked stream.
+struct UnpackedRange {
+    std::uint64_t skip = 0;   ///< bytes before it
+    std::uint64_t count = 0;  ///< bytes of it
+};
+
+/// Unpacks the gzip or zlib stream at `offset` of a file to its end, so that checksums are verified, and keeps one
+/// range of it in `target` (nothing when null). Returns the number of bytes behind `range.skip`: `range.count` when the
+/// stream holds just that; reading stops early once it is more. Throws IoError on a stream that is cut short or
+/// damaged.
+std::uint64_t inflate(const std::filesystem::path& path, std::uint64_t offset, const UnpackedRange& range,
+                      char* target);
 
 /// Reads up to `count` first bytes of a file, unpacked when it is gzip. Throws IoError.
 std::string read_head(const std::filesystem::path& path, std::size_t count);

@@ -1,13 +1,10 @@
 #pragma once
-/// The one place that hands images to ITK and takes them from it.
+/// The one place that hands images to ITK, for writing.
 
-#include "imaging/detail/file_layout.hpp"
+#include "imaging/detail/image_header.hpp"
 #include "imaging/volume.hpp"
 
 namespace tissuewarp::imaging::detail {
-
-/// Reads one file that `require_sound_file` let pass. Vectors come as stored. Throws IoError or InvalidInput.
-Volume read_through_itk(const std::filesystem::path& path, Format format);
 
 /// Writes one file of a format; NRRD and MetaImage are compressed, NIfTI (.nii) is not. Throws IoError. The caller
 /// checks that the file is whole: ITK does not notice a full disk.

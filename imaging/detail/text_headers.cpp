@@ -1,9 +1,11 @@
 #include "imaging/detail/text_headers.hpp"
 
 #include "core/errors.hpp"
+#include "imaging/detail/header_checks.hpp"
 
 #include <algorithm>
 #include <cctype>
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <limits>
@@ -14,6 +16,86 @@ namespace tissuewarp::imaging::detail {
 namespace {
 
 constexpr std::size_t longest_header = 1 << 20;  // 1 MiB of text: garbage without line ends must stop somewhere
+
+/// The first lines of a file, one after the other.
+class HeadLines {
+public:
+    explicit HeadLines(const std::filesystem::path& path) : head_(longest_header, '\0') {
+        std::ifstream file(path, std::ios::binary);
+        if (!file) throw IoError("cannot open '" + path.string() + "'; check the path and its rights");
+        file.read(head_.data(), static_cast<std::streamsize>(head_.size()));
+        head_.resize(static_cast<std::size_t>(file.gcount()));
+    }
+    [[nodiscard]] const std::string& text() const { return head_; }
+    /// Bytes of the lines that were taken.
+    [[nodiscard]] std::size_t taken() const { return std::min(begin_, head_.size()); }
+    bool next(std::string& line) {
+        if (begin_ >= head_.size()) return false;
+        const std::size_t end = std::min(head_.find('\n', begin_), head_.size());
+        line = trimmed(head_.substr(begin_, end - begin_));
+        begin_ = end + 1;
+        return true;
+    }
+    /// The lines that remain, without empty ones.
+    std::vector<std::string> rest() {
+        std::vector<std::string> lines;
+        for (std::string line; next(line);)
+            if (!line.empty()) lines.push_back(line);
+        return lines;
+    }
+
+private:
+    std::string head_;
+    std::size_t begin_ = 0;
+};
+
+bool is_list(const std::string& value) {
+    const std::string word = lower_case(value.substr(0, value.find_first_of(" \t")));
+    return word == "list";
+}
+
+/// A printf pattern of one whole number, "slice%03d.raw" for instance: nothing else is handed to printf.
+bool is_pattern(const std::string& word) {
+    const auto percent = word.find('%');
+    if (percent == std::string::npos || word.find('%', percent + 1) != std::string::npos) return false;
+    auto end = word.find_first_not_of("0123456789", percent + 1);
+    return end != std::string::npos && end - percent <= 3 && (word[end] == 'd' || word[end] == 'i' || word[end] == 'u');
+}
+
+/// "pattern [first [last [step]]]", counted inclusively as both formats do.
+std::vector<std::string> names_of_pattern(const std::filesystem::path& path, const std::string& value,
+                                          std::size_t slices) {
+    std::istringstream words(value);
+    std::string pattern;
+    words >> pattern;
+    if (!is_pattern(pattern))
+        throw unusable(path, "'" + pattern +
+                                 "' is no pattern of file names with one number (such as slice%03d.raw); "
+                                 "correct the header");
+    long long first = 1, last = 0, step = 1;
+    words >> first;
+    if (!(words >> last)) last = first + static_cast<long long>(slices) - 1;
+    words.clear();
+    if (!(words >> step)) step = last < first ? -1 : 1;
+    constexpr long long most = 1 << 20;
+    if (step == 0 || (last - first) / step < 0 || (last - first) / step > most)
+        throw unusable(path, "the file names '" + value + "' count from " + std::to_string(first) + " to " +
+                                 std::to_string(last) + " by " + std::to_string(step) + "; correct the header");
+    std::vector<std::string> names;
+    for (long long i = first; step > 0 ? i <= last : i >= last; i += step) {
+        std::vector<char> name(pattern.size() + 64);
+        // The pattern was checked to hold one conversion of a whole number.
+        const auto index = static_cast<int>(i);
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wformat-nonliteral"
+        std::snprintf(name.data(), name.size(), pattern.c_str(), index);
+#pragma GCC diagnostic pop
+        names.emplace_back(name.data());
+    }
+    return names;
+}
+
+}  // namespace
 
 std::string trimmed(const std::string& text) {
     const auto first = text.find_first_not_of(" \t\r\n");
@@ -26,61 +108,62 @@ std::string lower_case(std::string text) {
     return text;
 }
 
-std::string head_of(const std::filesystem::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    if (!file) throw IoError("cannot open '" + path.string() + "'; check the path and its rights");
-    std::string head(longest_header, '\0');
-    file.read(head.data(), static_cast<std::streamsize>(head.size()));
-    head.resize(static_cast<std::size_t>(file.gcount()));
-    return head;
-}
-
-}  // namespace
-
 std::string TextHeader::value(const std::string& key) const {
     const auto found = fields.find(key);
     return found == fields.end() ? "" : found->second;
 }
 
 TextHeader read_nrrd_header(const std::filesystem::path& path) {
-    const std::string head = head_of(path);
-    if (head.compare(0, 4, "NRRD") != 0)
-        throw IoError("cannot read '" + path.string() + "': it does not begin with 'NRRD'; give an NRRD file");
+    HeadLines lines(path);
+    if (lines.text().compare(0, 4, "NRRD") != 0)
+        throw unreadable(path, "it does not begin with 'NRRD'; give an NRRD file");
     TextHeader header;
-    std::size_t begin = 0;
-    while (begin < head.size()) {
-        const std::size_t end = std::min(head.find('\n', begin), head.size());
-        const std::string line = trimmed(head.substr(begin, end - begin));
-        begin = end + 1;
-        header.bytes = std::min(begin, head.size());
-        if (line.empty()) break;
+    for (std::string line; lines.next(line) && !line.empty();) {
         const std::size_t colon = line.find(':');
         if (line[0] == '#' || colon == std::string::npos) continue;
         // "key:=value" is a free comment pair; "key: value" is a field of the format.
-        if (line.compare(colon, 2, ":=") == 0) continue;
-        header.fields[lower_case(trimmed(line.substr(0, colon)))] = trimmed(line.substr(colon + 1));
+        if (line.compare(colon, 2, ":=") == 0) {
+            header.comments[trimmed(line.substr(0, colon))] = trimmed(line.substr(colon + 2));
+            continue;
+        }
+        std::string key = lower_case(trimmed(line.substr(0, colon)));
+        const std::string value = trimmed(line.substr(colon + 1));
+        if (key == "datafile") key = "data file";
+        header.fields[key] = value;
+        if (key == "data file" && is_list(value)) header.listed_files = lines.rest();
     }
+    header.bytes = lines.taken();
     return header;
 }
 
 TextHeader read_meta_header(const std::filesystem::path& path) {
-    const std::string head = head_of(path);
+    HeadLines lines(path);
     TextHeader header;
-    std::size_t begin = 0;
-    while (begin < head.size()) {
-        const std::size_t end = std::min(head.find('\n', begin), head.size());
-        const std::string line = head.substr(begin, end - begin);
-        begin = end + 1;
+    for (std::string line; lines.next(line);) {
         const std::size_t equals = line.find('=');
         if (equals == std::string::npos) break;
         const std::string key = lower_case(trimmed(line.substr(0, equals)));
         header.fields[key] = trimmed(line.substr(equals + 1));
         if (key != "elementdatafile") continue;
-        header.bytes = std::min(begin, head.size());
+        header.bytes = lines.taken();
+        if (is_list(header.fields[key])) header.listed_files = lines.rest();
         return header;
     }
-    throw IoError("cannot read '" + path.string() +
-                  "': its header has no line 'ElementDataFile'; give a MetaImage file, whole");
+    throw unreadable(path, "its header has no line 'ElementDataFile'; give a MetaImage file, whole");
+}
+
+std::vector<std::filesystem::path> files_of(const std::filesystem::path& header_path, const TextHeader& header,
+                                            const std::string& value, std::size_t slices) {
+    std::vector<std::string> names{value};
+    // A name may hold blanks or '%'; a pattern is followed by numbers or is one by itself.
+    const std::string first_word = value.substr(0, value.find_first_of(" \t"));
+    if (is_list(value))
+        names = header.listed_files;
+    else if (is_pattern(first_word) || (first_word != value && first_word.find('%') != std::string::npos))
+        names = names_of_pattern(header_path, value, slices);
+    std::vector<std::filesystem::path> files;
+    for (const std::string& name : names) files.push_back(header_path.parent_path() / name);
+    return files;
 }
 
 std::vector<double> numbers_in(std::string text) {

@@ -1,5 +1,5 @@
 #pragma once
-/// The text headers of NRRD and MetaImage, as far as the checks before reading need them.
+/// The text headers of NRRD and MetaImage: keys, values, and files that the header lists.
 
 #include <filesystem>
 #include <map>
@@ -9,8 +9,10 @@
 namespace tissuewarp::imaging::detail {
 
 struct TextHeader {
-    std::map<std::string, std::string> fields;  ///< keys in lower case
-    std::size_t bytes = 0;                      ///< length of the header, where attached data begin
+    std::map<std::string, std::string> fields;    ///< keys in lower case
+    std::map<std::string, std::string> comments;  ///< NRRD's free pairs "key:=value", keys as written
+    std::vector<std::string> listed_files;        ///< lines behind "LIST"
+    std::size_t bytes = 0;                        ///< length of the header, where attached data begin
 
     /// The value of a key, or "" when it is absent.
     [[nodiscard]] std::string value(const std::string& key) const;
@@ -21,6 +23,15 @@ TextHeader read_nrrd_header(const std::filesystem::path& path);
 
 /// Lines "Key = Value" up to and with ElementDataFile. Throws IoError when that line does not come.
 TextHeader read_meta_header(const std::filesystem::path& path);
+
+/// The names of the files of slices that "LIST" or "pattern first last step" stands for, in a header's folder; one name
+/// otherwise. `fields` are the words of the value. Throws InvalidInput on a pattern that is none.
+std::vector<std::filesystem::path> files_of(const std::filesystem::path& header_path, const TextHeader& header,
+                                            const std::string& value, std::size_t slices);
+
+/// The text without blanks at both ends; in lower case.
+std::string trimmed(const std::string& text);
+std::string lower_case(std::string text);
 
 /// The numbers in a text, with parentheses and commas taken as blanks. Words that are no numbers become NaN.
 std::vector<double> numbers_in(std::string text);

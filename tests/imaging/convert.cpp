@@ -10,9 +10,9 @@
 int main(int count, char** arguments) {
     if (count != 3) return std::fputs("usage: imaging_convert INPUT OUTPUT\n", stderr), 2;
     try {
-        const auto [volume, notes] = tissuewarp::imaging::read_volume_with_notes(arguments[1]);
-        for (const std::string& note : notes) std::cout << "note: " << note << '\n';
-        tissuewarp::imaging::write_volume(volume, arguments[2]);
+        const tissuewarp::imaging::ReadResult read = tissuewarp::imaging::read_volume_with_notes(arguments[1]);
+        for (const std::string& note : read.notes) std::cout << "note: " << note << '\n';
+        tissuewarp::imaging::write_volume(read.volume, arguments[2]);
     } catch (const std::exception& error) {
         std::cerr << error.what() << '\n';
         return 1;

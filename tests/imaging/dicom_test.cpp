@@ -1,99 +1,53 @@
 /// DICOM series that the test writes itself, byte by byte, so that no library vouches for its own mistakes.
 
 #include "core/errors.hpp"
+#include "dicom_elements.hpp"
 #include "imaging/image_io.hpp"
 #include "test_volumes.hpp"
 
 #include <gmock/gmock.h>
 
 #include <fstream>
-#include <sstream>
 
 namespace tissuewarp::imaging {
 namespace {
 
+using test::decimals;
+using test::Elements;
 using test::message_of;
 using test::TemporaryFolder;
 using testing::HasSubstr;
-
-/// Data elements in explicit little-endian transfer syntax (DICOM PS3.5, section 7.1.2).
-class Elements {
-public:
-    void text(int group, int element, const char* representation, std::string value) {
-        if (value.size() % 2) value += std::string(representation) == "UI" ? '\0' : ' ';
-        head(group, element, representation);
-        number<std::uint16_t>(static_cast<std::uint16_t>(value.size()));
-        bytes_ += value;
-    }
-    void short_value(int group, int element, int value) {
-        head(group, element, "US");
-        number<std::uint16_t>(2);
-        number<std::uint16_t>(static_cast<std::uint16_t>(value));
-    }
-    void long_value(int group, int element, std::uint32_t value) {
-        head(group, element, "UL");
-        number<std::uint16_t>(4);
-        number(value);
-    }
-    void words(int group, int element, const std::vector<std::int16_t>& values) {
-        head(group, element, "OW");
-        number<std::uint16_t>(0);
-        number(static_cast<std::uint32_t>(2 * values.size()));
-        for (const std::int16_t value : values) number(value);
-    }
-    const std::string& bytes() const { return bytes_; }
-
-private:
-    template <class T>
-    void number(T value) {
-        bytes_.append(reinterpret_cast<const char*>(&value), sizeof(T));
-    }
-    void head(int group, int element, const char* representation) {
-        number(static_cast<std::uint16_t>(group));
-        number(static_cast<std::uint16_t>(element));
-        bytes_ += representation;
-    }
-    std::string bytes_;
-};
-
-std::string decimals(const Eigen::VectorXd& values) {
-    std::ostringstream text;
-    text.precision(9);
-    for (Eigen::Index i = 0; i < values.size(); ++i) text << (i ? "\\" : "") << values[i];
-    return text.str();
-}
 
 struct SliceOptions {
     std::string series = "1.2.3.4";
     double slope = 1.0, intercept = 0.0;
     Eigen::Vector3d shift = Eigen::Vector3d::Zero();  ///< of this slice's position, mm
+    double thickness = 0.0;                           ///< mm, that of the grid when 0
+    bool placed = true;                               ///< states position and orientation
+    std::string image_type = "ORIGINAL\\PRIMARY";
 };
 
 /// Slice k of an int16 volume as a CT image.
 void write_slice(const std::filesystem::path& path, const Volume& volume, int k, const SliceOptions& options = {}) {
     const Geometry& grid = volume.geometry;
-    const std::string instance = "1.2.3.9." + std::to_string(k + 1), image_class = "1.2.840.10008.5.1.4.1.1.2";
-    Elements meta;
-    meta.text(2, 2, "UI", image_class);
-    meta.text(2, 3, "UI", instance);
-    meta.text(2, 0x10, "UI", "1.2.840.10008.1.2.1");
-    Elements length;
-    length.long_value(2, 0, static_cast<std::uint32_t>(meta.bytes().size()));
-
+    const std::string instance = std::string("1.2.3.9.") + std::to_string(k + 1),
+                      image_class = "1.2.840.10008.5.1.4.1.1.2";
     Eigen::VectorXd axes(6);
     axes << grid.direction.col(0), grid.direction.col(1);
     const Eigen::Vector3d position = grid.point({0, 0, 1.0 * k}) + options.shift;
     Elements data;
+    data.text(8, 8, "CS", options.image_type);
     data.text(8, 0x16, "UI", image_class);
     data.text(8, 0x18, "UI", instance);
     data.text(8, 0x60, "CS", "CT");
-    data.text(0x18, 0x50, "DS", decimals(Eigen::VectorXd::Constant(1, grid.spacing[2])));
+    data.text(0x18, 0x50, "DS",
+              decimals(Eigen::VectorXd::Constant(1, options.thickness > 0 ? options.thickness : grid.spacing[2])));
     data.text(0x20, 0xd, "UI", "1.2.3");
     data.text(0x20, 0xe, "UI", options.series);
     data.text(0x20, 0x11, "IS", "1");
     data.text(0x20, 0x13, "IS", std::to_string(k + 1));
-    data.text(0x20, 0x32, "DS", decimals(position));
-    data.text(0x20, 0x37, "DS", decimals(axes));
+    if (options.placed) data.text(0x20, 0x32, "DS", decimals(position));
+    if (options.placed) data.text(0x20, 0x37, "DS", decimals(axes));
     data.short_value(0x28, 2, 1);
     data.text(0x28, 4, "CS", "MONOCHROME2");
     data.short_value(0x28, 0x10, grid.size[1]);
@@ -109,12 +63,11 @@ void write_slice(const std::filesystem::path& path, const Volume& volume, int k,
     const std::int16_t* first = volume.data<short>() + volume.offset(0, 0, k);
     data.words(0x7fe0, 0x10, {first, first + grid.size[0] * grid.size[1]});
 
-    std::ofstream file(path, std::ios::binary);
-    file << std::string(128, '\0') << "DICM" << length.bytes() << meta.bytes() << data.bytes();
+    test::write_dicom(path, image_class, instance, data);
 }
 
 std::string reversed_name(int k, int count) {
-    return "slice" + std::to_string(100 + count - k) + ".dcm";
+    return std::string("slice") + std::to_string(100 + count - k) + ".dcm";
 }
 
 Volume ct_volume() {
@@ -164,8 +117,8 @@ TEST(DicomSeries, AMissingSliceIsRefused) {
 TEST(DicomSeries, TwoSeriesInOneFolderAreRefused) {
     const TemporaryFolder folder;
     for (int k = 0; k < 6; ++k) {
-        write_slice(folder / ("a" + std::to_string(k) + ".dcm"), ct_volume(), k);
-        write_slice(folder / ("b" + std::to_string(k) + ".dcm"), ct_volume(), k, {.series = "1.2.3.5"});
+        write_slice(folder / (std::string("a") + std::to_string(k) + ".dcm"), ct_volume(), k);
+        write_slice(folder / (std::string("b") + std::to_string(k) + ".dcm"), ct_volume(), k, {.series = "1.2.3.5"});
     }
     EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(folder.path()); }), HasSubstr("2 series"));
 }
@@ -183,6 +136,43 @@ TEST(DicomSeries, GantryTiltIsRefused) {
     for (int k = 0; k < 6; ++k)
         write_slice(folder / reversed_name(k, 6), volume, k, {.shift = 0.5 * k * volume.geometry.direction.col(1)});
     EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(folder.path()); }), HasSubstr("gantry tilt"));
+}
+
+TEST(DicomSeries, ATiltOfLittleMoreThanATenthOfAPixelOverTheStackIsRefused) {
+    const TemporaryFolder folder;
+    const Volume volume = ct_volume();  // pixels of 0.75 mm, 5 steps
+    for (const double shift : {0.01, 0.02}) {
+        for (int k = 0; k < 6; ++k)
+            write_slice(folder / reversed_name(k, 6), volume, k,
+                        {.shift = shift * k * volume.geometry.direction.col(1)});
+        if (shift < 0.015)
+            EXPECT_EQ(read_volume(folder.path()).geometry.size[2], 6);
+        else
+            EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(folder.path()); }), HasSubstr("mm over the stack"));
+    }
+}
+
+TEST(DicomSeries, ThicknessesThatDifferByRoundingAreOneSeries) {
+    const TemporaryFolder folder;
+    for (int k = 0; k < 6; ++k)
+        write_slice(folder / reversed_name(k, 6), ct_volume(), k, {.thickness = 2.5 + 1e-6 * k});
+    EXPECT_TRUE(test::same_voxels(read_volume(folder.path()).voxels, ct_volume().voxels));
+}
+
+TEST(DicomSeries, SlicesWithoutPositionsAndMosaicsAreRefused) {
+    const TemporaryFolder folder;
+    for (int k = 0; k < 6; ++k) write_slice(folder / reversed_name(k, 6), ct_volume(), k, {.placed = false});
+    EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(folder.path()); }), HasSubstr("secondary capture"));
+    for (int k = 0; k < 6; ++k)
+        write_slice(folder / reversed_name(k, 6), ct_volume(), k, {.image_type = "ORIGINAL\\PRIMARY\\M\\MOSAIC"});
+    EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(folder.path()); }), HasSubstr("mosaic"));
+}
+
+TEST(DicomSeries, OneSliceGivenAsAFileAsksForItsFolder) {
+    const TemporaryFolder folder;
+    write_slice(folder / "slice", ct_volume(), 0);
+    EXPECT_TRUE(is_image(folder / "slice"));
+    EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(folder / "slice"); }), HasSubstr("give the folder"));
 }
 
 TEST(DicomSeries, AFolderWithoutImagesIsRefused) {

@@ -1,0 +1,298 @@
+#include "imaging/detail/dicom_file.hpp"
+
+#include "imaging/detail/dicom_bits.hpp"
+#include "imaging/detail/dicom_set.hpp"
+#include "imaging/detail/header_checks.hpp"
+
+#include <Eigen/Geometry>
+
+#include <gdcmPixmapReader.h>
+#include <gdcmTrace.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <stdexcept>
+
+namespace tissuewarp::imaging::detail {
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr DicomTag pixel_data = 0x7fe00010;
+
+/// Attributes of frames: in their own functional groups, in the shared ones, or, in files of one frame, in the file.
+class FrameAttributes {
+public:
+    explicit FrameAttributes(const DicomSet& file)
+        : file_(file), own_(file.items(0x52009230)), shared_(file.items(0x52009229)) {}
+
+    DicomFrame frame(std::size_t index) {
+        DicomFrame frame;
+        if (const auto p = numbers(0x00209113, 0x00200032, index, 3))
+            frame.position = Eigen::Vector3d((*p)[0], (*p)[1], (*p)[2]);
+        if (const auto a = numbers(0x00209116, 0x00200037, index, 6))
+            frame.axes = Eigen::Map<const Eigen::Matrix<double, 3, 2>>(a->data()).colwise().normalized();
+        constexpr DicomTag measures = 0x00289110, transformation = 0x00289145;
+        // The distance between rows, that along j, comes first.
+        if (const auto s = numbers(measures, 0x00280030, index, 2)) frame.spacing = {(*s)[1], (*s)[0]};
+        frame.slice_spacing = number(measures, 0x00180088, index);
+        if (!frame.slice_spacing) frame.slice_spacing = number(measures, 0x00180050, index);
+        frame.intercept = number(transformation, 0x00281052, index).value_or(0.0);
+        frame.slope = number(transformation, 0x00281053, index).value_or(1.0);
+        if (const auto set = group(0x00209111, index)) frame.stack = set->text(0x00209056);
+        if (const auto set = group(0x0062000a, index)) frame.segment = set->whole(0x0062000b, 0);
+        return frame;
+    }
+
+private:
+    const DicomSet& file_;
+    std::vector<DicomSet> own_, shared_;
+
+    std::optional<DicomSet> group(DicomTag sequence, std::size_t index) {
+        for (const DicomSet* groups :
+             {index < own_.size() ? &own_[index] : nullptr, shared_.empty() ? nullptr : &shared_.front()}) {
+            if (groups == nullptr) continue;
+            std::vector<DicomSet> items = groups->items(sequence);
+            if (!items.empty()) return std::move(items.front());
+        }
+        return std::nullopt;
+    }
+    std::optional<std::vector<double>> numbers(DicomTag sequence, DicomTag tag, std::size_t index, std::size_t count) {
+        if (const auto set = group(sequence, index))
+            if (auto found = set->numbers(tag, count)) return found;
+        return file_.numbers(tag, count);
+    }
+    std::optional<double> number(DicomTag sequence, DicomTag tag, std::size_t index) {
+        const auto found = numbers(sequence, tag, index, 1);
+        return found ? std::optional((*found)[0]) : std::nullopt;
+    }
+};
+
+/// Planes of a dose (RT Dose): offsets along the normal from the one position of the file.
+void place_dose_planes(const DicomSet& set, std::vector<DicomFrame>& frames) {
+    if (const auto scaling = set.number(0x3004000e))
+        for (DicomFrame& frame : frames) frame.slope = *scaling;
+    const auto offsets = set.numbers(0x3004000c, frames.size());
+    if (!offsets || !frames[0].position || !frames[0].axes) return;
+    const Eigen::Vector3d normal = frames[0].axes->col(0).cross(frames[0].axes->col(1)), first = *frames[0].position;
+    for (std::size_t i = 0; i < frames.size(); ++i)
+        frames[i].position = first + ((*offsets)[i] - (*offsets)[0]) * normal;
+}
+
+void read_segments(const DicomSet& set, DicomFile& file) {
+    const std::string type = set.text(0x00620001);
+    if (type == "FRACTIONAL") file.segmentation = DicomFile::Segmentation::Fractional;
+    if (type == "BINARY") file.segmentation = DicomFile::Segmentation::Binary;
+    if (type == "LABELMAP") file.segmentation = DicomFile::Segmentation::LabelMap;
+    if (file.segmentation == DicomFile::Segmentation::None) return;
+    file.most_fraction = set.whole(0x0062000e, 255);
+    for (const DicomSet& segment : set.items(0x00620002))
+        file.segment_names[segment.whole(0x00620004, 0)] = segment.text(0x00620005);
+}
+
+IoError damaged(const DicomFile& file, const std::string& cause) {
+    return IoError("cannot read the pixels of '" + file.path.string() + "': " + cause + "; copy or convert the file");
+}
+
+cv::Mat frames_of(const DicomFile& file, int depth) {
+    const int sizes[3] = {static_cast<int>(file.frames.size()), file.rows, file.columns};
+    return {3, sizes, CV_MAKETYPE(depth, 1)};
+}
+
+/// Values of 8, 16 or 32 bits as they lie in the file: of them the stored bits count, with a sign or without.
+template <class T, class Stored>
+void unpack_values(const DicomFile& file, std::string_view bytes, bool swapped, cv::Mat& frames) {
+    using Unsigned = std::make_unsigned_t<Stored>;
+    const int unused =
+        static_cast<int>(8 * sizeof(Stored)) - std::clamp(file.bits_stored, 1, static_cast<int>(8 * sizeof(Stored)));
+    const int below = std::clamp(file.high_bit + 1 - file.bits_stored, 0, unused);
+    T* target = frames.ptr<T>();
+    for (std::size_t i = 0; i < frames.total(); ++i) {
+        std::array<char, sizeof(Stored)> raw;
+        std::memcpy(raw.data(), bytes.data() + i * sizeof(Stored), sizeof(Stored));
+        if (swapped) std::reverse(raw.begin(), raw.end());
+        const auto value = std::bit_cast<Unsigned>(raw);
+        // Up to the top, so that a shift back brings the sign along.
+        const auto top = static_cast<Unsigned>(value << (unused - below));
+        target[i] = static_cast<T>(static_cast<Stored>(static_cast<Stored>(top) >> unused));
+    }
+}
+
+cv::Mat values_of_bytes(const DicomFile& file, std::string_view bytes, bool swapped) {
+    const bool has_sign = file.is_signed;
+    const int depth = file.bits_allocated == 8    ? (has_sign ? CV_8S : CV_8U)
+                      : file.bits_allocated == 16 ? (has_sign ? CV_16S : CV_16U)
+                                                  : (has_sign ? CV_32S : CV_64F);
+    cv::Mat frames = frames_of(file, depth);
+    switch (depth) {
+        case CV_8U:
+            unpack_values<std::uint8_t, std::uint8_t>(file, bytes, false, frames);
+            break;
+        case CV_8S:
+            unpack_values<std::int8_t, std::int8_t>(file, bytes, false, frames);
+            break;
+        case CV_16U:
+            unpack_values<std::uint16_t, std::uint16_t>(file, bytes, swapped, frames);
+            break;
+        case CV_16S:
+            unpack_values<std::int16_t, std::int16_t>(file, bytes, swapped, frames);
+            break;
+        case CV_32S:
+            unpack_values<std::int32_t, std::int32_t>(file, bytes, swapped, frames);
+            break;
+        default:
+            unpack_values<double, std::uint32_t>(file, bytes, swapped, frames);
+            break;
+    }
+    return frames;
+}
+
+/// Bytes of all frames, unpacked; nothing where the transfer syntax is one that GDCM decodes.
+std::optional<std::string> plain_bytes(const DicomFile& file, const DicomBytes& read) {
+    const auto fragments = read.set.fragments(pixel_data);
+    if (!fragments) {
+        const std::string_view value = read.set.bytes(pixel_data);
+        if (const std::uint64_t promised = read.set.promised(pixel_data); value.size() < promised)
+            throw IoError("'" + file.path.string() + "' is cut short: " + std::to_string(value.size()) + " bytes of " +
+                          std::to_string(promised) + " of pixels; copy the file again");
+        return std::string(value);
+    }
+    const bool rle = read.transfer_syntax == "1.2.840.10008.1.2.5";
+    const bool deflated = read.transfer_syntax == "1.2.840.10008.1.2.8.1";
+    if (!rle && !deflated) return std::nullopt;
+    if (fragments->size() != file.frames.size())
+        throw damaged(file,
+                      std::to_string(fragments->size()) + " packed frames of " + std::to_string(file.frames.size()));
+    const std::uint64_t bits = static_cast<std::uint64_t>(file.rows) * static_cast<std::uint64_t>(file.columns) *
+                               static_cast<std::uint64_t>(file.bits_allocated);
+    std::string all;
+    std::string joined_bits;
+    for (const std::string_view fragment : *fragments) {
+        std::string frame =
+            rle ? unpack_rle(fragment, std::max<std::size_t>(1, static_cast<std::size_t>(file.bits_allocated) / 8))
+                : unpack_deflated(fragment);
+        if (8 * frame.size() < bits) throw damaged(file, "a packed frame is cut short or damaged");
+        if (file.bits_allocated == 1) {
+            joined_bits.resize(bits);
+            unpack_bits(frame, bits, reinterpret_cast<std::uint8_t*>(joined_bits.data()));
+            all += joined_bits;
+        } else {
+            all.append(frame, 0, bits / 8);
+        }
+    }
+    return all;
+}
+
+int opencv_depth(const gdcm::PixelFormat& format) {
+    switch (format.GetScalarType()) {
+        case gdcm::PixelFormat::UINT8:
+            return CV_8U;
+        case gdcm::PixelFormat::INT8:
+            return CV_8S;
+        case gdcm::PixelFormat::UINT12:
+        case gdcm::PixelFormat::UINT16:
+            return CV_16U;
+        case gdcm::PixelFormat::INT12:
+        case gdcm::PixelFormat::INT16:
+            return CV_16S;
+        default:
+            return -1;
+    }
+}
+
+/// Frames of JPEG, JPEG-LS and JPEG 2000.
+cv::Mat decoded(const DicomFile& file, const std::string& transfer_syntax) {
+    // What the library would print becomes an exception here.
+    gdcm::Trace::WarningOff();
+    gdcm::Trace::ErrorOff();
+    gdcm::PixmapReader reader;
+    reader.SetFileName(file.path.c_str());
+    if (!reader.Read())
+        throw damaged(
+            file, "they are cut short, or packed in a way that is not known (transfer syntax " + transfer_syntax + ")");
+    const gdcm::Pixmap& pixmap = reader.GetPixmap();
+    const int depth = opencv_depth(pixmap.GetPixelFormat());
+    if (depth < 0)
+        throw unusable(file.path, "its pixels are of type " +
+                                      std::string(pixmap.GetPixelFormat().GetScalarTypeAsString()) +
+                                      "; convert it to 16 bits");
+    cv::Mat frames = frames_of(file, depth);
+    if (pixmap.GetBufferLength() != frames.total() * frames.elemSize())
+        throw damaged(file, std::to_string(pixmap.GetBufferLength()) + " bytes where its header promises " +
+                                std::to_string(frames.total() * frames.elemSize()));
+    if (!pixmap.GetBuffer(reinterpret_cast<char*>(frames.data))) throw damaged(file, "they are cut short or damaged");
+    return frames;
+}
+
+DicomFile description_of(const fs::path& path, const DicomSet& set) {
+    DicomFile file;
+    file.path = path;
+    file.rows = set.whole(0x00280010, 0);
+    file.columns = set.whole(0x00280011, 0);
+    file.series = set.text(0x0020000e);
+    file.modality = set.text(0x00080060);
+    file.samples = set.whole(0x00280002, 1);
+    file.bits_allocated = set.whole(0x00280100, 0);
+    file.bits_stored = set.whole(0x00280101, file.bits_allocated);
+    file.high_bit = set.whole(0x00280102, file.bits_stored - 1);
+    file.is_signed = set.whole(0x00280103, 0) != 0;
+    file.mosaic = set.text(0x00080008).find("MOSAIC") != std::string::npos;
+    const double frames = set.number(0x00280008).value_or(1.0);
+    values_of(path, {frames, 1.0 * file.rows, 1.0 * file.columns});
+    FrameAttributes attributes(set);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(frames); ++i) file.frames.push_back(attributes.frame(i));
+    if (file.modality == "RTDOSE") place_dose_planes(set, file.frames);
+    read_segments(set, file);
+    return file;
+}
+
+/// Turns what does not end within the file into words.
+template <class Read>
+auto within_file(const fs::path& path, const Read& read) {
+    try {
+        return read();
+    } catch (const std::out_of_range&) {
+        throw IoError("cannot read '" + path.string() + "' as DICOM: it is cut short or damaged; copy the file again");
+    }
+}
+
+}  // namespace
+
+std::optional<DicomFile> read_dicom_file(const fs::path& path) {
+    const DicomBytes read(path);
+    if (read.set.whole(0x00280010, 0) == 0 || read.set.whole(0x00280011, 0) == 0) return std::nullopt;
+    return within_file(path, [&] { return description_of(path, read.set); });
+}
+
+cv::Mat read_dicom_pixels(const DicomFile& file) {
+    if (file.samples != 1) throw unusable(file.path, "it is a colour image; give a grey one");
+    const int bits = file.bits_allocated;
+    if (bits != 1 && bits != 8 && bits != 16 && bits != 32)
+        throw unusable(file.path, "its pixels take " + std::to_string(bits) + " bits; convert it to 8 or 16 bits");
+    const DicomBytes read(file.path);
+    if (read.big_endian && bits < 16)
+        throw unusable(file.path, "its small pixels are stored big endian; convert it to explicit little endian");
+    if (!read.set.contains(pixel_data))
+        throw unusable(file.path, "it holds no whole numbers as pixels (Pixel Data); convert it to 16 bits");
+    const std::optional<std::string> bytes = within_file(file.path, [&] { return plain_bytes(file, read); });
+    if (!bytes) return decoded(file, read.transfer_syntax);
+    const std::uint64_t pixels =
+        static_cast<std::uint64_t>(file.rows) * static_cast<std::uint64_t>(file.columns) * file.frames.size();
+    const bool packed_bits = bits == 1 && !read.set.fragments(pixel_data);
+    const std::uint64_t expected = packed_bits ? (pixels + 7) / 8
+                                   : bits == 1 ? pixels
+                                               : pixels * static_cast<std::uint64_t>(bits) / 8;
+    if (bytes->size() < expected)
+        throw damaged(file,
+                      std::to_string(bytes->size()) + " bytes where its header promises " + std::to_string(expected));
+    if (bits != 1) return values_of_bytes(file, *bytes, read.big_endian != (std::endian::native == std::endian::big));
+    cv::Mat frames = frames_of(file, CV_8U);
+    if (packed_bits)
+        unpack_bits(*bytes, pixels, frames.ptr<std::uint8_t>());
+    else
+        std::memcpy(frames.data, bytes->data(), pixels);
+    return frames;
+}
+
+}  // namespace tissuewarp::imaging::detail

@@ -1,0 +1,151 @@
+"""Files that say of themselves what most do not: units, two places, names. What the reader decided reaches every verb."""
+
+import json
+import struct
+import unittest
+
+import numpy
+
+from phantom import MOVING_AFFINE, PhantomTest, SIZE, run, save
+
+INPUT = 2
+NOTE = "sform and qform disagree by up to 30 voxels"
+
+SCENE = """
+[geometry]
+labels = "LABELS"
+edge_length_mm = 8
+[label.1]
+youngs_modulus_kpa = 3.0
+poissons_ratio = 0.3
+[label.2]
+youngs_modulus_kpa = 3.0
+poissons_ratio = 0.3
+[set.base]
+half_space = { point_mm = [0, 0, 6], normal = [0, 0, 1] }
+[[fixed]]
+set = "base"
+[gravity]
+to = [0, 0, -1]
+[solve]
+frames = 1
+"""
+
+
+def segmentation(path, labels, names):
+    """A .seg.nrrd of 3D Slicer with one layer, in LPS."""
+    origin = MOVING_AFFINE[:3, 3] * [-1, -1, 1]
+    fields = ["NRRD0004", "type: uint8", "dimension: 3", "space: left-posterior-superior",
+              f"sizes: {SIZE} {SIZE} {SIZE}", "space directions: (1,0,0) (0,1,0) (0,0,1)",
+              "kinds: domain domain domain", "encoding: raw", "space origin: ({},{},{})".format(*origin)]
+    for number, (label, name) in enumerate(names.items()):
+        fields += [f"Segment{number}_ID:=s{number}", f"Segment{number}_Name:={name}",
+                   f"Segment{number}_LabelValue:={label}", f"Segment{number}_Layer:=0"]
+    path.write_bytes("\n".join(fields + ["", ""]).encode() + labels.tobytes(order="F"))
+    return path
+
+
+class TwoPlaces(PhantomTest):
+    """The qform lies 30 mm from the sform and is used, as ITK does."""
+
+    def setUp(self):
+        super().setUp()
+        self.labels = self.two_places(self.phantom.moving_labels_array, MOVING_AFFINE, "two_places.nii")
+
+    def two_places(self, array, affine, name):
+        path = save(array, affine, self.phantom.folder / name)
+        data = bytearray(path.read_bytes())
+        data[252:256] = struct.pack("<hh", 1, 2)
+        data[292:296] = struct.pack("<f", affine[0, 3] + 30)
+        path.write_bytes(data)
+        return path
+
+    def assert_said(self, text):
+        self.assertIn(NOTE, text)
+        self.assertIn("two_places.nii", text)
+
+    def test_register_says_so_on_the_terminal_in_the_report_and_on_the_page(self):
+        result = self.phantom.register("--no-error-estimate", "--edge-length", 6, moving=None, fixed=None,
+                                       moving_labels=self.labels)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assert_said(result.stdout)
+        self.assert_said(" ".join(json.loads((self.phantom.output / "report.json").read_text())["notes"]))
+        self.assertIn(NOTE, (self.phantom.output / "report.html").read_text())
+
+    def test_a_dry_run_says_so(self):
+        result = self.phantom.register("--dry-run", moving=None, moving_labels=self.labels)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assert_said(result.stdout)
+
+    def test_mesh_says_so(self):
+        report = self.phantom.folder / "mesh.json"
+        result = run("mesh", self.labels, "-o", self.phantom.folder / "a.vtu", "--edge-length", 8, "--json", report)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assert_said(result.stdout)
+        self.assert_said(" ".join(json.loads(report.read_text())["notes"]))
+
+    def test_simulate_and_explain_say_so(self):
+        scene = self.phantom.folder / "scene.toml"
+        scene.write_text(SCENE.replace("LABELS", self.labels.name))
+        result = run("simulate", scene, "-o", self.phantom.output)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assert_said(result.stdout)
+        self.assert_said(" ".join(json.loads((self.phantom.output / "summary.json").read_text())["notes"]))
+        self.assert_said(run("explain", scene).stdout)
+
+    def test_evaluate_says_so(self):
+        scores = self.phantom.folder / "scores.json"
+        result = run("evaluate", "--labels", self.labels, "--reference-labels", self.labels, "--json", scores)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assert_said(result.stdout)
+        self.assert_said(" ".join(json.loads(scores.read_text())["notes"]))
+
+    def test_warp_says_so(self):
+        field = save(numpy.zeros((SIZE, SIZE, SIZE, 1, 3), numpy.float32), MOVING_AFFINE, self.phantom.folder / "f.nii")
+        data = bytearray(field.read_bytes())
+        data[68:70] = struct.pack("<h", 1007)
+        field.write_bytes(data)
+        warped = self.phantom.folder / "warped.nii.gz"
+        result = run("warp", self.labels, "-o", warped, "--labels", "--displacement", field)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assert_said(result.stdout)
+
+
+class Kinds(PhantomTest):
+    def test_a_grey_image_is_refused_as_labels(self):
+        grey = numpy.random.default_rng(1).integers(0, 400, size=(SIZE, SIZE, SIZE)).astype(numpy.int16)
+        path = save(grey, MOVING_AFFINE, self.phantom.folder / "grey.nii.gz")
+        self.assert_refused(self.phantom.register(moving=None, moving_labels=path), INPUT, "grey.nii.gz", "grey image")
+
+    def test_info_describes_a_field_of_three_components(self):
+        vectors = numpy.zeros((5, 6, 7, 1, 3), numpy.float32)
+        vectors[2, 3, 4, 0] = [-1.5, 0, 2.5]
+        path = save(vectors, MOVING_AFFINE, self.phantom.folder / "field.nii.gz")
+        result = run("info", path)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("3 components", result.stdout)
+        self.assertIn("-1.5 to 2.5", result.stdout)
+
+    def test_names_in_upper_case(self):
+        path = self.phantom.moving_labels.rename(self.phantom.folder / "LABELS.NII.GZ")
+        result = run("info", "--labels", path)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("centroid", result.stdout)
+
+    def test_segments_have_names(self):
+        path = segmentation(self.phantom.folder / "a.seg.nrrd", self.phantom.moving_labels_array, {1: "shell", 2: "core"})
+        result = run("info", "--labels", path)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("'shell'", result.stdout)
+        self.assertIn("'core'", result.stdout)
+
+    def test_one_name_with_two_numbers_is_refused(self):
+        folder, phantom = self.phantom.folder, self.phantom
+        moving = segmentation(folder / "m.seg.nrrd", phantom.moving_labels_array, {1: "shell", 2: "core"})
+        fixed = segmentation(folder / "f.seg.nrrd", phantom.moving_labels_array, {1: "core", 2: "shell"})
+        result = phantom.register(moving=None, fixed=None, moving_labels=moving, fixed_labels=fixed)
+        self.assert_refused(result, INPUT, "m.seg.nrrd", "f.seg.nrrd", "'shell'", "label 2")
+
+
+if __name__ == "__main__":
+    unittest.main()
