@@ -215,7 +215,8 @@ std::string summary_text(const RegistrationRun& run, double total_seconds) {
                             run.scores.before.contains(label) ? run.scores.before.at(label).dice : 0.0, after.dice);
     text +=
         fmt::format("det J of the mesh: minimum {:.3f}, folded {}\n", run.scores.mesh.minimum, run.scores.mesh.folded);
-    for (const registration::Doubt& doubt : run.result.doubts) text += "doubt: " + doubt.text + "\n";
+    for (const registration::Doubt& doubt : run.result.doubts)
+        text += fmt::format("{}: {}\n", name_of(doubt.severity), full_text(doubt));
     return text + "results in " + run.options.output.string() + "\n";
 }
 
