@@ -46,7 +46,8 @@ void doubt_dial(RegistrationRun& run) {
     if (const auto& budget = run.options.time_budget; budget && run.intraoperative_seconds > late * *budget)
         doubts.push_back(
             {"time.exceeded", run.intraoperative_seconds, *budget,
-             fmt::format("the time budget of {:.3g} s was exceeded: {:.3g} s", *budget, run.intraoperative_seconds)});
+             fmt::format("the time budget of {:.3g} s was exceeded: {:.3g} s", *budget, run.intraoperative_seconds),
+             "allow more time, or a coarser mesh", Severity::Notice});
     if (!run.options.accuracy) return;
     if (auto doubt = doubt_of_accuracy(summarise(*run.products.uncertainty), *run.options.accuracy))
         doubts.push_back(std::move(*doubt));

@@ -116,6 +116,7 @@ struct Parser {
         verb.flag("--match-image", o.match_image, "Match blocks of the images besides the other data");
         verb.flag("--no-align", o.no_align, "Skip the rigid alignment: the images share one frame");
         verb.flag("--no-error-estimate", o.no_error_estimate, "Leave out how far off targets may lie, for speed");
+        verb.flag("--strict", o.strict, "End with exit code 4 where the result is doubted; everything is written");
         verb.flag("--resample-labels", o.resample_labels, "Accept labels on another grid than their image");
         verb.text("--device", o.device.name, "auto, cpu, gpu or gpu:<index>")
             ->check(CLI::Validator(check_device, "", "device"));

@@ -66,6 +66,7 @@ struct RegisterOptions {
     bool no_align = false;
     bool resample_labels = false;
     bool no_error_estimate = false;
+    bool strict = false;  ///< a result that is doubted ends with exit code 4
     bool dry_run = false;
     DeviceChoice device;
     std::filesystem::path save_parameters;

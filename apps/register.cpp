@@ -9,6 +9,7 @@
 #include "apps/update_device.hpp"
 #include "apps/verbs.hpp"
 #include "apps/versions.hpp"
+#include "core/errors.hpp"
 #include "imaging/filters.hpp"
 #include "imaging/labels.hpp"
 #include "meshing/mesh_io.hpp"
@@ -151,8 +152,27 @@ CurveDistances curve_distances(const RegistrationRun& run) {
             curve_residual(carried, curves.fixed, {}).to_lines};
 }
 
+/// The field that is written, where the organ is: tissue never folds.
+void doubt_field(RegistrationRun& run) {
+    const imaging::Volume organ =
+        imaging::mask_of_all(imaging::without_labels(run.inputs.moving_labels, run.options.rigid_neighbours));
+    run.scores.organ = field_jacobians(run.products.moving_to_fixed, &organ);
+    if (auto doubt = doubt_of_folds(run.scores.organ)) run.result.doubts.push_back(std::move(*doubt));
+}
+
+/// After everything was written. Throws SolverFailure.
+void require_no_doubts(const RegistrationRun& run) {
+    std::vector<std::string> codes;
+    for (const Doubt& doubt : run.result.doubts)
+        if (doubt.severity == Severity::Doubt) codes.push_back(doubt.code);
+    if (codes.empty()) return;
+    throw SolverFailure(fmt::format("the result is doubted ({}); '{}' says why, and all files are written",
+                                    fmt::join(codes, ", "), (run.options.output / "report.json").string()));
+}
+
 Scores score(const RegistrationRun& run) {
     Scores scores;
+    scores.organ = run.scores.organ;
     const auto without_neighbours = [&](const imaging::Volume& labels) {
         return imaging::without_labels(labels, run.options.rigid_neighbours);
     };
@@ -163,8 +183,6 @@ Scores score(const RegistrationRun& run) {
         scores.after = overlap(without_neighbours(run.products.warped_labels), fixed);
     }
     scores.mesh = mesh_jacobians(run.result.deformation);
-    const imaging::Volume organ = imaging::mask_of_all(moving);
-    scores.organ = field_jacobians(run.products.moving_to_fixed, &organ);
     scores.grid = field_jacobians(run.products.moving_to_fixed);
     if (run.inputs.landmarks) scores.target_error = target_error(*run.inputs.landmarks, run.products.landmarks);
     if (run.inputs.curves) scores.curves = curve_distances(run);
@@ -218,6 +236,7 @@ void run_register(const RegisterOptions& options) {
         run.times.push_back(clock.lap("error estimate"));
     }
     if (run.dial) doubt_dial(run);
+    doubt_field(run);
 
     progress.begin("writing and scoring", 0.65, 0.88);
     auto silenced = std::make_unique<SilencedStandardError>();
@@ -238,6 +257,7 @@ void run_register(const RegisterOptions& options) {
     run.times.push_back(clock.lap("report"));
     progress.clear();
     if (!options.common.quiet) fmt::print("{}", summary_text(run, clock.total()));
+    if (options.strict) require_no_doubts(run);
 }
 
 }  // namespace tissuewarp::apps

@@ -218,7 +218,8 @@ std::string summary_text(const RegistrationRun& run, double total_seconds) {
     for (const std::vector<std::string>* notes : {&run.inputs.notes, &run.notes})
         for (const std::string& note : *notes)
             if (!run.dial || note != run.dial->reason) text += "note: " + note + "\n";  // said above
-    for (const registration::Doubt& doubt : run.result.doubts) text += "doubt: " + doubt.text + "\n";
+    for (const registration::Doubt& doubt : run.result.doubts)
+        text += fmt::format("{}: {}\n", name_of(doubt.severity), full_text(doubt));
     return text + "results in " + run.options.output.string() + "\n";
 }
 

@@ -128,6 +128,18 @@ json notes(const RegistrationRun& run) {
     return all;
 }
 
+json doubts(const std::vector<registration::Doubt>& doubts) {
+    json list = json::array();
+    for (const registration::Doubt& doubt : doubts)
+        list.push_back({{"code", doubt.code},
+                        {"severity", name_of(doubt.severity)},
+                        {"value", number(doubt.value)},
+                        {"limit", number(doubt.limit)},
+                        {"text", doubt.text},
+                        {"remedy", doubt.remedy}});
+    return list;
+}
+
 json mesh(const RegistrationRun& run) {
     json object = to_json(meshing::quality(run.result.deformation.mesh));
     const bool t4 = run.prepared->model.element == tled::Element::T4;
@@ -282,7 +294,7 @@ json report_json(const RegistrationRun& run, double total_seconds) {
     const Scores& scores = run.scores;
     json report{
         {"schema", "tissuewarp.report"},
-        {"schema_version", 1},
+        {"schema_version", 2},
         {"program", "tissuewarp"},
         {"version", program_version()},
         {"versions", versions()},
@@ -296,7 +308,7 @@ json report_json(const RegistrationRun& run, double total_seconds) {
         {"rounds", rounds(run)},
         {"jacobian",
          {{"mesh", to_json(scores.mesh)}, {"field_in_organ", to_json(scores.organ)}, {"field", to_json(scores.grid)}}},
-        {"doubts", texts(run.result.doubts)},
+        {"doubts", doubts(run.result.doubts)},
         {"notes", notes(run)},
         {"outputs", output_names(run.options)},
         {"stages", stages(run)},

@@ -199,7 +199,7 @@ void run(const Arguments& arguments) {
             seed, draw.coverage, result.surface->coverage, draw.outliers, draw.angle_deg, draw.shift_mm,
             rigid_errors.back(), errors.back(), result.surface->inlier_share, result.surface->residual_mm,
             result.surface->rival_mm, result.surface->rival_support, expected.mean_mm, seconds);
-        for (const Doubt& doubt : result.doubts) std::printf(" %s;", doubt.text.c_str());
+        for (const Doubt& doubt : result.doubts) std::printf(" %s;", full_text(doubt).c_str());
         std::printf(" |\n");
         std::fflush(stdout);
     }

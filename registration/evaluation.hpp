@@ -3,11 +3,13 @@
 
 #include "imaging/volume.hpp"
 #include "registration/deformation.hpp"
+#include "registration/result.hpp"
 
 #include <Eigen/Core>
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <vector>
 
 namespace tissuewarp::registration {
@@ -65,5 +67,8 @@ JacobianReport mesh_jacobians(const Deformation& deformation);
 
 /// det J of a forward field on its grid, every voxel, or those of a mask.
 JacobianReport field_jacobians(const imaging::Volume& moving_to_fixed, const imaging::Volume* mask = nullptr);
+
+/// `field.folds` where such a report of the organ's voxels holds folded ones, which tissue never has.
+std::optional<Doubt> doubt_of_folds(const JacobianReport& in_organ);
 
 }  // namespace tissuewarp::registration

@@ -19,10 +19,23 @@ std::vector<PulledNode> LastPulls::data() const {
     return result;
 }
 
+const char* name_of(Severity severity) {
+    return severity == Severity::Notice ? "notice" : "doubt";
+}
+
+std::string full_text(const Doubt& doubt) {
+    return doubt.remedy.empty() ? doubt.text : doubt.text + "; " + doubt.remedy;
+}
+
 std::vector<std::string> texts(const std::vector<Doubt>& doubts) {
     std::vector<std::string> result;
-    for (const Doubt& doubt : doubts) result.push_back(doubt.text);
+    for (const Doubt& doubt : doubts) result.push_back(full_text(doubt));
     return result;
+}
+
+int count_of_severe(const std::vector<Doubt>& doubts) {
+    return static_cast<int>(std::count_if(doubts.begin(), doubts.end(),
+                                          [](const Doubt& doubt) { return doubt.severity == Severity::Doubt; }));
 }
 
 }  // namespace tissuewarp::registration

@@ -108,16 +108,29 @@ struct LastPulls {
     [[nodiscard]] std::vector<PulledNode> data() const;
 };
 
+/// What a doubt says of the result.
+enum class Severity {
+    Notice,  ///< less is known, or it took longer, than was asked for: the result may be right all the same
+    Doubt    ///< as results look that failed
+};
+/// "notice", "doubt".
+const char* name_of(Severity severity);
+
 /// A reason not to trust a result.
 struct Doubt {
-    std::string code;       ///< which one, for programs: `labels.unmatched`
-    double value = 0;       ///< what was found …
-    double limit = 0;       ///< … and what would have been in order
-    std::string text = {};  ///< for people, with the remedy
+    std::string code;         ///< which one, for programs: `labels.unmatched`
+    double value = 0;         ///< what was found …
+    double limit = 0;         ///< … and what would have been in order
+    std::string text = {};    ///< what is the matter, for people
+    std::string remedy = {};  ///< what to do about it; empty where `text` says so
+    Severity severity = Severity::Doubt;
 };
 
-/// What doubts say, for people.
+/// What it says and what to do about it, for people.
+std::string full_text(const Doubt& doubt);
 std::vector<std::string> texts(const std::vector<Doubt>& doubts);
+/// Those of severity Doubt.
+int count_of_severe(const std::vector<Doubt>& doubts);
 
 struct UpdateResult {
     Deformation deformation;

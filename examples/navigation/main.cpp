@@ -34,7 +34,7 @@ void report(const char* data, const registration::PreparedModel& model, const re
     std::printf("%s: (%.1f, %.1f, %.1f) moved %.1f mm, to within %.1f mm\n", data, target[0], target[1], target[2],
                 (now - target).norm(), error ? error->interval_mm : 0.0);
     for (const registration::Doubt& doubt : result.doubts)
-        std::printf("  doubt (%s): %s\n", doubt.code.c_str(), doubt.text.c_str());
+        std::printf("  doubt (%s): %s\n", doubt.code.c_str(), full_text(doubt).c_str());
 }
 
 void during_the_operation(const char* preop, const char* intraop, const char* surface) {

@@ -6,6 +6,7 @@
 
 #include <Eigen/Dense>
 
+#include <cstdio>
 #include <numeric>
 #include <string>
 
@@ -120,6 +121,18 @@ JacobianReport field_jacobians(const Volume& moving_to_fixed, const Volume* mask
     report.percentile_99 = percentile(values, 99.0);
     report.folded_share = static_cast<double>(report.folded) / static_cast<double>(values.size());
     return report;
+}
+
+std::optional<Doubt> doubt_of_folds(const JacobianReport& in_organ) {
+    if (in_organ.folded == 0) return std::nullopt;
+    char least[32];
+    std::snprintf(least, sizeof least, "%.3g", in_organ.minimum);
+    return Doubt{
+        "field.folds", double(in_organ.folded), 0,
+        "the displacement field folds in " + std::to_string(in_organ.folded) +
+            " voxels of the organ, where its det J falls to " + least,
+        "do not trust it there (report.json lists places); a finer mesh, or labels and points that do not pull "
+        "against each other there"};
 }
 
 }  // namespace tissuewarp::registration

@@ -43,8 +43,8 @@ void AnchorTerm::judge(const State& state, UpdateResult& result) {
     result.anchors = fit;
     if (fit.largest_mm > most_mm)
         result.doubts.push_back({"anchors.pulled", fit.largest_mm, most_mm,
-                                 "anchored tissue was pulled by up to " + to_text(fit.largest_mm) +
-                                     " mm; check which tissue stays, and the rigid placement"});
+                                 "anchored tissue was pulled by up to " + to_text(fit.largest_mm) + " mm",
+                                 "check which tissue stays, and the rigid placement"});
 }
 
 }  // namespace tissuewarp::registration::detail

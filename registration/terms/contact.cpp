@@ -80,9 +80,10 @@ void ContactTerm::judge(const State& state, UpdateResult& result) {
     constexpr double most_mm = contact_options.most_depth_mm;
     result.contact = fit(state);
     if (result.contact->deepest_mm > most_mm)
-        result.doubts.push_back({"contact.entered", result.contact->deepest_mm, most_mm,
-                                 "the organ lies up to " + to_text(result.contact->deepest_mm) +
-                                     " mm in a rigid neighbour; check its label and the rigid placement"});
+        result.doubts.push_back(
+            {"contact.entered", result.contact->deepest_mm, most_mm,
+             "the organ lies up to " + to_text(result.contact->deepest_mm) + " mm in a rigid neighbour",
+             "check its label and the rigid placement"});
 }
 
 }  // namespace tissuewarp::registration::detail

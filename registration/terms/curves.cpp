@@ -52,13 +52,14 @@ void doubt(const CurveFit& fit, double deviation_mm, std::vector<Doubt>& doubts)
     if (fit.inlier_share < least_inliers)
         doubts.push_back({"curves.outliers", fit.inlier_share, least_inliers,
                           "only " + percent(fit.inlier_share) +
-                              " of the intraoperative points along vessels came near a preoperative curve; check that "
-                              "both show the same vessels, and that the headers place the images within a centimetre "
-                              "or two"});
+                              " of the intraoperative points along vessels came near a preoperative curve",
+                          "check that both show the same vessels, and that the headers place the images within a "
+                          "centimetre or two"});
     else if (fit.residual_mm > most_residual * deviation_mm)
         doubts.push_back({"curves.apart", fit.residual_mm, most_residual * deviation_mm,
                           "points along vessels lie " + to_text(fit.residual_mm) + " mm across from the curves where " +
-                              to_text(deviation_mm) + " mm along each axis were stated"});
+                              to_text(deviation_mm) + " mm along each axis were stated",
+                          "state how far off the points are (--curves-sd), or check that they show these vessels"});
 }
 
 }  // namespace

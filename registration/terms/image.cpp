@@ -30,20 +30,23 @@ void doubt(const ImageFit& fit, std::vector<Doubt>& doubts) {
     if (fit.matched < limits.least_matched * fit.blocks)
         doubts.push_back({"image.blocks_lost", fit.matched / double(fit.blocks), limits.least_matched,
                           "only " + std::to_string(fit.matched) + " of " + std::to_string(fit.blocks) +
-                              " blocks of the moving image were found in the fixed one"});
+                              " blocks of the moving image were found in the fixed one",
+                          "check that both show the same organ, within the search range of each other"});
     if (fit.shown_share < limits.least_shown)
         doubts.push_back({"image.out_of_view", fit.shown_share, limits.least_shown,
                           "the fixed image shows only " + percent(fit.shown_share) +
-                              " of the organ; the rest is where mechanics alone put it"});
+                              " of the organ; the rest is where mechanics alone put it",
+                          "trust the map uncertainty_trust, or show more of the organ", Severity::Notice});
     if (fit.agreement && *fit.agreement < limits.least_agreement)
         doubts.push_back({"image.disagree", *fit.agreement, limits.least_agreement,
                           "the images agree where the organ lies hardly better than by chance (" +
-                              to_text(*fit.agreement) +
-                              "; 0 is chance, 1 the same image): check that they show the same organ"});
+                              to_text(*fit.agreement) + "; 0 is chance, 1 the same image)",
+                          "check that they show the same organ"});
     if (fit.residual_mm > limits.most_residual_mm)
         doubts.push_back(
             {"image.apart", fit.residual_mm, limits.most_residual_mm,
-             "blocks found in the fixed image lie " + to_text(fit.residual_mm) + " mm from where the tissue went"});
+             "blocks found in the fixed image lie " + to_text(fit.residual_mm) + " mm from where the tissue went",
+             "look where image and result differ; give labels or landmarks beside the image"});
 }
 
 }  // namespace

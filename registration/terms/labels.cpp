@@ -3,6 +3,7 @@
 #include "imaging/labels.hpp"
 #include "registration/doubts.hpp"
 #include "registration/pose/alignment.hpp"
+#include "registration/terms/label_doubts.hpp"
 #include "registration/terms/label_matches.hpp"
 
 #include <algorithm>
@@ -73,18 +74,22 @@ void LabelTerm::judge(const State& /*state*/, UpdateResult& result) {
     if (last_.matched < limits.least_matched * last_.candidates)
         result.doubts.push_back({"labels.unmatched", last_.matched / double(last_.candidates), limits.least_matched,
                                  "only " + std::to_string(last_.matched) + " of " + std::to_string(last_.candidates) +
-                                     " boundary nodes found their boundary in the fixed labels"});
+                                     " boundary nodes found their boundary in the fixed labels",
+                                 "check that both label maps are of this organ, and its placement"});
     if (last_.mean_residual_mm > most_residual)
         result.doubts.push_back(
             {"labels.apart", last_.mean_residual_mm, most_residual,
-             "the surfaces still differ by " + to_text(last_.mean_residual_mm) + " mm on average, more than a voxel"});
+             "the surfaces still differ by " + to_text(last_.mean_residual_mm) + " mm on average, more than a voxel",
+             "look where the labels differ; allow more rounds, or softer tissue"});
     const double growth = labelled_volume(labels_) / labelled_volume(prepared_.labels);
     const double poisson = largest_poisson_ratio(prepared_.model.materials);
     if (std::abs(growth - 1) > limits.most_growth && poisson > limits.resisting_poisson)
         result.doubts.push_back({"labels.volume_changed", growth, limits.most_growth,
                                  "the labelled volume changed by the factor " + to_text(growth) +
-                                     ", which tissue of Poisson's ratio " + to_text(poisson) +
-                                     " resists; for lungs and other tissue that changes volume take 0.3 or less"});
+                                     ", which tissue of Poisson's ratio " + to_text(poisson) + " resists",
+                                 "for lungs and other tissue that changes volume take 0.3 or less"});
+    for (Doubt& doubt : doubts_of_labels(prepared_, labels_, options_, result))
+        result.doubts.push_back(std::move(doubt));
 }
 
 }  // namespace tissuewarp::registration::detail

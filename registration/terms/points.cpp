@@ -43,8 +43,8 @@ void doubt(const PointFit& fit, std::vector<Doubt>& doubts) {
     if (fit.outliers > most_outliers * fit.used)
         doubts.push_back({"points.outliers", fit.outliers / double(fit.used), most_outliers,
                           std::to_string(fit.outliers) + " of " + std::to_string(fit.used) +
-                              " pairs of points do not fit the tissue; check that they are the same places in both "
-                              "images"});
+                              " pairs of points do not fit the tissue",
+                          "check that they are the same places in both images"});
 }
 
 }  // namespace

@@ -18,22 +18,25 @@ void doubt(const SurfaceFit& fit, double deviation_mm, std::vector<Doubt>& doubt
     const double residual_limit = most_residual * std::max(deviation_mm, least_deviation_mm);
     if (fit.inlier_share < least_inliers)
         doubts.push_back({"surface.outliers", fit.inlier_share, least_inliers,
-                          "only " + percent(fit.inlier_share) + " of the intraoperative surface lies on the model"});
+                          "only " + percent(fit.inlier_share) + " of the intraoperative surface lies on the model",
+                          "check that the points are of this organ, in LPS mm"});
     if (fit.residual_mm > residual_limit)
         doubts.push_back({"surface.apart", fit.residual_mm, residual_limit,
                           "points of the intraoperative surface lie " + to_text(fit.residual_mm) +
-                              " mm from the model where " + to_text(deviation_mm) + " mm were stated"});
+                              " mm from the model where " + to_text(deviation_mm) + " mm were stated",
+                          "state how far off the points are (--surface-sd), or leave out what is not of this organ"});
     if (!fit.pose_searched) return;
     if (fit.coverage < least_coverage)
         doubts.push_back(
             {"surface.too_small", fit.coverage, least_coverage,
-             "the points show " + percent(fit.coverage) +
-                 " of the organ's surface, too little to tell where it lies; show more of it, give pairs of points, or "
-                 "leave it where the headers place it if they are right (--no-align)"});
+             "the points show " + percent(fit.coverage) + " of the organ's surface, too little to tell where it lies",
+             "show more of it, give pairs of points, or leave it where the headers place it if they are right "
+             "(--no-align)"});
     if (fit.rival_support > most_rival_support)
-        doubts.push_back({"surface.two_poses", fit.rival_support, most_rival_support,
-                          "the points fit about as well with the organ placed " + to_text(fit.rival_mm) +
-                              " mm elsewhere; give a wider patch, or landmarks"});
+        doubts.push_back(
+            {"surface.two_poses", fit.rival_support, most_rival_support,
+             "the points fit about as well with the organ placed " + to_text(fit.rival_mm) + " mm elsewhere",
+             "give a wider patch, or landmarks"});
 }
 
 }  // namespace

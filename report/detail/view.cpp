@@ -286,6 +286,21 @@ void put_table(json& view, const std::string& name, json rows) {
     view[name] = std::move(rows);
 }
 
+/// Doubts of reports of schema version 1 are texts alone.
+void put_doubts(json& view, const json& doubts) {
+    json severe = json::array(), notices = json::array();
+    if (doubts.is_array())
+        for (const json& doubt : doubts) {
+            json& list = at(doubt, "severity") == "notice" ? notices : severe;
+            list.push_back({{"text", text(doubt.is_object() ? at(doubt, "text") : doubt)},
+                            {"remedy", text(at(doubt, "remedy"))},
+                            {"code", text(at(doubt, "code"))}});
+        }
+    view["no_doubts"] = doubts.is_array() && severe.empty();
+    if (!severe.empty()) view["doubtful"] = {{"doubts", severe}};
+    if (!notices.empty()) view["noticed"] = {{"notices", notices}};
+}
+
 }  // namespace
 
 json view_of(const json& report) {
@@ -317,11 +332,7 @@ json view_of(const json& report) {
     put_table(view, "materials", materials_view(at(report, "materials")));
     if (at(report, "notes").is_array() && !at(report, "notes").empty())
         view["notable"] = {{"notes", at(report, "notes")}};
-    json doubts = json::array();
-    if (at(report, "doubts").is_array())
-        for (const json& doubt : at(report, "doubts")) doubts.push_back(text(doubt));
-    view["no_doubts"] = at(report, "doubts").is_array() && doubts.empty();
-    if (!doubts.empty()) view["doubtful"] = {{"doubts", doubts}};
+    put_doubts(view, at(report, "doubts"));
     return view;
 }
 

@@ -50,7 +50,7 @@ const std::map<std::string, std::set<std::string>> rooms_of_registration{
     {"dial", {}},
     {"io", {}},
     {"springs", {}},
-    {"evaluation", {"io"}},
+    {"evaluation", {"field", "io"}},
     {"field", {}},
     {"matching", {"field", "springs"}},
     {"pose", {"io"}},

@@ -1,0 +1,61 @@
+#include "registration/pose/label_rivals.hpp"
+
+#include "registration/pose/label_distance.hpp"
+#include "registration/pose/pose_search.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <vector>
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+/// The 48 signed permutations of the axes: 24 rotations, the identity first, and their reflections.
+std::vector<Eigen::Matrix3d> symmetries_of_a_cube() {
+    std::vector<Eigen::Matrix3d> result;
+    std::array<int, 3> axes{0, 1, 2};
+    do
+        for (int signs = 0; signs < 8; ++signs) {
+            Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
+            for (int row = 0; row < 3; ++row)
+                matrix(row, axes[static_cast<std::size_t>(row)]) = signs >> row & 1 ? -1 : 1;
+            result.push_back(matrix);
+        }
+    while (std::next_permutation(axes.begin(), axes.end()));
+    return result;
+}
+
+}  // namespace
+
+LabelRivals label_rivals(const imaging::Volume& moving, const imaging::Volume& fixed,
+                         const Eigen::Isometry3d& placement, const AlignmentOptions& options, Observer& observer) {
+    const LabelDistance distance(moving.as(CV_32S), fixed.as(CV_32S), LabelRivalOptions().samples);
+    const Eigen::Matrix3Xd& points = distance.forward.points();
+    const Eigen::Vector3d centre = points.rowwise().mean(), fixed_centre = distance.backward.points().rowwise().mean();
+    LabelRivals rivals{0, std::numeric_limits<double>::infinity(), 0, std::numeric_limits<double>::infinity()};
+    for (const Eigen::Matrix3d& symmetry : symmetries_of_a_cube()) {
+        Eigen::Affine3d about_centre = Eigen::Affine3d::Identity();
+        about_centre.linear() = symmetry;
+        about_centre.translation() = centre - symmetry * centre;
+        const Eigen::Affine3d start = placement * about_centre;
+        const auto cost = [&](const Eigen::Affine3d& map, double trim, int stride) {
+            return distance(map * start, trim, stride);
+        };
+        const Eigen::Matrix3Xd started = start * points;
+        const Alignment found = search_pose(cost, started, fixed_centre, PoseFreedom::Similarity, options, observer);
+        if (symmetry.isIdentity()) {
+            rivals.found_mm = found.mean_distance_mm;
+        } else if (symmetry.determinant() < 0) {
+            rivals.mirrored_mm = std::min(rivals.mirrored_mm, found.mean_distance_mm);
+        } else if (found.mean_distance_mm < rivals.turned_mm) {
+            rivals.turned_mm = found.mean_distance_mm;
+            const Eigen::Matrix3d turn = placement.linear().transpose() * found.placement.linear() * start.linear();
+            rivals.turned_deg = Eigen::AngleAxisd(turn).angle() * 180 / EIGEN_PI;
+        }
+    }
+    return rivals;
+}
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,277 @@
+#include "registration/terms/label_doubts.hpp"
+
+#include "imaging/filters.hpp"
+#include "imaging/labels.hpp"
+#include "registration/doubts.hpp"
+#include "registration/evaluation.hpp"
+#include "registration/evaluation/model_labels.hpp"
+#include "registration/pose/alignment.hpp"
+#include "registration/pose/label_distance.hpp"
+#include "registration/pose/label_rivals.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+using imaging::Volume;
+using Counts = std::map<int, std::int64_t>;
+
+constexpr LabelFitLimits limits = label_fit_limits;
+
+/// Voxels of each label.
+Counts voxels_of(const Volume& labels) {
+    Counts counts;
+    const auto* value = labels.data<std::int32_t>();
+    const std::int64_t end = labels.geometry.voxel_count();
+    for (std::int64_t n = 0; n < end;) {
+        const int label = value[n];
+        std::int64_t same = n + 1;
+        while (same < end && value[same] == label) ++same;
+        if (label != 0) counts[label] += same - n;
+        n = same;
+    }
+    return counts;
+}
+
+/// Area (mm²) of labelled voxels at the faces of the image.
+double cut_area(const Volume& labels) {
+    const auto& grid = labels.geometry;
+    const auto* value = labels.data<std::int32_t>();
+    double area = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        const std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
+        const double face = grid.voxel_volume() / grid.spacing[static_cast<Eigen::Index>(axis)];
+        for (const int at : {0, grid.size[axis] - 1})
+            for (int a = 0; a < grid.size[u]; ++a)
+                for (int b = 0; b < grid.size[v]; ++b) {
+                    std::array<int, 3> index{};
+                    index[axis] = at;
+                    index[u] = a;
+                    index[v] = b;
+                    if (value[labels.offset(index[0], index[1], index[2])] != 0) area += face;
+                }
+    }
+    return area;
+}
+
+std::string name_of_label(int label) {
+    return "label " + std::to_string(label);
+}
+
+/// Labels that one of the maps lacks.
+void doubt_vanished(const Counts& moving, const Counts& fixed, std::vector<Doubt>& doubts) {
+    const auto doubt = [&](int label, std::int64_t voxels, const char* text, const char* remedy) {
+        doubts.push_back({"label.vanished", double(voxels), 0, name_of_label(label) + text, remedy,
+                          voxels < limits.fewest_voxels ? Severity::Notice : Severity::Doubt});
+    };
+    for (const auto& [label, voxels] : moving)
+        if (!fixed.contains(label))
+            doubt(label, voxels,
+                  " is in the moving labels only: its tissue is where mechanics alone put it, and what is there in the "
+                  "fixed labels pulls at the others",
+                  "segment it in both, or merge it with what is around it; check the label tables");
+    for (const auto& [label, voxels] : fixed)
+        if (!moving.contains(label))
+            doubt(label, voxels, " is in the fixed labels only: no tissue belongs there",
+                  "segment it in both, or leave it out; check the label tables");
+}
+
+/// How well the model's own labels fit.
+class LabelFits {
+public:
+    LabelFits(const PreparedModel& prepared, const Volume& fixed, const UpdateResult& result)
+        : moving_(prepared.labels.as(CV_32S)),
+          fixed_(fixed.as(CV_32S)),
+          in_moving_(voxels_of(moving_)),
+          in_fixed_(voxels_of(fixed_)),
+          coarse_(coarsened(fixed_, limits.grid_mm)),
+          shown_(labels_of_model(result.deformation, moving_, coarse_.geometry)),
+          after_(overlap(shown_, coarse_)),
+          voxel_mm_(std::max(coarse_.geometry.spacing.maxCoeff(), moving_.geometry.spacing.maxCoeff())) {}
+
+    [[nodiscard]] std::vector<Doubt> doubts(const UpdateResult& result) const {
+        std::vector<Doubt> doubts;
+        doubt_vanished(in_moving_, in_fixed_, doubts);
+        for (const auto& [label, fit] : after_)
+            if (label != 0 && is_in_both(label)) doubt_fit(label, fit, doubts);
+        doubt_worse(result, doubts);
+        doubt_cut(doubts);
+        return doubts;
+    }
+
+    /// Which label of the fixed map a label of the model lies on, of those that lie on another than their own.
+    [[nodiscard]] std::map<int, int> exchanged() const {
+        std::map<int, int> pairs = exchanged_on(shown_);
+        return pairs.empty() ? exchanged_on(where_all_labels_together_fit()) : pairs;
+    }
+
+    [[nodiscard]] const Volume& moving() const { return moving_; }
+    [[nodiscard]] const Volume& fixed() const { return fixed_; }
+
+private:
+    Volume moving_, fixed_;
+    Counts in_moving_, in_fixed_;
+    Volume coarse_, shown_;  // fixed labels and those of the model, on one grid
+    std::map<int, Overlap> after_;
+    double voxel_mm_;
+
+    [[nodiscard]] bool is_in_both(int label) const { return in_moving_.contains(label) && in_fixed_.contains(label); }
+
+    /// Of more voxels of the comparison's grid than a speck.
+    [[nodiscard]] bool is_speck(int label) const {
+        const double least = limits.fewest_voxels * coarse_.geometry.voxel_volume();
+        return double(in_moving_.at(label)) * moving_.geometry.voxel_volume() < least &&
+               double(in_fixed_.at(label)) * fixed_.geometry.voxel_volume() < least;
+    }
+
+    void doubt_fit(int label, const Overlap& fit, std::vector<Doubt>& doubts) const {
+        const double apart = fit.mean_surface_distance_mm;
+        if (!std::isfinite(apart) && is_speck(label)) return;  // between the voxels of the grid
+        const Severity severity = is_speck(label) ? Severity::Notice : Severity::Doubt;
+        const std::string distance =
+            std::isfinite(apart) ? "lies " + to_text(apart) + " mm from it on average" : "is out of its image";
+        constexpr const char* remedy = "look where this label went; check that it is the same tissue in both maps";
+        const double most_mm = std::max(limits.most_apart_mm, limits.most_apart_voxels * voxel_mm_);
+        if (fit.dice < limits.least_dice && apart > limits.within_voxels * voxel_mm_)
+            doubts.push_back({"label.overlap", fit.dice, limits.least_dice,
+                              name_of_label(label) + " overlaps the fixed one by a Dice of " + to_text(fit.dice) +
+                                  " only and " + distance,
+                              remedy, severity});
+        else if (apart > most_mm)
+            doubts.push_back({"label.apart", apart, most_mm,
+                              name_of_label(label) + " of the model " + distance + " in the fixed labels", remedy,
+                              severity});
+    }
+
+    void doubt_worse(const UpdateResult& result, std::vector<Doubt>& doubts) const {
+        const meshing::TetMesh& mesh = result.deformation.mesh;
+        const Deformation at_rest{mesh, Eigen::Matrix3Xd::Zero(3, mesh.nodes.cols()), Eigen::Isometry3d::Identity()};
+        const double before = dice_of_all(labels_of_model(at_rest, moving_, coarse_.geometry)),
+                     after = after_.at(0).dice;
+        if (after < before - limits.most_worse)
+            doubts.push_back({"labels.worse", after, before,
+                              "all labels together overlap less than before the registration: Dice " + to_text(before) +
+                                  " → " + to_text(after),
+                              "leave them where the headers place them, or check the labels"});
+    }
+
+    [[nodiscard]] double dice_of_all(const Volume& shown) const {
+        std::int64_t in_one = 0, in_both = 0;
+        for (std::int64_t n = 0; n < coarse_.geometry.voxel_count(); ++n) {
+            const bool a = shown.data<std::int32_t>()[n] != 0, b = coarse_.data<std::int32_t>()[n] != 0;
+            in_one += a + b;
+            in_both += a && b;
+        }
+        return in_one > 0 ? 2 * double(in_both) / double(in_one) : 0;
+    }
+
+    void doubt_cut(std::vector<Doubt>& doubts) const {
+        const auto share = [](const Volume& labels, const Counts& counts) {
+            double voxels = 0;
+            for (const auto& [label, count] : counts) voxels += double(count);
+            return cut_area(labels) / (6 * std::pow(voxels * labels.geometry.voxel_volume(), 2.0 / 3));
+        };
+        const double more = share(fixed_, in_fixed_) - share(moving_, in_moving_);
+        if (std::abs(more) <= limits.most_cut) return;
+        const std::string cut = more > 0 ? "fixed" : "moving", whole = more > 0 ? "moving" : "fixed";
+        doubts.push_back({"labels.cut_off", std::abs(more), limits.most_cut,
+                          "the border of the image cuts the organ off in the " + cut + " labels and not in the " +
+                              whole + " ones (" + percent(std::abs(more)) +
+                              " of its surface): tissue near the cut is drawn to where the image ends",
+                          "do not trust tissue near it; give labels of all of the organ, or cut both maps alike"});
+    }
+
+    /// The moving labels under the rigid motion that brings all of them together, whatever their numbers, to the fixed.
+    [[nodiscard]] Volume where_all_labels_together_fit() const {
+        const Alignment found = align_labels(imaging::mask_of_all(moving_), imaging::mask_of_all(fixed_));
+        Volume placed = moving_;
+        placed.geometry.origin = found.placement * moving_.geometry.origin;
+        placed.geometry.direction = found.placement.linear() * moving_.geometry.direction;
+        return imaging::resample(placed, coarse_.geometry, imaging::Interpolation::Nearest);
+    }
+
+    [[nodiscard]] std::map<int, int> exchanged_on(const Volume& shown) const {
+        std::map<std::pair<int, int>, double> common;
+        for (std::int64_t n = 0; n < coarse_.geometry.voxel_count(); ++n) {
+            const int a = shown.data<std::int32_t>()[n], b = coarse_.data<std::int32_t>()[n];
+            if (a != 0 && b != 0) common[{a, b}] += 2;
+        }
+        const Counts in_shown = voxels_of(shown), in_coarse = voxels_of(coarse_);
+        std::map<int, int> pairs;
+        for (auto& [pair, dice] : common) {
+            const auto [a, b] = pair;
+            const double own = common.contains({a, a}) ? common.at({a, a}) : 0;
+            const double all = double(in_shown.at(a) + in_coarse.at(b));
+            if (a != b && dice > limits.least_dice * all && dice > own) pairs[a] = b;
+        }
+        return pairs;
+    }
+};
+
+std::optional<Doubt> doubt_of_pairing(const LabelFits& fits) {
+    const std::map<int, int> pairs = fits.exchanged();
+    if (pairs.empty()) return std::nullopt;
+    std::string text = "labels seem to be exchanged:";
+    for (const auto& [moving, fixed] : pairs)
+        text += (text.back() == ':' ? " " : ", ") + std::to_string(moving) + " of the moving map lies where " +
+                std::to_string(fixed) + " of the fixed one does";
+    return Doubt{"labels.exchanged", double(pairs.size()), 0, text,
+                 "give the same tissue the same number in both maps"};
+}
+
+std::optional<Doubt> doubt_of_pose(const LabelFits& fits, const UpdateOptions& options, const UpdateResult& result) {
+    constexpr LabelPoseLimits pose = label_pose_limits;
+    const LabelRivals rivals = label_rivals(fits.moving(), fits.fixed(), result.alignment.placement, options.alignment);
+    const auto is_better = [&](double rival, double than) {
+        return rival < pose.better * than && rival < than - pose.better_mm;
+    };
+    const double found = rivals.found_mm, best = std::min(found, rivals.turned_mm);
+    if (is_better(rivals.mirrored_mm, best))
+        return Doubt{"labels.mirrored", rivals.mirrored_mm, pose.better * best,
+                     "the mirror image of the moving labels fits better: its boundaries lie " +
+                         to_text(rivals.mirrored_mm) + " mm from the fixed ones instead of " + to_text(best) + " mm",
+                     "check the orientation of both label maps: left and right seem to be exchanged in one"};
+    if (rivals.turned_deg > pose.least_turn_deg && is_better(rivals.turned_mm, found))
+        return Doubt{"labels.turned", rivals.turned_mm, pose.better * found,
+                     "the labels fit better turned by another " + std::to_string(std::lround(rivals.turned_deg)) +
+                         "°: their boundaries lie " + to_text(rivals.turned_mm) + " mm apart instead of " +
+                         to_text(found) + " mm",
+                     "turn one of the images by about as much beforehand"};
+    return std::nullopt;
+}
+
+/// Labels that lie elsewhere, as opposed to those that a map lacks or that its image cuts off.
+bool is_misplaced(const std::vector<Doubt>& doubts) {
+    return std::any_of(doubts.begin(), doubts.end(), [](const Doubt& doubt) {
+        return doubt.severity == Severity::Doubt && doubt.code != "labels.cut_off" && doubt.code != "label.vanished";
+    });
+}
+
+}  // namespace
+
+std::vector<Doubt> doubts_of_labels(const PreparedModel& prepared, const Volume& fixed, const UpdateOptions& options,
+                                    const UpdateResult& result) {
+    const LabelFits fits(prepared, fixed, result);
+    std::vector<Doubt> doubts = fits.doubts(result);
+    const double most_mm = label_pose_limits.most_distance_mm;
+    if (result.alignment.mean_distance_mm > most_mm)
+        doubts.push_back({"alignment.apart", result.alignment.mean_distance_mm, most_mm,
+                          "after the rigid alignment the boundaries still lay " +
+                              to_text(result.alignment.mean_distance_mm) + " mm apart on average",
+                          "check that both label maps show the same organ, placed alike"});
+    if (count_of_severe(doubts) == 0) return doubts;
+    std::optional<Doubt> cause = doubt_of_pairing(fits);
+    if (!cause && is_misplaced(doubts)) cause = doubt_of_pose(fits, options, result);
+    if (cause) doubts.insert(doubts.begin(), std::move(*cause));
+    return doubts;
+}
+
+}  // namespace tissuewarp::registration::detail
