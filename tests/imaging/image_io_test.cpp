@@ -243,7 +243,8 @@ TEST(ImageIo, CompressedNiftiIsOneGzipMember) {
 TEST(ImageIo, UnknownExtensionsAndMissingFoldersAreRefused) {
     const TemporaryFolder folder;
     const Volume volume(test::plain_grid({2, 2, 2}), CV_8U);
-    EXPECT_THROW(write_volume(volume, folder / "volume.png"), InvalidInput);
+    for (const char* name : {"volume.png", "volume.hdr", "volume.img", "volume.mhd", "volume.nhdr"})
+        EXPECT_THROW(write_volume(volume, folder / name), InvalidInput);
     EXPECT_THROW(write_volume(volume, folder / "missing/volume.nii.gz"), IoError);
     EXPECT_THROW(write_volume(volume, folder / "missing/volume.nrrd"), IoError);
     EXPECT_THROW(write_volume(volume, folder / "missing/volume.mha"), IoError);
