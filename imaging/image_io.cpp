@@ -172,14 +172,19 @@ void require_no_grey_image(const Volume& labels, const fs::path& path) {
     throw InvalidInput(message.str());
 }
 
-/// Writes one file through ITK and makes sure that all of it arrived: ITK does not notice a full disk.
+/// Writes one file through ITK and makes sure that all of it arrived: ITK does not notice a full disk, and knows its
+/// formats by small letters only.
 void write_whole(const Volume& volume, const fs::path& temporary, detail::Format format, const fs::path& path) {
-    detail::write_through_itk(volume, temporary, format);
+    fs::path small_letters = temporary;
+    small_letters.replace_extension(lower_case_name(temporary.extension()));
+    const AtomicFile file(small_letters);
+    detail::write_through_itk(volume, file.path(), format);
     try {
-        detail::require_whole(temporary, detail::read_image_header(temporary, format).voxels);
+        detail::require_whole(file.path(), detail::read_image_header(file.path(), format).voxels);
     } catch (const Error&) {
         throw IoError("cannot write '" + path.string() + "': the file did not arrive whole; free space on the disk");
     }
+    fs::rename(file.path(), temporary);
 }
 
 void write_compressed_nifti(const Volume& volume, const fs::path& path, const fs::path& temporary) {

@@ -52,6 +52,14 @@ TEST_P(EveryFormat, KeepsVectorsOfThreeComponents) {
     expect_round_trip(test::random_volume(oblique_grid(), CV_64FC3), folder / (std::string("field") + GetParam()));
 }
 
+TEST_P(EveryFormat, NamesMayBeInCapitals) {
+    const TemporaryFolder folder;
+    std::string name = std::string("volume") + GetParam();
+    std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::toupper(c); });
+    expect_round_trip(test::random_volume(oblique_grid(), CV_16S), folder / name);
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
+}
+
 TEST_P(EveryFormat, LeavesNothingButTheFile) {
     const TemporaryFolder folder;
     const auto path = folder / (std::string("only") + GetParam());
