@@ -1,5 +1,6 @@
 #include "meshing/mesher.hpp"
 
+#include "imaging/labels.hpp"
 #include "meshing/detail/delaunay_refinement.hpp"
 #include "meshing/detail/relaxation.hpp"
 
@@ -63,6 +64,19 @@ void require_affordable(const LabelGrid& grid, const std::vector<double>& edges)
                        " mm or more");
 }
 
+/// Thousands of pieces are mostly noise or a broken shell, and each is meshed.
+void note_scattered(const imaging::Volume& labels, const std::vector<int>& chosen, Observer& observer) {
+    constexpr int many = 1000;
+    for (const auto& [label, statistics] : imaging::label_statistics(labels)) {
+        const bool meshed = chosen.empty() || std::find(chosen.begin(), chosen.end(), label) != chosen.end();
+        if (meshed && statistics.components >= many)
+            observer.note("meshing: label " + std::to_string(label) + " lies in " +
+                          std::to_string(statistics.components) +
+                          " pieces that do not touch, as noise and broken shells do; meshing takes long: remove small "
+                          "pieces first");
+    }
+}
+
 /// Pieces below half a tetrahedron of the target size cannot be shown by the mesh and would only force tiny elements.
 void drop_specks(LabelGrid& grid, const std::vector<double>& edges, Observer& observer) {
     std::vector<double> voxels(edges.size());
@@ -119,6 +133,7 @@ TetMesh mesh_labels(const imaging::Volume& labels, const MeshingOptions& options
     LabelGrid grid = detail::make_label_grid(labels, options.labels, padding);
     const std::vector<double> edges = edge_lengths(grid, options);
     require_affordable(grid, edges);
+    note_scattered(labels, options.labels, observer);
     drop_specks(grid, edges, observer);
 
     observer.checkpoint("smoothing the labels", 0.02);

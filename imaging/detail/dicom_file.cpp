@@ -237,6 +237,7 @@ DicomFile description_of(const fs::path& path, const DicomSet& set) {
     file.bits_stored = set.whole(0x00280101, file.bits_allocated);
     file.high_bit = set.whole(0x00280102, file.bits_stored - 1);
     file.is_signed = set.whole(0x00280103, 0) != 0;
+    file.palette = set.text(0x00280004) == "PALETTE COLOR";
     file.mosaic = set.text(0x00080008).find("MOSAIC") != std::string::npos;
     const double frames = set.number(0x00280008).value_or(1.0);
     values_of(path, {frames, 1.0 * file.rows, 1.0 * file.columns});
@@ -266,7 +267,9 @@ std::optional<DicomFile> read_dicom_file(const fs::path& path) {
 }
 
 cv::Mat read_dicom_pixels(const DicomFile& file) {
-    if (file.samples != 1) throw unusable(file.path, "it is a colour image; give a grey one");
+    const bool label_map = file.segmentation == DicomFile::Segmentation::LabelMap;  // whose colours are for display
+    if (file.samples != 1 || (file.palette && !label_map))
+        throw unusable(file.path, "it is a colour image; give a grey one");
     const int bits = file.bits_allocated;
     if (bits != 1 && bits != 8 && bits != 16 && bits != 32)
         throw unusable(file.path, "its pixels take " + std::to_string(bits) + " bits; convert it to 8 or 16 bits");

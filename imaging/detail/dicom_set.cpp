@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <iterator>
 #include <set>
 #include <stdexcept>
 
@@ -218,7 +217,11 @@ std::optional<std::vector<std::string_view>> DicomSet::fragments(DicomTag tag) c
 DicomBytes::DicomBytes(const fs::path& path) {
     std::ifstream stream(path, std::ios::binary);
     if (!stream) throw IoError("cannot open '" + path.string() + "'; check the path and its rights");
-    bytes.assign(std::istreambuf_iterator<char>(stream), {});
+    std::error_code failure;
+    bytes.resize(fs::file_size(path, failure));
+    stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    if (failure || static_cast<std::size_t>(stream.gcount()) != bytes.size())
+        throw IoError("cannot read '" + path.string() + "'; check the file and its rights");
     try {
         std::string_view data = bytes;
         if (data.size() >= 132 && data.substr(128, 4) == "DICM") data.remove_prefix(132);

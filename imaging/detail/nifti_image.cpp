@@ -5,8 +5,10 @@
 #include "imaging/detail/header_checks.hpp"
 #include "imaging/detail/image_header.hpp"
 #include "imaging/detail/nifti_header.hpp"
+#include "imaging/detail/text_headers.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <map>
 #include <sstream>
@@ -137,18 +139,25 @@ void read_sizes(const fs::path& path, const NiftiHeader& header, StoredVoxels& v
     }
 }
 
-/// The .img beside a .hdr, packed or not, whatever the case of its name.
-fs::path voxels_beside(const fs::path& path) {
-    std::string stem = path.filename().string();
-    for (int endings = is_gzip(path) && stem.find('.') != stem.rfind('.') ? 2 : 1; endings > 0; --endings)
-        stem = stem.substr(0, stem.rfind('.'));
-    const fs::path folder = path.parent_path();
-    for (const char* extension : {".img", ".img.gz", ".IMG", ".IMG.GZ"}) {
+/// The other file of a pair (.hdr, .img): beside this one, packed or not, in small or capital letters.
+fs::path other_of_pair(const fs::path& path, const std::string& extension) {
+    std::string name = path.filename().string();
+    if (lower_case(name).ends_with(".gz")) name.resize(name.size() - 3);
+    const fs::path stem = path.parent_path() / fs::path(name).stem();
+    std::string capitals = extension;
+    for (char& c : capitals) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    for (const std::string& ending : {extension, extension + ".gz", capitals, capitals + ".GZ"}) {
         std::error_code failure;
-        if (fs::exists(folder / (stem + extension), failure)) return folder / (stem + extension);
+        const fs::path other = stem.string() + ending;
+        if (fs::exists(other, failure)) return other;
     }
-    throw IoError("cannot read '" + path.string() + "': its voxels are to be in '" + (folder / stem).string() +
-                  ".img', which is not there; put that file beside the header");
+    throw IoError("cannot read '" + path.string() + "': it is one of a pair, and '" + stem.string() + extension +
+                  "' is not there; put that file beside it");
+}
+
+bool is_voxel_file(const fs::path& path) {
+    const std::string name = lower_case(path.filename().string());
+    return name.ends_with(".img") || name.ends_with(".img.gz");
 }
 
 /// More bytes than the header promises may be padding, or a size that is stated wrongly.
@@ -177,7 +186,7 @@ void read_layout(const fs::path& path, const NiftiHeader& header, ImageHeader& i
                                    std::to_string(header.bits_per_voxel) + " bits a voxel; the header is damaged");
     voxels.swapped = header.swapped;
     voxels.surplus = Surplus::Allowed;
-    const fs::path file = header.separate_voxels ? voxels_beside(path) : path;
+    const fs::path file = header.separate_voxels ? other_of_pair(path, ".img") : path;
     const auto offset = static_cast<std::uint64_t>(header.data_offset);
     voxels.packing = is_gzip(file) ? Packing::Deflate : Packing::Raw;
     if (voxels.packing == Packing::Deflate) voxels.unpacked_skip = offset;
@@ -216,6 +225,7 @@ void read_intent(const fs::path& path, const NiftiHeader& header, ImageHeader& i
 }  // namespace
 
 ImageHeader read_nifti_image_header(const fs::path& path) {
+    if (is_voxel_file(path)) return read_nifti_image_header(other_of_pair(path, ".hdr"));
     const NiftiHeader header = read_nifti_header(path);
     ImageHeader image;
     read_sizes(path, header, image.voxels);

@@ -1,4 +1,4 @@
-"""Files that say of themselves what most do not: units, two places, names. What the reader decided reaches every verb."""
+"""Files that say of themselves what most do not: two places, names. What the reader decided reaches every verb."""
 
 import json
 import struct
@@ -133,7 +133,8 @@ class Kinds(PhantomTest):
         self.assertIn("centroid", result.stdout)
 
     def test_segments_have_names(self):
-        path = segmentation(self.phantom.folder / "a.seg.nrrd", self.phantom.moving_labels_array, {1: "shell", 2: "core"})
+        path = segmentation(self.phantom.folder / "a.seg.nrrd", self.phantom.moving_labels_array,
+                            {1: "shell", 2: "core"})
         result = run("info", "--labels", path)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("'shell'", result.stdout)

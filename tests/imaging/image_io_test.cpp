@@ -52,6 +52,14 @@ TEST_P(EveryFormat, KeepsVectorsOfThreeComponents) {
     expect_round_trip(test::random_volume(oblique_grid(), CV_64FC3), folder / (std::string("field") + GetParam()));
 }
 
+TEST_P(EveryFormat, NamesMayBeInCapitals) {
+    const TemporaryFolder folder;
+    std::string name = std::string("volume") + GetParam();
+    std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::toupper(c); });
+    expect_round_trip(test::random_volume(oblique_grid(), CV_16S), folder / name);
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
+}
+
 TEST_P(EveryFormat, LeavesNothingButTheFile) {
     const TemporaryFolder folder;
     const auto path = folder / (std::string("only") + GetParam());
@@ -243,7 +251,8 @@ TEST(ImageIo, CompressedNiftiIsOneGzipMember) {
 TEST(ImageIo, UnknownExtensionsAndMissingFoldersAreRefused) {
     const TemporaryFolder folder;
     const Volume volume(test::plain_grid({2, 2, 2}), CV_8U);
-    EXPECT_THROW(write_volume(volume, folder / "volume.png"), InvalidInput);
+    for (const char* name : {"volume.png", "volume.hdr", "volume.img", "volume.mhd", "volume.nhdr"})
+        EXPECT_THROW(write_volume(volume, folder / name), InvalidInput);
     EXPECT_THROW(write_volume(volume, folder / "missing/volume.nii.gz"), IoError);
     EXPECT_THROW(write_volume(volume, folder / "missing/volume.nrrd"), IoError);
     EXPECT_THROW(write_volume(volume, folder / "missing/volume.mha"), IoError);

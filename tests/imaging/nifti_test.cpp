@@ -150,6 +150,7 @@ TEST(Nifti, APairOfHeaderAndVoxelsIsRead) {
     const Volume read = read_volume(folder / "pair.hdr");
     EXPECT_TRUE(test::same_voxels(read.voxels, some_volume().voxels));
     EXPECT_TRUE(same_grid(read.geometry, some_volume().geometry));
+    EXPECT_TRUE(test::same_voxels(read_volume(folder / "pair.img").voxels, some_volume().voxels));
     header.replace(344, 4, std::string(4, '\0'));
     write(folder / "pair.hdr", header);
     EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(folder / "pair.hdr"); }), HasSubstr("ANALYZE 7.5"));

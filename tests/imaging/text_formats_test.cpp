@@ -167,6 +167,16 @@ TEST(MetaImage, TextAndBigEndianVoxelsAreRead) {
     expect_counted(read_volume(folder / "big.mha"));
 }
 
+TEST(MetaImage, VoxelsOfTwoValuesAndColoursAreRefused) {
+    const TemporaryFolder folder;
+    for (const int channels : {2, 3, 4}) {
+        write(folder / "a.mha", meta(std::string("ElementNumberOfChannels = ") + std::to_string(channels) + "\n") +
+                                    "LOCAL\n" + std::string(static_cast<std::size_t>(60 * channels), 'a'));
+        EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(folder / "a.mha"); }),
+                    HasSubstr(std::string("hold ") + std::to_string(channels)));
+    }
+}
+
 TEST(MetaImage, UnitsAreConvertedAndUnknownOnesRefused) {
     const TemporaryFolder folder;
     write(folder / "a.mha", meta("DistanceUnits = cm\n") + "LOCAL\n" + counted_bytes());

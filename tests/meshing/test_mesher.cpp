@@ -243,5 +243,23 @@ TEST(Mesher, StopsWhenAsked) {
     }
 }
 
+TEST(Mesher, LabelsInThousandsOfPiecesAreNoted) {
+    struct Listener : Observer {
+        void note(std::string_view message) override { notes.emplace_back(message); }
+        std::vector<std::string> notes;
+    } listener;
+    Volume labels(grid(45), CV_32S);
+    for (int k = 0; k < 45; ++k)
+        for (int j = 0; j < 45; ++j)
+            for (int i = 0; i < 45; ++i) {
+                const bool block = i < 20 && j < 20 && k < 20;
+                const bool speck = i > 21 && i % 2 == 0 && j % 2 == 0 && k % 2 == 0;
+                labels.data<int>()[labels.offset(i, j, k)] = block || speck ? 1 : 0;
+            }
+    mesh_labels(labels, with_edge(12.0), listener);
+    ASSERT_FALSE(listener.notes.empty());
+    EXPECT_THAT(listener.notes[0], testing::HasSubstr("label 1 lies in 6349 pieces"));
+}
+
 }  // namespace
 }  // namespace tissuewarp::meshing
