@@ -1,4 +1,6 @@
 /// The lung pair and the head that may not be copied, where their folder lies beside the repository; skipped elsewhere.
+#include <algorithm>
+
 #include "imaging/image_io.hpp"
 #include "registration/field.hpp"
 #include "registration/warp.hpp"
@@ -57,8 +59,8 @@ TEST_F(Lung, ThatTissueResistsIsFollowedAndDoubted) {
     // 6.15 with weights that let go of the boundary
     claims::expect({26, 35.66, 3.90, 8.64}, error.before, error.after);
     claims::expect_unfolded(result.deformation, moving);
-    ASSERT_FALSE(result.doubts.empty());
-    EXPECT_NE(result.doubts.back().text.find("Poisson"), std::string::npos);
+    EXPECT_TRUE(std::ranges::any_of(
+        result.doubts, [](const Doubt& doubt) { return doubt.text.find("Poisson") != std::string::npos; }));
 }
 
 TEST_F(Lung, FromItsImage) {
