@@ -1,6 +1,7 @@
 // tissuewarp info: what a file holds, and what this machine can compute on.
 
 #include "apps/file_kind.hpp"
+#include "apps/progress.hpp"
 #include "apps/verbs.hpp"
 #include "core/errors.hpp"
 #include "imaging/image_io.hpp"
@@ -92,12 +93,14 @@ void print_mesh(const meshing::TetMesh& mesh) {
 }
 
 void print_surface(const fs::path& path) {
-    const meshing::Surface surface = meshing::read_surface(path);
+    ProgressLine notes(true);
+    const meshing::Surface surface = meshing::read_surface(path, notes);
     fmt::print("{} points, {} triangles{}\n", surface.mesh.node_count(), surface.mesh.triangle_count(),
                surface.normals.cols() > 0 ? ", with normals" : "");
     if (surface.mesh.node_count() == 0) return;
     fmt::print("  box (mm, LPS)    {} to {}\n", point_text(surface.mesh.nodes.rowwise().minCoeff()),
                point_text(surface.mesh.nodes.rowwise().maxCoeff()));
+    for (const std::string& note : notes.notes()) fmt::print("  note: {}\n", note);
 }
 
 void print_record(const fs::path& path) {

@@ -12,7 +12,6 @@
 #include "core/errors.hpp"
 #include "imaging/filters.hpp"
 #include "imaging/labels.hpp"
-#include "meshing/mesh_io.hpp"
 #include "registration/evaluation/curve_residual.hpp"
 #include "registration/field.hpp"
 #include "registration/io/curves.hpp"
@@ -120,13 +119,12 @@ void warp_everything(RegistrationRun& run) {
     Products& products = run.products;
     if (!inputs.moving.empty()) products.warped = warp_image(inputs.moving, products.fixed_to_moving);
     products.warped_labels = warp_labels(inputs.moving_labels, products.fixed_to_moving);
-    const bool surface = !run.options.surface.empty();
-    if (!inputs.landmarks && !inputs.points && !surface) return;
+    if (!inputs.landmarks && !inputs.points && !inputs.surface) return;
     const PointTransform transform(run.result.deformation, {run.options.fade});
     if (inputs.landmarks) products.landmarks = transform(inputs.landmarks->moving);
     if (inputs.points) products.points = transform(*inputs.points);
-    if (surface) {
-        products.surface = meshing::read_surface(run.options.surface).mesh;
+    if (inputs.surface) {
+        products.surface = inputs.surface;
         products.surface->nodes = transform(products.surface->nodes);
     }
 }

@@ -16,6 +16,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace tissuewarp::apps {
 
 namespace {
@@ -49,9 +51,26 @@ void warp_volume(const WarpOptions& options, Observer& observer) {
     imaging::write_volume(warped, options.output);
 }
 
+/// Points of other units or another frame would be carried along rigidly, as what lies outside of all tissue is.
+void require_near(const Eigen::Matrix3Xd& points, const meshing::TetMesh& mesh, const std::filesystem::path& path) {
+    constexpr double farthest_mm = 500;  // larger than an organ
+    const Eigen::Vector3d lower = mesh.nodes.rowwise().minCoeff(), upper = mesh.nodes.rowwise().maxCoeff();
+    std::vector<double> distances;
+    for (const auto& point : points.colwise())
+        distances.push_back((lower - point).cwiseMax(point - upper).cwiseMax(0).norm());
+    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+    std::nth_element(distances.begin(), middle, distances.end());
+    if (*middle <= farthest_mm) return;
+    throw InvalidInput(
+        fmt::format("'{}' lies {:.0f} mm from the model of the record, more than {:g}; coordinates must "
+                    "be LPS mm of the moving image",
+                    path.string(), *middle, farthest_mm));
+}
+
 Eigen::Matrix3Xd map_points(const WarpOptions& options, const Eigen::Matrix3Xd& points, Observer& observer) {
     if (!options.displacement.empty()) return displaced(points, read_field(options.displacement, observer));
     const registration::Record record = registration::read_record(options.record);
+    require_near(points, record.deformation.mesh, options.input);
     return registration::PointTransform(record.deformation, {options.fade})(points);
 }
 
@@ -71,10 +90,10 @@ void run_warp(const WarpOptions& options) {
         warp_volume(options, progress);
     } else if (kind == FileKind::Points) {
         std::vector<Column> columns;
-        append_points(columns, "", map_points(options, read_points(options.input), progress));
+        append_points(columns, "", map_points(options, read_points(options.input, progress), progress));
         write_columns(columns, options.output);
     } else if (kind == FileKind::Surface) {
-        meshing::SurfaceMesh surface = meshing::read_surface(options.input).mesh;
+        meshing::SurfaceMesh surface = read_tissue_surface(options.input, progress);
         surface.nodes = map_points(options, surface.nodes, progress);
         meshing::write_surface(surface, options.output);
     } else {
