@@ -8,6 +8,7 @@
 #include "imaging/labels.hpp"
 #include "meshing/mesh_io.hpp"
 #include "meshing/quality.hpp"
+#include "registration/io/extent.hpp"
 #include "registration/record.hpp"
 #include "shaders/device.hpp"
 
@@ -101,6 +102,12 @@ void print_surface(const fs::path& path) {
     fmt::print("  box (mm, LPS)    {} to {}\n", point_text(surface.mesh.nodes.rowwise().minCoeff()),
                point_text(surface.mesh.nodes.rowwise().maxCoeff()));
     for (const std::string& note : notes.notes()) fmt::print("  note: {}\n", note);
+    if (surface.mesh.triangle_count() == 0) return;
+    try {
+        registration::detail::require_millimetres(surface.mesh.nodes, "the surface is");
+    } catch (const InvalidInput& doubt) {
+        fmt::print("  note: {}\n", doubt.what());
+    }
 }
 
 void print_record(const fs::path& path) {

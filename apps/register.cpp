@@ -194,10 +194,10 @@ void run_register(const RegisterOptions& options) {
     ProgressLine progress(options.common.quiet);
     RegistrationRun run(options, utc_now());
 
-    if (options.dry_run) require_could_write(options.output);
+    if (options.dry_run) require_could_write(options.output, is_register_output);
     if (!options.save_parameters.empty()) require_could_write_file(options.save_parameters);
     std::unique_ptr<OutputFolder> output;
-    if (!options.dry_run) output = std::make_unique<OutputFolder>(options.output);
+    if (!options.dry_run) output = std::make_unique<OutputFolder>(options.output, is_register_output);
 
     progress.begin("reading", 0.0, 0.02);
     run.inputs = read_inputs(options, progress);

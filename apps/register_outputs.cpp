@@ -130,6 +130,14 @@ std::vector<std::string> output_names(const RegisterOptions& options) {
     return names;
 }
 
+bool is_register_output(const std::string& name) {
+    RegisterOptions all;
+    all.moving = all.landmarks.csv = all.points = all.surface = "given";
+    const std::vector<std::string> names = output_names(all);
+    const std::filesystem::path path(name);
+    return std::find(names.begin(), names.end(), name) != names.end() || path.stem() == "warped_surface";
+}
+
 void start_writing(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks) {
     const auto start = [&](const std::string& name, auto write) {
         tasks.run([=, &output, path = output.path(name)] {

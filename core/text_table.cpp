@@ -85,17 +85,17 @@ std::vector<std::string> split(std::string_view line, char separator) {
     return fields;
 }
 
-/// "1,5 2,25 3": commas that are no separators although there is no other sign than blanks.
-bool has_commas_in_numbers(std::string_view line) {
+/// "1,5 2,25 3": commas that are no separators.
+bool is_row_of_numbers_between_blanks(std::string_view line) {
     const std::vector<std::string> fields = split(line, blanks);
     return fields.size() > 1 && std::all_of(fields.begin(), fields.end(), is_number);
 }
 
 char separator_of(std::string_view line) {
     if (line.find(';') != std::string_view::npos) return ';';
-    if (trimmed(line).find('\t') != std::string_view::npos && line.find(',') == std::string_view::npos) return '\t';
-    if (line.find(',') == std::string_view::npos || has_commas_in_numbers(line)) return blanks;
-    return ',';
+    if (is_row_of_numbers_between_blanks(line)) return blanks;
+    if (line.find(',') != std::string_view::npos) return ',';
+    return trimmed(line).find('\t') != std::string_view::npos ? '\t' : blanks;
 }
 
 /// The text behind the sign of a remark; nothing where the line is none.

@@ -3,6 +3,7 @@
 #include "core/errors.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <map>
 
@@ -111,8 +112,8 @@ std::string frame_in_remarks(const TextTable& table) {
     std::string frame;
     for (const TextTable::Remark& remark : table.remarks()) {
         std::string text = remark.text;
-        std::replace(text.begin(), text.end(), '=', ' ');
-        std::replace(text.begin(), text.end(), ':', ' ');
+        std::replace_if(
+            text.begin(), text.end(), [](unsigned char c) { return std::isalnum(c) == 0; }, ' ');
         for (const std::string& word : words_of(text)) {
             if (word != "RAS" && word != "LPS") continue;
             if (!frame.empty() && frame != word)

@@ -84,9 +84,10 @@ private:
             const std::string type(file_.token());
             file_.line();
             const std::size_t values =
-                file_.checked_count(components, "components", 0) * file_.checked_count(tuples, "tuples", 0);
+                file_.checked_count(components, "components", 1) * file_.checked_count(tuples, "tuples", 1);
             if (type == "string" || type == "utf8_string") {
-                for (std::size_t v = 0; v < file_.checked_count(static_cast<long long>(values), "texts", 1); ++v) {
+                (void)file_.checked_count(static_cast<long long>(values), "texts", 1);
+                for (std::size_t v = 0; v < values; ++v) {
                     const std::string_view text = read_text();
                     if (name == "SPACE" && surface_.space.empty())
                         surface_.space = space_in("SPACE=" + std::string(text));

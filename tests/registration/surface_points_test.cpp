@@ -47,9 +47,9 @@ TEST_F(SurfacePointFiles, PointListsWithAndWithoutNormals) {
     EXPECT_EQ(bare.normals.cols(), 0);
     EXPECT_EQ(bare.deviation_mm, 0.4);
     EXPECT_NEAR((bare.points.col(11) - Eigen::Vector3d(30, 20, 9)).norm(), 0, 1e-6);
-    const SurfacePoints with = read_surface_points(written("b.xyz", sheet(1, " 0 0 2")));
+    const SurfacePoints with = read_surface_points(written("b.xyz", sheet(1, " 0 0 1")));
     ASSERT_EQ(with.normals.cols(), 12);
-    EXPECT_NEAR((with.normals.col(3) - Eigen::Vector3d(0, 0, 1)).norm(), 0, 1e-12);  // of unit length
+    EXPECT_NEAR((with.normals.col(3) - Eigen::Vector3d(0, 0, 1)).norm(), 0, 1e-12);
 }
 
 TEST_F(SurfacePointFiles, TrianglesGiveNormals) {
@@ -62,6 +62,24 @@ TEST_F(SurfacePointFiles, TrianglesGiveNormals) {
             const Eigen::Vector3d outward = (read.points.col(n) - Eigen::Vector3d(5, 6, 7)).normalized();
             EXPECT_GT(outward.dot(read.normals.col(n)), 0.8) << name << ' ' << n;
         }
+    }
+}
+
+TEST_F(SurfacePointFiles, NormalsThatPointInwardsAreSaid) {
+    struct Notes : Observer {
+        std::string all;
+        void note(std::string_view text) override { all += text; }
+    };
+    const auto surface = meshing::boundary_surface(test::ball({5, 6, 7}, 20, 4)).surface;
+    for (const double sign : {1.0, -1.0}) {
+        std::string text = "x,y,z,nx,ny,nz\n";
+        for (const Eigen::Vector3d point : surface.nodes.colwise()) {
+            const Eigen::Vector3d normal = sign * (point - Eigen::Vector3d(5, 6, 7)).normalized();
+            for (int k = 0; k < 6; ++k) text += std::to_string(k < 3 ? point[k] : normal[k - 3]) + (k < 5 ? "," : "\n");
+        }
+        Notes notes;
+        read_surface_points(written("ball.csv", text), 1, notes);
+        EXPECT_EQ(notes.all.find("normals point inwards") != std::string::npos, sign < 0) << notes.all;
     }
 }
 
