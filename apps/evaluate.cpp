@@ -1,5 +1,6 @@
 // tissuewarp evaluate: scores label maps, landmarks, curves and displacement fields, whoever made them.
 
+#include "apps/displacement_field.hpp"
 #include "apps/inputs.hpp"
 #include "apps/noted_images.hpp"
 #include "apps/output_folder.hpp"
@@ -34,13 +35,7 @@ void evaluate_labels(const EvaluateOptions& options, Observer& observer, ScoreSh
 }
 
 Volume read_field(const fs::path& path, Observer& observer) {
-    if (path.empty()) return {};
-    const Volume field = read_noted_volume(path, observer);
-    if (field.channels() != 3)
-        throw InvalidInput(
-            fmt::format("'{}' has {} components; give a displacement field of three", path.string(), field.channels()));
-    require_millimetres(field.geometry, path);
-    return field.as(CV_32F);
+    return path.empty() ? Volume{} : read_displacement(path, observer);
 }
 
 Volume read_organ(const fs::path& path, Observer& observer) {

@@ -2,6 +2,7 @@
 
 #include "registration/warp.hpp"
 
+#include "apps/displacement_field.hpp"
 #include "apps/file_kind.hpp"
 #include "apps/noted_images.hpp"
 #include "apps/output_folder.hpp"
@@ -24,17 +25,9 @@ namespace {
 
 using imaging::Volume;
 
-Volume read_field(const std::filesystem::path& path, Observer& observer) {
-    const Volume field = read_noted_volume(path, observer);
-    if (field.channels() != 3)
-        throw InvalidInput("'" + path.string() + "' has " + std::to_string(field.channels()) +
-                           " components; give a displacement field of three");
-    return field.as(CV_32F);
-}
-
 /// The pulling field: the one that was given, or the record's on the reference grid.
 Volume fixed_to_moving(const WarpOptions& options, const Volume& image, Observer& observer) {
-    if (!options.displacement.empty()) return read_field(options.displacement, observer);
+    if (!options.displacement.empty()) return read_displacement(options.displacement, observer);
     const registration::Record record = registration::read_record(options.record);
     const imaging::Geometry grid =
         options.reference.empty() ? image.geometry : read_noted_volume(options.reference, observer).geometry;
@@ -68,7 +61,7 @@ void require_near(const Eigen::Matrix3Xd& points, const meshing::TetMesh& mesh, 
 }
 
 Eigen::Matrix3Xd map_points(const WarpOptions& options, const Eigen::Matrix3Xd& points, Observer& observer) {
-    if (!options.displacement.empty()) return displaced(points, read_field(options.displacement, observer));
+    if (!options.displacement.empty()) return displaced(points, read_displacement(options.displacement, observer));
     const registration::Record record = registration::read_record(options.record);
     require_near(points, record.deformation.mesh, options.input);
     return registration::PointTransform(record.deformation, {options.fade})(points);
