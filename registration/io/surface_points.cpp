@@ -1,7 +1,6 @@
 #include "registration/io/surface_points.hpp"
 
 #include "core/errors.hpp"
-#include "core/text_table.hpp"
 #include "meshing/mesh_io.hpp"
 #include "registration/io/extent.hpp"
 
@@ -13,17 +12,6 @@ namespace tissuewarp::registration {
 namespace {
 
 constexpr Eigen::Index least_points = 10;
-
-/// An organ bulges: seen from a point of its surface, the others lie behind the tangent plane. Sums over all points, so
-/// that folds and noise cancel.
-bool points_inwards(const SurfacePoints& surface) {
-    constexpr double most_share = 0.5;  // of distances before the planes, which are all on a sphere turned inside out
-    if (surface.normals.cols() == 0) return false;
-    const Eigen::Vector3d centre = surface.points.rowwise().mean();
-    const Eigen::RowVectorXd before =
-        (surface.normals.array() * ((-surface.points).colwise() + centre).array()).colwise().sum();
-    return before.sum() > most_share * before.cwiseAbs().sum();
-}
 
 }  // namespace
 
@@ -59,10 +47,6 @@ SurfacePoints read_surface_points(const std::filesystem::path& path, double devi
     } catch (const InvalidInput& problem) {
         throw InvalidInput(path.string() + ": " + problem.what());
     }
-    if (points_inwards(surface))
-        observer.note(note_of(path,
-                              "the normals point inwards, to where most of the points lie; normals point out of "
-                              "the organ: turn them round, unless the organ is hollow there"));
     return surface;
 }
 

@@ -10,7 +10,7 @@ namespace tissuewarp::registration {
 
 /// Reads .ply (ascii, binary), .stl, .obj, .vtk (legacy polydata), .vtp (XML polydata), .csv and .xyz
 /// (meshing/point_table.hpp), with what normals the file holds, or those of its triangles. `deviation_mm` is taken
-/// over. What was turned to LPS is noted, and normals that point inwards. Throws IoError or InvalidInput naming the
+/// over. What was turned to LPS is noted. Throws IoError or InvalidInput naming the
 /// file, also where the extent cannot be that of tissue in mm.
 SurfacePoints read_surface_points(const std::filesystem::path& path, double deviation_mm = 1.0,
                                   Observer& observer = silent_observer());

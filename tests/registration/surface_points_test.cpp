@@ -65,24 +65,6 @@ TEST_F(SurfacePointFiles, TrianglesGiveNormals) {
     }
 }
 
-TEST_F(SurfacePointFiles, NormalsThatPointInwardsAreSaid) {
-    struct Notes : Observer {
-        std::string all;
-        void note(std::string_view text) override { all += text; }
-    };
-    const auto surface = meshing::boundary_surface(test::ball({5, 6, 7}, 20, 4)).surface;
-    for (const double sign : {1.0, -1.0}) {
-        std::string text = "x,y,z,nx,ny,nz\n";
-        for (const Eigen::Vector3d point : surface.nodes.colwise()) {
-            const Eigen::Vector3d normal = sign * (point - Eigen::Vector3d(5, 6, 7)).normalized();
-            for (int k = 0; k < 6; ++k) text += std::to_string(k < 3 ? point[k] : normal[k - 3]) + (k < 5 ? "," : "\n");
-        }
-        Notes notes;
-        read_surface_points(written("ball.csv", text), 1, notes);
-        EXPECT_EQ(notes.all.find("normals point inwards") != std::string::npos, sign < 0) << notes.all;
-    }
-}
-
 TEST_F(SurfacePointFiles, MetresAndOtherUnitsAreRefusedByName) {
     const std::string metres = complaint(written("metres.xyz", sheet(1000)));
     EXPECT_NE(metres.find("metres.xyz"), std::string::npos);
