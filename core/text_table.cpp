@@ -41,15 +41,21 @@ std::string with_plain_minus(std::string_view text) {
     return plain;
 }
 
-std::optional<double> parsed(std::string_view text, bool decimal_commas) {
-    std::string plain = with_plain_minus(text);
-    if (decimal_commas) std::replace(plain.begin(), plain.end(), ',', '.');
-    std::string_view digits = plain;
+std::optional<double> parsed_plain(std::string_view digits) {
     if (digits.starts_with('+')) digits.remove_prefix(1);
     double value = 0;
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
     if (digits.empty() || error != std::errc{} || end != digits.data() + digits.size()) return std::nullopt;
     return value;
+}
+
+std::optional<double> parsed(std::string_view text, bool decimal_commas) {
+    const bool as_it_stands =
+        !text.starts_with('\xE2') && !(decimal_commas && text.find(',') != std::string_view::npos);
+    if (as_it_stands) return parsed_plain(text);
+    std::string plain = with_plain_minus(text);
+    if (decimal_commas) std::replace(plain.begin(), plain.end(), ',', '.');
+    return parsed_plain(plain);
 }
 
 bool is_decimal(std::string_view text, char mark) {
@@ -140,7 +146,7 @@ std::vector<std::string> words_of(std::string_view text) {
 TextTable::TextTable(const std::filesystem::path& path, char separator) : path_(path), separator_(separator) {
     take_lines(read_text(path));
     find_header();
-    find_decimal_mark();
+    if (separator == 0) find_decimal_mark();
 }
 
 void TextTable::take_lines(std::string_view text) {
@@ -172,15 +178,15 @@ void TextTable::find_header() {
 }
 
 void TextTable::find_decimal_mark() {
-    bool points = false;
     for (const Row& row : rows_)
-        for (const std::string& field : row.fields) {
-            points = points || is_decimal(field, '.');
-            decimal_commas_ = decimal_commas_ || is_decimal(field, ',');
-            if (points && decimal_commas_)
+        decimal_commas_ = decimal_commas_ || std::any_of(row.fields.begin(), row.fields.end(),
+                                                         [](auto& field) { return is_decimal(field, ','); });
+    if (!decimal_commas_) return;
+    for (const Row& row : rows_)
+        for (const std::string& field : row.fields)
+            if (is_decimal(field, '.'))
                 refuse(row.line, std::string("'") + field +
                                      "': the file has decimal commas and decimal points; write one of them");
-        }
 }
 
 void TextTable::require_even_rows() {

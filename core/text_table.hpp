@@ -19,7 +19,8 @@ public:
         std::vector<std::string> fields;
     };
 
-    /// `separator` where the format fixes it; 0 finds it. Throws IoError; InvalidInput for what is no text.
+    /// `separator` where the format fixes it, which then has decimal points; 0 finds it. Throws IoError; InvalidInput
+    /// for what is no text.
     explicit TextTable(const std::filesystem::path& path, char separator = 0);
 
     [[nodiscard]] const std::filesystem::path& path() const { return path_; }

@@ -135,6 +135,7 @@ public:
         table_.require_even_rows();
         header_ = table_.header().empty() ? header_in_remark() : table_.header();
         find_columns();
+        find_further_columns();
         for (const Row& row : table_.rows()) take(row);
         finish();
         return std::move(result_);
@@ -146,6 +147,8 @@ private:
     AxisColumns axes_{{0, 1, 2}, {"x", "y", "z"}};
     std::optional<AxisColumns> normals_;
     std::vector<Eigen::Vector3d> points_, directions_;
+    std::size_t label_ = 0, line_ = 0;
+    std::vector<std::size_t> counts_;
     std::vector<std::string> left_out_;
     PointTable result_;
 
@@ -198,32 +201,26 @@ private:
         return frame;
     }
 
+    /// Columns that say more of a point; those that there are not are past the last.
+    void find_further_columns() {
+        label_ = find_column(table_, header_, "label");
+        if (label_ == header_.size()) label_ = find_column(table_, header_, "name");
+        line_ = find_column(table_, header_, "line");
+        for (const char* name : {"defined", "visible"})  // of 3D Slicer: 0 for points that are not placed, or hidden
+            if (const std::size_t c = find_column(table_, header_, name); c < header_.size()) counts_.push_back(c);
+    }
+
     void take(const Row& row) {
-        if (is_left_out(row)) return;
+        const bool counts =
+            std::none_of(counts_.begin(), counts_.end(), [&](std::size_t column) { return row.fields[column] == "0"; });
+        if (!counts) {
+            left_out_.push_back(label_ < header_.size() ? row.fields[label_] : "line " + std::to_string(row.line));
+            return;
+        }
         points_.push_back(axes_.point(table_, row));
         if (normals_) directions_.push_back(direction(row));
-        for (const char* name : {"label", "name"})
-            if (take_text(row, name, result_.names)) break;
-        take_text(row, "line", result_.groups);
-    }
-
-    bool take_text(const Row& row, const char* column, std::vector<std::string>& texts) {
-        const std::size_t c = find_column(table_, header_, column);
-        if (c == header_.size()) return false;
-        texts.push_back(row.fields[c]);
-        return true;
-    }
-
-    /// What 3D Slicer writes of points that are not placed yet, or hidden.
-    bool is_left_out(const Row& row) {
-        for (const char* name : {"defined", "visible"}) {
-            const std::size_t c = find_column(table_, header_, name);
-            if (c == header_.size() || row.fields[c] != "0") continue;
-            const std::size_t label = find_column(table_, header_, "label");
-            left_out_.push_back(label < header_.size() ? row.fields[label] : "line " + std::to_string(row.line));
-            return true;
-        }
-        return false;
+        if (label_ < header_.size()) result_.names.push_back(row.fields[label_]);
+        if (line_ < header_.size()) result_.groups.push_back(row.fields[line_]);
     }
 
     /// A normal in LPS. Numbers without a name are normals where they have unit length, or zero; named ones are scaled.

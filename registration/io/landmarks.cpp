@@ -33,6 +33,9 @@ bool is_table(const std::filesystem::path& path) {
 Eigen::Matrix3Xd read_elastix_points(const std::filesystem::path& path) {
     const TextTable table(path, ' ');
     if (table.header() != std::vector<std::string>{"point"}) {
+        if (table.header().empty() && table.rows().empty())
+            throw InvalidInput(path.string() +
+                               ": the file is empty; a line 'point', a count and one point per line are needed");
         if (table.header().empty())
             throw InvalidInput(
                 path.string() +
