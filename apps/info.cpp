@@ -8,7 +8,9 @@
 #include "imaging/labels.hpp"
 #include "meshing/mesh_io.hpp"
 #include "meshing/quality.hpp"
+#include "registration/evaluation.hpp"
 #include "registration/io/extent.hpp"
+#include "registration/io/slicer_markups.hpp"
 #include "registration/record.hpp"
 #include "shaders/device.hpp"
 
@@ -95,7 +97,11 @@ void print_mesh(const meshing::TetMesh& mesh) {
 
 void print_surface(const fs::path& path) {
     ProgressLine notes(true);
-    const meshing::Surface surface = meshing::read_surface(path, notes);
+    meshing::Surface surface;
+    if (registration::is_slicer_markups(path))
+        surface.mesh.nodes = registration::read_points(path, notes);
+    else
+        surface = meshing::read_surface(path, notes);
     fmt::print("{} points, {} triangles{}\n", surface.mesh.node_count(), surface.mesh.triangle_count(),
                surface.normals.cols() > 0 ? ", with normals" : "");
     if (surface.mesh.node_count() == 0) return;
@@ -148,7 +154,7 @@ void print_file(const fs::path& path, bool labels) {
     }
     throw InvalidInput("'" + path.string() +
                        "' has an unknown extension; give .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, a DICOM "
-                       "folder, .vtu, .ply, .stl, .obj, .vtk, .vtp, .csv, .xyz or .h5");
+                       "folder, .vtu, .ply, .stl, .obj, .vtk, .vtp, .csv, .xyz, .fcsv, .mrk.json or .h5");
 }
 
 }  // namespace

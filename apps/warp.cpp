@@ -13,6 +13,7 @@
 #include "core/errors.hpp"
 #include "meshing/mesh_io.hpp"
 #include "registration/field.hpp"
+#include "registration/io/slicer_markups.hpp"
 #include "registration/record.hpp"
 
 #include <fmt/format.h>
@@ -74,9 +75,10 @@ void run_warp(const WarpOptions& options) {
     if (options.record.empty() && options.displacement.empty())
         throw InvalidInput("nothing to warp with; give --record record.h5 or --displacement FIELD");
     const FileKind kind = file_kind(options.input);
-    if (file_kind(options.output) != kind)
+    const bool writes_markups = registration::is_slicer_markups(options.output);
+    if (file_kind(options.output) != kind || writes_markups)
         throw InvalidInput("'" + options.input.string() + "' cannot become '" + options.output.string() +
-                           "'; give an output of the same kind (image, points or surface)");
+                           "'; give an output of the same kind (image, points as .csv or surface)");
     require_could_write_file(options.output);
     progress.begin("warping", 0.0, 1.0);
     if (kind == FileKind::Image) {
@@ -90,10 +92,10 @@ void run_warp(const WarpOptions& options) {
         surface.nodes = map_points(options, surface.nodes, progress);
         meshing::write_surface(surface, options.output);
     } else {
-        throw InvalidInput(
-            "'" + options.input.string() +
-            "' is of no kind that can be warped; give an image, points (.csv, .xyz) or a surface (.ply, .stl, "
-            ".obj, .vtk, .vtp)");
+        throw InvalidInput("'" + options.input.string() +
+                           "' is of no kind that can be warped; give an image, points (.csv, .xyz, .fcsv, .mrk.json) "
+                           "or a surface (.ply, .stl, "
+                           ".obj, .vtk, .vtp)");
     }
     progress.clear();
     if (options.common.quiet) return;

@@ -145,6 +145,19 @@ class Kinds(PhantomTest):
             self.assert_refused(run("warp", self.phantom.moving, "-o", self.phantom.folder / "w.nii.gz",
                                     "--displacement", path), INPUT, f"positions ({frame})")
 
+    def test_markups_are_points_for_every_verb(self):
+        path = self.phantom.folder / "points.fcsv"
+        path.write_text("# CoordinateSystem = RAS\n# columns = x,y,z,label\n1,2,3,tip\n4,5,6,base\n")
+        result = run("info", path)
+        self.assertIn("2 points", result.stdout + result.stderr)
+        field = self.field(numpy.ones((SIZE, SIZE, SIZE, 3)), "ones.nii.gz")
+        warped = self.phantom.folder / "warped.csv"
+        result = run("warp", path, "-o", warped, "--displacement", field)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(warped.read_text().splitlines()[1], "0.000000,-1.000000,4.000000")
+        self.assert_refused(run("warp", path, "-o", self.phantom.folder / "warped.fcsv", "--displacement", field),
+                            INPUT, ".csv")
+
     def test_names_in_upper_case(self):
         path = self.phantom.moving_labels.rename(self.phantom.folder / "LABELS.NII.GZ")
         result = run("info", "--labels", path)
