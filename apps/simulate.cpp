@@ -16,6 +16,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <set>
 
 namespace tissuewarp::apps {
 
@@ -64,7 +65,9 @@ void apply_device(const DeviceChoice& device, simulation::Solve& solve) {
 }
 
 bool is_simulate_output(const std::string& name) {
-    return name == "summary.json" || name == "frames.pvd" || (name.starts_with("frame_") && name.ends_with(".vtu"));
+    static const std::set<std::string> names{"summary.json", "frames.pvd", "frames.xdmf", "displacement.h5",
+                                             "probes.csv"};
+    return names.contains(name) || (name.starts_with("frame_") && name.ends_with(".vtu"));
 }
 
 /// --init: a scene to begin with.

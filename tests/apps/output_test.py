@@ -90,6 +90,18 @@ class OutputFolder(PhantomTest):
                 self.assertEqual(hidden(self.output), [])
                 self.assertFalse((self.output / "warped.nii.gz").exists())
 
+    def test_frames_and_probes_of_an_older_simulation_go(self):
+        scene = self.phantom.folder / "cube.toml"
+        run("simulate", "--init", "cube", scene)
+        self.output.mkdir()
+        for name in ("frame_0999.vtu", "probes.csv", "mine.vtu"):
+            (self.output / name).write_text("of before")
+        result = run("simulate", scene, "--output", self.output)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertFalse((self.output / "frame_0999.vtu").exists())
+        self.assertNotEqual((self.output / "probes.csv").read_text(), "of before")
+        self.assertEqual((self.output / "mine.vtu").read_text(), "of before")
+
     def test_temporaries_of_one_file_are_swept(self):
         left = self.phantom.folder / ".scores.partial-999999.json"
         left.write_text("{")
