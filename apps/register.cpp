@@ -76,6 +76,20 @@ void print_plan(const RegistrationInputs& inputs, const RegisterOptions& options
     for (const std::string& note : inputs.notes) fmt::print("note: {}\n", note);
 }
 
+/// Results of an older run go when the new ones come: an input must not be one of them.
+void require_inputs_stay(const RegistrationInputs& inputs, const std::filesystem::path& output) {
+    for (const InputFile& file : inputs.files) {
+        std::error_code none;
+        const bool within =
+            std::filesystem::equivalent(std::filesystem::absolute(file.path).parent_path(), output, none);
+        if (!none && within && is_register_output(file.path.filename().string()))
+            throw InvalidInput(
+                fmt::format("--{} '{}' is a result in the output folder, which this run would replace; "
+                            "choose another --output",
+                            file.role, file.path.string()));
+    }
+}
+
 /// Where no fixed image gives a grid: the moving one, carried along by the rigid alignment.
 imaging::Geometry output_grid(const RegistrationRun& run) {
     if (const imaging::Geometry* fixed = run.inputs.fixed_grid()) return *fixed;
@@ -201,6 +215,7 @@ void run_register(const RegisterOptions& options) {
 
     progress.begin("reading", 0.0, 0.02);
     run.inputs = read_inputs(options, progress);
+    require_inputs_stay(run.inputs, options.output);
     validate(run.inputs, options);
     run.times.push_back(clock.lap("read"));
     if (options.dry_run) {

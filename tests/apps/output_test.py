@@ -47,6 +47,15 @@ class OutputFolder(PhantomTest):
         self.assertEqual((self.output / "notes.txt").read_text(), "of the user")
         self.assertEqual(hidden(self.output), [])
 
+    def test_an_input_that_the_run_would_replace_is_refused(self):
+        self.output.mkdir()
+        labels = self.output / "warped_labels.nii.gz"
+        labels.write_bytes(self.phantom.fixed_labels.read_bytes())
+        result = self.phantom.register(*QUICK, fixed_labels=labels)
+        self.assertEqual(result.returncode, 2, result.stderr)
+        self.assertIn("warped_labels.nii.gz' is a result in the output folder", result.stderr)
+        self.assertEqual(os.listdir(self.output), ["warped_labels.nii.gz"])
+
     def test_a_folder_in_the_way_is_refused_before_anything_is_written(self):
         (self.output / "report.json").mkdir(parents=True)
         for more in ([], ["--dry-run"]):
