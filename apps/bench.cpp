@@ -212,6 +212,11 @@ void write_results(const BenchResults& results, OutputFolder& output) {
     output.commit();
 }
 
+bool is_bench_output(const std::string& name) {
+    if (name == "bench.json" || name == "bench.csv") return true;
+    return name == "cube.svg" || name == "brain.svg" || name == "scaling.svg";
+}
+
 std::string fault_of(const EngineTiming& engine) {
     if (!engine.repeats_equal) return "runs from one state end in different bits";
     if (!std::isfinite(*engine.difference)) return "its displacements are not finite";
@@ -238,7 +243,7 @@ void run_bench(const BenchOptions& options) {
         throw InvalidInput("--elements with --study all fits no study; name one: cube, brain or scaling");
     std::optional<OutputFolder> output;
     Benchmark benchmark(options, progress);
-    if (!options.output.empty()) output.emplace(options.output);
+    if (!options.output.empty()) output.emplace(options.output, is_bench_output);
     const BenchResults results = benchmark.run();
     if (output) write_results(results, *output);
     require_correct(results);

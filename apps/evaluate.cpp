@@ -1,6 +1,6 @@
 // tissuewarp evaluate: scores label maps, landmarks, curves and displacement fields, whoever made them.
 
-#include "apps/file_kind.hpp"
+#include "apps/displacement_field.hpp"
 #include "apps/inputs.hpp"
 #include "apps/noted_images.hpp"
 #include "apps/output_folder.hpp"
@@ -35,13 +35,7 @@ void evaluate_labels(const EvaluateOptions& options, Observer& observer, ScoreSh
 }
 
 Volume read_field(const fs::path& path, Observer& observer) {
-    if (path.empty()) return {};
-    const Volume field = read_noted_volume(path, observer);
-    if (field.channels() != 3)
-        throw InvalidInput(
-            fmt::format("'{}' has {} components; give a displacement field of three", path.string(), field.channels()));
-    require_millimetres(field.geometry, path);
-    return field.as(CV_32F);
+    return path.empty() ? Volume{} : read_displacement(path, observer);
 }
 
 Volume read_organ(const fs::path& path, Observer& observer) {
@@ -52,20 +46,20 @@ Volume read_organ(const fs::path& path, Observer& observer) {
     return labels;
 }
 
-/// Fixed points of what register takes as --fixed-points: a CSV of pairs, or a file of points.
-Eigen::Matrix3Xd read_data_points(const fs::path& path) {
-    return file_kind(path) == FileKind::Points ? read_landmarks(path).fixed : read_landmarks(path, path).fixed;
+/// Fixed points of what register takes as --fixed-points: a table of pairs, or a file of points.
+Eigen::Matrix3Xd read_data_points(const fs::path& path, Observer& observer) {
+    return is_table_of_pairs(path) ? read_landmarks(path, observer).fixed : registration::read_points(path, observer);
 }
 
-Eigen::Matrix3Xd read_data(const EvaluateOptions& options) {
+Eigen::Matrix3Xd read_data(const EvaluateOptions& options, Observer& observer) {
     Eigen::Matrix3Xd data(3, 0);
     const auto append = [&](const Eigen::Matrix3Xd& more) {
         const Eigen::Index before = data.cols();
         data.conservativeResize(3, before + more.cols());
         data.rightCols(more.cols()) = more;
     };
-    if (!options.data_surface.empty()) append(read_surface_points(options.data_surface).points);
-    if (!options.data_points.empty()) append(read_data_points(options.data_points));
+    if (!options.data_surface.empty()) append(read_surface_points(options.data_surface, 1, observer).points);
+    if (!options.data_points.empty()) append(read_data_points(options.data_points, observer));
     return data;
 }
 
@@ -87,8 +81,8 @@ struct Targets {
 };
 
 void evaluate_landmarks(const EvaluateOptions& options, const Volume& field, const Volume& organ,
-                        std::vector<std::string>& notes, ScoreSheet& sheet) {
-    Targets targets{*read_landmark_files(options.landmarks), {}, !field.empty()};
+                        std::vector<std::string>& notes, Observer& observer, ScoreSheet& sheet) {
+    Targets targets{*read_landmark_files(options.landmarks, observer), {}, !field.empty()};
     const Landmarks& landmarks = targets.landmarks;
     targets.mapped = targets.is_mapped ? displaced(landmarks.moving, field) : landmarks.moving;
     sheet.add(target_error(landmarks, targets.mapped, options.moved), targets.is_mapped);
@@ -103,7 +97,7 @@ void evaluate_landmarks(const EvaluateOptions& options, const Volume& field, con
                             outside, depths.size()));
         sheet.add(targets.binned("depth", "by_depth", depths, options.bin_edges));
     }
-    const Eigen::Matrix3Xd data = read_data(options);
+    const Eigen::Matrix3Xd data = read_data(options, observer);
     if (data.cols() == 0) return;
     const Eigen::VectorXd distances = distance_to_data(landmarks.fixed, data);
     constexpr double farthest_mm = 500;  // larger than an organ
@@ -128,9 +122,9 @@ std::vector<Eigen::Matrix3Xd> displaced_lines(const fs::path& path, const Curves
     return lines;
 }
 
-void evaluate_curves(const EvaluateOptions& options, const Volume& field, ScoreSheet& sheet) {
+void evaluate_curves(const EvaluateOptions& options, const Volume& field, Observer& observer, ScoreSheet& sheet) {
     constexpr double farthest_mm = 100;
-    const Curves curves = read_curves(options.moving_curves, options.fixed_curves);
+    const Curves curves = read_curves(options.moving_curves, options.fixed_curves, 1, observer);
     const std::vector<std::vector<int>> pieces = read_curve_file(options.fixed_curves).lines;
     CurveErrors errors{curve_residual(curves.moving, curves.fixed, pieces), std::nullopt};
     if (!field.empty())
@@ -157,8 +151,9 @@ void evaluate_field(const EvaluateOptions& options, const Volume& field, Observe
     if (!options.inverse.empty()) sheet.add(inverse_consistency(field, read_field(options.inverse, observer), chosen));
 }
 
-void evaluate_held_out(const EvaluateOptions& options, const Volume& field, const Volume& organ, ScoreSheet& sheet) {
-    const SurfacePoints points = read_surface_points(options.held_out);
+void evaluate_held_out(const EvaluateOptions& options, const Volume& field, const Volume& organ, Observer& observer,
+                       ScoreSheet& sheet) {
+    const SurfacePoints points = read_surface_points(options.held_out, 1, observer);
     meshing::SurfaceMesh surface = label_surface(organ);
     surface.nodes = displaced(surface.nodes, field);
     sheet.add(surface_residual(surface, points.points));
@@ -190,10 +185,10 @@ void run_evaluate(const EvaluateOptions& options) {
     if (!options.labels.empty()) evaluate_labels(options, progress, sheet);
     const Volume field = read_field(options.displacement, progress),
                  organ = read_organ(options.moving_labels, progress);
-    if (options.landmarks.given()) evaluate_landmarks(options, field, organ, notes, sheet);
-    if (!options.moving_curves.empty()) evaluate_curves(options, field, sheet);
+    if (options.landmarks.given()) evaluate_landmarks(options, field, organ, notes, progress, sheet);
+    if (!options.moving_curves.empty()) evaluate_curves(options, field, progress, sheet);
     if (!field.empty()) evaluate_field(options, field, progress, sheet);
-    if (!options.held_out.empty()) evaluate_held_out(options, field, organ, sheet);
+    if (!options.held_out.empty()) evaluate_held_out(options, field, organ, progress, sheet);
     notes.insert(notes.begin(), progress.notes().begin(), progress.notes().end());
     sheet.add_notes(notes);
     if (!options.json.empty()) write_json(sheet.json(), options.json);

@@ -15,7 +15,7 @@ enum class FileKind { Image, Points, Surface, Mesh, Record, Unknown };
 inline FileKind file_kind(const std::filesystem::path& path) {
     std::string name = path.filename().string();
     std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
-    for (const char* extension : {".csv", ".xyz"})
+    for (const char* extension : {".csv", ".xyz", ".fcsv", ".mrk.json"})
         if (name.ends_with(extension)) return FileKind::Points;
     for (const char* extension : {".ply", ".stl", ".obj", ".vtk", ".vtp"})
         if (name.ends_with(extension)) return FileKind::Surface;

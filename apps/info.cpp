@@ -1,12 +1,16 @@
 // tissuewarp info: what a file holds, and what this machine can compute on.
 
 #include "apps/file_kind.hpp"
+#include "apps/progress.hpp"
 #include "apps/verbs.hpp"
 #include "core/errors.hpp"
 #include "imaging/image_io.hpp"
 #include "imaging/labels.hpp"
 #include "meshing/mesh_io.hpp"
 #include "meshing/quality.hpp"
+#include "registration/evaluation.hpp"
+#include "registration/io/extent.hpp"
+#include "registration/io/slicer_markups.hpp"
 #include "registration/record.hpp"
 #include "shaders/device.hpp"
 
@@ -92,12 +96,24 @@ void print_mesh(const meshing::TetMesh& mesh) {
 }
 
 void print_surface(const fs::path& path) {
-    const meshing::Surface surface = meshing::read_surface(path);
+    ProgressLine notes(true);
+    meshing::Surface surface;
+    if (registration::is_slicer_markups(path))
+        surface.mesh.nodes = registration::read_points(path, notes);
+    else
+        surface = meshing::read_surface(path, notes);
     fmt::print("{} points, {} triangles{}\n", surface.mesh.node_count(), surface.mesh.triangle_count(),
                surface.normals.cols() > 0 ? ", with normals" : "");
     if (surface.mesh.node_count() == 0) return;
     fmt::print("  box (mm, LPS)    {} to {}\n", point_text(surface.mesh.nodes.rowwise().minCoeff()),
                point_text(surface.mesh.nodes.rowwise().maxCoeff()));
+    for (const std::string& note : notes.notes()) fmt::print("  note: {}\n", note);
+    if (surface.mesh.triangle_count() == 0) return;
+    try {
+        registration::detail::require_millimetres(surface.mesh.nodes, "the surface is");
+    } catch (const InvalidInput& doubt) {
+        fmt::print("  note: {}\n", doubt.what());
+    }
 }
 
 void print_record(const fs::path& path) {
@@ -138,7 +154,7 @@ void print_file(const fs::path& path, bool labels) {
     }
     throw InvalidInput("'" + path.string() +
                        "' has an unknown extension; give .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, a DICOM "
-                       "folder, .vtu, .ply, .stl, .obj, .vtk, .vtp, .csv, .xyz or .h5");
+                       "folder, .vtu, .ply, .stl, .obj, .vtk, .vtp, .csv, .xyz, .fcsv, .mrk.json or .h5");
 }
 
 }  // namespace

@@ -154,18 +154,47 @@ void require_same_grid(const Geometry& image, const Geometry& labels, const std:
         fmt::format("'{}' and '{}' are not on one grid ({}); {}", image_name, labels_name, difference, remedy));
 }
 
-std::optional<registration::Landmarks> read_landmark_files(const LandmarkFiles& files) {
-    if (!files.csv.empty()) return registration::read_landmarks(files.csv);
-    if (!files.moving.empty()) return registration::read_landmarks(files.moving, files.fixed);
+std::optional<registration::Landmarks> read_landmark_files(const LandmarkFiles& files, Observer& observer) {
+    if (!files.csv.empty()) return registration::read_landmarks(files.csv, observer);
+    if (!files.moving.empty()) return registration::read_landmarks(files.moving, files.fixed, observer);
     return std::nullopt;
 }
 
-std::optional<registration::PointPairs> read_point_pairs(const PointPairFiles& files) {
+std::optional<registration::PointPairs> read_point_pairs(const PointPairFiles& files, Observer& observer) {
     if (files.fixed.empty()) return std::nullopt;
-    registration::Landmarks pairs = files.moving.empty() ? registration::read_landmarks(files.fixed)
-                                                         : registration::read_landmarks(files.moving, files.fixed);
+    registration::Landmarks pairs = files.moving.empty()
+                                        ? registration::read_landmarks(files.fixed, observer)
+                                        : registration::read_landmarks(files.moving, files.fixed, observer);
     return registration::PointPairs{std::move(pairs.moving), std::move(pairs.fixed), files.deviation};
 }
+
+namespace {
+
+/// What readers of points and surfaces note becomes a note of the inputs.
+class InputNotes final : public Observer {
+public:
+    explicit InputNotes(std::vector<std::string>& notes) : notes_(notes) {}
+    void note(std::string_view message) override { notes_.emplace_back(message); }
+
+private:
+    std::vector<std::string>& notes_;
+};
+
+void read_point_files(RegistrationInputs& inputs, const RegisterOptions& options) {
+    InputNotes notes(inputs.notes);
+    inputs.landmarks = read_landmark_files(options.landmarks, notes);
+    inputs.point_pairs = read_point_pairs(options.point_pairs, notes);
+    if (!options.fixed_surface.empty())
+        inputs.fixed_surface =
+            registration::read_surface_points(options.fixed_surface, options.surface_deviation, notes);
+    if (!options.curves.fixed.empty())
+        inputs.curves =
+            registration::read_curves(options.curves.moving, options.curves.fixed, options.curves.deviation, notes);
+    if (!options.points.empty()) inputs.points = read_points(options.points, notes);
+    if (!options.surface.empty()) inputs.surface = read_tissue_surface(options.surface, notes);
+}
+
+}  // namespace
 
 RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observer) {
     RegistrationInputs inputs;
@@ -186,14 +215,7 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
                                                                      {"surface", &options.surface}};
     for (const auto& [role, path] : roles) add_file(inputs, role, *path);
     if (!options.materials.empty()) inputs.materials = read_materials(options.materials);
-    inputs.landmarks = read_landmark_files(options.landmarks);
-    inputs.point_pairs = read_point_pairs(options.point_pairs);
-    if (!options.fixed_surface.empty())
-        inputs.fixed_surface = registration::read_surface_points(options.fixed_surface, options.surface_deviation);
-    if (!options.curves.fixed.empty())
-        inputs.curves =
-            registration::read_curves(options.curves.moving, options.curves.fixed, options.curves.deviation);
-    if (!options.points.empty()) inputs.points = read_points(options.points);
+    read_point_files(inputs, options);
     observer.checkpoint("reading", 0.1);
 
     imaging::ReadResult moving, fixed, moving_labels, fixed_labels;
@@ -255,6 +277,7 @@ void validate(RegistrationInputs& inputs, const RegisterOptions& options) {
     }
     if (inputs.fixed_surface) check_fixed(inputs.fixed_surface->points, "points of the fixed surface");
     if (inputs.points) check_moving(*inputs.points, "points");
+    if (inputs.surface) check_moving(inputs.surface->nodes, "points of the surface");
 }
 
 }  // namespace tissuewarp::apps

@@ -31,6 +31,7 @@ struct RegistrationInputs {
     std::optional<registration::Curves> curves;
     std::optional<registration::Landmarks> landmarks;
     std::optional<Eigen::Matrix3Xd> points;                            ///< moving frame, LPS mm
+    std::optional<meshing::SurfaceMesh> surface;                       ///< to carry along, moving frame, LPS mm
     std::map<int, TissueEntry> materials;                              ///< empty without a table
     std::map<int, std::string> moving_label_names, fixed_label_names;  ///< of segmentations that name their segments
     std::vector<InputFile> files;
@@ -65,9 +66,9 @@ void check_inside(const Eigen::Matrix3Xd& points, const imaging::Geometry& grid,
                   std::vector<std::string>& notes);
 
 /// Reads the files of points to register to, if given.
-std::optional<registration::PointPairs> read_point_pairs(const PointPairFiles& files);
+std::optional<registration::PointPairs> read_point_pairs(const PointPairFiles& files, Observer& observer);
 
 /// Reads the landmark files that were given.
-std::optional<registration::Landmarks> read_landmark_files(const LandmarkFiles& files);
+std::optional<registration::Landmarks> read_landmark_files(const LandmarkFiles& files, Observer& observer);
 
 }  // namespace tissuewarp::apps

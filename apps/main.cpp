@@ -51,7 +51,9 @@ int main(int argc, char** argv) {
     try {
         const apps::Command command = apps::parse_command_line(arguments);
         apps::catch_interrupts();
-        const int threads = std::visit([](const auto& options) { return options.common.threads; }, command);
+        const int asked = std::visit([](const auto& options) { return options.common.threads; }, command);
+        const int threads = apps::usable_threads(asked);
+        if (threads < asked) spdlog::warn("note: {} threads on {} processors; {} are used", asked, threads, threads);
         apps::with_threads(threads, [&] { std::visit(RunVerb{}, command); });
         if (std::fflush(stdout) != 0) throw IoError("cannot write to standard output");
         return 0;
@@ -70,6 +72,8 @@ int main(int argc, char** argv) {
         return report(arguments, 130, interrupted.what());
     } catch (const Cancelled&) {
         return report(arguments, 130, "interrupted; nothing was written");
+    } catch (const apps::TooFewThreads& error) {
+        return report(arguments, 1, error.what());
     } catch (const std::bad_alloc&) {
         return report(arguments, 1, "not enough memory; use a coarser --edge-length or smaller images");
     } catch (const std::exception& error) {

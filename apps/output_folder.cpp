@@ -1,12 +1,15 @@
 #include "apps/output_folder.hpp"
 
+#include "apps/output_commit.hpp"
 #include "core/atomic_file.hpp"
 #include "core/errors.hpp"
 
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
+#include <csignal>
 #include <cstring>
 #include <system_error>
 
@@ -34,16 +37,45 @@ void remove_created(const std::vector<fs::path>& created) {
     for (auto folder = created.rbegin(); folder != created.rend(); ++folder) fs::remove(*folder, ignored);
 }
 
+void require_no_folder_in_the_way(const fs::path& folder, const IsResult& is_result) {
+    std::error_code ignored;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored))
+        if (is_result(entry.path().filename().string()) && entry.is_directory(ignored))
+            throw IoError("cannot write '" + entry.path().string() +
+                          "': it is a folder; move it away or choose another --output");
+}
+
+std::string run_number() {
+    return std::to_string(::getpid());
+}
+
+/// A commit takes milliseconds: whoever asks the program to stop is too late.
+class SignalsWait {
+public:
+    SignalsWait() {
+        for (std::size_t s = 0; s < signals.size(); ++s) before_[s] = std::signal(signals[s], SIG_IGN);
+    }
+    ~SignalsWait() {
+        for (std::size_t s = 0; s < signals.size(); ++s) std::signal(signals[s], before_[s]);
+    }
+    SignalsWait(const SignalsWait&) = delete;
+    SignalsWait& operator=(const SignalsWait&) = delete;
+
+private:
+    static constexpr std::array<int, 3> signals{SIGINT, SIGTERM, SIGHUP};
+    std::array<void (*)(int), 3> before_{};
+};
+
 }  // namespace
 
-OutputFolder::OutputFolder(fs::path folder)
-    : folder_(std::move(folder)), staging_(folder_ / (".partial-" + std::to_string(::getpid()))) {
+OutputFolder::OutputFolder(fs::path folder, IsResult is_result)
+    : folder_(std::move(folder)), is_result_(std::move(is_result)) {
     created_ = missing_folders(folder_);
     try {
         require_writable_folder(folder_);
-        std::error_code failure;
-        fs::create_directory(staging_, failure);
-        if (failure) throw IoError("cannot write into the folder '" + folder_.string() + "': " + failure.message());
+        sweep(folder_, is_result_);
+        require_no_folder_in_the_way(folder_, is_result_);
+        make_staging();
     } catch (...) {
         remove_created(created_);
         throw;
@@ -52,8 +84,17 @@ OutputFolder::OutputFolder(fs::path folder)
 
 OutputFolder::~OutputFolder() {
     std::error_code ignored;
-    fs::remove_all(staging_, ignored);
+    if (!committed_) fs::remove_all(staging_, ignored);
+    if (lock_ >= 0) ::close(lock_);
     if (!committed_) remove_created(created_);
+}
+
+void OutputFolder::make_staging() {
+    staging_ = hidden_folders(folder_, run_number()).partial;
+    std::error_code failure;
+    fs::create_directory(staging_, failure);
+    if (failure) throw IoError("cannot write into the folder '" + folder_.string() + "': " + failure.message());
+    lock_ = lock_folder(staging_);  // a file system without locks is used without them
 }
 
 std::string OutputFolder::in_words(std::string message) const {
@@ -64,16 +105,18 @@ std::string OutputFolder::in_words(std::string message) const {
 }
 
 void OutputFolder::commit() {
-    for (const fs::directory_entry& entry : fs::directory_iterator(staging_)) {
-        std::error_code failure;
-        fs::rename(entry.path(), folder_ / entry.path().filename(), failure);
-        if (failure)
-            throw IoError("cannot write '" + (folder_ / entry.path().filename()).string() + "': " + failure.message());
-    }
+    const SignalsWait wait;
+    require_no_folder_in_the_way(folder_, is_result_);
+    const HiddenFolders hidden = hidden_folders(folder_, run_number());
+    std::error_code failure;
+    fs::rename(staging_, hidden.complete, failure);
+    if (failure) throw IoError("cannot write into the folder '" + folder_.string() + "': " + failure.message());
+    staging_ = hidden.complete;  // to be removed where the old results cannot be moved away
+    finish_commit(folder_, run_number(), is_result_);
     committed_ = true;
 }
 
-void require_could_write(const fs::path& folder) {
+void require_could_write(const fs::path& folder, const IsResult& is_result) {
     fs::path at = fs::absolute(folder).lexically_normal();
     std::error_code ignored;
     while (!fs::exists(at, ignored) && at.has_relative_path()) at = at.parent_path();
@@ -81,6 +124,7 @@ void require_could_write(const fs::path& folder) {
         throw IoError("cannot write into '" + folder.string() + "': '" + at.string() + "' is not a folder");
     if (::access(at.c_str(), W_OK | X_OK) != 0)
         throw IoError("cannot write into '" + folder.string() + "': " + std::strerror(errno));
+    require_no_folder_in_the_way(folder, is_result);
 }
 
 void require_could_write_file(const fs::path& file) {
@@ -88,7 +132,10 @@ void require_could_write_file(const fs::path& file) {
     std::error_code ignored;
     if (!fs::is_directory(folder, ignored))
         throw IoError("cannot write '" + file.string() + "': there is no folder '" + folder.string() + "'");
-    require_could_write(folder);
+    if (fs::is_directory(file, ignored))
+        throw IoError("cannot write '" + file.string() + "': it is a folder; give the name of a file");
+    require_could_write(folder, [](const std::string&) { return false; });
+    remove_left_temporaries(file);
 }
 
 }  // namespace tissuewarp::apps

@@ -1,15 +1,25 @@
 #include "apps/point_files.hpp"
 
+#include "apps/file_kind.hpp"
 #include "core/atomic_file.hpp"
 #include "imaging/vector_sampling.hpp"
 #include "meshing/mesh_io.hpp"
+#include "registration/evaluation.hpp"
+#include "registration/io/extent.hpp"
 
 #include <fmt/format.h>
 
 namespace tissuewarp::apps {
 
-Eigen::Matrix3Xd read_points(const std::filesystem::path& path) {
-    return meshing::read_surface(path).mesh.nodes;
+Eigen::Matrix3Xd read_points(const std::filesystem::path& path, Observer& observer) {
+    if (file_kind(path) == FileKind::Surface) return meshing::read_surface(path, observer).mesh.nodes;
+    return registration::read_points(path, observer);
+}
+
+meshing::SurfaceMesh read_tissue_surface(const std::filesystem::path& path, Observer& observer) {
+    meshing::SurfaceMesh surface = meshing::read_surface(path, observer).mesh;
+    registration::detail::require_millimetres(surface.nodes, "'" + path.string() + "': the surface is");
+    return surface;
 }
 
 void write_columns(const std::vector<Column>& columns, const std::filesystem::path& path) {

@@ -1,7 +1,9 @@
 #pragma once
 /// Points and landmarks as text files, and displacement fields read at points.
 
+#include "core/observer.hpp"
 #include "imaging/volume.hpp"
+#include "meshing/tet_mesh.hpp"
 
 #include <Eigen/Core>
 
@@ -11,8 +13,11 @@
 
 namespace tissuewarp::apps {
 
-/// Points of a .csv or .xyz file, 3 × P, LPS mm. Throws IoError or InvalidInput.
-Eigen::Matrix3Xd read_points(const std::filesystem::path& path);
+/// Points of a file of points or of a surface, 3 × P, LPS mm. Throws IoError or InvalidInput.
+Eigen::Matrix3Xd read_points(const std::filesystem::path& path, Observer& observer);
+
+/// A surface of tissue. Throws IoError, or InvalidInput where its extent cannot be that of tissue in mm.
+meshing::SurfaceMesh read_tissue_surface(const std::filesystem::path& path, Observer& observer);
 
 /// Named columns of numbers, all of one length, as CSV with six decimals. Complete or absent; throws IoError.
 struct Column {

@@ -39,8 +39,11 @@ void catch_interrupts() {
     struct sigaction action {};
     action.sa_handler = request_stop;
     action.sa_flags = static_cast<int>(SA_RESETHAND);  // the second one kills
-    sigaction(SIGINT, &action, nullptr);
-    sigaction(SIGTERM, &action, nullptr);
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+        struct sigaction before {};
+        sigaction(signal, nullptr, &before);
+        if (before.sa_handler != SIG_IGN) sigaction(signal, &action, nullptr);  // nohup and shells ignore some for us
+    }
 }
 
 bool interrupted() {

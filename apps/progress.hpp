@@ -10,7 +10,8 @@
 
 namespace tissuewarp::apps {
 
-/// From here on SIGINT and SIGTERM ask the running verb to stop; a second one ends the process at once.
+/// From here on SIGINT, SIGTERM and SIGHUP ask the running verb to stop, unless the process was started with them
+/// ignored; a second one ends the process at once.
 void catch_interrupts();
 
 /// True once an interrupt arrived.

@@ -12,7 +12,6 @@
 #include "core/errors.hpp"
 #include "imaging/filters.hpp"
 #include "imaging/labels.hpp"
-#include "meshing/mesh_io.hpp"
 #include "registration/evaluation/curve_residual.hpp"
 #include "registration/field.hpp"
 #include "registration/io/curves.hpp"
@@ -77,6 +76,20 @@ void print_plan(const RegistrationInputs& inputs, const RegisterOptions& options
     for (const std::string& note : inputs.notes) fmt::print("note: {}\n", note);
 }
 
+/// Results of an older run go when the new ones come: an input must not be one of them.
+void require_inputs_stay(const RegistrationInputs& inputs, const std::filesystem::path& output) {
+    for (const InputFile& file : inputs.files) {
+        std::error_code none;
+        const bool within =
+            std::filesystem::equivalent(std::filesystem::absolute(file.path).parent_path(), output, none);
+        if (!none && within && is_register_output(file.path.filename().string()))
+            throw InvalidInput(
+                fmt::format("--{} '{}' is a result in the output folder, which this run would replace; "
+                            "choose another --output",
+                            file.role, file.path.string()));
+    }
+}
+
 /// Where no fixed image gives a grid: the moving one, carried along by the rigid alignment.
 imaging::Geometry output_grid(const RegistrationRun& run) {
     if (const imaging::Geometry* fixed = run.inputs.fixed_grid()) return *fixed;
@@ -120,13 +133,12 @@ void warp_everything(RegistrationRun& run) {
     Products& products = run.products;
     if (!inputs.moving.empty()) products.warped = warp_image(inputs.moving, products.fixed_to_moving);
     products.warped_labels = warp_labels(inputs.moving_labels, products.fixed_to_moving);
-    const bool surface = !run.options.surface.empty();
-    if (!inputs.landmarks && !inputs.points && !surface) return;
+    if (!inputs.landmarks && !inputs.points && !inputs.surface) return;
     const PointTransform transform(run.result.deformation, {run.options.fade});
     if (inputs.landmarks) products.landmarks = transform(inputs.landmarks->moving);
     if (inputs.points) products.points = transform(*inputs.points);
-    if (surface) {
-        products.surface = meshing::read_surface(run.options.surface).mesh;
+    if (inputs.surface) {
+        products.surface = inputs.surface;
         products.surface->nodes = transform(products.surface->nodes);
     }
 }
@@ -196,13 +208,14 @@ void run_register(const RegisterOptions& options) {
     ProgressLine progress(options.common.quiet);
     RegistrationRun run(options, utc_now());
 
-    if (options.dry_run) require_could_write(options.output);
+    if (options.dry_run) require_could_write(options.output, is_register_output);
     if (!options.save_parameters.empty()) require_could_write_file(options.save_parameters);
     std::unique_ptr<OutputFolder> output;
-    if (!options.dry_run) output = std::make_unique<OutputFolder>(options.output);
+    if (!options.dry_run) output = std::make_unique<OutputFolder>(options.output, is_register_output);
 
     progress.begin("reading", 0.0, 0.02);
     run.inputs = read_inputs(options, progress);
+    require_inputs_stay(run.inputs, options.output);
     validate(run.inputs, options);
     run.times.push_back(clock.lap("read"));
     if (options.dry_run) {

@@ -1,5 +1,6 @@
 #include "apps/register_outputs.hpp"
 
+#include "apps/file_kind.hpp"
 #include "apps/point_files.hpp"
 #include "apps/progress.hpp"
 #include "apps/report_json.hpp"
@@ -128,6 +129,15 @@ std::vector<std::string> output_names(const RegisterOptions& options) {
     if (!options.surface.empty()) names.push_back(surface_name(options));
     for (const char* name : {"report.json", "preview.png", "report.html"}) names.emplace_back(name);
     return names;
+}
+
+bool is_register_output(const std::string& name) {
+    RegisterOptions all;
+    all.moving = all.landmarks.csv = all.points = all.surface = "given";
+    const std::vector<std::string> names = output_names(all);
+    const std::filesystem::path path(name);
+    return std::find(names.begin(), names.end(), name) != names.end() ||
+           (path.stem() == "warped_surface" && file_kind(path) == FileKind::Surface);
 }
 
 void start_writing(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks) {

@@ -15,6 +15,9 @@ namespace tissuewarp::apps {
 /// Names of the files in the output folder.
 std::vector<std::string> output_names(const RegisterOptions& options);
 
+/// Of any options, and of versions before this one.
+bool is_register_output(const std::string& name);
+
 /// Starts one task per file for images, fields, mesh, points and record; `run` and `output` must outlive `tasks`.
 /// wait() on the tasks rethrows the first IoError, or Cancelled.
 void start_writing(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks);

@@ -76,7 +76,7 @@ Scene read_scene(const std::filesystem::path& path, Observer& observer) {
     read_tissues(file, folder, scene, uses, observer);
     read_sets(file, scene, uses);
     read_loads(file, scene, uses);
-    read_neighbours(file, folder, scene, uses);
+    read_neighbours(file, folder, scene, uses, observer);
     read_solve(file, scene);
     read_probes(file, scene);
     (void)file.table("geometry");

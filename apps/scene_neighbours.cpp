@@ -11,11 +11,12 @@ using namespace simulation;
 
 namespace {
 
-Body body_of(TomlReader& reader, const std::filesystem::path& folder, NameUses& uses) {
+Body body_of(TomlReader& reader, const std::filesystem::path& folder, NameUses& uses, Observer& observer) {
     std::vector<Body> bodies;
     if (const auto plane = reader.table("plane")) bodies.emplace_back(read_half_space(*plane));
     if (const auto ball = reader.table("ball")) bodies.emplace_back(read_ball(*ball));
-    if (const auto surface = reader.text("surface")) bodies.emplace_back(meshing::read_surface(folder / *surface).mesh);
+    if (const auto surface = reader.text("surface"))
+        bodies.emplace_back(meshing::read_surface(folder / *surface, observer).mesh);
     if (const auto label = reader.whole("label", 1, 1000000)) {
         bodies.emplace_back(ObstacleLabel{*label});
         uses.volume_labels.push_back({*label, reader.place("label"), "is a body in contact"});
@@ -66,7 +67,8 @@ RigidMotion rigid_motion(TomlReader& reader) {
 
 }  // namespace
 
-void read_neighbours(TomlReader& file, const std::filesystem::path& folder, Scene& scene, NameUses& uses) {
+void read_neighbours(TomlReader& file, const std::filesystem::path& folder, Scene& scene, NameUses& uses,
+                     Observer& observer) {
     for (TomlReader& reader : file.tables("contact")) {
         Contact contact;
         contact.set = reader.text("set").value_or("");
@@ -75,7 +77,7 @@ void read_neighbours(TomlReader& file, const std::filesystem::path& folder, Scen
         contact.friction = reader.number("friction", {0.0, 10.0}).value_or(0.0);
         contact.motion = rigid_motion(reader);
         contact.curve = reader.curve();
-        contact.body = body_of(reader, folder, uses);
+        contact.body = body_of(reader, folder, uses, observer);
         reader.finish();
         scene.contacts.push_back(contact);
     }

@@ -42,7 +42,8 @@ void read_geometry(TomlReader& file, const std::filesystem::path& folder, simula
                    const NameUses& uses, Observer& observer);
 void read_sets(TomlReader& file, simulation::Scene& scene, NameUses& uses);
 void read_loads(TomlReader& file, simulation::Scene& scene, NameUses& uses);
-void read_neighbours(TomlReader& file, const std::filesystem::path& folder, simulation::Scene& scene, NameUses& uses);
+void read_neighbours(TomlReader& file, const std::filesystem::path& folder, simulation::Scene& scene, NameUses& uses,
+                     Observer& observer);
 void read_solve(TomlReader& file, simulation::Scene& scene);
 
 simulation::Box read_box(TomlReader reader);

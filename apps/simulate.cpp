@@ -16,6 +16,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <set>
 
 namespace tissuewarp::apps {
 
@@ -63,6 +64,12 @@ void apply_device(const DeviceChoice& device, simulation::Solve& solve) {
     if (device.name.starts_with("gpu:")) solve.gpu_index = std::stoi(device.name.substr(4));
 }
 
+bool is_simulate_output(const std::string& name) {
+    static const std::set<std::string> names{"summary.json", "frames.pvd", "frames.xdmf", "displacement.h5",
+                                             "probes.csv"};
+    return names.contains(name) || (name.starts_with("frame_") && name.ends_with(".vtu"));
+}
+
 /// --init: a scene to begin with.
 void write_template(const SimulateOptions& options) {
     const fs::path file = options.scene.empty() ? fs::path(options.init + ".toml") : options.scene;
@@ -105,7 +112,7 @@ void run_simulate(const SimulateOptions& options) {
     if (options.ablate) return run_ablation(options);
     ProgressLine progress(options.common.quiet);
     if (options.output.empty()) throw InvalidInput("give --output, the folder for the frames");
-    require_could_write(options.output);
+    require_could_write(options.output, is_simulate_output);
     progress.begin("reading", 0.0, 0.02);
     simulation::Scene scene = read_scene(options.scene, progress);
     apply_device(options.device, scene.solve);
@@ -115,7 +122,7 @@ void run_simulate(const SimulateOptions& options) {
     const simulation::BuiltScene built = simulation::build(scene, progress);
     const double building = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
-    OutputFolder folder(options.output);
+    OutputFolder folder(options.output, is_simulate_output);
     progress.begin("simulating", 0.3, 1.0);
     simulation::SeriesWriter series(built, folder.staging());
     const simulation::RunSummary run = simulation::simulate(

@@ -2,6 +2,7 @@
 
 #include "registration/warp.hpp"
 
+#include "apps/displacement_field.hpp"
 #include "apps/file_kind.hpp"
 #include "apps/noted_images.hpp"
 #include "apps/output_folder.hpp"
@@ -12,9 +13,12 @@
 #include "core/errors.hpp"
 #include "meshing/mesh_io.hpp"
 #include "registration/field.hpp"
+#include "registration/io/slicer_markups.hpp"
 #include "registration/record.hpp"
 
 #include <fmt/format.h>
+
+#include <algorithm>
 
 namespace tissuewarp::apps {
 
@@ -22,17 +26,9 @@ namespace {
 
 using imaging::Volume;
 
-Volume read_field(const std::filesystem::path& path, Observer& observer) {
-    const Volume field = read_noted_volume(path, observer);
-    if (field.channels() != 3)
-        throw InvalidInput("'" + path.string() + "' has " + std::to_string(field.channels()) +
-                           " components; give a displacement field of three");
-    return field.as(CV_32F);
-}
-
 /// The pulling field: the one that was given, or the record's on the reference grid.
 Volume fixed_to_moving(const WarpOptions& options, const Volume& image, Observer& observer) {
-    if (!options.displacement.empty()) return read_field(options.displacement, observer);
+    if (!options.displacement.empty()) return read_displacement(options.displacement, observer);
     const registration::Record record = registration::read_record(options.record);
     const imaging::Geometry grid =
         options.reference.empty() ? image.geometry : read_noted_volume(options.reference, observer).geometry;
@@ -49,9 +45,26 @@ void warp_volume(const WarpOptions& options, Observer& observer) {
     imaging::write_volume(warped, options.output);
 }
 
+/// Points of other units or another frame would be carried along rigidly, as what lies outside of all tissue is.
+void require_near(const Eigen::Matrix3Xd& points, const meshing::TetMesh& mesh, const std::filesystem::path& path) {
+    constexpr double farthest_mm = 500;  // larger than an organ
+    const Eigen::Vector3d lower = mesh.nodes.rowwise().minCoeff(), upper = mesh.nodes.rowwise().maxCoeff();
+    std::vector<double> distances;
+    for (const auto& point : points.colwise())
+        distances.push_back((lower - point).cwiseMax(point - upper).cwiseMax(0).norm());
+    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+    std::nth_element(distances.begin(), middle, distances.end());
+    if (*middle <= farthest_mm) return;
+    throw InvalidInput(
+        fmt::format("'{}' lies {:.0f} mm from the model of the record, more than {:g}; coordinates must "
+                    "be LPS mm of the moving image",
+                    path.string(), *middle, farthest_mm));
+}
+
 Eigen::Matrix3Xd map_points(const WarpOptions& options, const Eigen::Matrix3Xd& points, Observer& observer) {
-    if (!options.displacement.empty()) return displaced(points, read_field(options.displacement, observer));
+    if (!options.displacement.empty()) return displaced(points, read_displacement(options.displacement, observer));
     const registration::Record record = registration::read_record(options.record);
+    require_near(points, record.deformation.mesh, options.input);
     return registration::PointTransform(record.deformation, {options.fade})(points);
 }
 
@@ -62,26 +75,27 @@ void run_warp(const WarpOptions& options) {
     if (options.record.empty() && options.displacement.empty())
         throw InvalidInput("nothing to warp with; give --record record.h5 or --displacement FIELD");
     const FileKind kind = file_kind(options.input);
-    if (file_kind(options.output) != kind)
+    const bool writes_markups = registration::is_slicer_markups(options.output);
+    if (file_kind(options.output) != kind || writes_markups)
         throw InvalidInput("'" + options.input.string() + "' cannot become '" + options.output.string() +
-                           "'; give an output of the same kind (image, points or surface)");
+                           "'; give an output of the same kind (image, points as .csv or surface)");
     require_could_write_file(options.output);
     progress.begin("warping", 0.0, 1.0);
     if (kind == FileKind::Image) {
         warp_volume(options, progress);
     } else if (kind == FileKind::Points) {
         std::vector<Column> columns;
-        append_points(columns, "", map_points(options, read_points(options.input), progress));
+        append_points(columns, "", map_points(options, read_points(options.input, progress), progress));
         write_columns(columns, options.output);
     } else if (kind == FileKind::Surface) {
-        meshing::SurfaceMesh surface = meshing::read_surface(options.input).mesh;
+        meshing::SurfaceMesh surface = read_tissue_surface(options.input, progress);
         surface.nodes = map_points(options, surface.nodes, progress);
         meshing::write_surface(surface, options.output);
     } else {
-        throw InvalidInput(
-            "'" + options.input.string() +
-            "' is of no kind that can be warped; give an image, points (.csv, .xyz) or a surface (.ply, .stl, "
-            ".obj, .vtk, .vtp)");
+        throw InvalidInput("'" + options.input.string() +
+                           "' is of no kind that can be warped; give an image, points (.csv, .xyz, .fcsv, .mrk.json) "
+                           "or a surface (.ply, .stl, "
+                           ".obj, .vtk, .vtp)");
     }
     progress.clear();
     if (options.common.quiet) return;

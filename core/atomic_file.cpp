@@ -6,10 +6,13 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <string>
 #include <system_error>
+#include <utility>
 
 namespace tissuewarp {
 namespace fs = std::filesystem;
@@ -23,11 +26,19 @@ std::string full_extension(const fs::path& path) {
     return path.stem().extension().string() + last;
 }
 
+/// What stands before and behind the number of the process in the name of a temporary.
+std::pair<std::string, std::string> around_number(const fs::path& destination) {
+    const std::string name = destination.filename().string(), extension = full_extension(destination);
+    return {std::string(".").append(name, 0, name.size() - extension.size()) + ".partial-", extension};
+}
+
 fs::path temporary_name(const fs::path& destination) {
-    const std::string name = destination.filename().string();
-    const std::string extension = full_extension(destination);
-    const std::string base = name.substr(0, name.size() - extension.size());
-    return destination.parent_path() / ("." + base + ".partial-" + std::to_string(::getpid()) + extension);
+    const auto [before, behind] = around_number(destination);
+    return destination.parent_path() / (before + std::to_string(::getpid()) + behind);
+}
+
+bool lives(const std::string& process) {
+    return process.size() > 9 || ::kill(std::atoi(process.c_str()), 0) == 0 || errno != ESRCH;
 }
 
 }  // namespace
@@ -52,6 +63,20 @@ void AtomicFile::commit() {
     fs::rename(temporary_, destination_, failure);
     if (failure) throw IoError("cannot write '" + destination_.string() + "': " + failure.message());
     committed_ = true;
+}
+
+void remove_left_temporaries(const fs::path& destination) {
+    const auto [before, behind] = around_number(destination);
+    const fs::path folder = destination.has_parent_path() ? destination.parent_path() : fs::path(".");
+    std::error_code ignored;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored)) {
+        const std::string name = entry.path().filename().string();
+        if (name.size() <= before.size() + behind.size() || !name.starts_with(before) || !name.ends_with(behind))
+            continue;
+        const std::string number = name.substr(before.size(), name.size() - before.size() - behind.size());
+        if (number.find_first_not_of("0123456789") == std::string::npos && !lives(number))
+            fs::remove(entry.path(), ignored);
+    }
 }
 
 void write_file(std::string_view bytes, const fs::path& path) {

@@ -25,6 +25,9 @@ private:
     bool committed_ = false;
 };
 
+/// Removes temporaries of this destination that processes left which were killed.
+void remove_left_temporaries(const std::filesystem::path& destination);
+
 /// A file of these bytes. Throws IoError (full disk, missing folder, permission).
 void write_file(std::string_view bytes, const std::filesystem::path& path);
 

@@ -1,6 +1,7 @@
 #pragma once
 /// Mesh files. VTU is written by hand (appended raw binary, little-endian) so that ParaView and Slicer read it.
 
+#include "core/observer.hpp"
 #include "meshing/tet_mesh.hpp"
 
 #include <filesystem>
@@ -35,9 +36,10 @@ struct Surface {
     Eigen::Matrix3Xd normals;
 };
 
-/// Reads .ply, .stl, .obj, .vtk (legacy polydata), .vtp (XML polydata, as .vtu) and point lists .csv/.xyz
-/// (x,y,z[,nx,ny,nz], mm LPS) by extension. Point clouds have no triangles. Throws IoError or InvalidInput.
-Surface read_surface(const std::filesystem::path& path);
+/// Reads .ply, .stl, .obj, .vtk (legacy polydata), .vtp (XML polydata, as .vtu) and tables of points .csv/.xyz
+/// (point_table.hpp) by extension. Points that the file says to be RAS ("SPACE=RAS", as 3D Slicer writes) are turned to
+/// LPS, with a note. Point clouds have no triangles. Throws IoError or InvalidInput.
+Surface read_surface(const std::filesystem::path& path, Observer& observer = silent_observer());
 
 /// Points, some of them joined by lines: indices of nodes, two at least each.
 struct Polylines {
@@ -45,8 +47,8 @@ struct Polylines {
     std::vector<std::vector<int>> lines;
 };
 
-/// Reads the lines of VTK polydata, legacy (.vtk) or XML (.vtp). Throws IoError or InvalidInput.
-Polylines read_polylines(const std::filesystem::path& path);
+/// Reads the lines of VTK polydata, legacy (.vtk) or XML (.vtp), turned as surfaces are. Throws IoError or InvalidInput.
+Polylines read_polylines(const std::filesystem::path& path, Observer& observer = silent_observer());
 
 /// Writes .ply (binary), .stl, .obj, .vtk or .vtp by extension. Complete or absent. Throws IoError.
 void write_surface(const SurfaceMesh& surface, const std::filesystem::path& path);

@@ -2,9 +2,11 @@
 #include "meshing/detail/surface_formats.hpp"
 #include "meshing/detail/vtk_appended.hpp"
 #include "meshing/mesh_io.hpp"
+#include "meshing/point_table.hpp"
 
 #include <Eigen/Dense>
 
+#include <cctype>
 #include <charconv>
 #include <cstdint>
 
@@ -22,9 +24,17 @@ RawSurface read_by_extension(const std::filesystem::path& path, FileReader& file
     if (extension == ".obj") return detail::read_obj(file);
     if (extension == ".vtk") return detail::read_vtk_polydata(file);
     if (extension == ".vtp") return detail::read_vtp(file);
-    if (extension == ".csv" || extension == ".xyz") return detail::read_point_list(file);
     file.fail("has the extension '" + extension +
               "'; surfaces are read from .ply, .stl, .obj, .vtk, .vtp, .csv and .xyz");
+}
+
+/// One rule for all formats: RAS is turned to LPS and said, other frames are refused, what says nothing is LPS.
+bool is_ras(const RawSurface& raw, const FileReader& file, Observer& observer) {
+    if (raw.space.empty() || raw.space == "LPS") return false;
+    if (raw.space != "RAS")
+        file.refuse("says that its points are in the frame " + raw.space + "; write them as LPS or RAS");
+    observer.note(note_of(file.path(), "says that its points are RAS; they were turned to LPS"));
+    return true;
 }
 
 Eigen::Matrix3Xd checked_nodes(const RawSurface& raw, const FileReader& file) {
@@ -43,7 +53,7 @@ int checked_index(long long node, Eigen::Index count, const FileReader& file) {
     return static_cast<int>(node);
 }
 
-Surface checked(const RawSurface& raw, const FileReader& file) {
+Surface checked(const RawSurface& raw, const FileReader& file, Observer& observer) {
     Surface surface;
     surface.mesh.nodes = checked_nodes(raw, file);
     const Eigen::Index count = surface.mesh.nodes.cols();
@@ -52,13 +62,23 @@ Surface checked(const RawSurface& raw, const FileReader& file) {
         for (int k = 0; k < 3; ++k)
             surface.mesh.triangles(k, static_cast<Eigen::Index>(t)) =
                 checked_index(raw.triangles[t][static_cast<std::size_t>(k)], count, file);
-    if (raw.normals.size() != raw.nodes.size()) return surface;
-    surface.normals.resize(3, count);
-    for (Eigen::Index n = 0; n < count; ++n) {
+    if (raw.normals.size() == raw.nodes.size()) surface.normals.resize(3, count);
+    for (Eigen::Index n = 0; n < surface.normals.cols(); ++n) {
         const Eigen::Vector3d& normal = raw.normals[static_cast<std::size_t>(n)];
         if (!normal.allFinite()) file.refuse("has a normal that is not finite at point " + std::to_string(n));
         surface.normals.col(n) = normal.norm() > 0.0 ? Eigen::Vector3d(normal.normalized()) : normal;
     }
+    if (is_ras(raw, file, observer))
+        for (Eigen::Matrix3Xd* vectors : {&surface.mesh.nodes, &surface.normals}) vectors->topRows<2>() *= -1.0;
+    return surface;
+}
+
+Surface from_table(const std::filesystem::path& path, Observer& observer) {
+    PointTable table = read_point_table(path);
+    for (const std::string& note : table.notes) observer.note(note);
+    Surface surface;
+    surface.mesh.nodes = std::move(table.points);
+    surface.normals = std::move(table.normals);
     return surface;
 }
 
@@ -174,18 +194,39 @@ std::string document(const SurfaceMesh& surface, const std::filesystem::path& pa
 
 }  // namespace
 
-Surface read_surface(const std::filesystem::path& path) {
-    FileReader file(path);
-    return checked(read_by_extension(path, file), file);
+std::string detail::space_in(std::string_view text) {
+    const std::string lower = lower_case(text);
+    for (std::size_t at = 0; (at = lower.find("space", at)) != std::string::npos; at += 5) {
+        if (at > 0 && std::isalnum(static_cast<unsigned char>(lower[at - 1])) != 0) continue;
+        const std::size_t sign = lower.find_first_not_of(" \t", at + 5);
+        if (sign == std::string::npos || (lower[sign] != '=' && lower[sign] != ':')) continue;
+        const std::size_t value = lower.find_first_not_of(" \t", sign + 1);
+        if (value == std::string::npos) continue;
+        std::string space = lower.substr(value, 3);
+        std::transform(space.begin(), space.end(), space.begin(), [](unsigned char c) { return std::toupper(c); });
+        const bool whole = value + 3 >= lower.size() || std::isalnum(static_cast<unsigned char>(lower[value + 3])) == 0;
+        int axes = 0;
+        for (const std::string_view axis : {"LR", "PA", "SI"}) axes += space.find_first_of(axis) != std::string::npos;
+        if (whole && axes == 3) return space;
+    }
+    return "";
 }
 
-Polylines read_polylines(const std::filesystem::path& path) {
+Surface read_surface(const std::filesystem::path& path, Observer& observer) {
+    const std::string extension = detail::extension_of(path);
+    if (extension == ".csv" || extension == ".xyz") return from_table(path, observer);
+    FileReader file(path);
+    return checked(read_by_extension(path, file), file, observer);
+}
+
+Polylines read_polylines(const std::filesystem::path& path, Observer& observer) {
     FileReader file(path);
     const std::string extension = detail::extension_of(path);
     if (extension != ".vtk" && extension != ".vtp")
         file.fail("has the extension '" + extension + "'; lines are read from .vtk and .vtp");
     const RawSurface raw = read_by_extension(path, file);
     Polylines result{checked_nodes(raw, file), {}};
+    if (is_ras(raw, file, observer)) result.nodes.topRows<2>() *= -1.0;
     for (const std::vector<long long>& line : raw.lines) {
         if (line.size() < 2) file.refuse("has a line of fewer than two points");
         std::vector<int>& nodes = result.lines.emplace_back();

@@ -1,6 +1,7 @@
 #pragma once
 /// How good a registration is, in the measures of the field.
 
+#include "core/observer.hpp"
 #include "imaging/volume.hpp"
 #include "registration/deformation.hpp"
 #include "registration/result.hpp"
@@ -25,14 +26,23 @@ struct Landmarks {
     Eigen::Matrix3Xd moving, fixed;
 };
 
-/// Reads a CSV with a header naming pre_x,pre_y,pre_z,intra_x,intra_y,intra_z (further columns ignored), LPS mm.
-/// Throws IoError or InvalidInput with line numbers.
-Landmarks read_landmarks(const std::filesystem::path& path);
+/// Reads a table of pairs with a header naming pre_x,pre_y,pre_z,intra_x,intra_y,intra_z, in any order, or the same
+/// with r,a,s (further columns ignored), LPS mm. Notes go to the observer. Throws IoError or InvalidInput with line
+/// numbers.
+Landmarks read_landmarks(const std::filesystem::path& path, Observer& observer = silent_observer());
 
-/// Reads a pair of point files: elastix/transformix ("point", count, then x y z per line), LPS mm, or 3D Slicer's
-/// (slicer_markups.hpp). Points correspond by name where both files give all of them the same names, by order
-/// otherwise. Throws IoError or InvalidInput.
-Landmarks read_landmarks(const std::filesystem::path& moving, const std::filesystem::path& fixed);
+/// Reads a pair of point files: elastix/transformix ("point", count, then x y z per line), LPS mm, tables of points
+/// (meshing/point_table.hpp), or markups of 3D Slicer (slicer_markups.hpp). Points of files that name them are pairs
+/// where they share a name; those without a partner are left out, with a note. Points without names are pairs by their
+/// order, of equal numbers. Throws IoError or InvalidInput, also for names that repeat and for fewer than one pair.
+Landmarks read_landmarks(const std::filesystem::path& moving, const std::filesystem::path& fixed,
+                         Observer& observer = silent_observer());
+
+/// Whether the header of a table names intra_x or the like: pairs, and not points.
+bool is_table_of_pairs(const std::filesystem::path& path);
+
+/// The points of one file of points, LPS mm. Throws IoError or InvalidInput.
+Eigen::Matrix3Xd read_points(const std::filesystem::path& path, Observer& observer = silent_observer());
 
 /// Target registration error ‖mapped − fixed‖ in mm.
 struct TargetError {

@@ -217,6 +217,9 @@ void read_intent(const fs::path& path, const NiftiHeader& header, ImageHeader& i
         image.notes.emplace_back(
             "NIfTI intent 1006 (displacement): components are taken as RAS and turned to LPS, as ITK 5.3 and later do; "
             "a file whose components are LPS already must carry intent 1007");
+    } else if (header.intent_code >= 2006 && header.intent_code <= 2018) {
+        throw unusable(path, "it is a warp of FSL (intent " + std::to_string(header.intent_code) +
+                                 "), in a frame of FSL's own; convert it to displacements in LPS mm");
     } else if (header.intent_code != nifti_intent_vector) {
         image.notes.push_back("vectors of NIfTI intent " + std::to_string(header.intent_code) + " are taken as LPS mm");
     }

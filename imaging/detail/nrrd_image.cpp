@@ -321,11 +321,10 @@ private:
     }
     /// Components are in the measurement frame, or in the world where there is none.
     void read_vector_axes(const Eigen::Matrix3d& to_lps) {
-        image_.vector_axes = to_lps;
+        Eigen::Matrix3d to_world = Eigen::Matrix3d::Identity();
         const auto frame = vectors_of(path_, header_.value("measurement frame"));
-        if (frame.size() != 3 || !frame[0] || !frame[1] || !frame[2]) return;
-        Eigen::Matrix3d to_world;
-        for (int i = 0; i < 3; ++i) to_world.col(i) = *frame[static_cast<std::size_t>(i)];
+        if (frame.size() == 3 && frame[0] && frame[1] && frame[2])
+            for (int i = 0; i < 3; ++i) to_world.col(i) = *frame[static_cast<std::size_t>(i)];
         image_.vector_axes = to_lps * to_world;
     }
 
@@ -342,6 +341,9 @@ private:
         if (!segmented && (count != 3.0 || is_domain(axis)))
             throw unusable(path_, "its voxels hold " + text_of({count}) + " values ('" + kind +
                                       "'); give one grey value or a vector of three, or extract one volume");
+        if (!segmented && !image_.vector_axes.isIdentity(1e-6))
+            image_.notes.push_back("vectors were turned to LPS from the frame that the header names ('" +
+                                   header_.value("space") + "')");
         if (!segmented && kind != "vector" && kind != "3-vector" && kind != "covariant-vector")
             image_.notes.push_back("three values a voxel of kind '" + kind + "' are taken as vectors");
         if (count > 512.0) throw unusable(path_, "it holds " + text_of({count}) + " layers, limit 512; give fewer");

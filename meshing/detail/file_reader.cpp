@@ -1,6 +1,7 @@
 #include "meshing/detail/file_reader.hpp"
 
-#include <cctype>
+#include "core/text_table.hpp"
+
 #include <charconv>
 #include <fstream>
 #include <iterator>
@@ -80,13 +81,6 @@ void FileReader::fail(const std::string& problem) const {
 
 void FileReader::refuse(const std::string& problem) const {
     throw InvalidInput("'" + path_.string() + "' " + problem);
-}
-
-std::string lower_case(std::string_view text) {
-    std::string lower(text);
-    std::transform(lower.begin(), lower.end(), lower.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    return lower;
 }
 
 std::string extension_of(const std::filesystem::path& path) {

@@ -19,6 +19,7 @@ public:
     /// Reads the whole file. Throws IoError.
     explicit FileReader(const std::filesystem::path& path);
 
+    [[nodiscard]] const std::filesystem::path& path() const { return path_; }
     [[nodiscard]] std::string_view text() const { return bytes_; }
     [[nodiscard]] std::size_t position() const { return cursor_; }
     [[nodiscard]] std::size_t remaining() const { return bytes_.size() - cursor_; }
@@ -63,9 +64,6 @@ private:
     std::string bytes_;
     std::size_t cursor_ = 0;
 };
-
-/// Lower-case copy of ASCII text.
-std::string lower_case(std::string_view text);
 
 /// Lower-case extension with its dot.
 std::string extension_of(const std::filesystem::path& path);

@@ -132,6 +132,7 @@ void read_element(FileReader& file, const Element& element, Encoding encoding, R
 RawSurface read_ply(FileReader& file) {
     RawSurface surface;
     const Header header = read_header(file);
+    surface.space = space_in(file.text().substr(0, file.position()));
     for (const Element& element : header.elements) read_element(file, element, header.encoding, surface);
     return surface;
 }

@@ -1,4 +1,4 @@
-// The short formats: stereolithography (ascii, binary), Wavefront OBJ, and point lists.
+// The short formats: stereolithography (ascii, binary) and Wavefront OBJ.
 
 #include "meshing/detail/surface_formats.hpp"
 
@@ -31,6 +31,7 @@ void require_finite(const Eigen::Vector3d& position, const FileReader& file) {
 
 RawSurface read_binary_stl(FileReader& file, std::size_t count) {
     RawSurface surface;
+    surface.space = space_in(file.text().substr(0, 80));
     NodeMerger merger(surface);
     file.seek(84);
     for (std::size_t t = 0; t < count; ++t) {
@@ -50,6 +51,7 @@ RawSurface read_binary_stl(FileReader& file, std::size_t count) {
 
 RawSurface read_ascii_stl(FileReader& file) {
     RawSurface surface;
+    surface.space = space_in(file.line());
     NodeMerger merger(surface);
     std::vector<long long> corners;
     bool ended = false;
@@ -89,7 +91,9 @@ RawSurface read_obj(FileReader& file) {
     RawSurface surface;
     while (file.remaining() > 0) {
         const std::string_view line = file.line();
-        if (line.starts_with("v ") || line.starts_with("v\t")) {
+        if (line.starts_with('#')) {
+            if (surface.space.empty()) surface.space = space_in(line);
+        } else if (line.starts_with("v ") || line.starts_with("v\t")) {
             const std::size_t next = file.position();
             file.seek(static_cast<std::size_t>(line.data() - file.text().data()) + 1);
             Eigen::Vector3d position;
@@ -109,35 +113,6 @@ RawSurface read_obj(FileReader& file) {
             surface.add_polygon(corners);
             file.seek(next);
         }
-    }
-    return surface;
-}
-
-RawSurface read_point_list(FileReader& file) {
-    RawSurface surface;
-    bool first = true;
-    std::size_t columns = 0;
-    while (file.remaining() > 0) {
-        const std::string_view line = file.line();
-        std::vector<std::string_view> words;
-        for (std::size_t at = 0; (at = line.find_first_not_of(", ;\t", at)) < line.size();) {
-            const std::size_t end = std::min(line.find_first_of(", ;\t", at), line.size());
-            words.push_back(line.substr(at, end - at));
-            at = end;
-        }
-        if (words.empty() || words[0].starts_with('#')) continue;
-        const bool heading = first && words[0].find_first_not_of("+-.0123456789eE") != std::string_view::npos;
-        first = false;
-        if (heading && lower_case(words[0]) != "nan") continue;
-        if (words.size() != 3 && words.size() != 6)
-            file.fail("has a line of " + std::to_string(words.size()) +
-                      " columns; 3 (x,y,z) or 6 (with normal) needed");
-        if (columns != 0 && words.size() != columns) file.fail("has lines of 3 and of 6 columns; use one of them");
-        columns = words.size();
-        std::array<double, 6> values{};
-        for (std::size_t c = 0; c < columns; ++c) values[c] = file.to_number(words[c]);
-        surface.nodes.emplace_back(values[0], values[1], values[2]);
-        if (columns == 6) surface.normals.emplace_back(values[3], values[4], values[5]);
     }
     return surface;
 }

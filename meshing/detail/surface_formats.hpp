@@ -14,6 +14,7 @@ struct RawSurface {
     std::vector<Eigen::Vector3d> normals;  ///< as many as nodes, or none
     std::vector<std::array<long long, 3>> triangles;
     std::vector<std::vector<long long>> lines;  ///< of VTK's files alone
+    std::string space;                          ///< "LPS", "RAS", ...; empty where the file does not say
 
     /// Cuts a polygon into a fan of triangles.
     void add_polygon(const std::vector<long long>& corners) {
@@ -26,6 +27,9 @@ RawSurface read_stl(FileReader& file);
 RawSurface read_obj(FileReader& file);
 RawSurface read_vtk_polydata(FileReader& file);  ///< legacy
 RawSurface read_vtp(FileReader& file);
-RawSurface read_point_list(FileReader& file);
+
+/// "RAS" of "SPACE=RAS", as 3D Slicer states the frame in the free text of a format, in any case; empty where the text
+/// says no three directions.
+std::string space_in(std::string_view text);
 
 }  // namespace tissuewarp::meshing::detail

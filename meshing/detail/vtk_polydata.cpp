@@ -2,6 +2,8 @@
 
 #include "meshing/detail/surface_formats.hpp"
 
+#include <map>
+
 namespace tissuewarp::meshing::detail {
 
 namespace {
@@ -12,8 +14,7 @@ public:
 
     RawSurface read() {
         if (!file_.line().starts_with("# vtk DataFile")) file_.fail("is no VTK legacy file");
-        if (file_.line().find("SPACE=RAS") != std::string_view::npos)  // the title, as 3D Slicer writes it
-            file_.refuse("says that its points are RAS; write them as LPS: negate x and y");
+        surface_.space = space_in(file_.line());  // the title, as 3D Slicer writes it
         const std::string_view encoding = file_.token();
         if (encoding != "ASCII" && encoding != "BINARY") file_.fail("is neither ASCII nor BINARY");
         binary_ = encoding == "BINARY";
@@ -40,9 +41,9 @@ private:
         } else if (keyword == "TRIANGLE_STRIPS") {
             file_.fail("has triangle strips; write triangles");
         } else if (keyword == "METADATA") {
-            file_.line();
-            while (file_.remaining() > 0 && !file_.line().empty()) {
-            }
+            skip_metadata();
+        } else if (keyword == "FIELD") {
+            read_field();
         } else if (keyword == "POINT_DATA") {
             file_.integer();
             const std::size_t start = file_.position();
@@ -52,10 +53,74 @@ private:
             }
             file_.token();  // name
             read_vectors(static_cast<long long>(surface_.nodes.size()), surface_.normals);
+            return false;
+        } else if (keyword == "CELL_DATA") {
+            return false;
         } else {
-            return false;  // cell data, field data: of no use here
+            file_.fail("has the section '" + std::string(keyword.substr(0, 40)) +
+                       "'; points, polygons, lines, fields and data of points are read");
         }
         return true;
+    }
+
+    /// Up to an empty line.
+    void skip_metadata() {
+        file_.line();
+        while (file_.remaining() > 0 && !file_.line().empty()) {
+        }
+    }
+
+    /// Arrays that may stand before, between and behind the other sections; only one that names the frame is of use.
+    void read_field() {
+        file_.token();  // name
+        const std::size_t arrays = file_.count("arrays", 4);
+        for (std::size_t a = 0; a < arrays; ++a) {
+            std::string name(file_.token());
+            while (name == "METADATA") {  // of the array before
+                skip_metadata();
+                name = file_.token();
+            }
+            const long long components = file_.integer(), tuples = file_.integer();
+            const std::string type(file_.token());
+            file_.line();
+            const std::size_t values =
+                file_.checked_count(components, "components", 1) * file_.checked_count(tuples, "tuples", 1);
+            if (type == "string" || type == "utf8_string") {
+                (void)file_.checked_count(static_cast<long long>(values), "texts", 1);
+                for (std::size_t v = 0; v < values; ++v) {
+                    const std::string_view text = read_text();
+                    if (name == "SPACE" && surface_.space.empty())
+                        surface_.space = space_in("SPACE=" + std::string(text));
+                }
+            } else {
+                skip_values(static_cast<long long>(values), type);
+            }
+        }
+    }
+
+    /// In binary files the two highest bits of the first byte say how many bytes hold the length.
+    std::string_view read_text() {
+        if (!binary_) return file_.line();
+        const auto first = file_.binary<std::uint8_t>();
+        std::size_t length = first & 0x3fU;
+        for (int more = (1 << (3 - (first >> 6U))) - 1; more > 0; --more)
+            length = length << 8U | file_.binary<std::uint8_t>();
+        const std::size_t start = file_.position();
+        file_.skip(length);
+        return file_.text().substr(start, length);
+    }
+
+    void skip_values(long long count, const std::string& type) {
+        static const std::map<std::string, std::size_t> bytes{
+            {"char", 1},         {"unsigned_char", 1}, {"short", 2},     {"unsigned_short", 2},
+            {"int", 4},          {"unsigned_int", 4},  {"long", 8},      {"unsigned_long", 8},
+            {"vtktypeint64", 8}, {"vtktypeuint64", 8}, {"vtkIdType", 4}, {"float", 4},
+            {"double", 8}};
+        const auto size = bytes.find(type);
+        if (size == bytes.end()) file_.fail("has a field of type '" + type + "'; write it without");
+        file_.checked_count(count, "values", binary_ ? size->second : 2);
+        if (binary_) return file_.skip(static_cast<std::size_t>(count) * size->second);
+        for (long long v = 0; v < count; ++v) file_.number();
     }
 
     double value(const std::string& type) {

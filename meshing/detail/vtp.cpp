@@ -46,10 +46,9 @@ std::vector<std::vector<long long>> cells(const VtkXml& xml, const std::string& 
 
 RawSurface read_vtp(FileReader& file) {
     const VtkXml xml(file, "PolyData");
-    if (xml.text("FieldData/SPACE").find("RAS") != std::string::npos)  // as 3D Slicer writes it
-        file.refuse("says that its points are RAS; write them as LPS: negate x and y");
     if (xml.count("NumberOfStrips") > 0) file.fail("has triangle strips; write triangles");
     RawSurface surface;
+    surface.space = space_in("SPACE=" + xml.text("FieldData/SPACE"));  // as 3D Slicer writes it
     const std::size_t points = xml.count("NumberOfPoints");
     surface.nodes = vectors(xml, "Points/", points);
     surface.lines = cells(xml, "Lines", "NumberOfLines", file);

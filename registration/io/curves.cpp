@@ -2,13 +2,11 @@
 
 #include "core/errors.hpp"
 #include "meshing/mesh_io.hpp"
+#include "meshing/point_table.hpp"
 #include "registration/io/extent.hpp"
-#include "registration/io/line_reader.hpp"
 #include "registration/io/slicer_markups.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cctype>
 #include <cmath>
 #include <map>
 #include <sstream>
@@ -27,44 +25,19 @@ template <class... Parts>
     throw InvalidInput(text.str());
 }
 
-/// Column of each name in a header; the number of columns where there is none.
-std::size_t column_of(const std::vector<std::string_view>& header, std::string_view name) {
-    return static_cast<std::size_t>(std::find(header.begin(), header.end(), name) - header.begin());
-}
-
-Polylines read_table(const std::filesystem::path& path) {
-    detail::LineReader reader(path);
-    if (!reader.next()) reader.refuse("the file is empty; a header naming x,y,z and, for lines, line is needed");
-    const std::string header_line(reader.line());
-    const auto header = detail::split(header_line, ',');
-    const std::array<std::string_view, 3> axes{"x", "y", "z"};
-    for (const std::string_view axis : axes)
-        if (column_of(header, axis) == header.size())
-            reader.refuse("the header lacks the column " + std::string(axis) + "; it must name x,y,z[,line]");
-    const std::size_t line_column = column_of(header, "line");
-    std::vector<Eigen::Vector3d> points;
+Polylines read_table(const std::filesystem::path& path, Observer& observer) {
+    meshing::PointTable table = meshing::read_point_table(path);
+    for (const std::string& note : table.notes) observer.note(note);
     std::vector<std::vector<int>> lines;
-    std::map<std::string, std::size_t, std::less<>> line_of;
-    while (reader.next()) {
-        const auto fields = detail::split(reader.line(), ',');
-        if (fields.size() != header.size())
-            reader.refuse(std::to_string(fields.size()) + " fields; the header names " + std::to_string(header.size()));
-        Eigen::Vector3d point;
-        for (std::size_t axis = 0; axis < 3; ++axis)
-            point[static_cast<Eigen::Index>(axis)] =
-                reader.coordinate(fields[column_of(header, axes[axis])], axes[axis]);
-        if (line_column < header.size() && !fields[line_column].empty()) {
-            const auto [entry, added] = line_of.try_emplace(std::string(fields[line_column]), lines.size());
-            if (added) lines.emplace_back();
-            lines[entry->second].push_back(static_cast<int>(points.size()));
-        }
-        points.push_back(point);
+    std::map<std::string, std::size_t> line_of;
+    for (std::size_t n = 0; n < table.groups.size(); ++n) {
+        if (table.groups[n].empty()) continue;
+        const auto [entry, added] = line_of.try_emplace(table.groups[n], lines.size());
+        if (added) lines.emplace_back();
+        lines[entry->second].push_back(static_cast<int>(n));
     }
-    if (points.empty()) reader.refuse("no point follows the header; at least one row is needed");
     std::erase_if(lines, [](const std::vector<int>& line) { return line.size() < 2; });
-    Polylines result{Eigen::Matrix3Xd(3, static_cast<Eigen::Index>(points.size())), std::move(lines)};
-    for (std::size_t n = 0; n < points.size(); ++n) result.nodes.col(static_cast<Eigen::Index>(n)) = points[n];
-    return result;
+    return {std::move(table.points), std::move(lines)};
 }
 
 void require_usable_lines(const std::vector<Eigen::Matrix3Xd>& lines) {
@@ -98,14 +71,12 @@ void require_usable_tangents(const Curves& curves) {
 
 }  // namespace
 
-Polylines read_curve_file(const std::filesystem::path& path) {
-    std::string extension = path.extension().string();
-    std::transform(extension.begin(), extension.end(), extension.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    if (extension == ".csv") return read_table(path);
-    if (extension == ".vtk" || extension == ".vtp") return meshing::read_polylines(path);
+Polylines read_curve_file(const std::filesystem::path& path, Observer& observer) {
+    const std::string extension = lower_case(path.extension().string());
+    if (extension == ".csv" || extension == ".xyz") return read_table(path, observer);
+    if (extension == ".vtk" || extension == ".vtp") return meshing::read_polylines(path, observer);
     if (is_slicer_markups(path)) {
-        Markups markups = read_slicer_markups(path);
+        Markups markups = read_slicer_markups(path, observer);
         return {std::move(markups.points), std::move(markups.lines)};
     }
     throw InvalidInput(path.string() +
@@ -172,9 +143,10 @@ void require_usable(const Curves& curves) {
     detail::require_millimetres(curves.fixed, "the fixed curves are");
 }
 
-Curves read_curves(const std::filesystem::path& moving, const std::filesystem::path& fixed, double deviation_mm) {
+Curves read_curves(const std::filesystem::path& moving, const std::filesystem::path& fixed, double deviation_mm,
+                   Observer& observer) {
     constexpr double least_reach_mm = 2.5;
-    const Polylines before = read_curve_file(moving), during = read_curve_file(fixed);
+    const Polylines before = read_curve_file(moving, observer), during = read_curve_file(fixed, observer);
     if (before.lines.empty())
         throw InvalidInput(
             moving.string() +

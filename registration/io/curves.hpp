@@ -10,14 +10,15 @@ namespace tissuewarp::registration {
 
 /// Points of one file, some of them joined by lines, LPS mm, of the kinds that read_curves takes. Throws IoError or
 /// InvalidInput naming the file.
-meshing::Polylines read_curve_file(const std::filesystem::path& path);
+meshing::Polylines read_curve_file(const std::filesystem::path& path, Observer& observer = silent_observer());
 
 /// Reads the preoperative lines and the intraoperative points, LPS mm: the lines of polydata, .vtk (legacy) or .vtp
-/// (XML); markups of 3D Slicer, whose curves and lines are the polylines of their control points; or .csv with
-/// a header that names x, y, z and line (further columns ignored); rows with the same entry there are the points of one
-/// line, in their order. Points of the fixed file need no line (column `line` absent or empty); those on a line that is
-/// long enough get its tangent. `deviation_mm` is taken over. Throws IoError or InvalidInput naming the file.
-Curves read_curves(const std::filesystem::path& moving, const std::filesystem::path& fixed, double deviation_mm = 1.0);
+/// (XML); markups of 3D Slicer, whose curves and lines are the polylines of their control points; or a table
+/// of points whose header names a column line (meshing/point_table.hpp); rows with the same entry there are the points
+/// of one line, in their order. Points of the fixed file need no line (column `line` absent or empty); those on a line
+/// that is long enough get its tangent. `deviation_mm` is taken over. Throws IoError or InvalidInput naming the file.
+Curves read_curves(const std::filesystem::path& moving, const std::filesystem::path& fixed, double deviation_mm = 1.0,
+                   Observer& observer = silent_observer());
 
 /// Throws InvalidInput unless there is a preoperative line and five intraoperative points, all finite, tangents that
 /// are unit, zero or absent, a positive finite deviation, an extent of either between 3 mm and 2 m, outliers aside, and

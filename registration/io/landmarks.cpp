@@ -1,11 +1,12 @@
 #include "core/errors.hpp"
+#include "core/text_table.hpp"
+#include "meshing/point_table.hpp"
 #include "registration/evaluation.hpp"
-#include "registration/io/line_reader.hpp"
 #include "registration/io/slicer_markups.hpp"
 
 #include <algorithm>
 #include <charconv>
-#include <set>
+#include <map>
 #include <string>
 #include <string_view>
 
@@ -13,10 +14,9 @@ namespace tissuewarp::registration {
 
 namespace {
 
-using detail::LineReader;
-using detail::split;
-using detail::trimmed;
-using detail::words;
+using meshing::AxisColumns;
+
+constexpr const char* pair_columns = "pre_x,pre_y,pre_z,intra_x,intra_y,intra_z";
 
 Eigen::Matrix3Xd as_matrix(const std::vector<Eigen::Vector3d>& points) {
     Eigen::Matrix3Xd matrix(3, static_cast<Eigen::Index>(points.size()));
@@ -24,104 +24,161 @@ Eigen::Matrix3Xd as_matrix(const std::vector<Eigen::Vector3d>& points) {
     return matrix;
 }
 
+bool is_table(const std::filesystem::path& path) {
+    const std::string extension = lower_case(path.extension().string());
+    return extension == ".csv" || extension == ".xyz";
+}
+
+/// "point", the number of points, then x y z per line.
 Eigen::Matrix3Xd read_elastix_points(const std::filesystem::path& path) {
-    LineReader reader(path);
-    if (!reader.next()) reader.refuse("the file is empty; a line 'point', a count and one point per line are needed");
-    if (const auto kind = trimmed(reader.line()); kind != "point")
-        reader.refuse("starts with '" + std::string(kind.substr(0, 40)) +
-                      "'; only files of physical points, starting with 'point', can be read");
-    long long count = 0;
-    if (reader.next()) {
-        const auto text = trimmed(reader.line());
-        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
-        if (error != std::errc{} || end != text.data() + text.size()) count = 0;
+    const TextTable table(path, ' ');
+    if (table.header() != std::vector<std::string>{"point"}) {
+        if (table.header().empty() && table.rows().empty())
+            throw InvalidInput(path.string() +
+                               ": the file is empty; a line 'point', a count and one point per line are needed");
+        if (table.header().empty())
+            throw InvalidInput(
+                path.string() +
+                ": does not start with 'point', a count and one point per line; name tables .csv or .xyz");
+        table.refuse(table.header_line(), "starts with '" + table.header()[0].substr(0, 40) +
+                                              "'; only files of physical points, starting with 'point', can be read");
     }
-    if (count < 1) reader.refuse("the second line must be the number of points, at least 1");
+    const auto& rows = table.rows();
+    const std::string text = rows.empty() ? "" : rows[0].fields[0];
+    long long count = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
+    if (error != std::errc{} || end != text.data() + text.size() || count < 1 || rows[0].fields.size() != 1)
+        table.refuse(table.header_line() + 1, "the second line must be the number of points, at least 1");
     std::vector<Eigen::Vector3d> points;
-    while (reader.next()) {
-        const auto fields = words(reader.line());
-        if (fields.size() != 3)
-            reader.refuse(std::to_string(fields.size()) + " numbers; a point needs three: x y z in mm");
-        points.emplace_back(reader.coordinate(fields[0], "x"), reader.coordinate(fields[1], "y"),
-                            reader.coordinate(fields[2], "z"));
+    for (std::size_t r = 1; r < rows.size(); ++r) {
+        if (rows[r].fields.size() != 3)
+            table.refuse(rows[r].line,
+                         std::to_string(rows[r].fields.size()) + " numbers; a point needs three: x y z in mm");
+        points.emplace_back(AxisColumns{{0, 1, 2}, {"x", "y", "z"}}.point(table, rows[r]));
     }
     if (static_cast<long long>(points.size()) != count)
-        reader.refuse("the file ends after " + std::to_string(points.size()) + " points; its second line promises " +
-                      std::to_string(count));
+        table.refuse(rows.back().line, "the file ends after " + std::to_string(points.size()) +
+                                           " points; its second line promises " + std::to_string(count));
     return as_matrix(points);
 }
 
-Markups read_points_of_any_kind(const std::filesystem::path& path) {
-    if (is_slicer_markups(path)) return read_slicer_markups(path);
-    return {read_elastix_points(path), {}, {}};
+Markups read_points_of_any_kind(const std::filesystem::path& path, Observer& observer) {
+    if (is_slicer_markups(path)) return read_slicer_markups(path, observer);
+    if (!is_table(path)) return {read_elastix_points(path), {}, {}};
+    meshing::PointTable table = meshing::read_point_table(path);
+    for (const std::string& note : table.notes) observer.note(note);
+    return {std::move(table.points), std::move(table.names), {}};
 }
 
-/// Whether both files name all points, each differently, and by the same names.
-bool same_names(const Markups& a, const Markups& b) {
-    const std::set<std::string> names(a.labels.begin(), a.labels.end());
-    return !names.empty() && names.size() == a.labels.size() && !names.contains("") &&
-           names.size() == b.labels.size() && names == std::set<std::string>(b.labels.begin(), b.labels.end());
+bool has_names(const Markups& markups) {
+    return std::any_of(markups.labels.begin(), markups.labels.end(), [](const auto& name) { return !name.empty(); });
 }
 
-std::string names_without_partner(const Markups& a, const Markups& b) {
-    const std::set<std::string> left(a.labels.begin(), a.labels.end()), right(b.labels.begin(), b.labels.end());
-    std::vector<std::string> alone;
-    std::set_symmetric_difference(left.begin(), left.end(), right.begin(), right.end(), std::back_inserter(alone));
-    if (left.empty() || right.empty() || alone.empty()) return "";
-    std::string text = "; only one of them has " + alone.front();
-    for (std::size_t i = 1; i < std::min<std::size_t>(alone.size(), 5); ++i) text += ", " + alone[i];
-    return text + (alone.size() > 5 ? ", …" : "");
-}
-
-/// Precondition: same_names.
-Eigen::Matrix3Xd in_the_order_of(const std::vector<std::string>& labels, const Markups& markups) {
-    Eigen::Matrix3Xd points(3, markups.points.cols());
-    for (std::size_t i = 0; i < labels.size(); ++i) {
-        const auto at = std::find(markups.labels.begin(), markups.labels.end(), labels[i]) - markups.labels.begin();
-        points.col(static_cast<Eigen::Index>(i)) = markups.points.col(at);
+/// Place of each name. Throws InvalidInput where one repeats or a point has none.
+std::map<std::string, Eigen::Index> places_of(const Markups& markups, const std::filesystem::path& path) {
+    std::map<std::string, Eigen::Index> places;
+    for (std::size_t n = 0; n < markups.labels.size(); ++n) {
+        const std::string& name = markups.labels[n];
+        if (name.empty())
+            throw InvalidInput(path.string() + ": point " + std::to_string(n + 1) +
+                               " has no name and others have; name all points, or none");
+        if (!places.try_emplace(name, static_cast<Eigen::Index>(n)).second)
+            throw InvalidInput(path.string() + ": two points are named '" + name +
+                               "'; name each differently, as in the other file");
     }
-    return points;
+    return places;
+}
+
+std::string listed(const std::vector<std::string>& names) {
+    constexpr std::size_t most = 10;
+    std::string text;
+    for (std::size_t i = 0; i < std::min(names.size(), most); ++i) text += (i > 0 ? ", " : "") + names[i];
+    return text + (names.size() > most ? ", …" : "");
+}
+
+Landmarks paired_by_name(const Markups& from, const Markups& to, const std::filesystem::path& moving,
+                         const std::filesystem::path& fixed, Observer& observer) {
+    const auto from_places = places_of(from, moving), to_places = places_of(to, fixed);
+    std::vector<Eigen::Vector3d> from_points, to_points;
+    std::vector<std::string> alone;
+    for (const std::string& name : from.labels) {  // in the order of the moving file
+        const auto partner = to_places.find(name);
+        if (partner == to_places.end()) {
+            alone.push_back(name);
+            continue;
+        }
+        from_points.emplace_back(from.points.col(from_places.at(name)));
+        to_points.emplace_back(to.points.col(partner->second));
+    }
+    for (const std::string& name : to.labels)
+        if (!from_places.contains(name)) alone.push_back(name);
+    if (from_points.empty())
+        throw InvalidInput("'" + moving.string() + "' (" + listed(from.labels) + ") and '" + fixed.string() + "' (" +
+                           listed(to.labels) + ") share no name; give points that correspond the same name");
+    if (!alone.empty())
+        observer.note(note_of(moving, std::to_string(from_points.size()) + " points are pairs by name with '" +
+                                          fixed.string() + "'; only one of the files has " + listed(alone)));
+    return {as_matrix(from_points), as_matrix(to_points)};
+}
+
+/// The three columns behind a prefix.
+AxisColumns columns_of(const TextTable& table, const std::string& prefix) {
+    if (const auto columns = meshing::axis_columns(table, table.header(), prefix)) return *columns;
+    for (const char axis : {'x', 'y', 'z'}) {
+        const std::string name = prefix + axis;
+        if (std::find(table.header().begin(), table.header().end(), name) == table.header().end())
+            table.refuse(table.header_line(), "the header lacks the column " + name + "; it must name " + pair_columns);
+    }
+    table.refuse(table.header_line(), std::string("the header must name ") + pair_columns);
 }
 
 }  // namespace
 
-Landmarks read_landmarks(const std::filesystem::path& path) {
-    constexpr std::array<std::string_view, 6> names{"pre_x", "pre_y", "pre_z", "intra_x", "intra_y", "intra_z"};
-    LineReader reader(path);
-    if (!reader.next())
-        reader.refuse("the file is empty; a header naming pre_x,pre_y,pre_z,intra_x,intra_y,intra_z is needed");
-    const auto header = split(reader.line(), ',');
-    const std::size_t columns = header.size();
-    std::array<std::size_t, 6> column{};
-    for (std::size_t c = 0; c < names.size(); ++c) {
-        const auto found = std::find(header.begin(), header.end(), names[c]);
-        if (found == header.end())
-            reader.refuse("the header lacks the column " + std::string(names[c]) +
-                          "; it must name pre_x,pre_y,pre_z,intra_x,intra_y,intra_z");
-        column[c] = static_cast<std::size_t>(found - header.begin());
-    }
-    std::vector<Eigen::Vector3d> moving, fixed;
-    while (reader.next()) {
-        const auto fields = split(reader.line(), ',');
-        if (fields.size() != columns)
-            reader.refuse(std::to_string(fields.size()) + " fields; the header names " + std::to_string(columns));
-        std::array<double, 6> value{};
-        for (std::size_t c = 0; c < names.size(); ++c) value[c] = reader.coordinate(fields[column[c]], names[c]);
-        moving.emplace_back(value[0], value[1], value[2]);
-        fixed.emplace_back(value[3], value[4], value[5]);
-    }
-    if (moving.empty()) reader.refuse("no landmark follows the header; at least one row is needed");
-    return {as_matrix(moving), as_matrix(fixed)};
+bool is_table_of_pairs(const std::filesystem::path& path) {
+    if (!is_table(path)) return false;
+    const TextTable table(path);
+    return std::any_of(table.header().begin(), table.header().end(),
+                       [](const std::string& name) { return lower_case(name).starts_with("intra_"); });
 }
 
-Landmarks read_landmarks(const std::filesystem::path& moving, const std::filesystem::path& fixed) {
-    Markups from = read_points_of_any_kind(moving), to = read_points_of_any_kind(fixed);
+Landmarks read_landmarks(const std::filesystem::path& path, Observer& observer) {
+    TextTable table(path);
+    if (table.header().empty() && table.rows().empty())
+        throw InvalidInput(path.string() + ": the file is empty; a header naming " + pair_columns + " is needed");
+    if (table.header().empty())
+        table.refuse(table.rows().front().line,
+                     std::string("no header; a first row naming ") + pair_columns + " is needed");
+    table.require_even_rows();
+    const AxisColumns moving = columns_of(table, "pre_"), fixed = columns_of(table, "intra_");
+    std::vector<Eigen::Vector3d> from, to;
+    for (const TextTable::Row& row : table.rows()) {
+        from.push_back(moving.point(table, row));
+        to.push_back(fixed.point(table, row));
+    }
+    if (from.empty()) table.refuse(table.header_line(), "no landmark follows the header; at least one row is needed");
+    for (const AxisColumns& columns : {moving, fixed})
+        if (columns.signs != Eigen::Vector3d(1, 1, 1))
+            observer.note(note_of(table.path(), "the columns " + columns.name[0] + ", " + columns.name[1] + ", " +
+                                                    columns.name[2] + " were turned to LPS"));
+    if (table.has_decimal_commas()) observer.note(note_of(table.path(), "its numbers have decimal commas"));
+    return {as_matrix(from), as_matrix(to)};
+}
+
+Landmarks read_landmarks(const std::filesystem::path& moving, const std::filesystem::path& fixed, Observer& observer) {
+    Markups from = read_points_of_any_kind(moving, observer), to = read_points_of_any_kind(fixed, observer);
+    if (has_names(from) && has_names(to)) return paired_by_name(from, to, moving, fixed, observer);
     if (from.points.cols() != to.points.cols())
         throw InvalidInput(moving.string() + " has " + std::to_string(from.points.cols()) + " points and " +
                            fixed.string() + " has " + std::to_string(to.points.cols()) +
-                           "; corresponding points need equal numbers" + names_without_partner(from, to));
-    if (!same_names(from, to)) return {from.points, to.points};
-    return {from.points, in_the_order_of(from.labels, to)};
+                           "; corresponding points need equal numbers, or names in both files");
+    if (has_names(from) || has_names(to))
+        observer.note(
+            note_of(has_names(from) ? fixed : moving, "its points have no names; they are pairs by their order"));
+    return {std::move(from.points), std::move(to.points)};
+}
+
+Eigen::Matrix3Xd read_points(const std::filesystem::path& path, Observer& observer) {
+    return read_points_of_any_kind(path, observer).points;
 }
 
 }  // namespace tissuewarp::registration

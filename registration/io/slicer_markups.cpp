@@ -1,7 +1,7 @@
 #include "registration/io/slicer_markups.hpp"
 
 #include "core/errors.hpp"
-#include "registration/io/line_reader.hpp"
+#include "core/text_table.hpp"
 
 #include <nlohmann/json.hpp>
 
@@ -19,11 +19,6 @@ using nlohmann::json;
 
 constexpr std::uintmax_t most_bytes = 64U << 20U;
 
-std::string lower(std::string text) {
-    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
-    return text;
-}
-
 /// Signs that turn coordinates of the named system into LPS; Slicer also wrote numbers for the names.
 Eigen::Vector3d signs_of(std::string_view system, const std::string& where) {
     if (system == "LPS" || system == "1") return {1, 1, 1};
@@ -38,56 +33,86 @@ void add(Markups& markups, const Eigen::Vector3d& point, std::string label) {
     markups.labels.push_back(std::move(label));
 }
 
-/// Columns of an .fcsv file as its remark names them; these of every version where it has none.
+/// Why a point is left out; empty where it counts.
+struct PointState {
+    std::string name;
+    std::string_view why;
+};
+
+void note_left_out(const std::vector<PointState>& points, const std::filesystem::path& path, Observer& observer) {
+    if (points.empty()) return;
+    std::string text;
+    for (const PointState& point : points)
+        text += (text.empty() ? "" : ", ") + point.name + " (" + std::string(point.why) + ")";
+    observer.note(note_of(path, "points that do not count are left out: " + text));
+}
+
+/// Columns of an .fcsv file as its remark names them; these of every version where it has none. Two without a name
+/// stand behind them since 5.4.
 std::vector<std::string> usual_columns() {
     return {"id", "x", "y", "z", "ow", "ox", "oy", "oz", "vis", "sel", "lock", "label", "desc", "associatedNodeID"};
 }
 
 class FcsvReader {
 public:
-    explicit FcsvReader(const std::filesystem::path& path) : path_(path), reader_(path) {}
+    explicit FcsvReader(const std::filesystem::path& path) : table_(path, ',') {}
 
-    Markups read() {
+    Markups read(Observer& observer) {
+        for (const TextTable::Remark& remark : table_.remarks()) take_remark(remark.text);
         Markups markups;
-        while (reader_.next_of_any_kind()) {
-            if (detail::trimmed(reader_.line()).front() == '#')
-                take_remark();
-            else
-                take_point(markups);
-        }
+        if (!table_.header().empty()) table_.refuse(table_.header_line(), "is no point, it has no number");
+        for (const TextTable::Row& row : table_.rows()) take_point(row, markups);
+        note_left_out(left_out_, table_.path(), observer);
         return markups;
     }
 
 private:
-    std::filesystem::path path_;
-    detail::LineReader reader_;
+    TextTable table_;
     std::string system_;
     std::vector<std::string> columns_ = usual_columns();
+    std::vector<PointState> left_out_;
 
-    void take_remark() {
-        const std::string_view line = reader_.line();
-        const std::size_t equals = line.find('=');
+    void take_remark(std::string_view text) {
+        const std::size_t equals = text.find('=');
         if (equals == std::string_view::npos) return;
-        const std::string_view name = detail::trimmed(line.substr(1, equals - 1));
-        if (name == "CoordinateSystem") system_ = detail::trimmed(line.substr(equals + 1));
-        if (name != "columns") return;
-        columns_.clear();
-        for (const std::string_view column : detail::split(line.substr(equals + 1), ',')) columns_.emplace_back(column);
+        const std::string_view name = trimmed(text.substr(0, equals)), value = trimmed(text.substr(equals + 1));
+        if (name == "CoordinateSystem") system_ = trimmed(value.substr(0, value.find(',')));
+        if (name == "columns") columns_ = words_of(value);
     }
 
-    [[nodiscard]] std::string_view field(const std::vector<std::string_view>& fields, std::string_view name) const {
-        const auto at = static_cast<std::size_t>(std::find(columns_.begin(), columns_.end(), name) - columns_.begin());
-        return at < fields.size() && at < columns_.size() ? fields[at] : std::string_view();
+    /// Column of this name; one that no row has where there is none.
+    [[nodiscard]] std::size_t column(std::string_view name) const {
+        const auto at = std::find(columns_.begin(), columns_.end(), name);
+        return at == columns_.end() ? std::string::npos : static_cast<std::size_t>(at - columns_.begin());
+    }
+    [[nodiscard]] std::string field(const TextTable::Row& row, std::size_t column) const {
+        return column < row.fields.size() ? row.fields[column] : "";
+    }
+    [[nodiscard]] double coordinate(const TextTable::Row& row, const char* name) const {
+        const std::size_t at = column(name);
+        if (at >= row.fields.size()) table_.refuse(row.line, std::string(name) + " is ''; a number in mm is needed");
+        return table_.coordinate(row, at, name);
     }
 
-    void take_point(Markups& markups) {
+    /// The status since 5.4: 0 undefined, 1 previewed, 2 placed, 3 missing.
+    [[nodiscard]] std::string_view why_left_out(const TextTable::Row& row) const {
+        const std::string status = field(row, columns_.size());
+        if (column("associatedNodeID") + 1 == columns_.size() && !status.empty() && status != "2")
+            return status == "3" ? "missing" : "not placed";
+        return field(row, column("vis")) == "0" ? "hidden" : "";
+    }
+
+    void take_point(const TextTable::Row& row, Markups& markups) {
         if (system_.empty())
-            reader_.refuse("no line '# CoordinateSystem = LPS' (or RAS) stands before the points; add the right one");
-        const std::vector<std::string_view> fields = detail::split(reader_.line(), ',');
-        const Eigen::Vector3d point{reader_.coordinate(field(fields, "x"), "x"),
-                                    reader_.coordinate(field(fields, "y"), "y"),
-                                    reader_.coordinate(field(fields, "z"), "z")};
-        add(markups, signs_of(system_, path_.string()).cwiseProduct(point), std::string(field(fields, "label")));
+            table_.refuse(row.line,
+                          "no line '# CoordinateSystem = LPS' (or RAS) stands before the points; add the right one");
+        const std::string label = field(row, column("label"));
+        if (const std::string_view why = why_left_out(row); !why.empty()) {
+            left_out_.push_back({label.empty() ? "line " + std::to_string(row.line) : label, why});
+            return;
+        }
+        const Eigen::Vector3d point{coordinate(row, "x"), coordinate(row, "y"), coordinate(row, "z")};
+        add(markups, signs_of(system_, table_.path().string()).cwiseProduct(point), label);
     }
 };
 
@@ -144,7 +169,13 @@ void take_line(const json& list, int first, Markups& markups) {
     if (type == "ClosedCurve") line.push_back(first);
 }
 
-void take_list(const json& list, const std::string& where, Markups& markups) {
+std::string_view why_left_out(const json& point) {
+    const std::string status = point.value("positionStatus", std::string("defined"));
+    if (status != "defined") return status == "missing" ? "missing" : "not placed";
+    return point.value("visibility", true) ? "" : "hidden";
+}
+
+void take_list(const json& list, const std::string& where, Markups& markups, std::vector<PointState>& left_out) {
     if (!list.is_object()) throw InvalidInput(where + ": is no list of points");
     require_millimetres(list, where);
     const Eigen::Vector3d signs = signs_of(system_of(list, where), where);
@@ -152,40 +183,46 @@ void take_list(const json& list, const std::string& where, Markups& markups) {
     if (points == list.end() || !points->is_array()) throw InvalidInput(where + ": has no controlPoints");
     const int first = static_cast<int>(markups.points.cols());
     for (const json& point : *points) {
-        const std::string place = where + ", point " + std::to_string(&point - &points->front() + 1);
+        const std::string number = std::to_string(&point - &points->front() + 1), place = where + ", point " + number;
         if (!point.is_object()) throw InvalidInput(place + ": is no point");
-        if (point.value("positionStatus", std::string("defined")) != "defined") continue;
-        add(markups, signs.cwiseProduct(position_of(point, place)), point.value("label", std::string()));
+        const std::string label = point.value("label", std::string());
+        if (const std::string_view why = why_left_out(point); !why.empty())
+            left_out.push_back({label.empty() ? "point " + number : label, why});
+        else
+            add(markups, signs.cwiseProduct(position_of(point, place)), label);
     }
     take_line(list, first, markups);
 }
 
-Markups read_json(const std::filesystem::path& path) {
+Markups read_json(const std::filesystem::path& path, Observer& observer) {
     const json file = parsed(path);
     const auto lists = file.find("markups");
     if (!file.is_object() || lists == file.end() || !lists->is_array())
         throw InvalidInput(path.string() + ": has no \"markups\"; give a point list saved by 3D Slicer");
     Markups markups;
+    std::vector<PointState> left_out;
     try {
         for (std::size_t i = 0; i < lists->size(); ++i)
-            take_list((*lists)[i], path.string() + ", list " + std::to_string(i + 1), markups);
+            take_list((*lists)[i], path.string() + ", list " + std::to_string(i + 1), markups, left_out);
     } catch (const json::exception& error) {
         throw InvalidInput(path.string() + ": is no point list of 3D Slicer: " + error.what());
     }
+    note_left_out(left_out, path, observer);
     return markups;
 }
 
 }  // namespace
 
 bool is_slicer_markups(const std::filesystem::path& path) {
-    const std::string extension = lower(path.extension().string());
+    const std::string extension = lower_case(path.extension().string());
     return extension == ".json" || extension == ".fcsv";
 }
 
-Markups read_slicer_markups(const std::filesystem::path& path) {
-    const bool fcsv = lower(path.extension().string()) == ".fcsv";
-    Markups markups = fcsv ? FcsvReader(path).read() : read_json(path);
-    if (markups.labels.empty()) throw InvalidInput(path.string() + ": holds no placed point");
+Markups read_slicer_markups(const std::filesystem::path& path, Observer& observer) {
+    const bool fcsv = lower_case(path.extension().string()) == ".fcsv";
+    Markups markups = fcsv ? FcsvReader(path).read(observer) : read_json(path, observer);
+    if (markups.labels.empty())
+        throw InvalidInput(path.string() + ": holds no placed point; place points, and show those that shall count");
     return markups;
 }
 

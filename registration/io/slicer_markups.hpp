@@ -1,6 +1,8 @@
 #pragma once
 /// Point lists of 3D Slicer.
 
+#include "core/observer.hpp"
+
 #include <Eigen/Core>
 
 #include <filesystem>
@@ -20,9 +22,9 @@ struct Markups {
 bool is_slicer_markups(const std::filesystem::path& path);
 
 /// Reads the points of all lists of a .mrk.json file or those of an .fcsv file; of curves the control points. Slicer
-/// wrote RAS and writes LPS: what the file says counts, and a file that does not say is refused. Points that were not
-/// placed yet are left out. Throws IoError and InvalidInput, with the line where there is one, also for units other
-/// than mm and for files without a point.
-Markups read_slicer_markups(const std::filesystem::path& path);
+/// wrote RAS and writes LPS: what the file says counts, and a file that does not say is refused. Points that are not
+/// placed or hidden are left out, with a note that names them. Throws IoError and InvalidInput, with the line where
+/// there is one, also for units other than mm and for files without a point.
+Markups read_slicer_markups(const std::filesystem::path& path, Observer& observer = silent_observer());
 
 }  // namespace tissuewarp::registration

@@ -35,8 +35,8 @@ void require_usable(const SurfacePoints& surface) {
     detail::require_millimetres(points, "the intraoperative surface is");
 }
 
-SurfacePoints read_surface_points(const std::filesystem::path& path, double deviation_mm) {
-    const meshing::Surface file = meshing::read_surface(path);
+SurfacePoints read_surface_points(const std::filesystem::path& path, double deviation_mm, Observer& observer) {
+    const meshing::Surface file = meshing::read_surface(path, observer);
     SurfacePoints surface{file.mesh.nodes, file.normals, deviation_mm};
     if (surface.normals.cols() == 0 && file.mesh.triangle_count() > 0)
         surface.normals = meshing::node_normals(file.mesh);

@@ -14,7 +14,9 @@ namespace {
 constexpr double least_deviation_mm = surface_pull_options.least_deviation_mm;
 
 void doubt(const SurfaceFit& fit, double deviation_mm, std::vector<Doubt>& doubts) {
-    const auto& [least_inliers, most_residual, most_rival_support, least_coverage] = surface_doubt_limits;
+    const double least_inliers = surface_doubt_limits.least_inliers, most_residual = surface_doubt_limits.most_residual,
+                 most_rival_support = surface_doubt_limits.most_rival_support,
+                 least_coverage = surface_doubt_limits.least_coverage;
     const double residual_limit = most_residual * std::max(deviation_mm, least_deviation_mm);
     if (fit.inlier_share < least_inliers)
         doubts.push_back({"surface.outliers", fit.inlier_share, least_inliers,
@@ -48,7 +50,21 @@ SurfaceTerm::SurfaceTerm(const PreparedModel& prepared, const SurfacePoints& sur
       alignment_(alignment),
       data_(surface_data(surface)),
       surface_(prepared),
-      energy_(energy) {}
+      energy_(energy),
+      inward_(normals_point_inwards()) {}
+
+bool SurfaceTerm::normals_point_inwards() const {
+    if (!data_.oriented) return false;
+    const meshing::SurfaceTree tree(surface_.at_rest);
+    Eigen::Index near = 0, inward = 0;
+    for (Eigen::Index n = 0; n < data_.count(); ++n) {
+        const auto hit = tree.closest(data_.points.col(n), surface_doubt_limits.headers_reach_mm);
+        near += hit.has_value();
+        inward += hit && hit->normal.dot(data_.normals.col(n)) < 0;
+    }
+    return double(near) >= surface_doubt_limits.least_near * double(data_.count()) &&
+           double(inward) >= surface_doubt_limits.least_inward * double(near);
+}
 
 double SurfaceTerm::final_scale_mm() const {
     return options_.outlier_deviations * std::max(data_.deviation_mm, least_deviation_mm);
@@ -105,7 +121,9 @@ Contribution SurfaceTerm::linearise(const RoundPlan& plan, const State& state, O
             if (match.found) distances.push_back(std::abs(match.distance_mm));
         if (distances.empty())
             throw InvalidInput("no point of the intraoperative surface lies within " + to_text(reach) +
-                               " mm of the model; check the frame and the unit of the points");
+                               " mm of the model; " +
+                               (inward_ ? "its normals point inwards: turn them round"
+                                        : "check the frame and the unit of the points"));
         const auto high = distances.begin() +
                           static_cast<std::ptrdiff_t>(double(distances.size() - 1) * robust_rounds.first_percentile);
         std::nth_element(distances.begin(), high, distances.end());
@@ -156,6 +174,11 @@ SurfaceFit SurfaceTerm::fit(const State& state) const {
 void SurfaceTerm::judge(const State& state, UpdateResult& result) {
     result.surface = fit(state);
     doubt(*result.surface, data_.deviation_mm, result.doubts);
+    if (inward_)
+        result.doubts.push_back(
+            {"surface.normals_inward", 1, 0,
+             "the normals of the intraoperative surface point inwards where the headers place its points",
+             "turn them round: normals point out of the organ"});
 }
 
 }  // namespace tissuewarp::registration::detail

