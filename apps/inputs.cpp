@@ -1,5 +1,6 @@
 #include "apps/inputs.hpp"
 
+#include "apps/moving_organ.hpp"
 #include "apps/noted_images.hpp"
 #include "apps/point_files.hpp"
 #include "core/sha256.hpp"
@@ -28,6 +29,11 @@ void add_file(RegistrationInputs& inputs, const char* role, const fs::path& path
     std::error_code failure;
     if (!fs::exists(path, failure)) throw IoError(fmt::format("--{} '{}': no such file", role, path.string()));
     inputs.files.push_back({role, path, ""});
+}
+
+void require_grey(const Volume& image, const fs::path& path) {
+    if (image.channels() > 1)
+        throw InvalidInput(fmt::format("'{}' has {} components; give a grey image", path.string(), image.channels()));
 }
 
 void require_common_label(const Volume& moving, const Volume& fixed, const RegisterOptions& options) {
@@ -198,7 +204,8 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
 
     imaging::ReadResult moving, fixed, moving_labels, fixed_labels;
     tbb::task_group tasks;
-    tasks.run([&] { moving_labels = imaging::read_labels_with_notes(options.moving_labels); });
+    if (!options.moving_labels.empty())
+        tasks.run([&] { moving_labels = imaging::read_labels_with_notes(options.moving_labels); });
     if (!options.fixed_labels.empty())
         tasks.run([&] { fixed_labels = imaging::read_labels_with_notes(options.fixed_labels); });
     if (!options.moving.empty()) tasks.run([&] { moving = imaging::read_volume_with_notes(options.moving); });
@@ -215,22 +222,21 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
         for (const std::string& note : notes_of(*read, *path)) inputs.notes.push_back(note);
     inputs.moving = moving.volume;
     inputs.fixed = fixed.volume;
+    require_grey(inputs.moving, options.moving);
+    require_grey(inputs.fixed, options.fixed);
     inputs.moving_labels = moving_labels.volume;
     inputs.fixed_labels = fixed_labels.volume;
     inputs.moving_label_names = moving_labels.label_names;
     inputs.fixed_label_names = fixed_labels.label_names;
+    if (options.moving_labels.empty()) find_organ(inputs, options);
     observer.checkpoint("reading", 1.0);
     return inputs;
 }
 
 void validate(RegistrationInputs& inputs, const RegisterOptions& options) {
-    for (const auto& [image, path] : {std::pair{&inputs.moving, &options.moving}, {&inputs.fixed, &options.fixed}})
-        if (image->channels() > 1)
-            throw InvalidInput(
-                fmt::format("'{}' has {} components; give a grey image", path->string(), image->channels()));
     match_grid(inputs.moving_labels, inputs.moving, options.moving, options.moving_labels, options.resample_labels);
-    require_millimetres(inputs.moving_labels.geometry, options.moving_labels);
-    imaging::require_labels(inputs.moving_labels, {}, options.moving_labels.string().c_str());
+    require_millimetres(inputs.moving_labels.geometry, organ_file(options));
+    imaging::require_labels(inputs.moving_labels, {}, organ_file(options).string().c_str());
     if (!inputs.fixed_labels.empty()) validate_fixed_labels(inputs, options);
     require_known_surroundings(inputs.moving_labels, options);
     const Volume organ = imaging::without_labels(inputs.moving_labels, options.rigid_neighbours);

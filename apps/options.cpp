@@ -54,10 +54,12 @@ struct Parser {
     void declare_register(Verb& verb) {
         RegisterOptions& o = registration;
         verb.app().footer(
-            "Example:\n  tissuewarp register --moving preop.nii.gz --moving-labels preop_labels.nii.gz \\\n"
+            "Example:\n  tissuewarp register --moving preop.nii.gz --fixed intraop.nii.gz --output out\n"
+            "  tissuewarp register --moving preop.nii.gz --moving-labels preop_labels.nii.gz \\\n"
             "    --fixed intraop.nii.gz --fixed-labels intraop_labels.nii.gz --output out");
         verb.path("--moving", o.moving, "Preoperative grey image; without it no warped image is written");
-        verb.path("--moving-labels", o.moving_labels, "Preoperative label map: what is meshed")->required();
+        verb.path("--moving-labels", o.moving_labels,
+                  "Preoperative label map: what is meshed; without it, what is bright in --moving");
         verb.path("--fixed", o.fixed, "Intraoperative grey image: gives the output grid; alone, it is what is matched");
         verb.path("--fixed-labels", o.fixed_labels, "Intraoperative label map: what is matched");
         verb.path("--fixed-surface", o.fixed_surface,
@@ -321,6 +323,7 @@ struct Parser {
                         ? "nothing to register to; give --fixed, --fixed-labels, --fixed-surface, --fixed-points or "
                           "--fixed-curves, or several"
                         : "matching the fixed image takes the moving one; give --moving");
+            require_organ(registration);
             registration.parameters = verbs.front().parameters({"save-parameters", "dry-run"});
             return registration;
         }
@@ -337,6 +340,21 @@ struct Parser {
         if (verb == "study") return study;
         info.files.assign(info_files.begin(), info_files.end());
         return info;
+    }
+
+    /// Something must say where the organ is, and what the numbers of other options mean.
+    static void require_organ(const RegisterOptions& o) {
+        if (!o.moving_labels.empty()) return;
+        if (o.moving.empty()) throw InvalidInput("nothing says where the organ is; give --moving-labels or --moving");
+        const auto refuse_without_labels = [](bool given, const std::string& option) {
+            if (given)
+                throw InvalidInput(option +
+                                   " speaks of labels, and there are none of the moving image; give "
+                                   "--moving-labels");
+        };
+        refuse_without_labels(!o.fixed_labels.empty(), "--fixed-labels");
+        refuse_without_labels(!o.anchors.empty(), "--anchor");
+        refuse_without_labels(!o.rigid_neighbours.empty(), "--rigid-neighbour");
     }
 
     /// Throws for a verb or a long option that does not exist, with the nearest that does: before CLI11 looks for what

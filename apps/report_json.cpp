@@ -45,6 +45,12 @@ json inputs(const RegistrationInputs& inputs) {
     return object;
 }
 
+json foreground(const imaging::Foreground& found) {
+    return {{"threshold", number(found.threshold)},
+            {"volume_ml", number(found.volume_mm3 / 1000)},
+            {"image_share", number(found.image_share)}};
+}
+
 json parameters(const RegisterOptions& options) {
     json object = json::object();
     for (const Parameter& parameter : options.parameters) {
@@ -318,6 +324,7 @@ json report_json(const RegistrationRun& run, double total_seconds) {
         run.result.rounds.empty() ? json(nullptr) : number(run.result.rounds.back().estimated_error_mm);
     if (!scores.after.empty())
         report["overlap"] = {{"before", to_json(scores.before)}, {"after", to_json(scores.after)}};
+    if (run.inputs.foreground) report["foreground"] = foreground(*run.inputs.foreground);
     add_fits(report, run.result);
     if (run.products.uncertainty) {
         report["error_estimate"] = to_json(registration::summarise(*run.products.uncertainty));
