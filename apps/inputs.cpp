@@ -43,7 +43,7 @@ void require_common_label(const Volume& moving, const Volume& fixed, const Regis
     if (!common.empty()) return;
     throw InvalidInput(fmt::format(
         "'{}' (labels {}) and '{}' (labels {}) share no label; give the same tissue the same number",
-        options.moving_labels.string(), fmt::join(a, ", "), options.fixed_labels.string(), fmt::join(b, ", ")));
+        organ_file(options).string(), fmt::join(a, ", "), options.fixed_labels.string(), fmt::join(b, ", ")));
 }
 
 /// Segments are matched by number: one name with two numbers would match two tissues.
@@ -54,7 +54,7 @@ void require_same_numbers(const RegistrationInputs& inputs, const RegisterOption
                 throw InvalidInput(
                     fmt::format("'{}' calls label {} '{}' and '{}' gives that name to label {}; give the same tissue "
                                 "the same number",
-                                options.moving_labels.string(), label, name, options.fixed_labels.string(), other));
+                                organ_file(options).string(), label, name, options.fixed_labels.string(), other));
 }
 
 /// Corners of the box around the labels, LPS mm.
@@ -104,7 +104,7 @@ void require_known_surroundings(const Volume& moving_labels, const RegisterOptio
         registration::require_surroundings(moving_labels, named);
     } catch (const InvalidInput& problem) {
         throw InvalidInput(
-            fmt::format("'{}', --anchor and --rigid-neighbour: {}", options.moving_labels.string(), problem.what()));
+            fmt::format("'{}', --anchor and --rigid-neighbour: {}", organ_file(options).string(), problem.what()));
     }
 }
 
@@ -177,6 +177,8 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
     RegistrationInputs inputs;
     const std::vector<std::pair<const char*, const fs::path*>> roles{{"moving", &options.moving},
                                                                      {"moving-labels", &options.moving_labels},
+                                                                     {"moving-surface", &options.moving_surface},
+                                                                     {"moving-mesh", &options.moving_mesh},
                                                                      {"fixed", &options.fixed},
                                                                      {"fixed-labels", &options.fixed_labels},
                                                                      {"fixed-surface", &options.fixed_surface},
@@ -228,7 +230,7 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
     inputs.fixed_labels = fixed_labels.volume;
     inputs.moving_label_names = moving_labels.label_names;
     inputs.fixed_label_names = fixed_labels.label_names;
-    if (options.moving_labels.empty()) find_organ(inputs, options);
+    find_organ(inputs, options);
     observer.checkpoint("reading", 1.0);
     return inputs;
 }

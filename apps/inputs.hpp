@@ -6,6 +6,7 @@
 #include "core/observer.hpp"
 #include "imaging/foreground.hpp"
 #include "imaging/image_io.hpp"
+#include "meshing/tet_mesh.hpp"
 #include "registration/evaluation.hpp"
 #include "registration/intraoperative.hpp"
 
@@ -27,6 +28,7 @@ struct RegistrationInputs {
     imaging::Volume moving, fixed;                             ///< grey images; empty when not given
     imaging::Volume moving_labels, fixed_labels;               ///< the latter empty when not given
     std::optional<imaging::Foreground> foreground;             ///< whose labels are the moving ones, without any given
+    std::optional<meshing::TetMesh> moving_mesh;               ///< where it was made elsewhere
     imaging::Volume fixed_labels_as_given;                     ///< the same before they were resampled
     std::optional<registration::SurfacePoints> fixed_surface;  ///< to register to, as the pairs
     std::optional<registration::PointPairs> point_pairs;

@@ -60,6 +60,16 @@ struct Parser {
         verb.path("--moving", o.moving, "Preoperative grey image; without it no warped image is written");
         verb.path("--moving-labels", o.moving_labels,
                   "Preoperative label map: what is meshed; without it, what is bright in --moving");
+        verb.path(
+                "--moving-surface", o.moving_surface,
+                "Closed surface of the organ in its place: .stl, .ply, .obj, .vtp, .vtk (mm, LPS); its inside is label "
+                "1")
+            ->excludes("--moving-labels");
+        verb.path(
+                "--moving-mesh", o.moving_mesh,
+                "Tetrahedra of the organ in their place: .vtu, .msh (Gmsh), .inp (Abaqus) (mm, LPS), taken as they are")
+            ->excludes("--moving-labels")
+            ->excludes("--moving-surface");
         verb.path("--fixed", o.fixed, "Intraoperative grey image: gives the output grid; alone, it is what is matched");
         verb.path("--fixed-labels", o.fixed_labels, "Intraoperative label map: what is matched");
         verb.path("--fixed-surface", o.fixed_surface,
@@ -342,10 +352,23 @@ struct Parser {
         return info;
     }
 
+    static void require_unmeshed(const RegisterOptions& o) {
+        if (o.moving_mesh.empty()) return;
+        if (o.edge_length > 0 || !o.label_edge_length.empty() || o.accuracy || o.time_budget)
+            throw InvalidInput(
+                "--moving-mesh is taken as it is; leave out --edge-length, --label-edge-length, --accuracy and "
+                "--time-budget");
+        if (!o.rigid_neighbours.empty())
+            throw InvalidInput("--rigid-neighbour is not meshed, and --moving-mesh is; give --moving-labels instead");
+    }
+
     /// Something must say where the organ is, and what the numbers of other options mean.
     static void require_organ(const RegisterOptions& o) {
-        if (!o.moving_labels.empty()) return;
-        if (o.moving.empty()) throw InvalidInput("nothing says where the organ is; give --moving-labels or --moving");
+        require_unmeshed(o);
+        if (!o.moving_labels.empty() || !o.moving_surface.empty() || !o.moving_mesh.empty()) return;
+        if (o.moving.empty())
+            throw InvalidInput(
+                "nothing says where the organ is; give --moving-labels, --moving-surface, --moving-mesh or --moving");
         const auto refuse_without_labels = [](bool given, const std::string& option) {
             if (given)
                 throw InvalidInput(option +

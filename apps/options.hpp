@@ -43,9 +43,11 @@ struct CurveFiles {
 
 struct RegisterOptions {
     CommonOptions common;
-    std::filesystem::path moving, moving_labels, fixed, fixed_labels, output;  ///< no labels: the image's foreground
-    std::filesystem::path fixed_surface;  ///< points of a part of the organ's surface
-    double surface_deviation = 1.0;       ///< mm
+    std::filesystem::path moving, moving_labels, fixed, fixed_labels, output;
+    std::filesystem::path moving_surface, moving_mesh;  ///< of the organ; one of labels, surface and mesh, or none: the
+                                                        ///< foreground of the image
+    std::filesystem::path fixed_surface;                ///< points of a part of the organ's surface
+    double surface_deviation = 1.0;                     ///< mm
     PointPairFiles point_pairs;
     CurveFiles curves;
     LandmarkFiles landmarks;

@@ -1,4 +1,4 @@
-"""Where the organ is said by something other than a label map: the image alone."""
+"""Where the organ is said by something other than a label map: the image alone, a surface, tetrahedra."""
 
 import json
 import unittest
@@ -60,6 +60,96 @@ class ImagesAlone(PhantomTest):
         self.assert_refused(self.register(fixed_labels=self.phantom.fixed_labels), INPUT, "--moving-labels")
         self.assert_refused(run("register", "--fixed-surface", "a.ply", "-o", self.phantom.output), INPUT,
                             "--moving-labels")
+
+
+def ellipsoid_triangles(centre, axes, rings=24):
+    """T x 3 x 3, outward."""
+    latitude = numpy.linspace(0, numpy.pi, rings + 1)
+    longitude = numpy.linspace(0, 2 * numpy.pi, 2 * rings + 1)[:-1]
+    ring = numpy.stack([numpy.cos(longitude), numpy.sin(longitude), numpy.zeros_like(longitude)], axis=1)
+    grid = numpy.stack([ring * numpy.sin(t) + [0, 0, numpy.cos(t)] for t in latitude])
+    grid[0], grid[-1] = [0, 0, 1], [0, 0, -1]
+    upper, lower = grid[:-1], grid[1:]
+    next_upper, next_lower = numpy.roll(upper, -1, axis=1), numpy.roll(lower, -1, axis=1)
+    triangles = numpy.concatenate([numpy.stack([upper[1:], lower[1:], next_upper[1:]], axis=2).reshape(-1, 3, 3),
+                                   numpy.stack([next_upper[:-1], lower[:-1], next_lower[:-1]], axis=2).reshape(-1, 3, 3)])
+    return (triangles * axes + centre).astype(numpy.float32)
+
+
+def save_stl(triangles, path):
+    record = numpy.zeros(len(triangles), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
+    record["corners"] = triangles
+    path.write_bytes(b"tissuewarp".ljust(80) + numpy.uint32(len(triangles)).tobytes() + record.tobytes())
+    return path
+
+
+class WithoutImages(PhantomTest):
+    """A surface or tetrahedra are all that there is of the organ, in the frame of the intraoperative data."""
+
+    def setUp(self):
+        super().setUp()
+        folder = self.phantom.folder
+        self.triangles = ellipsoid_triangles(CENTRE_LPS, MOVING_AXES)
+        self.surface = save_stl(self.triangles, folder / "organ.stl")
+        self.seen = save_stl(ellipsoid_triangles(CENTRE_LPS + SHIFT_LPS, FIXED_AXES), folder / "seen.stl")
+        self.volume = 4 / 3 * numpy.pi * MOVING_AXES.prod()
+
+    def register(self, *more):
+        return run("register", "--output", self.phantom.output, "--no-error-estimate", *more)
+
+    def report(self, result):
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return json.loads((self.phantom.output / "report.json").read_text())
+
+    def test_a_surface_is_registered_to_a_surface(self):
+        report = self.report(self.register("--moving-surface", self.surface, "--fixed-surface", self.seen,
+                                           "--no-align", "--edge-length", 4, "--landmarks",
+                                           landmarks_of(self.phantom)))
+        self.assertLess(report["surface"]["residual_mm"], 0.5)
+        self.assertGreater(report["target_registration_error"]["all"]["before"]["mean"], 2)
+        self.assertLess(report["target_registration_error"]["all"]["after"]["mean"], 1)
+        self.assertAlmostEqual(report["mesh"]["label_volume_mm3"]["1"], self.volume, delta=0.03 * self.volume)
+        self.assertIn("sha256", report["inputs"]["moving-surface"])
+
+    def test_a_surface_goes_with_its_image_and_with_labels(self):
+        labels = save((self.phantom.fixed_labels_array > 0).astype(numpy.uint8), FIXED_AFFINE,
+                      self.phantom.folder / "organ.nii.gz")
+        report = self.report(self.register("--moving-surface", self.surface, "--moving", self.phantom.moving,
+                                           "--fixed-labels", labels, "--edge-length", 4))
+        self.assertGreater(report["overlap"]["after"]["1"]["dice"], 0.97)
+        self.assertTrue((self.phantom.output / "warped.nii.gz").exists())
+
+    def test_tetrahedra_are_taken_as_they_are(self):
+        mesh = self.phantom.folder / "organ.vtu"
+        self.assertEqual(run("mesh", self.phantom.moving_labels, "-o", mesh, "--edge-length", 5).returncode, 0)
+        arguments = ("--moving-mesh", mesh, "--fixed-surface", self.seen, "--no-align")
+        dry = self.register(*arguments, "--dry-run")
+        self.assertIn("tetrahedra as they are", dry.stdout, dry.stderr)
+        report = self.report(self.register(*arguments, "--landmarks", landmarks_of(self.phantom)))
+        self.assertIn(f"take {report['mesh']['tetrahedra']} tetrahedra", dry.stdout)
+        self.assertEqual(set(report["mesh"]["label_volume_mm3"]), {"1", "2"})
+        self.assertLess(report["target_registration_error"]["all"]["after"]["mean"], 1)
+        self.assert_refused_anew(self.register(*arguments, "--edge-length", 4), "as it is", "--edge-length")
+
+    def assert_refused_anew(self, result, *words):
+        self.assertEqual(result.returncode, INPUT, result.stderr)
+        for word in words:
+            self.assertIn(word, result.stderr)
+
+    def test_an_open_surface_is_refused_with_its_edges(self):
+        path = save_stl(self.triangles[1:], self.phantom.folder / "open.stl")
+        self.assert_refused(self.register("--moving-surface", path, "--fixed-surface", self.seen), INPUT, "open.stl",
+                            "3 open edges", "fill its holes")
+
+    def test_a_surface_in_a_surface_that_faces_outward_is_refused(self):
+        inner = ellipsoid_triangles(CENTRE_LPS, 0.6 * MOVING_AXES)
+        path = save_stl(numpy.concatenate([self.triangles, inner]), self.phantom.folder / "twice.stl")
+        self.assert_refused(self.register("--moving-surface", path, "--fixed-surface", self.seen), INPUT, "twice.stl",
+                            "face outward")
+
+    def test_one_file_says_where_the_organ_is(self):
+        self.assert_refused(self.register("--moving-surface", self.surface, "--moving-labels",
+                                          self.phantom.moving_labels, "--fixed-surface", self.seen), INPUT, "--moving-labels")
 
 
 if __name__ == "__main__":
