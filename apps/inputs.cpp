@@ -1,5 +1,7 @@
 #include "apps/inputs.hpp"
 
+#include "apps/initial_transform.hpp"
+#include "apps/match_masks.hpp"
 #include "apps/moving_organ.hpp"
 #include "apps/noted_images.hpp"
 #include "apps/point_files.hpp"
@@ -76,7 +78,12 @@ std::pair<Eigen::Vector3d, Eigen::Vector3d> label_box(const Volume& labels) {
 /// Without alignment the organs must already lie within the search range of each other.
 void require_organs_meet(const RegistrationInputs& inputs) {
     constexpr double search_mm = 15.0;  // UpdateOptions::first_range_mm
-    const auto [lower_a, upper_a] = label_box(inputs.moving_labels);
+    Volume placed = inputs.moving_labels;
+    if (inputs.start) {
+        placed.geometry.origin = inputs.start->placement * placed.geometry.origin;
+        placed.geometry.direction = inputs.start->placement.linear() * placed.geometry.direction;
+    }
+    const auto [lower_a, upper_a] = label_box(placed);
     const auto [lower_b, upper_b] = label_box(inputs.fixed_labels);
     const double gap = (lower_a - upper_b).cwiseMax(lower_b - upper_a).maxCoeff();
     if (gap <= search_mm) return;
@@ -179,7 +186,9 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
                                                                      {"moving-labels", &options.moving_labels},
                                                                      {"moving-surface", &options.moving_surface},
                                                                      {"moving-mesh", &options.moving_mesh},
+                                                                     {"moving-mask", &options.moving_mask},
                                                                      {"fixed", &options.fixed},
+                                                                     {"fixed-mask", &options.fixed_mask},
                                                                      {"fixed-labels", &options.fixed_labels},
                                                                      {"fixed-surface", &options.fixed_surface},
                                                                      {"fixed-points", &options.point_pairs.fixed},
@@ -187,6 +196,7 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
                                                                      {"moving-curves", &options.curves.moving},
                                                                      {"fixed-curves", &options.curves.fixed},
                                                                      {"materials", &options.materials},
+                                                                     {"initial-transform", &options.initial_transform},
                                                                      {"landmarks", &options.landmarks.csv},
                                                                      {"landmarks-moving", &options.landmarks.moving},
                                                                      {"landmarks-fixed", &options.landmarks.fixed},
@@ -231,6 +241,8 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
     inputs.moving_label_names = moving_labels.label_names;
     inputs.fixed_label_names = fixed_labels.label_names;
     find_organ(inputs, options);
+    exclude_unmatched(inputs, options);
+    take_initial_transform(inputs, options);
     observer.checkpoint("reading", 1.0);
     return inputs;
 }

@@ -71,6 +71,11 @@ struct Parser {
             ->excludes("--moving-labels")
             ->excludes("--moving-surface");
         verb.path("--fixed", o.fixed, "Intraoperative grey image: gives the output grid; alone, it is what is matched");
+        verb.path(
+            "--moving-mask", o.moving_mask,
+            "Mask over --moving: 0 where it may not be matched (instruments, lesions, artefacts), nonzero where it "
+            "may, as in elastix and ANTs");
+        verb.path("--fixed-mask", o.fixed_mask, "The same over --fixed");
         verb.path("--fixed-labels", o.fixed_labels, "Intraoperative label map: what is matched");
         verb.path("--fixed-surface", o.fixed_surface,
                   "Intraoperative points of a part of the surface: .ply, .stl, .obj, .vtk, .vtp, .csv, .xyz (mm, LPS)");
@@ -126,7 +131,12 @@ struct Parser {
                     "Pull of the matched boundary per area (kPa/mm)");
         verb.number("--fade", o.fade, "MM", 1.0, 1e4, "Distance from the organ where the field has become rigid (mm)");
         verb.flag("--match-image", o.match_image, "Match blocks of the images besides the other data");
-        verb.flag("--no-align", o.no_align, "Skip the rigid alignment: the images share one frame");
+        verb.flag("--no-align", o.no_align,
+                  "Skip the rigid alignment: the images share one frame, or --initial-transform tells the placement");
+        verb.path(
+            "--initial-transform", o.initial_transform,
+            "Where the alignment begins: a transform of ITK (.tfm, .txt, .h5, .mat), four rows of four numbers, or a "
+            "displacement field; each from fixed to moving points, as ITK's (mm, LPS)");
         verb.flag("--no-error-estimate", o.no_error_estimate, "Leave out how far off targets may lie, for speed");
         verb.flag("--strict", o.strict, "End with exit code 4 where the result is doubted; everything is written");
         verb.flag("--resample-labels", o.resample_labels, "Accept labels on another grid than their image");
@@ -334,6 +344,10 @@ struct Parser {
                           "--fixed-curves, or several"
                         : "matching the fixed image takes the moving one; give --moving");
             require_organ(registration);
+            if (!registration.match_image && !(registration.moving_mask.empty() && registration.fixed_mask.empty()))
+                throw InvalidInput(
+                    "--moving-mask and --fixed-mask say what of the images is matched, and they are not; add "
+                    "--match-image");
             registration.parameters = verbs.front().parameters({"save-parameters", "dry-run"});
             return registration;
         }

@@ -101,7 +101,8 @@ imaging::Geometry output_grid(const RegistrationRun& run) {
 
 Intraoperative seen(const RegistrationInputs& inputs, const RegisterOptions& options) {
     Intraoperative seen{.surface = inputs.fixed_surface, .points = inputs.point_pairs, .curves = inputs.curves};
-    if (options.match_image) seen.image = inputs.fixed;
+    if (inputs.start) seen.start = inputs.start->placement;
+    if (options.match_image) seen.image = inputs.fixed_matched;
     // An image that is only the grid of the output must not coarsen the boundary that is matched.
     if (!inputs.fixed_labels.empty())
         seen.labels = options.match_image ? inputs.fixed_labels : inputs.fixed_labels_as_given;
@@ -228,7 +229,7 @@ void run_register(const RegisterOptions& options) {
     }
     progress.begin("preparing the model", 0.02, 0.20);
     run.prepared = std::make_unique<PreparedModel>(prepared_model(run, progress));
-    if (options.match_image) prepare_image(*run.prepared, run.inputs.moving, {}, progress);
+    if (options.match_image) prepare_image(*run.prepared, run.inputs.moving_matched, {}, progress);
     if (looks_for_loads(run)) prepare_loads(*run.prepared, progress);
     append(run.times, run.prepared->times);
 
