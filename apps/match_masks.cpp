@@ -2,7 +2,7 @@
 
 #include "apps/noted_images.hpp"
 #include "imaging/filters.hpp"
-#include "registration/image_mask.hpp"
+#include "registration/matching/image_mask.hpp"
 
 #include <fmt/format.h>
 

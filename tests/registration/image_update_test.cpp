@@ -4,7 +4,7 @@
 #include "core/errors.hpp"
 #include "registration/evaluation.hpp"
 #include "registration/field.hpp"
-#include "registration/image_mask.hpp"
+#include "registration/matching/image_mask.hpp"
 #include "registration/matching/image_matching.hpp"
 #include "registration/prepared_io.hpp"
 #include "tests/registration/textured_phantom.hpp"

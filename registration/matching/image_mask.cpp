@@ -1,4 +1,4 @@
-#include "registration/image_mask.hpp"
+#include "registration/matching/image_mask.hpp"
 
 #include "core/errors.hpp"
 #include "imaging/filters.hpp"
