@@ -1,5 +1,8 @@
 #include "apps/inputs.hpp"
 
+#include "apps/initial_transform.hpp"
+#include "apps/match_masks.hpp"
+#include "apps/moving_organ.hpp"
 #include "apps/noted_images.hpp"
 #include "apps/point_files.hpp"
 #include "core/sha256.hpp"
@@ -30,6 +33,11 @@ void add_file(RegistrationInputs& inputs, const char* role, const fs::path& path
     inputs.files.push_back({role, path, ""});
 }
 
+void require_grey(const Volume& image, const fs::path& path) {
+    if (image.channels() > 1)
+        throw InvalidInput(fmt::format("'{}' has {} components; give a grey image", path.string(), image.channels()));
+}
+
 void require_common_label(const Volume& moving, const Volume& fixed, const RegisterOptions& options) {
     const std::vector<int> a = imaging::labels_in(moving), b = imaging::labels_in(fixed);
     std::vector<int> common;
@@ -37,7 +45,7 @@ void require_common_label(const Volume& moving, const Volume& fixed, const Regis
     if (!common.empty()) return;
     throw InvalidInput(fmt::format(
         "'{}' (labels {}) and '{}' (labels {}) share no label; give the same tissue the same number",
-        options.moving_labels.string(), fmt::join(a, ", "), options.fixed_labels.string(), fmt::join(b, ", ")));
+        organ_file(options).string(), fmt::join(a, ", "), options.fixed_labels.string(), fmt::join(b, ", ")));
 }
 
 /// Segments are matched by number: one name with two numbers would match two tissues.
@@ -48,7 +56,7 @@ void require_same_numbers(const RegistrationInputs& inputs, const RegisterOption
                 throw InvalidInput(
                     fmt::format("'{}' calls label {} '{}' and '{}' gives that name to label {}; give the same tissue "
                                 "the same number",
-                                options.moving_labels.string(), label, name, options.fixed_labels.string(), other));
+                                organ_file(options).string(), label, name, options.fixed_labels.string(), other));
 }
 
 /// Corners of the box around the labels, LPS mm.
@@ -70,7 +78,12 @@ std::pair<Eigen::Vector3d, Eigen::Vector3d> label_box(const Volume& labels) {
 /// Without alignment the organs must already lie within the search range of each other.
 void require_organs_meet(const RegistrationInputs& inputs) {
     constexpr double search_mm = 15.0;  // UpdateOptions::first_range_mm
-    const auto [lower_a, upper_a] = label_box(inputs.moving_labels);
+    Volume placed = inputs.moving_labels;
+    if (inputs.start) {
+        placed.geometry.origin = inputs.start->placement * placed.geometry.origin;
+        placed.geometry.direction = inputs.start->placement.linear() * placed.geometry.direction;
+    }
+    const auto [lower_a, upper_a] = label_box(placed);
     const auto [lower_b, upper_b] = label_box(inputs.fixed_labels);
     const double gap = (lower_a - upper_b).cwiseMax(lower_b - upper_a).maxCoeff();
     if (gap <= search_mm) return;
@@ -98,7 +111,7 @@ void require_known_surroundings(const Volume& moving_labels, const RegisterOptio
         registration::require_surroundings(moving_labels, named);
     } catch (const InvalidInput& problem) {
         throw InvalidInput(
-            fmt::format("'{}', --anchor and --rigid-neighbour: {}", options.moving_labels.string(), problem.what()));
+            fmt::format("'{}', --anchor and --rigid-neighbour: {}", organ_file(options).string(), problem.what()));
     }
 }
 
@@ -200,7 +213,11 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
     RegistrationInputs inputs;
     const std::vector<std::pair<const char*, const fs::path*>> roles{{"moving", &options.moving},
                                                                      {"moving-labels", &options.moving_labels},
+                                                                     {"moving-surface", &options.moving_surface},
+                                                                     {"moving-mesh", &options.moving_mesh},
+                                                                     {"moving-mask", &options.moving_mask},
                                                                      {"fixed", &options.fixed},
+                                                                     {"fixed-mask", &options.fixed_mask},
                                                                      {"fixed-labels", &options.fixed_labels},
                                                                      {"fixed-surface", &options.fixed_surface},
                                                                      {"fixed-points", &options.point_pairs.fixed},
@@ -208,6 +225,7 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
                                                                      {"moving-curves", &options.curves.moving},
                                                                      {"fixed-curves", &options.curves.fixed},
                                                                      {"materials", &options.materials},
+                                                                     {"initial-transform", &options.initial_transform},
                                                                      {"landmarks", &options.landmarks.csv},
                                                                      {"landmarks-moving", &options.landmarks.moving},
                                                                      {"landmarks-fixed", &options.landmarks.fixed},
@@ -220,7 +238,8 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
 
     imaging::ReadResult moving, fixed, moving_labels, fixed_labels;
     tbb::task_group tasks;
-    tasks.run([&] { moving_labels = imaging::read_labels_with_notes(options.moving_labels); });
+    if (!options.moving_labels.empty())
+        tasks.run([&] { moving_labels = imaging::read_labels_with_notes(options.moving_labels); });
     if (!options.fixed_labels.empty())
         tasks.run([&] { fixed_labels = imaging::read_labels_with_notes(options.fixed_labels); });
     if (!options.moving.empty()) tasks.run([&] { moving = imaging::read_volume_with_notes(options.moving); });
@@ -237,22 +256,23 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
         for (const std::string& note : notes_of(*read, *path)) inputs.notes.push_back(note);
     inputs.moving = moving.volume;
     inputs.fixed = fixed.volume;
+    require_grey(inputs.moving, options.moving);
+    require_grey(inputs.fixed, options.fixed);
     inputs.moving_labels = moving_labels.volume;
     inputs.fixed_labels = fixed_labels.volume;
     inputs.moving_label_names = moving_labels.label_names;
     inputs.fixed_label_names = fixed_labels.label_names;
+    find_organ(inputs, options);
+    exclude_unmatched(inputs, options);
+    take_initial_transform(inputs, options);
     observer.checkpoint("reading", 1.0);
     return inputs;
 }
 
 void validate(RegistrationInputs& inputs, const RegisterOptions& options) {
-    for (const auto& [image, path] : {std::pair{&inputs.moving, &options.moving}, {&inputs.fixed, &options.fixed}})
-        if (image->channels() > 1)
-            throw InvalidInput(
-                fmt::format("'{}' has {} components; give a grey image", path->string(), image->channels()));
     match_grid(inputs.moving_labels, inputs.moving, options.moving, options.moving_labels, options.resample_labels);
-    require_millimetres(inputs.moving_labels.geometry, options.moving_labels);
-    imaging::require_labels(inputs.moving_labels, {}, options.moving_labels.string().c_str());
+    require_millimetres(inputs.moving_labels.geometry, organ_file(options));
+    imaging::require_labels(inputs.moving_labels, {}, organ_file(options).string().c_str());
     if (!inputs.fixed_labels.empty()) validate_fixed_labels(inputs, options);
     require_known_surroundings(inputs.moving_labels, options);
     const Volume organ = imaging::without_labels(inputs.moving_labels, options.rigid_neighbours);

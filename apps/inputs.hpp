@@ -4,9 +4,12 @@
 #include "apps/material_file.hpp"
 #include "apps/options.hpp"
 #include "core/observer.hpp"
+#include "imaging/foreground.hpp"
 #include "imaging/image_io.hpp"
+#include "meshing/tet_mesh.hpp"
 #include "registration/evaluation.hpp"
 #include "registration/intraoperative.hpp"
+#include "registration/pose/start_pose.hpp"
 
 #include <map>
 #include <optional>
@@ -25,10 +28,14 @@ struct InputFile {
 struct RegistrationInputs {
     imaging::Volume moving, fixed;                             ///< grey images; empty when not given
     imaging::Volume moving_labels, fixed_labels;               ///< the latter empty when not given
+    imaging::Volume moving_matched, fixed_matched;             ///< the images without what their masks exclude
+    std::optional<imaging::Foreground> foreground;             ///< whose labels are the moving ones, without any given
+    std::optional<meshing::TetMesh> moving_mesh;               ///< where it was made elsewhere
     imaging::Volume fixed_labels_as_given;                     ///< the same before they were resampled
     std::optional<registration::SurfacePoints> fixed_surface;  ///< to register to, as the pairs
     std::optional<registration::PointPairs> point_pairs;
     std::optional<registration::Curves> curves;
+    std::optional<registration::StartPose> start;  ///< in place of the headers' placement
     std::optional<registration::Landmarks> landmarks;
     std::optional<Eigen::Matrix3Xd> points;                            ///< moving frame, LPS mm
     std::optional<meshing::SurfaceMesh> surface;                       ///< to carry along, moving frame, LPS mm

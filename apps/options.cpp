@@ -54,11 +54,28 @@ struct Parser {
     void declare_register(Verb& verb) {
         RegisterOptions& o = registration;
         verb.app().footer(
-            "Example:\n  tissuewarp register --moving preop.nii.gz --moving-labels preop_labels.nii.gz \\\n"
+            "Example:\n  tissuewarp register --moving preop.nii.gz --fixed intraop.nii.gz --output out\n"
+            "  tissuewarp register --moving preop.nii.gz --moving-labels preop_labels.nii.gz \\\n"
             "    --fixed intraop.nii.gz --fixed-labels intraop_labels.nii.gz --output out");
         verb.path("--moving", o.moving, "Preoperative grey image; without it no warped image is written");
-        verb.path("--moving-labels", o.moving_labels, "Preoperative label map: what is meshed")->required();
+        verb.path("--moving-labels", o.moving_labels,
+                  "Preoperative label map: what is meshed; without it, what is bright in --moving");
+        verb.path(
+                "--moving-surface", o.moving_surface,
+                "Closed surface of the organ in its place: .stl, .ply, .obj, .vtp, .vtk (mm, LPS); its inside is label "
+                "1")
+            ->excludes("--moving-labels");
+        verb.path(
+                "--moving-mesh", o.moving_mesh,
+                "Tetrahedra of the organ in their place: .vtu, .msh (Gmsh), .inp (Abaqus) (mm, LPS), taken as they are")
+            ->excludes("--moving-labels")
+            ->excludes("--moving-surface");
         verb.path("--fixed", o.fixed, "Intraoperative grey image: gives the output grid; alone, it is what is matched");
+        verb.path(
+            "--moving-mask", o.moving_mask,
+            "Mask over --moving: 0 where it may not be matched (instruments, lesions, artefacts), nonzero where it "
+            "may, as in elastix and ANTs");
+        verb.path("--fixed-mask", o.fixed_mask, "The same over --fixed");
         verb.path("--fixed-labels", o.fixed_labels, "Intraoperative label map: what is matched");
         verb.path("--fixed-surface", o.fixed_surface,
                   "Intraoperative points of a part of the surface: .ply, .stl, .obj, .vtk, .vtp, .csv, .xyz (mm, LPS)");
@@ -114,7 +131,12 @@ struct Parser {
                     "Pull of the matched boundary per area (kPa/mm)");
         verb.number("--fade", o.fade, "MM", 1.0, 1e4, "Distance from the organ where the field has become rigid (mm)");
         verb.flag("--match-image", o.match_image, "Match blocks of the images besides the other data");
-        verb.flag("--no-align", o.no_align, "Skip the rigid alignment: the images share one frame");
+        verb.flag("--no-align", o.no_align,
+                  "Skip the rigid alignment: the images share one frame, or --initial-transform tells the placement");
+        verb.path(
+            "--initial-transform", o.initial_transform,
+            "Where the alignment begins: a transform of ITK (.tfm, .txt, .h5, .mat), four rows of four numbers, or a "
+            "displacement field; each from fixed to moving points, as ITK's (mm, LPS)");
         verb.flag("--no-error-estimate", o.no_error_estimate, "Leave out how far off targets may lie, for speed");
         verb.flag("--strict", o.strict, "End with exit code 4 where the result is doubted; everything is written");
         verb.flag("--resample-labels", o.resample_labels, "Accept labels on another grid than their image");
@@ -321,6 +343,11 @@ struct Parser {
                         ? "nothing to register to; give --fixed, --fixed-labels, --fixed-surface, --fixed-points or "
                           "--fixed-curves, or several"
                         : "matching the fixed image takes the moving one; give --moving");
+            require_organ(registration);
+            if (!registration.match_image && !(registration.moving_mask.empty() && registration.fixed_mask.empty()))
+                throw InvalidInput(
+                    "--moving-mask and --fixed-mask say what of the images is matched, and they are not; add "
+                    "--match-image");
             registration.parameters = verbs.front().parameters({"save-parameters", "dry-run"});
             return registration;
         }
@@ -337,6 +364,34 @@ struct Parser {
         if (verb == "study") return study;
         info.files.assign(info_files.begin(), info_files.end());
         return info;
+    }
+
+    static void require_unmeshed(const RegisterOptions& o) {
+        if (o.moving_mesh.empty()) return;
+        if (o.edge_length > 0 || !o.label_edge_length.empty() || o.accuracy || o.time_budget)
+            throw InvalidInput(
+                "--moving-mesh is taken as it is; leave out --edge-length, --label-edge-length, --accuracy and "
+                "--time-budget");
+        if (!o.rigid_neighbours.empty())
+            throw InvalidInput("--rigid-neighbour is not meshed, and --moving-mesh is; give --moving-labels instead");
+    }
+
+    /// Something must say where the organ is, and what the numbers of other options mean.
+    static void require_organ(const RegisterOptions& o) {
+        require_unmeshed(o);
+        if (!o.moving_labels.empty() || !o.moving_surface.empty() || !o.moving_mesh.empty()) return;
+        if (o.moving.empty())
+            throw InvalidInput(
+                "nothing says where the organ is; give --moving-labels, --moving-surface, --moving-mesh or --moving");
+        const auto refuse_without_labels = [](bool given, const std::string& option) {
+            if (given)
+                throw InvalidInput(option +
+                                   " speaks of labels, and there are none of the moving image; give "
+                                   "--moving-labels");
+        };
+        refuse_without_labels(!o.fixed_labels.empty(), "--fixed-labels");
+        refuse_without_labels(!o.anchors.empty(), "--anchor");
+        refuse_without_labels(!o.rigid_neighbours.empty(), "--rigid-neighbour");
     }
 
     /// Throws for a verb or a long option that does not exist, with the nearest that does: before CLI11 looks for what

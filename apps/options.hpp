@@ -44,11 +44,15 @@ struct CurveFiles {
 struct RegisterOptions {
     CommonOptions common;
     std::filesystem::path moving, moving_labels, fixed, fixed_labels, output;
-    std::filesystem::path fixed_surface;  ///< points of a part of the organ's surface
-    double surface_deviation = 1.0;       ///< mm
+    std::filesystem::path moving_surface, moving_mesh;  ///< of the organ; one of labels, surface and mesh, or none: the
+                                                        ///< foreground of the image
+    std::filesystem::path moving_mask, fixed_mask;      ///< 0 where the image may not be matched
+    std::filesystem::path fixed_surface;                ///< points of a part of the organ's surface
+    double surface_deviation = 1.0;                     ///< mm
     PointPairFiles point_pairs;
     CurveFiles curves;
     LandmarkFiles landmarks;
+    std::filesystem::path initial_transform;      ///< fixed → moving points
     std::filesystem::path points, surface;        ///< of the moving frame, carried along
     std::optional<double> accuracy, time_budget;  ///< mm; s: they choose the mesh
     double edge_length = 0.0;                     ///< mm; 0: from the volume of the organ and what is given

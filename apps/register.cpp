@@ -36,7 +36,9 @@ PrepareOptions prepare_options(const RegistrationRun& run) {
     const RegisterOptions& options = run.options;
     const RegistrationInputs& inputs = run.inputs;
     PrepareOptions result;
-    result.meshing.edge_length = run.dial ? run.dial->edge_length_mm : edge_length(options, inputs);
+    result.meshing.edge_length = inputs.moving_mesh ? meshing::quality(*inputs.moving_mesh).edge_mm.median
+                                 : run.dial         ? run.dial->edge_length_mm
+                                                    : edge_length(options, inputs);
     result.meshing.label_edge_length = options.label_edge_length;
     for (const auto& [label, tissue] : inputs.materials) result.materials[label] = material_of(tissue);
     result.default_material = tled::neo_hookean_lnj(options.default_youngs_modulus, options.default_poissons_ratio);
@@ -58,6 +60,13 @@ UpdateOptions update_options(const RegistrationRun& run) {
     return result;
 }
 
+PreparedModel prepared_model(const RegistrationRun& run, Observer& observer) {
+    const RegistrationInputs& inputs = run.inputs;
+    const PrepareOptions options = prepare_options(run);
+    return inputs.moving_mesh ? prepare(*inputs.moving_mesh, inputs.moving_labels, options, observer)
+                              : prepare(inputs.moving_labels, options, observer);
+}
+
 void print_plan(const RegistrationInputs& inputs, const RegisterOptions& options) {
     const auto grid = [](const imaging::Geometry& g) {
         return fmt::format("{} x {} x {} voxels of {:g} x {:g} x {:g} mm", g.size[0], g.size[1], g.size[2],
@@ -69,9 +78,12 @@ void print_plan(const RegistrationInputs& inputs, const RegisterOptions& options
                fmt::join(imaging::labels_in(inputs.moving_labels), ", "));
     if (!options.anchors.empty()) fmt::print("stay          {}\n", fmt::join(options.anchors, ", "));
     if (!options.rigid_neighbours.empty()) fmt::print("rigid         {}\n", fmt::join(options.rigid_neighbours, ", "));
-    fmt::print("would mesh with edges of {:.3g} mm, {}, match in {} rounds on device '{}', and write to '{}':\n",
-               edge_length(options, inputs), options.no_align ? "not align" : "align rigidly", options.rounds,
-               options.device.name, options.output.string());
+    const std::string mesh = inputs.moving_mesh
+                                 ? fmt::format("take {} tetrahedra as they are", inputs.moving_mesh->tet_count())
+                                 : fmt::format("mesh with edges of {:.3g} mm", edge_length(options, inputs));
+    fmt::print("would {}, {}, match in {} rounds on device '{}', and write to '{}':\n", mesh,
+               options.no_align ? "not align" : "align rigidly", options.rounds, options.device.name,
+               options.output.string());
     for (const std::string& name : output_names(options)) fmt::print("  {}\n", name);
     for (const std::string& note : inputs.notes) fmt::print("note: {}\n", note);
 }
@@ -102,7 +114,8 @@ imaging::Geometry output_grid(const RegistrationRun& run) {
 
 Intraoperative seen(const RegistrationInputs& inputs, const RegisterOptions& options) {
     Intraoperative seen{.surface = inputs.fixed_surface, .points = inputs.point_pairs, .curves = inputs.curves};
-    if (options.match_image) seen.image = inputs.fixed;
+    if (inputs.start) seen.start = inputs.start->placement;
+    if (options.match_image) seen.image = inputs.fixed_matched;
     // An image that is only the grid of the output must not coarsen the boundary that is matched.
     if (!inputs.fixed_labels.empty())
         seen.labels = options.match_image ? inputs.fixed_labels : inputs.fixed_labels_as_given;
@@ -228,8 +241,8 @@ void run_register(const RegisterOptions& options) {
         progress.note(run.dial->reason);
     }
     progress.begin("preparing the model", 0.02, 0.20);
-    run.prepared = std::make_unique<PreparedModel>(prepare(run.inputs.moving_labels, prepare_options(run), progress));
-    if (options.match_image) prepare_image(*run.prepared, run.inputs.moving, {}, progress);
+    run.prepared = std::make_unique<PreparedModel>(prepared_model(run, progress));
+    if (options.match_image) prepare_image(*run.prepared, run.inputs.moving_matched, {}, progress);
     if (looks_for_loads(run)) prepare_loads(*run.prepared, progress);
     append(run.times, run.prepared->times);
 

@@ -111,7 +111,8 @@ std::string estimate_text(const registration::UncertaintySummary& s) {
     return text + fmt::format(
                       "shown by the data: {:.0f} % of the tissue, carried there by mechanics: {:.0f} %, not known "
                       "to 5 mm: {:.0f} %\n",
-                      100 * s.shown_share, 100 * (1 - s.shown_share - s.unknown_share), 100 * s.unknown_share);
+                      100 * s.shown_share, std::max(0.0, 100 * (1 - s.shown_share - s.unknown_share)),
+                      100 * s.unknown_share);
 }
 
 }  // namespace

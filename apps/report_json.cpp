@@ -45,6 +45,22 @@ json inputs(const RegistrationInputs& inputs) {
     return object;
 }
 
+json foreground(const imaging::Foreground& found) {
+    return {{"threshold", number(found.threshold)},
+            {"volume_ml", number(found.volume_mm3 / 1000)},
+            {"image_share", number(found.image_share)}};
+}
+
+json start(const registration::StartPose& pose) {
+    json matrix = json::array();
+    for (int row = 0; row < 4; ++row) {
+        const Eigen::RowVector4d values = pose.placement.matrix().row(row);
+        matrix.push_back({values[0], values[1], values[2], values[3]});
+    }
+    return {
+        {"matrix", matrix}, {"deformation_mm", number(pose.deformation_mm)}, {"furthest_mm", number(pose.furthest_mm)}};
+}
+
 json parameters(const RegisterOptions& options) {
     json object = json::object();
     for (const Parameter& parameter : options.parameters) {
@@ -318,6 +334,8 @@ json report_json(const RegistrationRun& run, double total_seconds) {
         run.result.rounds.empty() ? json(nullptr) : number(run.result.rounds.back().estimated_error_mm);
     if (!scores.after.empty())
         report["overlap"] = {{"before", to_json(scores.before)}, {"after", to_json(scores.after)}};
+    if (run.inputs.foreground) report["foreground"] = foreground(*run.inputs.foreground);
+    if (run.inputs.start) report["initial_transform"] = start(*run.inputs.start);
     add_fits(report, run.result);
     if (run.products.uncertainty) {
         report["error_estimate"] = to_json(registration::summarise(*run.products.uncertainty));

@@ -34,7 +34,7 @@ endif()
 foreach(folder ${folders})
   file(GLOB face RELATIVE ${PROJECT_SOURCE_DIR} CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${folder}/*.hpp)
   if(TISSUEWARP_COMPONENTS STREQUAL "tled")
-    list(FILTER face EXCLUDE REGEX "meshing/(mesher|fidelity)")  # these need images
+    list(FILTER face EXCLUDE REGEX "meshing/(mesher|fidelity|surface_voxels)")  # these need images
   endif()
   list(APPEND headers ${face})
 endforeach()

@@ -5,6 +5,7 @@
 #include "meshing/tet_mesh.hpp"
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,18 @@ void write_vtu(const TetMesh& mesh, const std::filesystem::path& path, const std
 /// appended, uncompressed or compressed by zlib, little-endian and in one piece. A missing `label` array means label 1.
 /// Throws IoError or InvalidInput.
 TetMesh read_vtu(const std::filesystem::path& path);
+
+/// Tetrahedra made by another program.
+struct MeshFile {
+    TetMesh mesh;
+    std::map<int, std::string> label_names;  ///< of regions that the file names
+    std::vector<std::string> notes;          ///< what the reader had to decide or doubts
+};
+
+/// Reads .vtu (as read_vtu), .msh (Gmsh 2.2 and 4.1, ascii; label: physical group, else the volume it belongs to) and
+/// .inp (Abaqus, C3D4; label: element sets in their order) by extension. Lengths are mm. Tetrahedra that are all
+/// inverted are turned, some of them are refused; nodes that none uses are left out. Throws IoError or InvalidInput.
+MeshFile read_tetrahedra(const std::filesystem::path& path);
 
 /// A cell array of a .vtu, components × cells in the order of the file. Throws IoError or, naming those that there are,
 /// InvalidInput.

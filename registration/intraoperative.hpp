@@ -3,7 +3,7 @@
 
 #include "imaging/volume.hpp"
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include <optional>
 #include <vector>
@@ -40,6 +40,9 @@ struct Intraoperative {
     std::optional<SurfacePoints> surface = std::nullopt;
     std::optional<PointPairs> points = std::nullopt;
     std::optional<Curves> curves = std::nullopt;
+    /// Where the organ is known to lie (moving → fixed), by navigation or another registration, in place of where the
+    /// headers place it: the alignment begins there, and without one it stays there.
+    std::optional<Eigen::Isometry3d> start = std::nullopt;
 };
 
 }  // namespace tissuewarp::registration

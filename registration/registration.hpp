@@ -4,6 +4,7 @@
 #include "registration/evaluation.hpp"
 #include "registration/field.hpp"
 #include "registration/gpu_warp.hpp"
+#include "registration/matching/image_mask.hpp"
 #include "registration/prepared_io.hpp"
 #include "registration/record.hpp"
 #include "registration/uncertainty.hpp"

@@ -3,6 +3,7 @@
 #include "core/stopwatch.hpp"
 #include "registration/boundary/surroundings.hpp"
 #include "registration/engine_choice.hpp"
+#include "registration/pose/start_pose.hpp"
 #include "registration/register.hpp"
 
 #include <string>
@@ -37,11 +38,14 @@ struct Updater::Impl {
           load_finder(*prepared, options.tissue) {}
 
     UpdateResult update(const Intraoperative& given, Observer& observer) {
-        const Intraoperative seen = detail::without_neighbours(given, prepared->options.rigid_neighbours);
+        const Eigen::Isometry3d start = given.start.value_or(Eigen::Isometry3d::Identity());
+        const Intraoperative seen = detail::without_neighbours(given.start ? detail::seen_from(given, start) : given,
+                                                               prepared->options.rigid_neighbours);
         Stopwatch stopwatch;
         detail::Terms terms = detail::terms_of(*prepared, seen, options, image_tools);
         const double seconds = stopwatch.lap();
         UpdateResult result = detail::register_model(*prepared, terms, load_finder, *solver, options, observer);
+        if (given.start) detail::return_to_fixed_frame(result, start);
         result.times.insert(result.times.begin() + 1, {stages::boundary_maps, seconds});
         return result;
     }

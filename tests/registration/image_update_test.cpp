@@ -4,6 +4,8 @@
 #include "core/errors.hpp"
 #include "registration/evaluation.hpp"
 #include "registration/field.hpp"
+#include "registration/matching/image_mask.hpp"
+#include "registration/matching/image_matching.hpp"
 #include "registration/prepared_io.hpp"
 #include "tests/registration/textured_phantom.hpp"
 #include "tests/support/label_shapes.hpp"
@@ -72,6 +74,50 @@ TEST(ImageUpdate, FollowsADeformationThroughTheWholeOrgan) {
     EXPECT_LT(error.mean, 0.22);
     EXPECT_LT(error.percentile_95, 0.485);
     EXPECT_TRUE(result.doubts.empty());
+}
+
+const Eigen::Vector3d artefact_middle(14, 0, 0);
+constexpr double artefact_mm = 15;  // radius
+
+/// An artefact that looks like the same tissue 5 mm away, in a ball of the organ; and a mask that is 0 there.
+std::pair<Volume, Volume> with_artefact(const Volume& image) {
+    std::pair<Volume, Volume> result{image.clone(), Volume(image.geometry, CV_8U)};
+    const Volume other =
+        sampled(image.geometry, [](const auto& y) { return Texture()(y - Eigen::Vector3d(4, -3, 2)); });
+    for_each_voxel(result.first, [&](const Eigen::Vector3d& index, std::int64_t n) {
+        const bool good = (image.geometry.point(index) - artefact_middle).norm() > artefact_mm;
+        if (!good) result.first.data<float>()[n] = other.data<float>()[n];
+        result.second.data<std::uint8_t>()[n] = good;
+    });
+    return result;
+}
+
+// Of tissue that did not move, so that what the mask hides has nowhere to go either.
+TEST(ImageUpdate, AnArtefactThatAMaskExcludesDoesNoHarm) {
+    const PreparedModel prepared = textured_model();
+    const auto furthest = [&](const Volume& image) {
+        const Deformation found = update(prepared, {.image = image}, quick()).deformation;
+        return (found.deformed_nodes() - found.mesh.nodes).colwise().norm().maxCoeff();
+    };
+    const auto [image, mask] = with_artefact(prepared.image->image);
+    EXPECT_GT(furthest(image), 2.0);
+    EXPECT_LT(furthest(without_unmatched(image, mask)), 0.6);
+}
+
+TEST(ImageUpdate, BlocksThatTheMovingMaskExcludesAreNotMade) {
+    PreparedModel prepared = textured_model();
+    const auto [artefact, mask] = with_artefact(prepared.image->image);
+    ImageModelOptions options;
+    options.blocks.grid_spacing_mm = spacing_mm;
+    prepare_image(prepared, without_unmatched(prepared.image->image, mask), options);
+    const Eigen::Matrix3Xd& points = prepared.image->blocks.points();
+    ASSERT_GT(points.cols(), 100);
+    EXPECT_GT((points.colwise() - artefact_middle).colwise().norm().minCoeff(), artefact_mm);
+}
+
+TEST(ImageUpdate, AMaskWithoutAnythingToMatchIsRefused) {
+    const Volume image = sampled(shapes::organ_labels({}, Eigen::Isometry3d::Identity(), 3).geometry, Texture());
+    EXPECT_THROW((void)without_unmatched(image, Volume(image.geometry, CV_8U)), InvalidInput);
 }
 
 // A model that was written before the operation and read during it gives the same bits, for every kind of data.

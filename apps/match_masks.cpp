@@ -1,0 +1,42 @@
+#include "apps/match_masks.hpp"
+
+#include "apps/noted_images.hpp"
+#include "imaging/filters.hpp"
+#include "registration/matching/image_mask.hpp"
+
+#include <fmt/format.h>
+
+namespace tissuewarp::apps {
+
+namespace {
+
+std::string excluded_text(const imaging::Volume& image, const imaging::Volume& mask) {
+    const imaging::Volume here = imaging::resample(mask, image.geometry, imaging::Interpolation::Nearest);
+    const double share = 1 - cv::countNonZero(here.voxels.reshape(1, 1)) / double(image.geometry.voxel_count());
+    if (share == 0) return "excludes nothing: voxels that may not be matched must be 0";
+    return fmt::format("excludes {:.3g} % of the image from matching, where it is 0", 100 * share);
+}
+
+imaging::Volume matched(const imaging::Volume& image, const std::filesystem::path& path,
+                        std::vector<std::string>& notes) {
+    if (path.empty()) return image;
+    imaging::ReadResult mask = imaging::read_volume_with_notes(path);
+    for (const std::string& note : notes_of(mask, path)) notes.push_back(note);
+    if (mask.volume.channels() > 1) throw InvalidInput(fmt::format("'{}' is no mask: it holds vectors", path.string()));
+    try {
+        imaging::Volume result = registration::without_unmatched(image, mask.volume);
+        notes.push_back(fmt::format("'{}' {}", path.string(), excluded_text(image, mask.volume)));
+        return result;
+    } catch (const InvalidInput& problem) {
+        throw InvalidInput(fmt::format("'{}': {}", path.string(), problem.what()));
+    }
+}
+
+}  // namespace
+
+void exclude_unmatched(RegistrationInputs& inputs, const RegisterOptions& options) {
+    inputs.moving_matched = matched(inputs.moving, options.moving_mask, inputs.notes);
+    inputs.fixed_matched = matched(inputs.fixed, options.fixed_mask, inputs.notes);
+}
+
+}  // namespace tissuewarp::apps

@@ -1,0 +1,12 @@
+#pragma once
+/// Tetrahedra → label map.
+
+#include "imaging/volume.hpp"
+#include "meshing/tet_mesh.hpp"
+
+namespace tissuewarp::registration {
+
+/// On a grid, int32: of each voxel whose centre lies in a tetrahedron the label of that, 0 elsewhere.
+imaging::Volume labels_of_mesh(const meshing::TetMesh& mesh, const imaging::Geometry& grid);
+
+}  // namespace tissuewarp::registration
