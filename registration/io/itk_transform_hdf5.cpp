@@ -2,6 +2,7 @@
 // /TransformGroup/<n>/Transform{Type,Parameters,FixedParameters}.
 
 #include "core/detail/hdf5.hpp"
+#include "core/detail/hdf5_seal.hpp"
 #include "core/errors.hpp"
 #include "registration/io/itk_transform.hpp"
 
@@ -16,7 +17,7 @@ bool holds(hid_t file, const std::string& name) {
 class ItkFile {
 public:
     explicit ItkFile(const std::filesystem::path& path)
-        : path_(path), file_(H5Fopen(path.string().c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose) {
+        : path_(path), file_(opened(path), H5Fclose) {
         if (!file_.valid()) fail("cannot be opened as HDF5");
         if (!holds(file_, "/TransformGroup")) fail("holds no transform of ITK");
     }
@@ -34,6 +35,10 @@ private:
     const std::filesystem::path& path_;
     Hdf5Handle file_;
 
+    static hid_t opened(const std::filesystem::path& path) {
+        require_unbroken_hdf5(path);
+        return H5Fopen(path.string().c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+    }
     static std::string group(int n) { return "/TransformGroup/" + std::to_string(n); }
     [[noreturn]] void fail(const std::string& problem) const { throw IoError("'" + path_.string() + "' " + problem); }
 

@@ -1,6 +1,6 @@
 #include "registration/io/point_map.hpp"
 
-#include "core/errors.hpp"
+#include "core/file_message.hpp"
 #include "imaging/image_io.hpp"
 #include "registration/io/itk_transform.hpp"
 
@@ -118,9 +118,7 @@ PointMap displacement_image(const std::filesystem::path& path) {
     return map;
 }
 
-}  // namespace
-
-PointMap read_point_map(const std::filesystem::path& path) {
+PointMap read_checked(const std::filesystem::path& path) {
     const std::string extension = path.extension().string();
     if (extension != ".mat" && extension != ".h5" && imaging::is_image(path)) return displacement_image(path);
     const std::string bytes = bytes_of(path);
@@ -128,6 +126,12 @@ PointMap read_point_map(const std::filesystem::path& path) {
     if (bytes.starts_with("#Insight Transform File")) return detail::composed(itk_text(bytes, path), path);
     if (extension == ".mat") return detail::composed({itk_matlab(bytes, path)}, path);
     return matrix(bytes, path);
+}
+
+}  // namespace
+
+PointMap read_point_map(const std::filesystem::path& path) {
+    return naming(path, [&] { return read_checked(path); });
 }
 
 }  // namespace tissuewarp::registration

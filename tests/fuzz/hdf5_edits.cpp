@@ -1,6 +1,7 @@
 #include "tests/fuzz/hdf5_edits.hpp"
 
 #include "core/detail/hdf5.hpp"
+#include "core/detail/hdf5_seal.hpp"
 
 #include <cmath>
 #include <limits>
@@ -58,7 +59,7 @@ void replace(hid_t file, const std::string& name, Random& random) {
 
 bool edit_hdf5(const std::filesystem::path& path, Random& random) {
     const Hdf5Quiet quiet;
-    const Hdf5Handle file(H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT), H5Fclose);
+    Hdf5Handle file(H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT), H5Fclose);
     const std::vector<std::string> names = datasets_of(file);
     if (names.empty()) return false;
     for (std::size_t left = 1 + random() % 2; left > 0; --left) {
@@ -79,7 +80,42 @@ bool edit_hdf5(const std::filesystem::path& path, Random& random) {
                 change_values(file, name, random);
         }
     }
+    file.close();
+    if (bytes_at(path).starts_with("tissuewarp")) seal_hdf5(path);
     return true;
+}
+
+namespace {
+
+/// Attributes of the root, of one text or number each.
+void copy_attributes(hid_t from, hid_t to) {
+    for (const char* name : {"format", "format_version"}) {
+        const Hdf5Handle attribute(H5Aopen(from, name, H5P_DEFAULT), H5Aclose);
+        if (!attribute.valid()) continue;
+        const Hdf5Handle type(H5Aget_type(attribute), H5Tclose), space(H5Aget_space(attribute), H5Sclose),
+            copy(H5Acreate2(to, name, type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+        void* value = nullptr;
+        H5Aread(attribute, type, &value);
+        H5Awrite(copy, type, &value);
+    }
+}
+
+}  // namespace
+
+void copy_without_seal(const std::filesystem::path& from, const std::filesystem::path& to, bool checked) {
+    const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+    if (checked) H5Pset_libver_bounds(access, H5F_LIBVER_V18, H5F_LIBVER_V18);
+    const Hdf5Handle source(H5Fopen(from.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose),
+        copy(H5Fcreate(to.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access), H5Fclose);
+    copy_attributes(source, copy);
+    std::pair<hid_t, hid_t> files{source, copy};
+    H5Literate(
+        source, H5_INDEX_NAME, H5_ITER_INC, nullptr,
+        [](hid_t, const char* name, const H5L_info_t*, void* both) -> herr_t {
+            const auto& [source_file, copy_file] = *static_cast<std::pair<hid_t, hid_t>*>(both);
+            return H5Ocopy(source_file, name, copy_file, name, H5P_DEFAULT, H5P_DEFAULT);
+        },
+        &files);
 }
 
 }  // namespace tissuewarp::fuzz

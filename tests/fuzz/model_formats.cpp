@@ -24,6 +24,16 @@ PreparedModel prepared_box() {
     return prepared;
 }
 
+/// Sealed as they are written, and as older versions wrote them.
+std::vector<Seed> all_kinds(const std::filesystem::path& folder, const std::string& name) {
+    copy_without_seal(folder / name, folder / ("old_" + name), false);
+    copy_without_seal(folder / name, folder / ("checked_" + name), true);
+    std::vector<Seed> seeds;
+    for (const std::string& file : {name, "old_" + name, "checked_" + name})
+        seeds.push_back(single(file, bytes_at(folder / file)));
+    return seeds;
+}
+
 std::vector<Seed> record_seeds(const std::filesystem::path& folder) {
     const PreparedModel prepared = prepared_box();
     UpdateResult result;
@@ -34,12 +44,12 @@ std::vector<Seed> record_seeds(const std::filesystem::path& folder) {
     result.engine = "CPU";
     write_record(prepared, result, {{{"device", "CPU"}, {"seed", "1"}}, "[meshing]\nedge_length = 5.0\n"},
                  folder / "record.h5");
-    return {single("record.h5", bytes_at(folder / "record.h5"))};
+    return all_kinds(folder, "record.h5");
 }
 
 std::vector<Seed> prepared_seeds(const std::filesystem::path& folder) {
     write_prepared(prepared_box(), folder / "prepared.h5");
-    return {single("prepared.h5", bytes_at(folder / "prepared.h5"))};
+    return all_kinds(folder, "prepared.h5");
 }
 
 void read_the_record(const std::filesystem::path& path, Digest& digest) {

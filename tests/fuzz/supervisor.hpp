@@ -29,8 +29,8 @@ Tally supervised(const Format& format, const std::function<CaseMaker(const std::
                  std::uint64_t first, std::uint64_t last, const std::filesystem::path& failures);
 
 /// What a reader may take for files of any size: buffers of zlib (1 MiB), dictionaries of GDCM, the chunk cache of HDF5
-/// and the scratch of parallel algorithms come to 9 MiB at most for seeds; the rest is for lies of a small file that
-/// cost no more than a small image.
-constexpr std::size_t floor_bytes = std::size_t{64} << 20;
+/// and the scratch of parallel algorithms come to 1 MiB for the seeds; the rest lets a small file lie no worse than a small
+/// image costs.
+constexpr std::size_t floor_bytes = std::size_t{16} << 20;
 
 }  // namespace tissuewarp::fuzz

@@ -91,7 +91,8 @@ std::vector<Seed> hdf5_seeds(const std::filesystem::path& folder) {
                 {2, 2, 2, 0, 0, 0, 2, 2, 2, 1, 0, 0, 0, 1, 0, 0, 0, 1});
     put_numbers(file, "/TransformGroup/2/TransformParameters", std::vector<double>(24, 0.5));
     H5Fclose(file);
-    return {single("composite.h5", bytes_at(path))};
+    copy_without_seal(path, folder / "checked.h5", true);
+    return {single("composite.h5", bytes_at(path)), single("checked.h5", bytes_at(folder / "checked.h5"))};
 }
 
 std::vector<Seed> field_seeds(const std::filesystem::path& folder) {
