@@ -57,11 +57,15 @@ Hdf5Space hdf5_space(const Hdf5Bytes& file, Hdf5Range message) {
     const std::uint64_t sizes = message.begin + (version == 1 ? 8 : 4);
     require_in(file, message, sizes, 8U * static_cast<unsigned>(rank) * ((flags & 1U) ? 2U : 1U));
     double count = none ? 0 : 1;
-    for (int axis = 0; axis < rank; ++axis)
-        count *= static_cast<double>(file.at<std::uint64_t>(sizes + 8U * static_cast<unsigned>(axis)));
+    Hdf5Space space{rank, 0, {}};
+    for (int axis = 0; axis < rank; ++axis) {
+        space.sizes.push_back(file.at<std::uint64_t>(sizes + 8U * static_cast<unsigned>(axis)));
+        count *= static_cast<double>(space.sizes.back());
+    }
     if (count > static_cast<double>(most_packed) * static_cast<double>(file.size()))
         file.fail("a dataset claims more values than the file can hold");
-    return {rank, static_cast<std::uint64_t>(count)};
+    space.values = static_cast<std::uint64_t>(count);
+    return space;
 }
 
 Hdf5Layout hdf5_layout(const Hdf5Bytes& file, Hdf5Range message) {

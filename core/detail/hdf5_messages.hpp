@@ -22,6 +22,7 @@ Hdf5Type hdf5_type(const Hdf5Bytes& file, Hdf5Range message);
 struct Hdf5Space {
     int rank = -1;  ///< −1: none was given
     std::uint64_t values = 0;
+    std::vector<std::uint64_t> sizes;  ///< as many as the rank
 };
 
 /// Throws IoError where the file could not hold as many values, packed.

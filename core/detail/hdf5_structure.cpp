@@ -2,6 +2,8 @@
 
 #include "core/detail/hdf5_messages.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 
@@ -222,6 +224,8 @@ private:
         if (object.fill_bytes != 0 && object.fill_bytes != value) file_.fail("a fill value is of another type");
         const bool stored = layout.kind == Hdf5Layout::Kind::Compact ||
                             (layout.kind == Hdf5Layout::Kind::Contiguous && layout.address != hdf5_nowhere);
+        if (object.space.values > 0 && !stored && layout.kind != Hdf5Layout::Kind::Chunked)
+            file_.fail("a dataset's values are missing");
         if (stored && object.space.values > layout.bytes / value) file_.fail("a dataset's values are cut short");
         if (stored && object.type.texts) check_texts(layout.address, object.space.values);
         if (layout.kind == Hdf5Layout::Kind::Chunked) check_chunks(object);
@@ -234,7 +238,12 @@ private:
         if (object.type.texts || chunk.size() != static_cast<std::size_t>(object.space.rank) + 1 ||
             chunk.back() != object.type.bytes || bytes == 0 || bytes > 1032.0 * static_cast<double>(file_.size()))
             file_.fail("a dataset's pieces do not fit it");
-        if (object.layout.address != hdf5_nowhere) take_chunk_node(object.layout.address, chunk.size(), most_levels);
+        double pieces = 1, found = 0;
+        for (std::size_t axis = 0; axis + 1 < chunk.size(); ++axis)
+            pieces *= std::ceil(static_cast<double>(object.space.sizes[axis]) / static_cast<double>(chunk[axis]));
+        if (object.layout.address != hdf5_nowhere)
+            found = static_cast<double>(take_chunk_node(object.layout.address, chunk.size(), most_levels));
+        if (found != pieces) file_.fail("pieces of a dataset are missing");
     }
 
     // Trees (version 1)
@@ -259,17 +268,18 @@ private:
             file_.fail("the levels of a tree are mixed up");
     }
 
-    void take_chunk_node(std::uint64_t at, std::uint64_t axes, int above) {
+    /// Pieces in it.
+    std::uint64_t take_chunk_node(std::uint64_t at, std::uint64_t axes, int above) {
         const std::uint64_t key = 8 + 8 * axes;
         const Node node = take_node(at, 1, chunk_entries_, key);
         require_level(node, above);
+        std::uint64_t pieces = 0;
         for (std::uint64_t entry = 0; entry < node.entries; ++entry) {
             const std::uint64_t place = at + 24 + entry * (key + 8), child = file_.at<std::uint64_t>(place + key);
-            if (node.level > 0)
-                take_chunk_node(child, axes, node.level);
-            else
-                file_.require(child, file_.at<std::uint32_t>(place));
+            if (node.level == 0) file_.require(child, file_.at<std::uint32_t>(place));
+            pieces += node.level > 0 ? take_chunk_node(child, axes, node.level) : 1;
         }
+        return pieces;
     }
 
     // Groups

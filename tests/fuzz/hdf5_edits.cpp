@@ -32,7 +32,7 @@ void change_values(hid_t file, const std::string& name, Random& random) {
     const Hdf5Handle data(H5Dopen2(file, name.c_str(), H5P_DEFAULT), H5Dclose);
     const Hdf5Handle type(H5Dget_type(data), H5Tclose), space(H5Dget_space(data), H5Sclose);
     const hssize_t count = H5Sget_simple_extent_npoints(space);
-    if (count <= 0 || H5Tget_class(type) == H5T_STRING) return;
+    if (count <= 0 || count > 1000000 || H5Tget_class(type) == H5T_STRING) return;
     std::vector<double> values(static_cast<std::size_t>(count));
     H5Dread(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data());
     for (std::size_t left = 1 + random() % 3; left > 0; --left)
