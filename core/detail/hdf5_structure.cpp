@@ -362,7 +362,7 @@ private:
     void check_texts(std::uint64_t at, std::uint64_t count) {
         for (std::uint64_t text = 0; text < count; ++text, at += 16) {
             const std::uint64_t length = file_.at<std::uint32_t>(at), heap = file_.at<std::uint64_t>(at + 4);
-            if (length == 0 || heap == 0) continue;
+            if (length == 0 && heap == 0) continue;
             const auto& objects = collection(heap);
             const auto object = objects.find(static_cast<int>(file_.at<std::uint32_t>(at + 12)));
             if (object == objects.end() || object->second != length) file_.fail("a text is not where it should be");

@@ -6,7 +6,9 @@
 
 #include <Eigen/Geometry>
 
-#include <gdcmPixmapReader.h>
+#include <gdcmFragment.h>
+#include <gdcmPixmap.h>
+#include <gdcmSequenceOfFragments.h>
 #include <gdcmTrace.h>
 
 #include <algorithm>
@@ -201,17 +203,41 @@ int opencv_depth(const gdcm::PixelFormat& format) {
     }
 }
 
+/// The packed frames alone: the library's own reading of the rest believes lengths that lie.
+gdcm::Pixmap packed_pixmap(const DicomFile& file, const DicomBytes& read) {
+    gdcm::Pixmap pixmap;
+    pixmap.SetNumberOfDimensions(3);
+    pixmap.SetDimension(0, static_cast<unsigned>(file.columns));
+    pixmap.SetDimension(1, static_cast<unsigned>(file.rows));
+    pixmap.SetDimension(2, static_cast<unsigned>(file.frames.size()));
+    pixmap.SetPixelFormat(gdcm::PixelFormat(
+        1, static_cast<unsigned short>(file.bits_allocated), static_cast<unsigned short>(file.bits_stored),
+        static_cast<unsigned short>(file.high_bit), file.is_signed ? 1 : 0));
+    pixmap.SetPhotometricInterpretation(gdcm::PhotometricInterpretation::MONOCHROME2);
+    const auto syntax = gdcm::TransferSyntax::GetTSType(read.transfer_syntax.c_str());
+    if (syntax == gdcm::TransferSyntax::TS_END || !gdcm::TransferSyntax(syntax).IsEncapsulated())
+        throw damaged(file, "they are packed in a way that is not known (transfer syntax '" + read.transfer_syntax +
+                                "')");
+    pixmap.SetTransferSyntax(gdcm::TransferSyntax(syntax));
+    const gdcm::SmartPointer<gdcm::SequenceOfFragments> fragments = new gdcm::SequenceOfFragments;
+    const std::vector<std::string_view> packed = read.set.fragments(pixel_data).value();
+    for (const std::string_view bytes : packed) {
+        gdcm::Fragment fragment;
+        fragment.SetByteValue(bytes.data(), gdcm::VL(static_cast<std::uint32_t>(bytes.size())));
+        fragments->AddFragment(fragment);
+    }
+    gdcm::DataElement element(gdcm::Tag(0x7fe0, 0x0010));
+    element.SetValue(*fragments);
+    pixmap.SetDataElement(element);
+    return pixmap;
+}
+
 /// Frames of JPEG, JPEG-LS and JPEG 2000.
-cv::Mat decoded(const DicomFile& file, const std::string& transfer_syntax) {
+cv::Mat decoded(const DicomFile& file, const DicomBytes& read) {
     // What the library would print becomes an exception here.
     gdcm::Trace::WarningOff();
     gdcm::Trace::ErrorOff();
-    gdcm::PixmapReader reader;
-    reader.SetFileName(file.path.c_str());
-    if (!reader.Read())
-        throw damaged(
-            file, "they are cut short, or packed in a way that is not known (transfer syntax " + transfer_syntax + ")");
-    const gdcm::Pixmap& pixmap = reader.GetPixmap();
+    const gdcm::Pixmap pixmap = packed_pixmap(file, read);
     const int depth = opencv_depth(pixmap.GetPixelFormat());
     if (depth < 0)
         throw unusable(file.path, "its pixels are of type " +
@@ -241,6 +267,9 @@ DicomFile description_of(const fs::path& path, const DicomSet& set) {
     file.mosaic = set.text(0x00080008).find("MOSAIC") != std::string::npos;
     const double frames = set.number(0x00280008).value_or(1.0);
     values_of(path, {frames, 1.0 * file.rows, 1.0 * file.columns});
+    std::error_code unknown;
+    if (frames > 8.0 * static_cast<double>(fs::file_size(path, unknown)))
+        throw unreadable(path, "it promises " + text_of({frames}) + " frames, more than it can hold; it is damaged");
     FrameAttributes attributes(set);
     for (std::size_t i = 0; i < static_cast<std::size_t>(frames); ++i) file.frames.push_back(attributes.frame(i));
     if (file.modality == "RTDOSE") place_dose_planes(set, file.frames);
@@ -279,7 +308,7 @@ cv::Mat read_dicom_pixels(const DicomFile& file) {
     if (!read.set.contains(pixel_data))
         throw unusable(file.path, "it holds no whole numbers as pixels (Pixel Data); convert it to 16 bits");
     const std::optional<std::string> bytes = within_file(file.path, [&] { return plain_bytes(file, read); });
-    if (!bytes) return decoded(file, read.transfer_syntax);
+    if (!bytes) return decoded(file, read);
     const std::uint64_t pixels =
         static_cast<std::uint64_t>(file.rows) * static_cast<std::uint64_t>(file.columns) * file.frames.size();
     const bool packed_bits = bits == 1 && !read.set.fragments(pixel_data);

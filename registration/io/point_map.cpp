@@ -75,8 +75,9 @@ ItkTransform itk_matlab(const std::string& bytes, const std::filesystem::path& p
         at += sizeof header;
         const std::int64_t count = std::int64_t{header[1]} * header[2], width = header[0] == 10 ? 4 : 8;
         const bool known = header[0] == 0 || header[0] == 10;
-        if (!known || header[1] < 0 || header[2] < 0 || header[3] != 0 || header[4] < 1 ||
-            header[4] + count * width > static_cast<std::int64_t>(bytes.size() - at))
+        const auto left = static_cast<std::int64_t>(bytes.size() - at);
+        if (!known || header[1] < 0 || header[2] < 0 || header[3] != 0 || header[4] < 1 || header[4] > left ||
+            count > (left - header[4]) / width)
             throw damaged();
         const std::string name = &bytes[at];
         at += static_cast<std::size_t>(header[4]);
