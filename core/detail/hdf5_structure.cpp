@@ -174,18 +174,29 @@ private:
                 take_continuation(file_.at<std::uint64_t>(body.begin), file_.at<std::uint64_t>(body.begin + 8), object,
                                   is_new);
                 break;
-            case Nothing:
             case LinkInfo:
+                require_compact(body, 8);
+                break;
+            case AttributeInfo:
+                require_compact(body, 2);
+                break;
+            case Nothing:
             case GroupInfo:
             case Comment:
             case OldTime:
             case Time:
-            case AttributeInfo:
             case References:
                 break;
             default:
                 file_.fail("a header holds a message of type " + std::to_string(type) + ", which is not read");
         }
+    }
+
+    /// More than eight links or attributes lie in heaps of their own; what those hold was not followed.
+    void require_compact(Hdf5Range body, std::uint64_t index_bytes) {
+        const std::uint64_t at = body.begin + 2 + ((file_.at<std::uint8_t>(body.begin + 1) & 1U) != 0 ? index_bytes : 0);
+        if (at + 8 > body.end || file_.at<std::uint64_t>(at) != hdf5_nowhere)
+            file_.fail("a group has more than eight parts, as those of no transform have");
     }
 
     void take_continuation(std::uint64_t at, std::uint64_t bytes, Object& object, bool is_new) {

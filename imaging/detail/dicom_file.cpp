@@ -3,6 +3,7 @@
 #include "imaging/detail/dicom_bits.hpp"
 #include "imaging/detail/dicom_set.hpp"
 #include "imaging/detail/header_checks.hpp"
+#include "imaging/detail/isolated.hpp"
 
 #include <Eigen/Geometry>
 
@@ -186,25 +187,13 @@ std::optional<std::string> plain_bytes(const DicomFile& file, const DicomBytes& 
     return all;
 }
 
-int opencv_depth(const gdcm::PixelFormat& format) {
-    switch (format.GetScalarType()) {
-        case gdcm::PixelFormat::UINT8:
-            return CV_8U;
-        case gdcm::PixelFormat::INT8:
-            return CV_8S;
-        case gdcm::PixelFormat::UINT12:
-        case gdcm::PixelFormat::UINT16:
-            return CV_16U;
-        case gdcm::PixelFormat::INT12:
-        case gdcm::PixelFormat::INT16:
-            return CV_16S;
-        default:
-            return -1;
-    }
-}
-
 /// The packed frames alone: the library's own reading of the rest believes lengths that lie.
 gdcm::Pixmap packed_pixmap(const DicomFile& file, const DicomBytes& read) {
+    if ((file.bits_allocated != 8 && file.bits_allocated != 16) || file.bits_stored < 1 ||
+        file.bits_stored > file.bits_allocated || file.high_bit != file.bits_stored - 1)
+        throw unusable(file.path, "its packed pixels take " + std::to_string(file.bits_stored) + " bits of " +
+                                      std::to_string(file.bits_allocated) + ", up to bit " +
+                                      std::to_string(file.high_bit) + "; convert it to 16 bits");
     gdcm::Pixmap pixmap;
     pixmap.SetNumberOfDimensions(3);
     pixmap.SetDimension(0, static_cast<unsigned>(file.columns));
@@ -232,22 +221,19 @@ gdcm::Pixmap packed_pixmap(const DicomFile& file, const DicomBytes& read) {
     return pixmap;
 }
 
-/// Frames of JPEG, JPEG-LS and JPEG 2000.
+/// Frames of JPEG, JPEG-LS and JPEG 2000. The library's decoders end the program over damaged frames, and leave parts
+/// of pictures unwritten.
 cv::Mat decoded(const DicomFile& file, const DicomBytes& read) {
     // What the library would print becomes an exception here.
     gdcm::Trace::WarningOff();
     gdcm::Trace::ErrorOff();
     const gdcm::Pixmap pixmap = packed_pixmap(file, read);
-    const int depth = opencv_depth(pixmap.GetPixelFormat());
-    if (depth < 0)
-        throw unusable(file.path, "its pixels are of type " +
-                                      std::string(pixmap.GetPixelFormat().GetScalarTypeAsString()) +
-                                      "; convert it to 16 bits");
-    cv::Mat frames = frames_of(file, depth);
-    if (pixmap.GetBufferLength() != frames.total() * frames.elemSize())
-        throw damaged(file, std::to_string(pixmap.GetBufferLength()) + " bytes where its header promises " +
-                                std::to_string(frames.total() * frames.elemSize()));
-    if (!pixmap.GetBuffer(reinterpret_cast<char*>(frames.data))) throw damaged(file, "they are cut short or damaged");
+    cv::Mat frames = frames_of(file, file.bits_allocated == 8 ? (file.is_signed ? CV_8S : CV_8U)
+                                                              : (file.is_signed ? CV_16S : CV_16U));
+    const std::size_t bytes = frames.total() * frames.elemSize();
+    const auto decode = [&](char* target) { return pixmap.GetBufferLength() == bytes && pixmap.GetBuffer(target); };
+    if (!decode_isolated(decode, reinterpret_cast<char*>(frames.data), bytes))
+        throw damaged(file, "they are cut short or damaged (transfer syntax " + read.transfer_syntax + ")");
     return frames;
 }
 

@@ -4,7 +4,13 @@
 #include "tests/fuzz/image_reading.hpp"
 #include "tests/imaging/dicom_elements.hpp"
 
+#include <gdcmImage.h>
+#include <gdcmImageChangeTransferSyntax.h>
+#include <gdcmSequenceOfFragments.h>
+#include <gdcmTrace.h>
 #include <Eigen/Core>
+
+#include <stdexcept>
 
 namespace tissuewarp::fuzz {
 
@@ -13,7 +19,7 @@ namespace {
 using imaging::test::decimals;
 using imaging::test::Elements;
 
-constexpr int columns = 6, rows = 5, slices = 4;
+constexpr int columns = 32, rows = 32, slices = 4;  // JPEG 2000 takes no less
 
 std::string one(double value) {
     return decimals(Eigen::VectorXd::Constant(1, value));
@@ -109,21 +115,22 @@ Elements many_frames(const std::string& image_class, const std::string& modality
     return data;
 }
 
-/// The high bytes and the low bytes of each frame in literal runs.
+/// The high bytes and the low bytes of each frame in literal runs of 128.
 std::vector<std::string> run_lengths() {
     std::vector<std::string> packed;
     const std::vector<std::int16_t> values = pixels(slices);
-    constexpr std::size_t count = columns * rows;
+    constexpr std::size_t count = columns * rows, run = 128;
     for (std::size_t frame = 0; frame < slices; ++frame) {
         std::string planes;
-        for (const int shift : {8, 0}) {
-            planes += static_cast<char>(count - 1);
-            for (std::size_t i = 0; i < count; ++i)
+        for (const int shift : {8, 0})
+            for (std::size_t i = 0; i < count; ++i) {
+                if (i % run == 0) planes += static_cast<char>(run - 1);
                 planes += static_cast<char>(values[frame * count + i] >> shift);
-            planes += std::string((planes.size()) % 2, '\x80');
-        }
+            }
         std::string header(64, '\0');
-        header[0] = 2, header[4] = 64, header[8] = static_cast<char>(64 + planes.size() / 2);
+        const std::size_t second = 64 + planes.size() / 2;
+        header[0] = 2, header[4] = 64;
+        header[8] = static_cast<char>(second & 0xffU), header[9] = static_cast<char>(second >> 8U);
         packed.push_back(header + planes);
     }
     return packed;
@@ -145,6 +152,50 @@ Seed segmentation() {
     std::string bits(static_cast<std::size_t>(columns * rows * slices / 8), '\x11');
     data.bytes_value(0x7fe0, 0x10, bits + std::string(bits.size(), '\x22'));
     return {{{"seg.dcm", dicom_file(seg, data, imaging::test::explicit_little_endian)}}, "seg.dcm"};
+}
+
+/// The frames packed by GDCM, lossless.
+std::vector<std::string> packed_by_gdcm(gdcm::TransferSyntax::TSType syntax) {
+    const std::vector<std::int16_t> values = pixels(slices);
+    gdcm::DataElement element(gdcm::Tag(0x7fe0, 0x0010));
+    element.SetByteValue(reinterpret_cast<const char*>(values.data()),
+                         gdcm::VL(static_cast<std::uint32_t>(2 * values.size())));
+    const gdcm::SmartPointer<gdcm::Image> image = new gdcm::Image;  // counts its references
+    image->SetNumberOfDimensions(3);
+    image->SetDimension(0, columns);
+    image->SetDimension(1, rows);
+    image->SetDimension(2, slices);
+    image->SetPixelFormat(gdcm::PixelFormat(gdcm::PixelFormat::INT16));
+    image->SetPhotometricInterpretation(gdcm::PhotometricInterpretation::MONOCHROME2);
+    image->SetTransferSyntax(gdcm::TransferSyntax::ExplicitVRLittleEndian);
+    image->SetDataElement(element);
+    gdcm::ImageChangeTransferSyntax change;
+    change.SetTransferSyntax(syntax);
+    change.SetInput(*image);
+    if (!change.Change()) throw std::runtime_error("GDCM cannot pack frames");
+    std::vector<std::string> frames;
+    const gdcm::SequenceOfFragments* fragments = change.GetOutput().GetDataElement().GetSequenceOfFragments();
+    for (std::size_t n = 0; n < fragments->GetNumberOfFragments(); ++n) {
+        const gdcm::ByteValue* bytes = fragments->GetFragment(n).GetByteValue();
+        frames.emplace_back(bytes->GetPointer(), bytes->GetLength());
+    }
+    return frames;
+}
+
+/// JPEG, JPEG-LS and JPEG 2000.
+std::vector<Seed> packed_seeds(const std::filesystem::path&) {
+    const std::string enhanced_ct = "1.2.840.10008.5.1.4.1.1.2.1";
+    gdcm::Trace::WarningOff();
+    std::vector<Seed> seeds;
+    for (const auto& [name, syntax] : {std::pair{"jpeg.dcm", gdcm::TransferSyntax::JPEGLosslessProcess14_1},
+                                       {"jpeg-ls.dcm", gdcm::TransferSyntax::JPEGLSLossless},
+                                       {"jpeg-2000.dcm", gdcm::TransferSyntax::JPEG2000Lossless}}) {
+        Elements data = many_frames(enhanced_ct, "CT", 16, 0);
+        data.fragments(packed_by_gdcm(syntax));
+        const std::string uid = gdcm::TransferSyntax(syntax).GetString();
+        seeds.push_back({{{name, dicom_file(enhanced_ct, data, uid.c_str())}}, name});
+    }
+    return seeds;
 }
 
 std::vector<Seed> series_seeds(const std::filesystem::path&) {
@@ -177,7 +228,8 @@ std::vector<Field> element_fields(const std::string& bytes) {
 
 std::vector<Format> dicom_formats() {
     return {{"dicom-series", series_seeds, read_image, element_fields},
-            {"dicom-frames", frame_seeds, read_image, element_fields}};
+            {"dicom-frames", frame_seeds, read_image, element_fields},
+            {"dicom-packed", packed_seeds, read_image, element_fields}};
 }
 
 }  // namespace tissuewarp::fuzz

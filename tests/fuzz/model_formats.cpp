@@ -27,11 +27,7 @@ PreparedModel prepared_box() {
 /// Sealed as they are written, and as older versions wrote them.
 std::vector<Seed> all_kinds(const std::filesystem::path& folder, const std::string& name) {
     copy_without_seal(folder / name, folder / ("old_" + name), false);
-    copy_without_seal(folder / name, folder / ("checked_" + name), true);
-    std::vector<Seed> seeds;
-    for (const std::string& file : {name, "old_" + name, "checked_" + name})
-        seeds.push_back(single(file, bytes_at(folder / file)));
-    return seeds;
+    return {single(name, bytes_at(folder / name)), single("old_" + name, bytes_at(folder / ("old_" + name)))};
 }
 
 std::vector<Seed> record_seeds(const std::filesystem::path& folder) {

@@ -28,6 +28,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr double most_seconds = 10;
 constexpr std::size_t longest_message = 4000;
+constexpr std::size_t enough_failures = 40;
 
 /// What both processes see.
 struct Shared {
@@ -209,7 +210,7 @@ Tally supervised(const Format& format, const std::function<CaseMaker(const std::
     const test::TemporaryFolder folder;
     const Clock::time_point start = Clock::now();
     Tally tally;
-    while (first < last) {
+    while (first < last && tally.failures.size() < enough_failures) {
         shared.started_ns = 0;
         shared.problem.fill('\0');
         const pid_t process = ::fork();
