@@ -1,8 +1,8 @@
 #include "registration/prepared_io.hpp"
 
-#include "registration/matching/image_matching.hpp"
 #include "registration/io/stored_model.hpp"
 #include "registration/loads/coarse_twin.hpp"
+#include "registration/matching/image_matching.hpp"
 #include "registration/terms/anchors.hpp"
 
 #include "core/atomic_file.hpp"

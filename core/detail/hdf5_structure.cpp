@@ -57,7 +57,7 @@ public:
 private:
     Hdf5Bytes file_;
     std::set<std::uint64_t> headers_, blocks_;
-    std::map<std::uint64_t, std::map<int, std::uint64_t>> collections_;  // sizes of objects
+    std::map<std::uint64_t, std::map<int, std::uint64_t>> collections_;         // sizes of objects
     std::uint64_t leaf_entries_ = 8, group_entries_ = 32, chunk_entries_ = 64;  // most in a node
     int depth_ = 0;
 
@@ -194,7 +194,8 @@ private:
 
     /// More than eight links or attributes lie in heaps of their own; what those hold was not followed.
     void require_compact(Hdf5Range body, std::uint64_t index_bytes) {
-        const std::uint64_t at = body.begin + 2 + ((file_.at<std::uint8_t>(body.begin + 1) & 1U) != 0 ? index_bytes : 0);
+        const std::uint64_t at =
+            body.begin + 2 + ((file_.at<std::uint8_t>(body.begin + 1) & 1U) != 0 ? index_bytes : 0);
         if (at + 8 > body.end || file_.at<std::uint64_t>(at) != hdf5_nowhere)
             file_.fail("a group has more than eight parts, as those of no transform have");
     }
@@ -211,7 +212,8 @@ private:
         if (version < 1 || version > 3 || file_.at<std::uint8_t>(body.begin + 1) != 0)
             file_.fail("an attribute of unknown version");
         const auto padded = [&](std::uint64_t bytes) { return version == 1 ? (bytes + 7) / 8 * 8 : bytes; };
-        const std::uint64_t name = file_.at<std::uint16_t>(body.begin + 2), type = file_.at<std::uint16_t>(body.begin + 4),
+        const std::uint64_t name = file_.at<std::uint16_t>(body.begin + 2),
+                            type = file_.at<std::uint16_t>(body.begin + 4),
                             space = file_.at<std::uint16_t>(body.begin + 6);
         std::uint64_t at = body.begin + (version == 3 ? 9 : 8);
         if (padded(name) + padded(type) + padded(space) > body.end - std::min(at, body.end) ||

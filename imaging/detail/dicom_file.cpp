@@ -195,18 +195,19 @@ gdcm::Pixmap packed_pixmap(const DicomFile& file, const DicomBytes& read) {
                                       std::to_string(file.bits_allocated) + ", up to bit " +
                                       std::to_string(file.high_bit) + "; convert it to 16 bits");
     gdcm::Pixmap pixmap;
-    pixmap.SetNumberOfDimensions(3);
+    const bool single = file.frames.size() == 1;  // which may lie in several fragments
+    pixmap.SetNumberOfDimensions(single ? 2 : 3);
     pixmap.SetDimension(0, static_cast<unsigned>(file.columns));
     pixmap.SetDimension(1, static_cast<unsigned>(file.rows));
-    pixmap.SetDimension(2, static_cast<unsigned>(file.frames.size()));
-    pixmap.SetPixelFormat(gdcm::PixelFormat(
-        1, static_cast<unsigned short>(file.bits_allocated), static_cast<unsigned short>(file.bits_stored),
-        static_cast<unsigned short>(file.high_bit), file.is_signed ? 1 : 0));
+    if (!single) pixmap.SetDimension(2, static_cast<unsigned>(file.frames.size()));
+    pixmap.SetPixelFormat(gdcm::PixelFormat(1, static_cast<unsigned short>(file.bits_allocated),
+                                            static_cast<unsigned short>(file.bits_stored),
+                                            static_cast<unsigned short>(file.high_bit), file.is_signed ? 1 : 0));
     pixmap.SetPhotometricInterpretation(gdcm::PhotometricInterpretation::MONOCHROME2);
     const auto syntax = gdcm::TransferSyntax::GetTSType(read.transfer_syntax.c_str());
     if (syntax == gdcm::TransferSyntax::TS_END || !gdcm::TransferSyntax(syntax).IsEncapsulated())
-        throw damaged(file, "they are packed in a way that is not known (transfer syntax '" + read.transfer_syntax +
-                                "')");
+        throw damaged(file,
+                      "they are packed in a way that is not known (transfer syntax '" + read.transfer_syntax + "')");
     pixmap.SetTransferSyntax(gdcm::TransferSyntax(syntax));
     const gdcm::SmartPointer<gdcm::SequenceOfFragments> fragments = new gdcm::SequenceOfFragments;
     const std::vector<std::string_view> packed = read.set.fragments(pixel_data).value();
@@ -228,8 +229,8 @@ cv::Mat decoded(const DicomFile& file, const DicomBytes& read) {
     gdcm::Trace::WarningOff();
     gdcm::Trace::ErrorOff();
     const gdcm::Pixmap pixmap = packed_pixmap(file, read);
-    cv::Mat frames = frames_of(file, file.bits_allocated == 8 ? (file.is_signed ? CV_8S : CV_8U)
-                                                              : (file.is_signed ? CV_16S : CV_16U));
+    cv::Mat frames = frames_of(
+        file, file.bits_allocated == 8 ? (file.is_signed ? CV_8S : CV_8U) : (file.is_signed ? CV_16S : CV_16U));
     const std::size_t bytes = frames.total() * frames.elemSize();
     const auto decode = [&](char* target) { return pixmap.GetBufferLength() == bytes && pixmap.GetBuffer(target); };
     if (!decode_isolated(decode, reinterpret_cast<char*>(frames.data), bytes))

@@ -35,7 +35,8 @@ private:
 };
 
 /// In the copy: silent, without a core file, and not for ever.
-[[noreturn]] void decode_and_exit(const std::function<bool(char*)>& decode, char* bytes, unsigned seconds, int pattern) {
+[[noreturn]] void decode_and_exit(const std::function<bool(char*)>& decode, char* bytes, unsigned seconds,
+                                  int pattern) {
     for (const int sign : {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTERM, SIGHUP, SIGINT, SIGALRM})
         std::signal(sign, SIG_DFL);
     const rlimit none{0, 0};
@@ -69,7 +70,8 @@ bool decode_isolated(const std::function<bool(char* bytes)>& decode, char* targe
     pid_t processes[2] = {};
     for (int copy = 0; copy < 2; ++copy) {
         processes[copy] = ::fork();
-        if (processes[copy] == 0) decode_and_exit(decode, (copy == 0 ? one : two).data(), seconds, copy == 0 ? 0x5a : 0xa5);
+        if (processes[copy] == 0)
+            decode_and_exit(decode, (copy == 0 ? one : two).data(), seconds, copy == 0 ? 0x5a : 0xa5);
     }
     const bool first = ended_well(processes[0]), second = ended_well(processes[1]);
     if (!first || !second || std::memcmp(one.data(), two.data(), count) != 0) return false;

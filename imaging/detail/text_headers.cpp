@@ -154,8 +154,7 @@ TextHeader read_meta_header(const std::filesystem::path& path) {
 }
 
 std::vector<std::filesystem::path> files_of(const std::filesystem::path& header_path, const TextHeader& header,
-                                            const std::string& value, std::size_t slices,
-                                            std::size_t most) {
+                                            const std::string& value, std::size_t slices, std::size_t most) {
     std::vector<std::string> names{value};
     // A name may hold blanks or '%'; a pattern is followed by numbers or is one by itself.
     const std::string first_word = value.substr(0, value.find_first_of(" \t"));

@@ -16,8 +16,7 @@ bool holds(hid_t file, const std::string& name) {
 
 class ItkFile {
 public:
-    explicit ItkFile(const std::filesystem::path& path)
-        : path_(path), file_(opened(path), H5Fclose) {
+    explicit ItkFile(const std::filesystem::path& path) : path_(path), file_(opened(path), H5Fclose) {
         if (!file_.valid()) fail("cannot be opened as HDF5");
         if (!holds(file_, "/TransformGroup")) fail("holds no transform of ITK");
     }

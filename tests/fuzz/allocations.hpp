@@ -6,8 +6,8 @@
 
 namespace tissuewarp::fuzz {
 
-/// From now on: counting begins at 0, new memory holds `pattern` (without sanitizers), and requests that would make more
-/// than `most_bytes` alive at once fail.
+/// From now on: counting begins at 0, new memory holds `pattern` (without sanitizers), and requests that would make
+/// more than `most_bytes` alive at once fail.
 void watch_allocations(std::size_t most_bytes, unsigned char pattern);
 void stop_watching();
 

@@ -121,10 +121,11 @@ Tally run(const Format& format, const Options& options) {
 
 void print(const Format& format, const Tally& tally, const Options& options) {
     const double cases = static_cast<double>(std::max<std::uint64_t>(tally.cases, 1));
-    std::printf("%-18s %8llu cases, %5.1f %% accepted, %3zu failed, %7.2f s per 1000, slowest %.2f s, at most %zu MiB\n",
-                format.name.c_str(), static_cast<unsigned long long>(tally.cases),
-                100.0 * static_cast<double>(tally.accepted) / cases, tally.failures.size(),
-                1000.0 * tally.seconds / cases, tally.slowest_seconds, tally.largest_peak >> 20);
+    std::printf(
+        "%-18s %8llu cases, %5.1f %% accepted, %3zu failed, %7.2f s per 1000, slowest %.2f s, at most %zu MiB\n",
+        format.name.c_str(), static_cast<unsigned long long>(tally.cases),
+        100.0 * static_cast<double>(tally.accepted) / cases, tally.failures.size(), 1000.0 * tally.seconds / cases,
+        tally.slowest_seconds, tally.largest_peak >> 20);
     for (const Failure& failure : tally.failures)
         std::printf("FAILED %s --seed %llu --first %llu: %s\n", format.name.c_str(),
                     static_cast<unsigned long long>(options.seed), static_cast<unsigned long long>(failure.number),

@@ -23,8 +23,8 @@ std::vector<std::string> datasets_of(hid_t file) {
 }
 
 double any_value(Random& random) {
-    constexpr double values[] = {0,    1,   -1,         2,          3,     7,   1e-3, 0.5, 1e3, 1e6, 1e12,
-                                 1e308, -1e308, 2147483647, -2147483648.0, 4e9, NAN, INFINITY};
+    constexpr double values[] = {
+        0, 1, -1, 2, 3, 7, 1e-3, 0.5, 1e3, 1e6, 1e12, 1e308, -1e308, 2147483647, -2147483648.0, 4e9, NAN, INFINITY};
     return values[random() % std::size(values)];
 }
 
@@ -35,8 +35,7 @@ void change_values(hid_t file, const std::string& name, Random& random) {
     if (count <= 0 || count > 1000000 || H5Tget_class(type) == H5T_STRING) return;
     std::vector<double> values(static_cast<std::size_t>(count));
     H5Dread(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data());
-    for (std::size_t left = 1 + random() % 3; left > 0; --left)
-        values[random() % values.size()] = any_value(random);
+    for (std::size_t left = 1 + random() % 3; left > 0; --left) values[random() % values.size()] = any_value(random);
     if (random() % 8 == 0) values.assign(values.size(), any_value(random));
     H5Dwrite(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data());
 }

@@ -1,7 +1,7 @@
 // NIfTI, NRRD and MetaImage, each as its writers vary it.
 
-#include "imaging/image_io.hpp"
 #include "core/errors.hpp"
+#include "imaging/image_io.hpp"
 #include "tests/fuzz/format.hpp"
 #include "tests/fuzz/image_reading.hpp"
 
@@ -48,8 +48,8 @@ void put(std::string& header, std::size_t at, T value) {
 std::string nifti_header(int type, int bits, int components, bool pair) {
     std::string header(352, '\0');
     put(header, 0, 348);
-    const std::array<std::int16_t, 8> dim{static_cast<std::int16_t>(components > 1 ? 5 : 3), 6, 5, 4, 1,
-                                          static_cast<std::int16_t>(components),             1, 1};
+    const std::array<std::int16_t, 8> dim{
+        static_cast<std::int16_t>(components > 1 ? 5 : 3), 6, 5, 4, 1, static_cast<std::int16_t>(components), 1, 1};
     std::memcpy(header.data() + 40, dim.data(), sizeof dim);
     put(header, 68, static_cast<std::int16_t>(components > 1 ? 1007 : 0));
     put(header, 70, static_cast<std::int16_t>(type));
@@ -101,11 +101,11 @@ std::vector<Seed> nifti_seeds(const std::filesystem::path& folder) {
     std::vector<Seed> seeds{nifti_seed("a.nii", 4, 16, 1, raw_shorts(), Packing::None),
                             nifti_seed("a.nii.gz", 2, 8, 1, raw_labels(), Packing::Gzip),
                             nifti_seed("v.nii.gz", 16, 32, 3, raw_vectors(), Packing::Gzip),
-                            nifti_seed("v.nii", 16, 32, 3, raw_vectors(), Packing::None), written("w.nii", folder),
+                            nifti_seed("v.nii", 16, 32, 3, raw_vectors(), Packing::None),
+                            written("w.nii", folder),
                             written("w.nii.gz", folder)};
     const std::string pair = nifti_header(4, 16, 1, true);
-    seeds.push_back(
-        {{{"p.hdr", {pair, "", Packing::None}}, {"p.img", {raw_shorts(), "", Packing::None}}}, "p.hdr"});
+    seeds.push_back({{{"p.hdr", {pair, "", Packing::None}}, {"p.img", {raw_shorts(), "", Packing::None}}}, "p.hdr"});
     seeds.push_back(
         {{{"q.hdr.gz", {"", pair, Packing::Gzip}}, {"q.img.gz", {"", raw_shorts(), Packing::Gzip}}}, "q.img.gz"});
     return seeds;
@@ -152,9 +152,10 @@ std::vector<Seed> nrrd_seeds(const std::filesystem::path& folder) {
         single("a.nrrd", nrrd_header("short", "raw", "\n") + raw_shorts()),
         single("t.nrrd", nrrd_header("uchar", "ascii", "\n") + as_text(raw_labels())),
         single("h.nrrd", nrrd_header("uchar", "hex", "\n") + as_hexadecimal(raw_labels())),
-        single("o.nrrd", "NRRD0001\ntype: uchar\ndimension: 3\nsizes: 6 5 4\nspacings: 2 2 2.5\naxis mins: 0 1 2\n"
-                         "units: \"mm\" \"mm\" \"cm\"\nencoding: raw\n\n" +
-                             raw_labels()),
+        single("o.nrrd",
+               "NRRD0001\ntype: uchar\ndimension: 3\nsizes: 6 5 4\nspacings: 2 2 2.5\naxis mins: 0 1 2\n"
+               "units: \"mm\" \"mm\" \"cm\"\nencoding: raw\n\n" +
+                   raw_labels()),
         {{{"g.nrrd", {nrrd_header("uchar", "gzip", "\n"), raw_labels(), Packing::Gzip}}}, "g.nrrd"},
         {{{"v.nrrd", {vectors, raw_vectors(), Packing::Gzip}}}, "v.nrrd"},
         segmentation(),
@@ -193,9 +194,10 @@ std::vector<Seed> meta_seeds(const std::filesystem::path& folder) {
         {{{"z.mhd", {meta_header("MET_SHORT", "CompressedData = True\n", "z.zraw"), ""}},
           {"z.zraw", {"", raw_shorts(), Packing::Zlib}}},
          "z.mhd"},
-        single("t.mha", "ObjectType = Image\nNDims = 3\nBinaryData = False\nDimSize = 6 5 4\nElementSize = 1 1 1\n"
-                        "DistanceUnits = cm\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n" +
-                            as_text(raw_labels())),
+        single("t.mha",
+               "ObjectType = Image\nNDims = 3\nBinaryData = False\nDimSize = 6 5 4\nElementSize = 1 1 1\n"
+               "DistanceUnits = cm\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n" +
+                   as_text(raw_labels())),
         written("w.mha", folder)};
     Seed slices{{{"s.mhd", {meta_header("MET_UCHAR", "", "s%02d.raw 1 4 1"), ""}}}, "s.mhd"};
     Seed list{{{"l.mhd", {meta_header("MET_UCHAR", "", "LIST") + "l0.raw\nl1.raw\nl2.raw\nl3.raw\n", ""}}}, "l.mhd"};

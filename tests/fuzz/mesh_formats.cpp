@@ -45,8 +45,7 @@ std::string vtu(const std::string& attributes, const std::string& points, const 
            array("Float64", "Points\" NumberOfComponents=\"3", format, points) + "</Points>\n<Cells>\n" +
            array("Int32", "connectivity", format, corners) + array("Int32", "offsets", "ascii", "4 8") +
            array("UInt8", "types", "ascii", "10 10") + "</Cells>\n<CellData>\n" +
-           array("Int32", "label", "ascii", "1 7") +
-           "</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
+           array("Int32", "label", "ascii", "1 7") + "</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
 }
 
 std::string base64(const std::string& bytes) {
@@ -96,28 +95,32 @@ std::vector<Seed> vtu_seeds(const std::filesystem::path& folder) {
 }
 
 std::vector<Seed> msh_seeds(const std::filesystem::path&) {
-    return {single("old.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n2 9 \"skin\"\n3 7 \"lobe\"\n"
-                              "$EndPhysicalNames\n$Nodes\n6\n10 0 0 0\n11 10 0 0\n12 0 10 0\n13 0 0 10\n14 10 10 10\n"
-                              "15 99 99 99\n$EndNodes\n$Elements\n3\n1 2 2 9 1 10 11 12\n2 4 2 7 1 10 11 12 13\n"
-                              "3 4 2 0 5 11 14 12 13\n$EndElements\n"),
-            single("new.msh", "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n1 0 0 2\n1 0 0 0 0\n"
-                              "1 0 0 0 10 10 10 1 7 0\n2 0 0 0 10 10 10 0 0\n$EndEntities\n$Nodes\n2 5 10 14\n"
-                              "2 1 0 2\n10\n11\n0 0 0\n10 0 0\n3 1 0 3\n12\n13\n14\n0 10 0\n0 0 10\n10 10 10\n"
-                              "$EndNodes\n$Elements\n3 3 1 3\n2 1 2 1\n1 10 11 12\n3 1 4 1\n2 10 11 12 13\n"
-                              "3 2 4 1\n3 11 14 12 13\n$EndElements\n")};
+    return {single("old.msh",
+                   "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n2 9 \"skin\"\n3 7 \"lobe\"\n"
+                   "$EndPhysicalNames\n$Nodes\n6\n10 0 0 0\n11 10 0 0\n12 0 10 0\n13 0 0 10\n14 10 10 10\n"
+                   "15 99 99 99\n$EndNodes\n$Elements\n3\n1 2 2 9 1 10 11 12\n2 4 2 7 1 10 11 12 13\n"
+                   "3 4 2 0 5 11 14 12 13\n$EndElements\n"),
+            single("new.msh",
+                   "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n1 0 0 2\n1 0 0 0 0\n"
+                   "1 0 0 0 10 10 10 1 7 0\n2 0 0 0 10 10 10 0 0\n$EndEntities\n$Nodes\n2 5 10 14\n"
+                   "2 1 0 2\n10\n11\n0 0 0\n10 0 0\n3 1 0 3\n12\n13\n14\n0 10 0\n0 0 10\n10 10 10\n"
+                   "$EndNodes\n$Elements\n3 3 1 3\n2 1 2 1\n1 10 11 12\n3 1 4 1\n2 10 11 12 13\n"
+                   "3 2 4 1\n3 11 14 12 13\n$EndElements\n")};
 }
 
 std::vector<Seed> inp_seeds(const std::filesystem::path&) {
-    return {single("a.inp", "*Heading\n** by hand\n*Node, nset=all\n1, 0., 0., 0.\n2, 10., 0., 0.\n 3, 0., 10., 0.\n"
-                            "4, 0., 0., 1e1\n5, 10., 10., 10.\n*ELEMENT, TYPE=S3, ELSET=skin\n1, 1, 2, 3\n"
-                            "*Element, type=C3D4, elset=Liver\n2, 1, 2, 3, 4\n*Element, type=C3D4, elset=Tumour\n"
-                            "3, 2, 5, 3, 4\n*End Part\n")};
+    return {single("a.inp",
+                   "*Heading\n** by hand\n*Node, nset=all\n1, 0., 0., 0.\n2, 10., 0., 0.\n 3, 0., 10., 0.\n"
+                   "4, 0., 0., 1e1\n5, 10., 10., 10.\n*ELEMENT, TYPE=S3, ELSET=skin\n1, 1, 2, 3\n"
+                   "*Element, type=C3D4, elset=Liver\n2, 1, 2, 3, 4\n*Element, type=C3D4, elset=Tumour\n"
+                   "3, 2, 5, 3, 4\n*End Part\n")};
 }
 
 }  // namespace
 
 std::vector<Format> mesh_formats() {
-    return {{"vtu", vtu_seeds, read_vtu, appended_fields}, {"msh", msh_seeds, read_mesh}, {"inp", inp_seeds, read_mesh}};
+    return {
+        {"vtu", vtu_seeds, read_vtu, appended_fields}, {"msh", msh_seeds, read_mesh}, {"inp", inp_seeds, read_mesh}};
 }
 
 }  // namespace tissuewarp::fuzz

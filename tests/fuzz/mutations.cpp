@@ -275,10 +275,10 @@ void change(std::string& bytes, const std::string& other, const std::vector<Fiel
     if (!fields.empty() && one_in(2, random))
         return put_number(bytes, any_of(fields, random), one_in(8, random), random);
     using Change = void (*)(std::string&, Random&);
-    constexpr std::array<Change, 16> changes{flip_a_bit,        set_a_byte,        cut_short,          drop_a_range,
-                                             repeat_a_range,    fill_a_range,      insert_noise,       put_any_number,
-                                             put_any_number,    put_a_number_text, put_a_number_text,  put_a_number_text,
-                                             put_a_number_text, change_words,      change_lines,       change_lines};
+    constexpr std::array<Change, 16> changes{flip_a_bit,        set_a_byte,        cut_short,         drop_a_range,
+                                             repeat_a_range,    fill_a_range,      insert_noise,      put_any_number,
+                                             put_any_number,    put_a_number_text, put_a_number_text, put_a_number_text,
+                                             put_a_number_text, change_words,      change_lines,      change_lines};
     if (one_in(40, random)) return repeat_a_character(bytes, random);
     if (one_in(12, random)) return put_in_a_piece(bytes, other, random);
     any_of(changes, random)(bytes, random);

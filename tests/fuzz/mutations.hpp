@@ -5,7 +5,8 @@
 
 namespace tissuewarp::fuzz {
 
-/// One to four changes of one file of the seed, rarely of two. `seeds` are all of the format: pieces of others are put in.
+/// One to four changes of one file of the seed, rarely of two. `seeds` are all of the format: pieces of others are put
+/// in.
 Seed damaged(const Format& format, const std::vector<Seed>& seeds, Random& random);
 
 }  // namespace tissuewarp::fuzz

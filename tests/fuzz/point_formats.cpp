@@ -1,4 +1,5 @@
-// Points, pairs of them and curves: tables, markups of 3D Slicer, points of elastix; measured fronts, which are JSON too.
+// Points, pairs of them and curves: tables, markups of 3D Slicer, points of elastix; measured fronts, which are JSON
+// too.
 
 #include "core/errors.hpp"
 #include "meshing/point_table.hpp"
@@ -61,13 +62,15 @@ void read_fronts(const std::filesystem::path& path, Digest& digest) {
 
 std::vector<Seed> table_seeds(const std::filesystem::path&) {
     std::string cloud = "x,y,z,nx,ny,nz\n";
-    for (int n = 0; n < 12; ++n)
-        cloud += std::to_string(n) + ".5," + std::to_string(n * n) + ",-3e0," + "0,0,1\n";
-    return {single("a.csv", cloud), single("b.csv", "x;y;z\n1,5;2,25;-3,0\n10,5;20;30\n\n"),
-            single("c.csv", "\xEF\xBB\xBFname\tr\ta\ts\tline\r\n\"P 1\"\t1\t2\t3\tA\r\nP2\t10\t20\t30\tA\r\n"
-                            "P3\t11\t21\t31\t\r\n"),
+    for (int n = 0; n < 12; ++n) cloud += std::to_string(n) + ".5," + std::to_string(n * n) + ",-3e0," + "0,0,1\n";
+    return {single("a.csv", cloud),
+            single("b.csv", "x;y;z\n1,5;2,25;-3,0\n10,5;20;30\n\n"),
+            single("c.csv",
+                   "\xEF\xBB\xBFname\tr\ta\ts\tline\r\n\"P 1\"\t1\t2\t3\tA\r\nP2\t10\t20\t30\tA\r\n"
+                   "P3\t11\t21\t31\t\r\n"),
             single("d.csv", "sep=;\nlabel;x (mm);y (mm);z (mm);defined\nF-1;1.5;2;3;1\nF-2;4;5;6;0\n"),
-            single("e.xyz", "# RAS\n1 2 3\n4 5 6\n7 8 9\n"), single("f.csv", "// x y z line\n1 2 3 a\n4 5 6 a\n")};
+            single("e.xyz", "# RAS\n1 2 3\n4 5 6\n7 8 9\n"),
+            single("f.csv", "// x y z line\n1 2 3 a\n4 5 6 a\n")};
 }
 
 std::vector<Seed> pair_seeds(const std::filesystem::path&) {
@@ -83,8 +86,8 @@ std::vector<Seed> markup_seeds(const std::filesystem::path&) {
     const auto list = [](const std::string& type, const std::string& system, const std::string& points) {
         return "{\"@schema\": \"https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/"
                "Resources/Schema/markups-schema-v1.0.3.json#\", \"markups\": [{\"type\": \"" +
-               type + "\", \"coordinateSystem\": " + system +
-               ", \"coordinateUnits\": \"mm\", \"controlPoints\": [" + points + "]}]}";
+               type + "\", \"coordinateSystem\": " + system + ", \"coordinateUnits\": \"mm\", \"controlPoints\": [" +
+               points + "]}]}";
     };
     const auto point = [](const std::string& name, const std::string& position, const std::string& status) {
         return "{\"id\": \"" + name + "\", \"label\": \"F-" + name + "\", \"position\": " + position +
@@ -95,17 +98,19 @@ std::vector<Seed> markup_seeds(const std::filesystem::path&) {
     const std::string points = point("1", "[1.5, 2, 3]", "defined") + ",\n" + point("2", "[4, 5e0, 16]", "defined") +
                                ",\n" + point("3", "[0, 0, 0]", "undefined") + ",\n" +
                                point("4", "[-7, 8, 9]", "defined");
-    return {single("a.mrk.json", list("Fiducial", "\"LPS\"", points)), single("b.mrk.json", list("Curve", "\"RAS\"", points)),
-            single("c.json", list("ClosedCurve", "0", points))};
+    return {single("a.mrk.json", list("Fiducial", "\"LPS\"", points)),
+            single("b.mrk.json", list("Curve", "\"RAS\"", points)), single("c.json", list("ClosedCurve", "0", points))};
 }
 
 std::vector<Seed> fcsv_seeds(const std::filesystem::path&) {
-    return {single("a.fcsv", "# Markups fiducial file version = 4.11\n# CoordinateSystem = LPS\n"
-                             "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n"
-                             "1,10.5,20,30,0,0,0,1,1,1,0,F-1,,\n2,11,21,31e0,0,0,0,1,1,1,0,F-2,,\n"),
-            single("b.fcsv", "# Markups fiducial file version = 5.4\n# CoordinateSystem = RAS,,\n"
-                             "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n"
-                             "1,10.5,20,30,0,0,0,1,1,1,0,F-1,,,2,0\n2,0,0,0,0,0,0,1,1,1,0,F-2,,,0,0\n")};
+    return {single("a.fcsv",
+                   "# Markups fiducial file version = 4.11\n# CoordinateSystem = LPS\n"
+                   "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n"
+                   "1,10.5,20,30,0,0,0,1,1,1,0,F-1,,\n2,11,21,31e0,0,0,0,1,1,1,0,F-2,,\n"),
+            single("b.fcsv",
+                   "# Markups fiducial file version = 5.4\n# CoordinateSystem = RAS,,\n"
+                   "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n"
+                   "1,10.5,20,30,0,0,0,1,1,1,0,F-1,,,2,0\n2,0,0,0,0,0,0,1,1,1,0,F-2,,,0,0\n")};
 }
 
 std::vector<Seed> front_seeds(const std::filesystem::path&) {
@@ -115,9 +120,12 @@ std::vector<Seed> front_seeds(const std::filesystem::path&) {
 }  // namespace
 
 std::vector<Format> point_formats() {
-    return {{"table", table_seeds, read_table},        {"pairs", pair_seeds, read_pairs},
-            {"elastix-points", elastix_seeds, read_points}, {"markups", markup_seeds, read_points},
-            {"fcsv", fcsv_seeds, read_points},         {"fronts", front_seeds, read_fronts}};
+    return {{"table", table_seeds, read_table},
+            {"pairs", pair_seeds, read_pairs},
+            {"elastix-points", elastix_seeds, read_points},
+            {"markups", markup_seeds, read_points},
+            {"fcsv", fcsv_seeds, read_points},
+            {"fronts", front_seeds, read_fronts}};
 }
 
 }  // namespace tissuewarp::fuzz

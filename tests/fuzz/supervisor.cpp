@@ -94,8 +94,9 @@ Reading reading(const Format& format, const fs::path& path, const fs::path& fold
     const std::size_t refused = refused_bytes(), peak = std::max(peak_bytes(), refused);
     if (result.problem.empty() && !result.accepted) result.problem = problem_of_message(message, folder);
     if (peak > most)
-        result.problem = "takes " + std::to_string(peak >> 20) + " MiB for files of " + std::to_string(size_of(folder)) +
-                         " bytes (" + (result.accepted ? "accepted" : message + result.problem) + ")";
+        result.problem = "takes " + std::to_string(peak >> 20) + " MiB for files of " +
+                         std::to_string(size_of(folder)) + " bytes (" +
+                         (result.accepted ? "accepted" : message + result.problem) + ")";
     // Deflate saves a factor of 1032 at most, a bitmap 8 values a byte.
     if (result.accepted && result.digest.items() > 1032 * 8 * size_of(folder))
         result.problem = "returns " + std::to_string(result.digest.items()) + " numbers";

@@ -34,13 +34,15 @@ void read_scene(const std::filesystem::path& path, Digest& digest) {
 }
 
 std::vector<Seed> material_seeds(const std::filesystem::path&) {
-    return {single("m.toml", "# kPa\n[label.1]\nname = \"brain\"\nyoungs_modulus_kpa = 3.0\npoissons_ratio = 0.45\n\n"
-                             "[label.7]\nname = \"tumour\"\nlaw = \"neo-hookean-iso\"\nyoungs_modulus_kpa = 9\n"
-                             "poissons_ratio = 0.31\n")};
+    return {single("m.toml",
+                   "# kPa\n[label.1]\nname = \"brain\"\nyoungs_modulus_kpa = 3.0\npoissons_ratio = 0.45\n\n"
+                   "[label.7]\nname = \"tumour\"\nlaw = \"neo-hookean-iso\"\nyoungs_modulus_kpa = 9\n"
+                   "poissons_ratio = 0.31\n")};
 }
 
 std::vector<Seed> config_seeds(const std::filesystem::path&) {
-    return {single("c.toml", "moving = \"a.nii.gz\"\nedge-length = 4.5\nthreads = 2\nquiet = true\nseed = [\"1\", 2]\n")};
+    return {
+        single("c.toml", "moving = \"a.nii.gz\"\nedge-length = 4.5\nthreads = 2\nquiet = true\nseed = [\"1\", 2]\n")};
 }
 
 std::vector<Seed> scene_seeds(const std::filesystem::path& folder) {
