@@ -268,7 +268,11 @@ Geometry segmentation_grid(const fs::path& path, std::vector<Slice>& slices) {
     const double height = places.back()->height - places.front()->height;
     // The stated spacing is finer where every other slice holds no segment; a thickness may be anything.
     if (stated > 0.0 && std::abs(std::round(step / stated) * stated - step) < 0.02 * stated) step = stated;
-    const double count = std::round(height / step);
+    const double count = std::round(height / step), most = 100.0 * static_cast<double>(places.size());
+    if (count > std::max(1000.0, most))
+        throw unusable_series(path, "its " + std::to_string(places.size()) + " slices lie over " + in_mm(height) +
+                                        ", in steps of " + in_mm(step) +
+                                        ": more than 100 empty ones to each; the positions are damaged");
     for (const Slice* place : places) {
         const double steps = (place->height - places.front()->height) / (height / count);
         if (std::abs(steps - std::round(steps)) > 0.02)

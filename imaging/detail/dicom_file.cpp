@@ -187,15 +187,46 @@ std::optional<std::string> plain_bytes(const DicomFile& file, const DicomBytes& 
     return all;
 }
 
-/// The packed frames alone: the library's own reading of the rest believes lengths that lie.
-gdcm::Pixmap packed_pixmap(const DicomFile& file, const DicomBytes& read) {
+/// Throws unless the frames are packed as the decoders below expect, and as large as the header promises.
+void require_packed_frames(const DicomFile& file, const std::vector<std::string_view>& fragments) {
     if ((file.bits_allocated != 8 && file.bits_allocated != 16) || file.bits_stored < 1 ||
         file.bits_stored > file.bits_allocated || file.high_bit != file.bits_stored - 1)
         throw unusable(file.path, "its packed pixels take " + std::to_string(file.bits_stored) + " bits of " +
                                       std::to_string(file.bits_allocated) + ", up to bit " +
                                       std::to_string(file.high_bit) + "; convert it to 16 bits");
-    gdcm::Pixmap pixmap;
     const bool single = file.frames.size() == 1;  // which may lie in several fragments
+    if (fragments.empty() || (!single && fragments.size() != file.frames.size()))
+        throw damaged(file, std::to_string(fragments.size()) + " packed pieces of " +
+                                std::to_string(file.frames.size()) + " frames");
+    const std::array size{static_cast<std::uint32_t>(file.columns), static_cast<std::uint32_t>(file.rows)};
+    for (std::size_t n = 0; n < (single ? 1 : fragments.size()); ++n)
+        if (packed_frame_size(fragments[n]) != size)
+            throw damaged(file, "packed frame " + std::to_string(n + 1) + " is not of the size " +
+                                    text_of({1.0 * file.columns, 1.0 * file.rows}) + " that its header promises");
+}
+
+gdcm::DataElement element_of(const std::vector<std::string_view>& fragments) {
+    const gdcm::SmartPointer<gdcm::SequenceOfFragments> sequence = new gdcm::SequenceOfFragments;
+    for (const std::string_view bytes : fragments) {
+        gdcm::Fragment fragment;
+        fragment.SetByteValue(bytes.data(), gdcm::VL(static_cast<std::uint32_t>(bytes.size())));
+        sequence->AddFragment(fragment);
+    }
+    gdcm::DataElement element(gdcm::Tag(0x7fe0, 0x0010));
+    element.SetValue(*sequence);
+    return element;
+}
+
+/// The packed frames alone: the library's own reading of the rest believes lengths that lie.
+gdcm::Pixmap packed_pixmap(const DicomFile& file, const DicomBytes& read) {
+    const std::vector<std::string_view> fragments = read.set.fragments(pixel_data).value();
+    require_packed_frames(file, fragments);
+    const auto syntax = gdcm::TransferSyntax::GetTSType(read.transfer_syntax.c_str());
+    if (syntax == gdcm::TransferSyntax::TS_END || !gdcm::TransferSyntax(syntax).IsEncapsulated())
+        throw damaged(file,
+                      "they are packed in a way that is not known (transfer syntax '" + read.transfer_syntax + "')");
+    gdcm::Pixmap pixmap;
+    const bool single = file.frames.size() == 1;
     pixmap.SetNumberOfDimensions(single ? 2 : 3);
     pixmap.SetDimension(0, static_cast<unsigned>(file.columns));
     pixmap.SetDimension(1, static_cast<unsigned>(file.rows));
@@ -204,21 +235,8 @@ gdcm::Pixmap packed_pixmap(const DicomFile& file, const DicomBytes& read) {
                                             static_cast<unsigned short>(file.bits_stored),
                                             static_cast<unsigned short>(file.high_bit), file.is_signed ? 1 : 0));
     pixmap.SetPhotometricInterpretation(gdcm::PhotometricInterpretation::MONOCHROME2);
-    const auto syntax = gdcm::TransferSyntax::GetTSType(read.transfer_syntax.c_str());
-    if (syntax == gdcm::TransferSyntax::TS_END || !gdcm::TransferSyntax(syntax).IsEncapsulated())
-        throw damaged(file,
-                      "they are packed in a way that is not known (transfer syntax '" + read.transfer_syntax + "')");
     pixmap.SetTransferSyntax(gdcm::TransferSyntax(syntax));
-    const gdcm::SmartPointer<gdcm::SequenceOfFragments> fragments = new gdcm::SequenceOfFragments;
-    const std::vector<std::string_view> packed = read.set.fragments(pixel_data).value();
-    for (const std::string_view bytes : packed) {
-        gdcm::Fragment fragment;
-        fragment.SetByteValue(bytes.data(), gdcm::VL(static_cast<std::uint32_t>(bytes.size())));
-        fragments->AddFragment(fragment);
-    }
-    gdcm::DataElement element(gdcm::Tag(0x7fe0, 0x0010));
-    element.SetValue(*fragments);
-    pixmap.SetDataElement(element);
+    pixmap.SetDataElement(element_of(fragments));
     return pixmap;
 }
 
