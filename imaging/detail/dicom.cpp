@@ -312,12 +312,13 @@ ReadResult read_segmentation(const fs::path& path, const std::vector<DicomFile>&
     const Geometry grid = segmentation_grid(path, slices);
     const std::int64_t plane = std::int64_t{grid.size[0]} * grid.size[1];
     const double first = slices.front().height;
-    SegmentPainter painter(grid);
+    std::optional<SegmentPainter> painter;  // memory is asked for once a frame was there
     for_each_frame(files, slices, [&](const Slice& slice, const cv::Mat& pixels) {
+        if (!painter) painter.emplace(grid);
         const auto k = static_cast<std::int64_t>(std::llround((slice.height - first) / grid.spacing[2]));
-        read_segment_frame(slice, pixels, [&](std::int64_t i, int label) { painter.paint(plane * k + i, label); });
+        read_segment_frame(slice, pixels, [&](std::int64_t i, int label) { painter->paint(plane * k + i, label); });
     });
-    result.volume = painter.disjoint(path, result.label_names);
+    result.volume = painter.value().disjoint(path, result.label_names);
     if (files.front().segmentation == DicomFile::Segmentation::Fractional)
         result.notes.emplace_back("a fractional segmentation: voxels that a segment fills by half or more are its own");
     return result;
