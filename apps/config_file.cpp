@@ -2,6 +2,7 @@
 
 #include "apps/parameters.hpp"
 #include "apps/toml_file.hpp"
+#include "core/file_message.hpp"
 
 #include <fmt/format.h>
 
@@ -29,9 +30,7 @@ void append_switch(const std::string& name, const toml::node& node, const std::s
     if (on->get()) arguments.push_back("--" + name);
 }
 
-}  // namespace
-
-std::vector<std::string> read_config(const std::filesystem::path& path, const KnownOptions& known) {
+std::vector<std::string> read_checked(const std::filesystem::path& path, const KnownOptions& known) {
     const toml::table table = parse_toml_file(path);
     std::vector<std::string> arguments;
     for (const auto& [key, node] : table) {
@@ -55,6 +54,12 @@ std::vector<std::string> read_config(const std::filesystem::path& path, const Kn
         }
     }
     return arguments;
+}
+
+}  // namespace
+
+std::vector<std::string> read_config(const std::filesystem::path& path, const KnownOptions& known) {
+    return naming(path, [&] { return read_checked(path, known); });
 }
 
 }  // namespace tissuewarp::apps

@@ -2,6 +2,7 @@
 
 #include "apps/parameters.hpp"
 #include "apps/toml_file.hpp"
+#include "core/file_message.hpp"
 
 #include <charconv>
 
@@ -64,7 +65,9 @@ tled::Material material_of(const TissueEntry& entry) {
     throw InvalidInput("unknown law '" + entry.law + "'; give neo-hookean-lnj or neo-hookean-iso");
 }
 
-std::map<int, TissueEntry> read_materials(const std::filesystem::path& path) {
+namespace {
+
+std::map<int, TissueEntry> read_checked(const std::filesystem::path& path) {
     const toml::table file = parse_toml_file(path);
     for (const auto& [key, node] : file)
         if (key.str() != "label")
@@ -81,6 +84,12 @@ std::map<int, TissueEntry> read_materials(const std::filesystem::path& path) {
         table[label] = entry_of(*node.as_table(), path);
     }
     return table;
+}
+
+}  // namespace
+
+std::map<int, TissueEntry> read_materials(const std::filesystem::path& path) {
+    return naming(path, [&] { return read_checked(path); });
 }
 
 void require_materials(const std::map<int, TissueEntry>& table, const std::vector<int>& labels,

@@ -2,6 +2,7 @@
 
 #include "apps/parameters.hpp"
 #include "apps/scene_parts.hpp"
+#include "core/file_message.hpp"
 #include "imaging/labels.hpp"
 
 #include <algorithm>
@@ -64,9 +65,7 @@ void read_probes(TomlReader& file, Scene& scene) {
     }
 }
 
-}  // namespace
-
-Scene read_scene(const std::filesystem::path& path, Observer& observer) {
+Scene read_checked(const std::filesystem::path& path, Observer& observer) {
     const toml::table table = parse_toml_file(path);
     const std::filesystem::path folder = path.parent_path();
     TomlReader file(table, path, "");
@@ -82,14 +81,16 @@ Scene read_scene(const std::filesystem::path& path, Observer& observer) {
     (void)file.table("geometry");
     file.finish();
     require_names(scene, uses);
-    try {
-        require_valid(scene);
-    } catch (const InvalidInput& error) {
-        throw InvalidInput("'" + path.string() + "': " + error.what());
-    }
+    require_valid(scene);
     read_geometry(file, folder, scene, uses, observer);
     require_labels(scene, uses);
     return scene;
+}
+
+}  // namespace
+
+Scene read_scene(const std::filesystem::path& path, Observer& observer) {
+    return naming(path, [&] { return read_checked(path, observer); });
 }
 
 }  // namespace tissuewarp::apps

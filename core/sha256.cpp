@@ -11,9 +11,10 @@
 
 namespace tissuewarp {
 
-std::string sha256_of_file(const std::filesystem::path& path) {
+std::string sha256_of_file(const std::filesystem::path& path, std::uint64_t from) {
     std::ifstream file(path, std::ios::binary);
     if (!file) throw IoError("cannot read '" + path.string() + "'");
+    file.seekg(static_cast<std::streamoff>(from));
     const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(), &EVP_MD_CTX_free);
     EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr);
     std::vector<char> block(1 << 20);

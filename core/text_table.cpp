@@ -1,6 +1,6 @@
 #include "core/text_table.hpp"
 
-#include "core/errors.hpp"
+#include "core/file_message.hpp"
 
 #include <algorithm>
 #include <cctype>
@@ -214,7 +214,7 @@ double TextTable::coordinate(const Row& row, std::size_t column, std::string_vie
 }
 
 void TextTable::refuse(int line, const std::string& reason) const {
-    throw InvalidInput(path_.string() + ":" + std::to_string(line) + ": " + reason);
+    throw InvalidInput(presentable(path_.string() + ":" + std::to_string(line) + ": " + reason));
 }
 
 }  // namespace tissuewarp

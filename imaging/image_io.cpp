@@ -1,7 +1,7 @@
 #include "imaging/image_io.hpp"
 
 #include "core/atomic_file.hpp"
-#include "core/errors.hpp"
+#include "core/file_message.hpp"
 #include "imaging/detail/dicom.hpp"
 #include "imaging/detail/gzip.hpp"
 #include "imaging/detail/image_header.hpp"
@@ -204,7 +204,9 @@ bool is_image(const fs::path& path) {
     return fs::is_directory(path, ignored) || format_named(lower_case_name(path)) || detail::is_dicom_file(path);
 }
 
-ReadResult read_volume_with_notes(const fs::path& path) {
+namespace {
+
+ReadResult read_checked(const fs::path& path) {
     std::error_code failure;
     const fs::file_status status = fs::status(path, failure);
     if (!fs::exists(status)) throw IoError("'" + path.string() + "' does not exist; check the path");
@@ -213,6 +215,12 @@ ReadResult read_volume_with_notes(const fs::path& path) {
     ReadResult result = dicom ? detail::read_dicom(path) : read_file(path);
     require_finite(result.volume, path);
     return result;
+}
+
+}  // namespace
+
+ReadResult read_volume_with_notes(const fs::path& path) {
+    return naming(path, [&] { return read_checked(path); });
 }
 
 Volume read_volume(const fs::path& path) {

@@ -1,5 +1,6 @@
 // Tetrahedra of other programs: by extension, then the checks that all formats share.
 
+#include "core/file_message.hpp"
 #include "meshing/detail/tetrahedra_formats.hpp"
 #include "meshing/quality.hpp"
 
@@ -71,9 +72,7 @@ void note_quality(MeshFile& read) {
                              " pieces that share no face; where they should, merge their nodes");
 }
 
-}  // namespace
-
-MeshFile read_tetrahedra(const std::filesystem::path& path) {
+MeshFile read_checked(const std::filesystem::path& path) {
     MeshFile read;
     const std::string extension = detail::extension_of(path);
     FileReader file(path);
@@ -95,6 +94,12 @@ MeshFile read_tetrahedra(const std::filesystem::path& path) {
     require_valid(read.mesh, path.string().c_str());
     note_quality(read);
     return read;
+}
+
+}  // namespace
+
+MeshFile read_tetrahedra(const std::filesystem::path& path) {
+    return naming(path, [&] { return read_checked(path); });
 }
 
 }  // namespace tissuewarp::meshing

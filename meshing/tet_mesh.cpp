@@ -6,6 +6,7 @@
 #include <Eigen/Dense>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <tuple>
 
@@ -112,9 +113,10 @@ void require_valid(const TetMesh& mesh, const char* name) {
                                    std::to_string(mesh.node_count() - 1));
         if (mesh.labels[t] <= 0)
             throw InvalidInput(tet + " has label " + std::to_string(mesh.labels[t]) + "; labels must be positive");
-        if (const double volume = signed_volume(mesh, t); !(volume > 0.0))
-            throw InvalidInput(tet + " has volume " + std::to_string(volume) +
-                               " mm³; volumes must be positive: remove flat elements, swap two nodes of inverted ones");
+        if (const double volume = signed_volume(mesh, t); !(volume > 0.0) || !std::isfinite(volume))
+            throw InvalidInput(
+                tet + " has volume " + std::to_string(volume) +
+                " mm³; volumes must be positive and finite: remove flat elements, swap two nodes of inverted ones");
     }
 }
 

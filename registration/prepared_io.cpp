@@ -1,11 +1,12 @@
 #include "registration/prepared_io.hpp"
 
-#include "registration/matching/image_matching.hpp"
 #include "registration/io/stored_model.hpp"
 #include "registration/loads/coarse_twin.hpp"
+#include "registration/matching/image_matching.hpp"
 #include "registration/terms/anchors.hpp"
 
 #include "core/atomic_file.hpp"
+#include "core/file_message.hpp"
 #include "registration/boundary/surroundings.hpp"
 
 namespace tissuewarp::registration {
@@ -145,7 +146,9 @@ void write_prepared(const PreparedModel& prepared, const std::filesystem::path& 
     target.commit();
 }
 
-PreparedModel read_prepared(const std::filesystem::path& path, Observer& observer) {
+namespace {
+
+PreparedModel read_checked(const std::filesystem::path& path, Observer& observer) {
     const Hdf5Input file(path, format, version, oldest_version);
     tled::Model model = detail::read_model(file);
     PrepareOptions options;
@@ -163,6 +166,12 @@ PreparedModel read_prepared(const std::filesystem::path& path, Observer& observe
     if (file.holds(image)) prepared.image = std::make_shared<const ImageModel>(read_image(file));
     if (file.holds(coarse_mesh)) read_coarse_model(file, path, prepared, observer);
     return prepared;
+}
+
+}  // namespace
+
+PreparedModel read_prepared(const std::filesystem::path& path, Observer& observer) {
+    return naming(path, [&] { return read_checked(path, observer); });
 }
 
 }  // namespace tissuewarp::registration

@@ -3,6 +3,7 @@
 #include "registration/io/stored_model.hpp"
 
 #include "core/atomic_file.hpp"
+#include "core/file_message.hpp"
 
 #include <algorithm>
 
@@ -111,7 +112,9 @@ void write_record(const PreparedModel& prepared, const UpdateResult& result, con
     target.commit();
 }
 
-Record read_record(const std::filesystem::path& path) {
+namespace {
+
+Record read_checked(const std::filesystem::path& path) {
     const Hdf5Input file(path, format, version, oldest_version);
     Record record;
     record.format_version = file.version();
@@ -133,6 +136,12 @@ Record read_record(const std::filesystem::path& path) {
     for (std::size_t row = 0; row < names.size(); ++row) record.provenance[names[row]] = values[row];
     record.parameters_toml = file.text("parameters_toml");
     return record;
+}
+
+}  // namespace
+
+Record read_record(const std::filesystem::path& path) {
+    return naming(path, [&] { return read_checked(path); });
 }
 
 }  // namespace tissuewarp::registration

@@ -1,5 +1,6 @@
 #include "core/detail/hdf5.hpp"
 
+#include "core/detail/hdf5_seal.hpp"
 #include "core/errors.hpp"
 
 #include <algorithm>
@@ -51,6 +52,12 @@ Hdf5Handle access() {
     Hdf5Handle list(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
     H5Pset_fclose_degree(list, H5F_CLOSE_STRONG);
     H5Pset_file_locking(list, false, true);
+    return list;
+}
+
+Hdf5Handle sealed() {
+    Hdf5Handle list(H5Pcreate(H5P_FILE_CREATE), H5Pclose);
+    H5Pset_userblock(list, hdf5_seal_bytes);
     return list;
 }
 
@@ -142,7 +149,7 @@ Hdf5Quiet::~Hdf5Quiet() {
 }
 
 Hdf5Output::Hdf5Output(const std::filesystem::path& path, const std::string& format, int version)
-    : path_(path), file_(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access()), H5Fclose) {
+    : path_(path), file_(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, sealed(), access()), H5Fclose) {
     if (!file_.valid()) throw IoError("cannot create '" + path_.string() + "'; is the folder there and writable?");
     const Hdf5Handle attribute(
         H5Acreate2(file_, "format_version", H5T_STD_I32LE, simple_space({}), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
@@ -222,12 +229,14 @@ void Hdf5Output::attribute(const std::string& object, const std::string& name, c
 void Hdf5Output::close() {
     const bool flushed = H5Fflush(file_, H5F_SCOPE_GLOBAL) >= 0;
     if (!file_.close() || !flushed) throw IoError("cannot write '" + path_.string() + "'; is the disk full?");
+    seal_hdf5(path_);
 }
 
 Hdf5Input::Hdf5Input(const std::filesystem::path& path, const std::string& format, int newest_version,
                      int oldest_version)
     : path_(path) {
     if (!std::filesystem::is_regular_file(path)) throw IoError("'" + path.string() + "' is not a file");
+    require_unbroken_hdf5(path);
     file_ = Hdf5Handle(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access()), H5Fclose);
     if (!file_.valid())
         throw IoError("'" + path.string() + "' cannot be read as HDF5; is it complete, and the file you meant?");

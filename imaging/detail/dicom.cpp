@@ -268,7 +268,11 @@ Geometry segmentation_grid(const fs::path& path, std::vector<Slice>& slices) {
     const double height = places.back()->height - places.front()->height;
     // The stated spacing is finer where every other slice holds no segment; a thickness may be anything.
     if (stated > 0.0 && std::abs(std::round(step / stated) * stated - step) < 0.02 * stated) step = stated;
-    const double count = std::round(height / step);
+    const double count = std::round(height / step), most = 100.0 * static_cast<double>(places.size());
+    if (count > std::max(1000.0, most))
+        throw unusable_series(path, "its " + std::to_string(places.size()) + " slices lie over " + in_mm(height) +
+                                        ", in steps of " + in_mm(step) +
+                                        ": more than 100 empty ones to each; the positions are damaged");
     for (const Slice* place : places) {
         const double steps = (place->height - places.front()->height) / (height / count);
         if (std::abs(steps - std::round(steps)) > 0.02)
@@ -308,12 +312,13 @@ ReadResult read_segmentation(const fs::path& path, const std::vector<DicomFile>&
     const Geometry grid = segmentation_grid(path, slices);
     const std::int64_t plane = std::int64_t{grid.size[0]} * grid.size[1];
     const double first = slices.front().height;
-    SegmentPainter painter(grid);
+    std::optional<SegmentPainter> painter;  // memory is asked for once a frame was there
     for_each_frame(files, slices, [&](const Slice& slice, const cv::Mat& pixels) {
+        if (!painter) painter.emplace(grid);
         const auto k = static_cast<std::int64_t>(std::llround((slice.height - first) / grid.spacing[2]));
-        read_segment_frame(slice, pixels, [&](std::int64_t i, int label) { painter.paint(plane * k + i, label); });
+        read_segment_frame(slice, pixels, [&](std::int64_t i, int label) { painter->paint(plane * k + i, label); });
     });
-    result.volume = painter.disjoint(path, result.label_names);
+    result.volume = painter.value().disjoint(path, result.label_names);
     if (files.front().segmentation == DicomFile::Segmentation::Fractional)
         result.notes.emplace_back("a fractional segmentation: voxels that a segment fills by half or more are its own");
     return result;

@@ -76,4 +76,22 @@ std::string unpack_deflated(std::string_view packed) {
     return plain;
 }
 
+std::optional<std::array<std::uint32_t, 2>> packed_frame_size(std::string_view frame) {
+    const auto number = [&](std::size_t at, int bytes) {  // big endian, 0 behind the end
+        std::uint32_t value = 0;
+        for (; bytes > 0; --bytes, ++at)
+            value = value << 8U | (at < frame.size() ? static_cast<unsigned char>(frame[at]) : 0U);
+        return value;
+    };
+    if (number(0, 4) == 0xff4fff51U) return std::array{number(8, 4) - number(16, 4), number(12, 4) - number(20, 4)};
+    if (number(0, 2) != 0xffd8U) return std::nullopt;
+    for (std::size_t at = 2; number(at, 1) == 0xffU; at += 2 + number(at + 2, 2)) {
+        const std::uint32_t marker = number(at, 2);
+        const bool tables = marker == 0xffc4U || marker == 0xffc8U || marker == 0xffccU;
+        if ((marker >= 0xffc0U && marker <= 0xffcfU && !tables) || marker == 0xfff7U)
+            return std::array{number(at + 7, 2), number(at + 5, 2)};
+    }
+    return std::nullopt;
+}
+
 }  // namespace tissuewarp::imaging::detail

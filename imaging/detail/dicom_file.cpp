@@ -3,10 +3,13 @@
 #include "imaging/detail/dicom_bits.hpp"
 #include "imaging/detail/dicom_set.hpp"
 #include "imaging/detail/header_checks.hpp"
+#include "imaging/detail/isolated.hpp"
 
 #include <Eigen/Geometry>
 
-#include <gdcmPixmapReader.h>
+#include <gdcmFragment.h>
+#include <gdcmPixmap.h>
+#include <gdcmSequenceOfFragments.h>
 #include <gdcmTrace.h>
 
 #include <algorithm>
@@ -184,44 +187,72 @@ std::optional<std::string> plain_bytes(const DicomFile& file, const DicomBytes& 
     return all;
 }
 
-int opencv_depth(const gdcm::PixelFormat& format) {
-    switch (format.GetScalarType()) {
-        case gdcm::PixelFormat::UINT8:
-            return CV_8U;
-        case gdcm::PixelFormat::INT8:
-            return CV_8S;
-        case gdcm::PixelFormat::UINT12:
-        case gdcm::PixelFormat::UINT16:
-            return CV_16U;
-        case gdcm::PixelFormat::INT12:
-        case gdcm::PixelFormat::INT16:
-            return CV_16S;
-        default:
-            return -1;
-    }
+/// Throws unless the frames are packed as the decoders below expect, and as large as the header promises.
+void require_packed_frames(const DicomFile& file, const std::vector<std::string_view>& fragments) {
+    if ((file.bits_allocated != 8 && file.bits_allocated != 16) || file.bits_stored < 1 ||
+        file.bits_stored > file.bits_allocated || file.high_bit != file.bits_stored - 1)
+        throw unusable(file.path, "its packed pixels take " + std::to_string(file.bits_stored) + " bits of " +
+                                      std::to_string(file.bits_allocated) + ", up to bit " +
+                                      std::to_string(file.high_bit) + "; convert it to 16 bits");
+    const bool single = file.frames.size() == 1;  // which may lie in several fragments
+    if (fragments.empty() || (!single && fragments.size() != file.frames.size()))
+        throw damaged(file, std::to_string(fragments.size()) + " packed pieces of " +
+                                std::to_string(file.frames.size()) + " frames");
+    const std::array size{static_cast<std::uint32_t>(file.columns), static_cast<std::uint32_t>(file.rows)};
+    for (std::size_t n = 0; n < (single ? 1 : fragments.size()); ++n)
+        if (packed_frame_size(fragments[n]) != size)
+            throw damaged(file, "packed frame " + std::to_string(n + 1) + " is not of the size " +
+                                    text_of({1.0 * file.columns, 1.0 * file.rows}) + " that its header promises");
 }
 
-/// Frames of JPEG, JPEG-LS and JPEG 2000.
-cv::Mat decoded(const DicomFile& file, const std::string& transfer_syntax) {
+gdcm::DataElement element_of(const std::vector<std::string_view>& fragments) {
+    const gdcm::SmartPointer<gdcm::SequenceOfFragments> sequence = new gdcm::SequenceOfFragments;
+    for (const std::string_view bytes : fragments) {
+        gdcm::Fragment fragment;
+        fragment.SetByteValue(bytes.data(), gdcm::VL(static_cast<std::uint32_t>(bytes.size())));
+        sequence->AddFragment(fragment);
+    }
+    gdcm::DataElement element(gdcm::Tag(0x7fe0, 0x0010));
+    element.SetValue(*sequence);
+    return element;
+}
+
+/// The packed frames alone: the library's own reading of the rest believes lengths that lie.
+gdcm::Pixmap packed_pixmap(const DicomFile& file, const DicomBytes& read) {
+    const std::vector<std::string_view> fragments = read.set.fragments(pixel_data).value();
+    require_packed_frames(file, fragments);
+    const auto syntax = gdcm::TransferSyntax::GetTSType(read.transfer_syntax.c_str());
+    if (syntax == gdcm::TransferSyntax::TS_END || !gdcm::TransferSyntax(syntax).IsEncapsulated())
+        throw damaged(file,
+                      "they are packed in a way that is not known (transfer syntax '" + read.transfer_syntax + "')");
+    gdcm::Pixmap pixmap;
+    const bool single = file.frames.size() == 1;
+    pixmap.SetNumberOfDimensions(single ? 2 : 3);
+    pixmap.SetDimension(0, static_cast<unsigned>(file.columns));
+    pixmap.SetDimension(1, static_cast<unsigned>(file.rows));
+    if (!single) pixmap.SetDimension(2, static_cast<unsigned>(file.frames.size()));
+    pixmap.SetPixelFormat(gdcm::PixelFormat(1, static_cast<unsigned short>(file.bits_allocated),
+                                            static_cast<unsigned short>(file.bits_stored),
+                                            static_cast<unsigned short>(file.high_bit), file.is_signed ? 1 : 0));
+    pixmap.SetPhotometricInterpretation(gdcm::PhotometricInterpretation::MONOCHROME2);
+    pixmap.SetTransferSyntax(gdcm::TransferSyntax(syntax));
+    pixmap.SetDataElement(element_of(fragments));
+    return pixmap;
+}
+
+/// Frames of JPEG, JPEG-LS and JPEG 2000. The library's decoders end the program over damaged frames, and leave parts
+/// of pictures unwritten.
+cv::Mat decoded(const DicomFile& file, const DicomBytes& read) {
     // What the library would print becomes an exception here.
     gdcm::Trace::WarningOff();
     gdcm::Trace::ErrorOff();
-    gdcm::PixmapReader reader;
-    reader.SetFileName(file.path.c_str());
-    if (!reader.Read())
-        throw damaged(
-            file, "they are cut short, or packed in a way that is not known (transfer syntax " + transfer_syntax + ")");
-    const gdcm::Pixmap& pixmap = reader.GetPixmap();
-    const int depth = opencv_depth(pixmap.GetPixelFormat());
-    if (depth < 0)
-        throw unusable(file.path, "its pixels are of type " +
-                                      std::string(pixmap.GetPixelFormat().GetScalarTypeAsString()) +
-                                      "; convert it to 16 bits");
-    cv::Mat frames = frames_of(file, depth);
-    if (pixmap.GetBufferLength() != frames.total() * frames.elemSize())
-        throw damaged(file, std::to_string(pixmap.GetBufferLength()) + " bytes where its header promises " +
-                                std::to_string(frames.total() * frames.elemSize()));
-    if (!pixmap.GetBuffer(reinterpret_cast<char*>(frames.data))) throw damaged(file, "they are cut short or damaged");
+    const gdcm::Pixmap pixmap = packed_pixmap(file, read);
+    cv::Mat frames = frames_of(
+        file, file.bits_allocated == 8 ? (file.is_signed ? CV_8S : CV_8U) : (file.is_signed ? CV_16S : CV_16U));
+    const std::size_t bytes = frames.total() * frames.elemSize();
+    const auto decode = [&](char* target) { return pixmap.GetBufferLength() == bytes && pixmap.GetBuffer(target); };
+    if (!decode_isolated(decode, reinterpret_cast<char*>(frames.data), bytes))
+        throw damaged(file, "they are cut short or damaged (transfer syntax " + read.transfer_syntax + ")");
     return frames;
 }
 
@@ -241,6 +272,9 @@ DicomFile description_of(const fs::path& path, const DicomSet& set) {
     file.mosaic = set.text(0x00080008).find("MOSAIC") != std::string::npos;
     const double frames = set.number(0x00280008).value_or(1.0);
     values_of(path, {frames, 1.0 * file.rows, 1.0 * file.columns});
+    std::error_code unknown;
+    if (frames > 8.0 * static_cast<double>(fs::file_size(path, unknown)))
+        throw unreadable(path, "it promises " + text_of({frames}) + " frames, more than it can hold; it is damaged");
     FrameAttributes attributes(set);
     for (std::size_t i = 0; i < static_cast<std::size_t>(frames); ++i) file.frames.push_back(attributes.frame(i));
     if (file.modality == "RTDOSE") place_dose_planes(set, file.frames);
@@ -279,7 +313,7 @@ cv::Mat read_dicom_pixels(const DicomFile& file) {
     if (!read.set.contains(pixel_data))
         throw unusable(file.path, "it holds no whole numbers as pixels (Pixel Data); convert it to 16 bits");
     const std::optional<std::string> bytes = within_file(file.path, [&] { return plain_bytes(file, read); });
-    if (!bytes) return decoded(file, read.transfer_syntax);
+    if (!bytes) return decoded(file, read);
     const std::uint64_t pixels =
         static_cast<std::uint64_t>(file.rows) * static_cast<std::uint64_t>(file.columns) * file.frames.size();
     const bool packed_bits = bits == 1 && !read.set.fragments(pixel_data);

@@ -1,5 +1,7 @@
 #include "imaging/detail/header_checks.hpp"
 
+#include "core/file_message.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <sstream>
@@ -15,11 +17,11 @@ constexpr double most_values = 2147483647.0;
 }  // namespace
 
 InvalidInput unusable(const fs::path& path, const std::string& cause) {
-    return InvalidInput("cannot use '" + path.string() + "': " + cause);
+    return InvalidInput(presentable("cannot use '" + path.string() + "': " + cause));
 }
 
 IoError unreadable(const fs::path& path, const std::string& cause) {
-    return IoError("cannot read '" + path.string() + "': " + cause);
+    return IoError(presentable("cannot read '" + path.string() + "': " + cause));
 }
 
 std::string text_of(const std::vector<double>& sizes) {

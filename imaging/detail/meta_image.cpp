@@ -127,7 +127,7 @@ void read_layout(const fs::path& path, const TextHeader& header, const std::vect
         return skip_headers(path, header, bytes, voxels);
     }
     const auto slices = static_cast<std::uint64_t>(sizes[2]);
-    for (const fs::path& file : files_of(path, header, data, slices)) voxels.pieces.push_back({file, 0});
+    for (const fs::path& file : files_of(path, header, data, slices, slices)) voxels.pieces.push_back({file, 0});
     const std::uint64_t files = voxels.pieces.size();
     if (files != 1 && files != slices)
         throw unusable(path, "its header names " + std::to_string(files) + " files for " + std::to_string(slices) +

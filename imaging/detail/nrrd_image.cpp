@@ -382,7 +382,8 @@ private:
             voxels.pieces = {{path_, header_.bytes}};
         } else {
             const auto last = static_cast<std::size_t>(sizes_.back());
-            for (const fs::path& file : files_of(path_, header_, data, last)) voxels.pieces.push_back({file, 0});
+            const auto rows = static_cast<std::size_t>(values_of(path_, {sizes_.begin() + 1, sizes_.end()}));
+            for (const fs::path& file : files_of(path_, header_, data, last, rows)) voxels.pieces.push_back({file, 0});
             require_file_count();
         }
         skip(bytes / voxels.pieces.size());

@@ -64,7 +64,7 @@ bool is_pattern(const std::string& word) {
 
 /// "pattern [first [last [step]]]", counted inclusively as both formats do.
 std::vector<std::string> names_of_pattern(const std::filesystem::path& path, const std::string& value,
-                                          std::size_t slices) {
+                                          std::size_t slices, std::size_t most) {
     std::istringstream words(value);
     std::string pattern;
     words >> pattern;
@@ -77,10 +77,11 @@ std::vector<std::string> names_of_pattern(const std::filesystem::path& path, con
     if (!(words >> last)) last = first + static_cast<long long>(slices) - 1;
     words.clear();
     if (!(words >> step)) step = last < first ? -1 : 1;
-    constexpr long long most = 1 << 20;
-    if (step == 0 || (last - first) / step < 0 || (last - first) / step > most)
+    const auto most_files = static_cast<long long>(most);
+    if (step == 0 || (last - first) / step < 0 || (last - first) / step >= most_files)
         throw unusable(path, "the file names '" + value + "' count from " + std::to_string(first) + " to " +
-                                 std::to_string(last) + " by " + std::to_string(step) + "; correct the header");
+                                 std::to_string(last) + " by " + std::to_string(step) +
+                                 "; one file for each slice is needed, at most " + std::to_string(most_files));
     std::vector<std::string> names;
     for (long long i = first; step > 0 ? i <= last : i >= last; i += step) {
         std::vector<char> name(pattern.size() + 64);
@@ -153,14 +154,14 @@ TextHeader read_meta_header(const std::filesystem::path& path) {
 }
 
 std::vector<std::filesystem::path> files_of(const std::filesystem::path& header_path, const TextHeader& header,
-                                            const std::string& value, std::size_t slices) {
+                                            const std::string& value, std::size_t slices, std::size_t most) {
     std::vector<std::string> names{value};
     // A name may hold blanks or '%'; a pattern is followed by numbers or is one by itself.
     const std::string first_word = value.substr(0, value.find_first_of(" \t"));
     if (is_list(value))
         names = header.listed_files;
     else if (is_pattern(first_word) || (first_word != value && first_word.find('%') != std::string::npos))
-        names = names_of_pattern(header_path, value, slices);
+        names = names_of_pattern(header_path, value, slices, most);
     std::vector<std::filesystem::path> files;
     for (const std::string& name : names) files.push_back(header_path.parent_path() / name);
     return files;

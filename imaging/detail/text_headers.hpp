@@ -25,9 +25,10 @@ TextHeader read_nrrd_header(const std::filesystem::path& path);
 TextHeader read_meta_header(const std::filesystem::path& path);
 
 /// The names of the files of slices that "LIST" or "pattern first last step" stands for, in a header's folder; one name
-/// otherwise. `fields` are the words of the value. Throws InvalidInput on a pattern that is none.
+/// otherwise. A pattern without `last` stands for `slices` files; it stands for `most` at most. Throws InvalidInput on
+/// a pattern that is none.
 std::vector<std::filesystem::path> files_of(const std::filesystem::path& header_path, const TextHeader& header,
-                                            const std::string& value, std::size_t slices);
+                                            const std::string& value, std::size_t slices, std::size_t most);
 
 /// The text without blanks at both ends; in lower case.
 std::string trimmed(const std::string& text);

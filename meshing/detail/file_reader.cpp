@@ -1,5 +1,6 @@
 #include "meshing/detail/file_reader.hpp"
 
+#include "core/file_message.hpp"
 #include "core/text_table.hpp"
 
 #include <charconv>
@@ -76,11 +77,11 @@ long long FileReader::to_integer(std::string_view word) const {
 }
 
 void FileReader::fail(const std::string& problem) const {
-    throw IoError("'" + path_.string() + "' " + problem);
+    throw IoError(presentable("'" + path_.string() + "' " + problem));
 }
 
 void FileReader::refuse(const std::string& problem) const {
-    throw InvalidInput("'" + path_.string() + "' " + problem);
+    throw InvalidInput(presentable("'" + path_.string() + "' " + problem));
 }
 
 std::string extension_of(const std::filesystem::path& path) {

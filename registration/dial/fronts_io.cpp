@@ -1,7 +1,7 @@
 #include "registration/dial/fronts_io.hpp"
 
 #include "core/atomic_file.hpp"
-#include "core/errors.hpp"
+#include "core/file_message.hpp"
 #include "core/user_cache.hpp"
 #include "registration/dial/shipped_fronts.hpp"
 
@@ -63,7 +63,8 @@ public:
         fail("'data' is " + member(entry, "data").dump() + " and should be \"labels\" or \"partial\"");
     }
     [[noreturn]] void fail(const std::string& what) const {
-        throw InvalidInput(source_ + ": " + what + "; remove the file or run 'tissuewarp calibrate' again");
+        throw InvalidInput(
+            presentable(source_ + ": " + what + "; remove the file or run 'tissuewarp calibrate' again"));
     }
 
 private:

@@ -119,6 +119,10 @@ PointMap composed(const std::vector<ItkTransform>& transforms, const std::filesy
         throw InvalidInput("'" + path.string() + "' holds " + std::to_string(parts.size()) +
                            " transforms that are no composition; save one");
     for (const ItkTransform& part : parts) {
+        for (const std::vector<double>* numbers : {&part.parameters, &part.fixed})
+            if (!std::all_of(numbers->begin(), numbers->end(), [](double v) { return std::isfinite(v); }))
+                throw InvalidInput("'" + path.string() + "' has parameters of an " + part.type +
+                                   " that are not finite; save the transform again");
         if (const auto step = linear(part, path)) {
             (map.field ? map.before : map.after) = (map.field ? map.before : map.after) * *step;
         } else if (part.type.starts_with("DisplacementFieldTransform") && !map.field) {

@@ -2,6 +2,7 @@
 // /TransformGroup/<n>/Transform{Type,Parameters,FixedParameters}.
 
 #include "core/detail/hdf5.hpp"
+#include "core/detail/hdf5_seal.hpp"
 #include "core/errors.hpp"
 #include "registration/io/itk_transform.hpp"
 
@@ -15,8 +16,7 @@ bool holds(hid_t file, const std::string& name) {
 
 class ItkFile {
 public:
-    explicit ItkFile(const std::filesystem::path& path)
-        : path_(path), file_(H5Fopen(path.string().c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose) {
+    explicit ItkFile(const std::filesystem::path& path) : path_(path), file_(opened(path), H5Fclose) {
         if (!file_.valid()) fail("cannot be opened as HDF5");
         if (!holds(file_, "/TransformGroup")) fail("holds no transform of ITK");
     }
@@ -33,7 +33,13 @@ private:
     Hdf5Quiet quiet_;
     const std::filesystem::path& path_;
     Hdf5Handle file_;
+    /// Deflate saves a factor of 1032 at most.
+    std::uintmax_t most_values_ = std::filesystem::file_size(path_) * 1032 / sizeof(float);
 
+    static hid_t opened(const std::filesystem::path& path) {
+        require_unbroken_hdf5(path);
+        return H5Fopen(path.string().c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+    }
     static std::string group(int n) { return "/TransformGroup/" + std::to_string(n); }
     [[noreturn]] void fail(const std::string& problem) const { throw IoError("'" + path_.string() + "' " + problem); }
 
@@ -41,7 +47,9 @@ private:
         const Hdf5Handle set(H5Dopen2(file_, name.c_str(), H5P_DEFAULT), H5Dclose);
         if (!set.valid()) fail("lacks " + name);
         const Hdf5Handle type(H5Dget_type(set), H5Tclose);
-        if (H5Tget_class(type) != H5T_STRING) fail("has no text in " + name);
+        const Hdf5Handle space(H5Dget_space(set), H5Sclose);
+        if (H5Tget_class(type) != H5T_STRING || H5Sget_simple_extent_npoints(space) != 1)
+            fail("has not one text in " + name);
         if (H5Tis_variable_str(type) > 0) {
             char* read = nullptr;
             if (H5Dread(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, static_cast<void*>(&read)) < 0 || !read)
@@ -63,7 +71,7 @@ private:
         const Hdf5Handle set(H5Dopen2(file_, name.c_str(), H5P_DEFAULT), H5Dclose);
         const Hdf5Handle space(set.valid() ? H5Dget_space(set) : H5I_INVALID_HID, H5Sclose);
         const hssize_t count = space.valid() ? H5Sget_simple_extent_npoints(space) : -1;
-        if (count < 0) fail("has damaged numbers in " + name);
+        if (count < 0 || static_cast<std::uintmax_t>(count) > most_values_) fail("has damaged numbers in " + name);
         std::vector<double> result(static_cast<std::size_t>(count));
         if (count > 0 && H5Dread(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, result.data()) < 0)
             fail("has damaged numbers in " + name);

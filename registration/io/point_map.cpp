@@ -1,6 +1,6 @@
 #include "registration/io/point_map.hpp"
 
-#include "core/errors.hpp"
+#include "core/file_message.hpp"
 #include "imaging/image_io.hpp"
 #include "registration/io/itk_transform.hpp"
 
@@ -75,8 +75,9 @@ ItkTransform itk_matlab(const std::string& bytes, const std::filesystem::path& p
         at += sizeof header;
         const std::int64_t count = std::int64_t{header[1]} * header[2], width = header[0] == 10 ? 4 : 8;
         const bool known = header[0] == 0 || header[0] == 10;
-        if (!known || header[1] < 0 || header[2] < 0 || header[3] != 0 || header[4] < 1 ||
-            header[4] + count * width > static_cast<std::int64_t>(bytes.size() - at))
+        const auto left = static_cast<std::int64_t>(bytes.size() - at);
+        if (!known || header[1] < 0 || header[2] < 0 || header[3] != 0 || header[4] < 1 || header[4] > left ||
+            count > (left - header[4]) / width)
             throw damaged();
         const std::string name = &bytes[at];
         at += static_cast<std::size_t>(header[4]);
@@ -118,9 +119,7 @@ PointMap displacement_image(const std::filesystem::path& path) {
     return map;
 }
 
-}  // namespace
-
-PointMap read_point_map(const std::filesystem::path& path) {
+PointMap read_checked(const std::filesystem::path& path) {
     const std::string extension = path.extension().string();
     if (extension != ".mat" && extension != ".h5" && imaging::is_image(path)) return displacement_image(path);
     const std::string bytes = bytes_of(path);
@@ -128,6 +127,12 @@ PointMap read_point_map(const std::filesystem::path& path) {
     if (bytes.starts_with("#Insight Transform File")) return detail::composed(itk_text(bytes, path), path);
     if (extension == ".mat") return detail::composed({itk_matlab(bytes, path)}, path);
     return matrix(bytes, path);
+}
+
+}  // namespace
+
+PointMap read_point_map(const std::filesystem::path& path) {
+    return naming(path, [&] { return read_checked(path); });
 }
 
 }  // namespace tissuewarp::registration

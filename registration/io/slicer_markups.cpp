@@ -1,6 +1,6 @@
 #include "registration/io/slicer_markups.hpp"
 
-#include "core/errors.hpp"
+#include "core/file_message.hpp"
 #include "core/text_table.hpp"
 
 #include <nlohmann/json.hpp>
@@ -220,7 +220,7 @@ bool is_slicer_markups(const std::filesystem::path& path) {
 
 Markups read_slicer_markups(const std::filesystem::path& path, Observer& observer) {
     const bool fcsv = lower_case(path.extension().string()) == ".fcsv";
-    Markups markups = fcsv ? FcsvReader(path).read(observer) : read_json(path, observer);
+    Markups markups = naming(path, [&] { return fcsv ? FcsvReader(path).read(observer) : read_json(path, observer); });
     if (markups.labels.empty())
         throw InvalidInput(path.string() + ": holds no placed point; place points, and show those that shall count");
     return markups;

@@ -1,5 +1,6 @@
 /// Records and prepared models survive the disk bit by bit, and what is damaged or foreign is refused in words.
 #include "registration/record.hpp"
+#include "core/detail/hdf5_seal.hpp"
 #include "registration/io/stored_model.hpp"
 #include "registration/prepared_io.hpp"
 #include "tests/registration/shapes.hpp"
@@ -87,6 +88,7 @@ protected:
         H5Sclose(space);
         H5Dclose(data);
         H5Fclose(file);
+        seal_hdf5(path);
     }
 
     void set_version(int version) const {
@@ -95,6 +97,7 @@ protected:
         ASSERT_GE(H5Awrite(attribute, H5T_NATIVE_INT, &version), 0);
         H5Aclose(attribute);
         H5Fclose(file);
+        seal_hdf5(path);
     }
 
     /// Materials as version 1 had them: the moduli of the two neo-Hookean laws.
@@ -119,12 +122,14 @@ protected:
         }
         ASSERT_GE(H5Ldelete(file, (group + "/parameters").c_str(), H5P_DEFAULT), 0);
         H5Fclose(file);
+        seal_hdf5(path);
     }
 
     void remove_dataset(const char* name) const {
         const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
         ASSERT_GE(H5Ldelete(file, name, H5P_DEFAULT), 0);
         H5Fclose(file);
+        seal_hdf5(path);
     }
 };
 
@@ -176,6 +181,7 @@ TEST_F(Records, HoldEveryLaw) {
     {
         Hdf5Output file(path, "materials", 1);
         detail::write_materials(file, "materials", materials);
+        file.close();
     }
     const Hdf5Input file(path, "materials", 1, 1);
     EXPECT_EQ(detail::read_materials(file, "materials"), materials);
@@ -249,6 +255,31 @@ TEST_F(Records, WithAFlippedByteAreRefused) {
     EXPECT_THROW(read_record(path), IoError);
 }
 
+TEST_F(Records, WithoutASealAreReadWhereTheirStructureIsSound) {
+    const fs::path old = folder / "old.h5";
+    const auto copy = [&] {  // as versions before the seal wrote them
+        const hid_t from = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT),
+                    to = H5Fcreate(old.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+        for (const char* name : {"mesh", "displacement"}) H5Ocopy(from, name, to, name, H5P_DEFAULT, H5P_DEFAULT);
+        H5Fclose(to);
+        H5Fclose(from);
+    };
+    write();
+    copy();
+    EXPECT_NO_THROW(require_unbroken_hdf5(old));
+    const auto size = fs::file_size(old);
+    std::ifstream stream(old, std::ios::binary);
+    std::string bytes(size, '\0');
+    stream.read(bytes.data(), static_cast<std::streamsize>(size));
+    const std::size_t tree = bytes.find("TREE"), heap = bytes.find("HEAP");
+    for (const std::size_t place : {std::size_t{40}, tree, heap, heap + 8, heap + 24}) {
+        std::string damaged = bytes;
+        damaged[place] = static_cast<char>(damaged[place] ^ 0x55);
+        std::ofstream(old, std::ios::binary) << damaged;
+        EXPECT_THROW(require_unbroken_hdf5(old), IoError) << place;
+    }
+}
+
 TEST_F(Records, OfForeignFormatsAreRefused) {
     std::ofstream(path) << "not HDF5";
     EXPECT_THROW(read_record(path), IoError);
@@ -310,6 +341,7 @@ TEST_F(Records, OfPartsThatDisagreeInSizeAreRefused) {
     H5Dclose(data);
     H5Sclose(space);
     H5Fclose(file);
+    seal_hdf5(path);
     EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr("4 nodes")));
 }
 
