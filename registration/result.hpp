@@ -99,6 +99,7 @@ struct LastPulls {
     double energy = 1;            ///< mN mm that weighs as much as one standard deviation of a datum
     bool free_placement = false;  ///< nothing but the data says where the organ lies: the prior moves with it
     bool parts_alone = false;     ///< points of it: neither labels nor an image show the organ as a whole
+    bool placement_sought = false;  ///< by the data: neither headers nor what does not move place the organ
     double load_size = 0;         ///< of unknown loads that were found: they strain tissue by about its square times
                                   ///< `energy`; 0: none
 

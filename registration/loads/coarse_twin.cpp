@@ -143,6 +143,7 @@ LastPulls pulls_on(const PreparedModel& coarse, const PreparedModel& prepared, c
     pulls.energy = given.energy;
     pulls.free_placement = given.free_placement;
     pulls.parts_alone = given.parts_alone;
+    pulls.placement_sought = given.placement_sought;
     return pulls;
 }
 

@@ -26,13 +26,6 @@ Columns times(const std::vector<tled::Spring>& springs, const Columns& vectors) 
     return result;
 }
 
-/// Unit forces at nodes along the axes, 3N × 3 per node.
-Columns unit_forces(const std::vector<int>& nodes, Eigen::Index rows) {
-    Columns forces = Columns::Zero(rows, 3 * static_cast<Eigen::Index>(nodes.size()));
-    for (Eigen::Index k = 0; k < forces.cols(); ++k) forces(3 * nodes[static_cast<std::size_t>(k / 3)] + k % 3, k) = 1;
-    return forces;
-}
-
 /// Of a symmetric matrix whose eigenvalues are to be no smaller than `least`.
 Columns bounded_inverse(const Columns& matrix, double least) {
     const Eigen::SelfAdjointEigenSolver<Columns> modes(matrix);
@@ -65,27 +58,12 @@ std::pair<Posterior, Posterior> Posterior::both(const PreparedModel& prepared, c
 
 Posterior::Posterior(const PreparedModel& prepared, const WeighedSprings& springs, tled::RestStiffness stiffness)
     : stiffness_(std::move(stiffness)),
-      rows_(3 * Eigen::Index(prepared.rest.node_count)),
-      energy_(springs.energy),
-      freed_(rows_, 0) {
+      freed_(3 * Eigen::Index(prepared.rest.node_count), 0) {
     if (!springs.free_placement) return;
     const Columns motions = rigid_motions(prepared.model.mesh.nodes), held = times(springs.ground, motions);
     freed_ = stiffness_.solve_columns(held);
     middle_ = bounded_inverse(motions.transpose() * held - held.transpose() * freed_,
-                              energy_ / (posterior_options.least_known_mm * posterior_options.least_known_mm));
-}
-
-std::vector<Eigen::Matrix3d> Posterior::covariances(const std::vector<int>& nodes) const {
-    const Columns answers = stiffness_.solve_columns(unit_forces(nodes, rows_));
-    std::vector<Eigen::Matrix3d> result;
-    for (std::size_t n = 0; n < nodes.size(); ++n) {
-        const Eigen::Index row = 3 * Eigen::Index(nodes[n]);
-        result.emplace_back(energy_ * answers.block<3, 3>(row, 3 * Eigen::Index(n)));
-        if (freed_.cols() == 0) continue;
-        const Eigen::Matrix<double, 3, Eigen::Dynamic> share = freed_.middleRows<3>(row);
-        result.back() += energy_ * share * middle_ * share.transpose();
-    }
-    return result;
+                              springs.energy / (posterior_options.least_known_mm * posterior_options.least_known_mm));
 }
 
 Eigen::MatrixXd Posterior::inverse(const Eigen::MatrixXd& forces) const {

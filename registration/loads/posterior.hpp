@@ -43,9 +43,6 @@ public:
     static std::pair<Posterior, Posterior> both(const PreparedModel& prepared, const WeighedSprings& first,
                                                 const WeighedSprings& second);
 
-    /// Covariances of the displacements of nodes, mm².
-    [[nodiscard]] std::vector<Eigen::Matrix3d> covariances(const std::vector<int>& nodes) const;
-
     /// The inverse of K times forces, 3N × k, mN: displacements, mm. Where
     /// the placement is free, the ground's hold on motions as a whole is taken out of K.
     [[nodiscard]] Eigen::MatrixXd inverse(const Eigen::MatrixXd& forces) const;
@@ -57,8 +54,6 @@ private:
     Posterior(const PreparedModel& prepared, const WeighedSprings& springs, tled::RestStiffness stiffness);
 
     tled::RestStiffness stiffness_;
-    Eigen::Index rows_;  // 3 N
-    double energy_;
     // (K − G R A⁻¹ Rᵀ G)⁻¹ = K⁻¹ + K⁻¹ H (A − Hᵀ K⁻¹ H)⁻¹ Hᵀ K⁻¹ with H = G R, A = Rᵀ G R (Woodbury):
     Eigen::MatrixXd freed_;   // K⁻¹ H, 3N × 6, or 3N × 0 where the placement is not free
     Eigen::MatrixXd middle_;  // (A − Hᵀ K⁻¹ H)⁻¹

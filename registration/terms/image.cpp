@@ -87,10 +87,11 @@ Eigen::Isometry3d ImageTerm::rigid_motion() const {
         moving.col(n) = matches_.matches[static_cast<std::size_t>(n)].moving;
         fixed.col(n) = matches_.matches[static_cast<std::size_t>(n)].fixed;
     }
-    if (prior_.share_in_view() < image_pose_options.whole_view &&
-        median_distance(moving, fixed) < options_.headers_within_mm)
-        return Eigen::Isometry3d::Identity();
-    return least_trimmed_motion(moving, fixed);
+    const Eigen::Isometry3d motion = least_trimmed_motion(moving, fixed);
+    if (prior_.share_in_view() >= image_pose_options.whole_view) return motion;
+    const double without = median_distance(moving, fixed), with = median_distance(motion * moving, fixed);
+    const bool deforms = with > image_pose_options.most_left * without && without < options_.headers_within_mm;
+    return deforms ? Eigen::Isometry3d::Identity() : motion;
 }
 
 const std::vector<ImageTerm::PulledMatch>& ImageTerm::pulled(const State& state) {
