@@ -174,7 +174,7 @@ void run(const Arguments& arguments) {
     std::printf(
         "| draw | coverage (as found) | outliers | start | rigid, mm | elastic, mm | inliers | residual, mm | rival, "
         "mm | "
-        "95 % radius, mm | s | doubts |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+        "95 %% radius, mm | s | doubts |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
     for (int seed = arguments.first; seed < arguments.first + arguments.count; ++seed) {
         const Draw draw = Drawing(truth, static_cast<unsigned>(seed)).draw(arguments.deviation_mm, seed % 2 == 0);
         const Eigen::Matrix3Xd targets = draw.pose * landmarks.fixed;
