@@ -52,7 +52,7 @@ tled::NodalConditions conditions_of(const PreparedModel& prepared, const LastPul
 /// Points of a part of the surface alone: where an organ of smooth shape lies may be told wrong, by more than any
 /// estimate about the place that was found says.
 bool place_is_uncertain(const UpdateResult& result) {
-    return result.pulls.free_placement && result.surface && !result.points && !result.curves;
+    return result.pulls.prior_moves == PriorMoves::WithSurface && result.surface && !result.points && !result.curves;
 }
 
 /// x with Φ(x) = probability, by Newton's method.

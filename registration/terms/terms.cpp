@@ -51,6 +51,12 @@ Term& Terms::best_placed() const {
     return **std::max_element(terms_.begin(), terms_.end(), less);
 }
 
+PriorMoves Terms::prior_moves() const {
+    if (free_placement_) return PriorMoves::WithSurface;
+    const bool placed = std::any_of(terms_.begin(), terms_.end(), [](const auto& term) { return term->has_placed(); });
+    return placed ? PriorMoves::WithData : PriorMoves::Not;
+}
+
 Alignment Terms::pose(Observer& observer) {
     Term& best = best_placed();
     Eigen::Isometry3d start = Eigen::Isometry3d::Identity();

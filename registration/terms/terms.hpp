@@ -21,8 +21,8 @@ public:
 
     /// Points alone show the organ.
     [[nodiscard]] bool parts_alone() const { return parts_alone_; }
-    /// Points show the organ wherever it lies, and nothing says where that is.
-    [[nodiscard]] bool free_placement() const { return free_placement_; }
+    /// With the surface where points show the organ wherever it lies, and nothing says where that is.
+    [[nodiscard]] PriorMoves prior_moves() const;
     /// The data say where the organ lies as a whole.
     [[nodiscard]] bool placement_sought() const { return placement_sought_; }
     /// Loads that nobody stated and that data may tell: of points of a free organ all, tractions too, since these also

@@ -1,6 +1,7 @@
 #include "registration/uncertainty/data_uncertainty.hpp"
 
 #include "registration/loads/unknown_loads.hpp"
+#include "registration/pose/rigid_part.hpp"
 #include "registration/pose/shown_motions.hpp"
 #include "registration/springs/ground_springs.hpp"
 #include "registration/uncertainty/error_model.hpp"
@@ -93,6 +94,17 @@ MatrixXd unseen_motions(const LastPulls& pulls, const Eigen::Matrix3Xd& nodes) {
     return error_model.unseen_motion_mm * shown.motions.leftCols(unseen);
 }
 
+/// What is missed if the tissue was not deformed but moved as a whole, as nearly as data show it move (3N × 1, mm):
+/// where the prior holds the rest back, A⁻¹ G' u.
+MatrixXd missed_if_rigid(const LastPulls& pulls, const Eigen::Matrix3Xd& nodes, const Eigen::Matrix3Xd& displacement,
+                         const LinearRegistration& registration) {
+    if (!pulls.placement_sought || pulls.prior_moves != PriorMoves::Not) return MatrixXd(nodes.size(), 0);
+    const MatrixXd motions = rigid_motions(nodes), weighed = forces_of(pulls.of(Origin::Datum), motions);
+    const MatrixXd motion =
+        motions * (motions.transpose() * weighed).ldlt().solve(weighed.transpose() * displacement.reshaped());
+    return registration.inverse(forces_of(pulls.of(Origin::Prior), motion));
+}
+
 bool has_prior(const LastPulls& pulls) {
     return std::any_of(pulls.springs.begin(), pulls.springs.end(),
                        [](const PulledNode& pulled) { return pulled.origin == Origin::Prior; });
@@ -116,7 +128,9 @@ OpenParts open_parts(const PreparedModel& prepared, const LastPulls& given, cons
     DataUncertainty result;
     result.covariance = covariances_of(beside(on.error, in.error)) +
                         covariances_of(registration.inverse(forces_of(data, errors, prepared.rest.node_count)));
-    const Covariances placement = sum_of_squares(unseen_motions(pulls, prepared.model.mesh.nodes));
+    const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
+    const Covariances placement =
+        sum_of_squares(beside(unseen_motions(pulls, nodes), missed_if_rigid(pulls, nodes, displacement, registration)));
     result.held_out =
         held_out(prepared, pulls, unseen, displacement, few_of(on.truths, in.truths, held_out_options.draws),
                  few_of(errors, held_out_options.draws));

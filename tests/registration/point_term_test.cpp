@@ -85,9 +85,8 @@ TEST(PointTerm, TwoPairsShiftTheOrganAndDoNotTurnIt) {
     const PointPairs places = grid_pairs(15);
     const Matrix3Xd moved = PointTransform(result.deformation)(places.moving);
     EXPECT_LT(((moved - places.moving).colwise() - shift).colwise().norm().maxCoeff(), 0.1);
-    EXPECT_THAT(test::codes(result.doubts), testing::IsSupersetOf({"placement.turn_unknown", "placement.loose"}));
-    const UncertaintySummary summary = summarise(uncertainty(prepared, result));
-    EXPECT_TRUE(doubt_of_data(summary)) << summary.failed_share;  // two points say little of the rest
+    EXPECT_THAT(test::codes(result.doubts), testing::Contains("placement.turn_unknown"));
+    EXPECT_GT(summarise(uncertainty(prepared, result)).failed_share, 0.3);  // two points say little of the rest
 }
 
 TEST(PointTerm, WrongPairsAmongFewAreSaid) {
