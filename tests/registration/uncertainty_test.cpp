@@ -63,9 +63,9 @@ TEST(Posterior, IsTheInverseOfTheDenseMatrix) {
     ASSERT_LE(count, 16);
     detail::WeighedSprings springs;
     springs.energy = 300;
-    springs.ground = detail::ground_springs(prepared, springs.energy, [](const InterfaceNode&) { return 0.7; });
+    springs.ground = detail::ground_springs(prepared, springs.energy, [](const InterfaceNode&) { return 7.0; });
     for (const int node : {0, 1, 4, 5})
-        springs.data.push_back({node, Vector3d(20, 5, 60).asDiagonal(), Vector3d::Zero()});
+        springs.data.push_back({node, Vector3d(2000, 500, 6000).asDiagonal(), Vector3d::Zero()});
     tled::Conditions all;
     all.springs = springs.data;
     all.springs.insert(all.springs.end(), springs.ground.begin(), springs.ground.end());
