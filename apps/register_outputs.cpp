@@ -214,12 +214,7 @@ std::string summary_text(const RegistrationRun& run, double total_seconds) {
         text += fmt::format("anchors: {} nodes, moved by at most {:.2f} mm\n", fit->nodes, fit->largest_mm);
     text += fmt::format("from data at hand to warped image: {:.2f} s\n", run.intraoperative_seconds);
     if (run.dial) text += "chosen: " + run.dial->reason + "\n";
-    if (const auto& error = run.products.uncertainty) {
-        text += estimate_text(registration::summarise(*error));
-        if (const auto& expected = error->expected())
-            text += fmt::format("expected error of tissue: {:.1f} mm, at most {:.1f} mm\n", expected->mean_mm,
-                                expected->worst_mm);
-    }
+    if (const auto& error = run.products.uncertainty) text += estimate_text(registration::summarise(*error));
     if (!run.scores.after.empty()) text += "Dice                      before   after\n";
     for (const auto& [label, after] : run.scores.after)
         text += fmt::format("  {:<22}{:>8.3f}{:>8.3f}\n", label == 0 ? "all labels" : fmt::format("label {}", label),

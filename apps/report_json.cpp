@@ -192,12 +192,6 @@ void add_fits(json& report, const registration::UpdateResult& result) {
         report["anchors"] = {{"nodes", fit->nodes}, {"largest_mm", number(fit->largest_mm)}};
 }
 
-json to_json(const registration::ExpectedError& expected) {
-    return {{"mean_mm", number(expected.mean_mm)},
-            {"worst_mm", number(expected.worst_mm)},
-            {"worst_place_mm", vector(expected.worst_place)}};
-}
-
 json to_json(const registration::HeldOut& held_out) {
     return {{"z", number(held_out.z)}, {"regions", held_out.regions}};
 }
@@ -211,7 +205,8 @@ json to_json(const registration::UncertaintySummary& s) {
             {"worst_interval_95_mm", number(s.worst_interval_mm)},
             {"worst_place_mm", vector(s.worst_place)},
             {"shown_share", number(s.shown_share)},
-            {"unknown_share", number(s.unknown_share)}};
+            {"unknown_share", number(s.unknown_share)},
+            {"beyond_10_mm_share", number(s.failed_share)}};
 }
 
 /// What was asked for, chosen and expected.
@@ -340,7 +335,6 @@ json report_json(const RegistrationRun& run, double total_seconds) {
     if (run.products.uncertainty) {
         report["error_estimate"] = to_json(registration::summarise(*run.products.uncertainty));
         if (const auto& held_out = run.products.uncertainty->held_out()) report["held_out"] = to_json(*held_out);
-        if (const auto& expected = run.products.uncertainty->expected()) report["expected_error"] = to_json(*expected);
     }
     report["intraoperative_seconds"] = run.intraoperative_seconds;
     if (run.dial) report["dial"] = dial(run);

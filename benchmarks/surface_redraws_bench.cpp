@@ -174,7 +174,7 @@ void run(const Arguments& arguments) {
     std::printf(
         "| draw | coverage (as found) | outliers | start | rigid, mm | elastic, mm | inliers | residual, mm | rival, "
         "mm | "
-        "expected, mm | s | doubts |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+        "95 %% radius, mm | s | doubts |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
     for (int seed = arguments.first; seed < arguments.first + arguments.count; ++seed) {
         const Draw draw = Drawing(truth, static_cast<unsigned>(seed)).draw(arguments.deviation_mm, seed % 2 == 0);
         const Eigen::Matrix3Xd targets = draw.pose * landmarks.fixed;
@@ -187,7 +187,7 @@ void run(const Arguments& arguments) {
         const auto start = std::chrono::steady_clock::now();
         UpdateResult result = update(prepared, {.surface = draw.seen}, options);
         const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-        const ExpectedError expected = expected_error(prepared, result);
+        const UncertaintySummary expected = summarise(uncertainty(prepared, result));
         if (const auto doubt = doubt_of_data(expected)) result.doubts.push_back(*doubt);
         errors.push_back(mean_error(PointTransform(result.deformation)(landmarks.moving), targets));
         constexpr double failure_mm = 5;
@@ -198,7 +198,7 @@ void run(const Arguments& arguments) {
             "| %d | %.2f (%.2f) | %.2f | %.0f°, %.0f mm | %.2f | %.2f | %.2f | %.2f | %.0f at %.2f | %.2f | %.1f |",
             seed, draw.coverage, result.surface->coverage, draw.outliers, draw.angle_deg, draw.shift_mm,
             rigid_errors.back(), errors.back(), result.surface->inlier_share, result.surface->residual_mm,
-            result.surface->rival_mm, result.surface->rival_support, expected.mean_mm, seconds);
+            result.surface->rival_mm, result.surface->rival_support, expected.interval_mm, seconds);
         for (const Doubt& doubt : result.doubts) std::printf(" %s;", full_text(doubt).c_str());
         std::printf(" |\n");
         std::fflush(stdout);

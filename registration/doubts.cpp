@@ -1,7 +1,10 @@
 #include "registration/doubts.hpp"
 
+#include "registration/pose/shown_motions.hpp"
+
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 namespace tissuewarp::registration::detail {
 
@@ -34,6 +37,8 @@ std::vector<Doubt> doubts_of_course(const UpdateResult& result) {
         doubts.push_back({"tissue.compressed", result.min_jacobian, limits.least_jacobian,
                           "tissue is compressed to " + to_text(result.min_jacobian) + " of its volume in one element",
                           "look there: labels or matches that pull against each other press tissue so"});
+    if (auto doubt = doubt_of_placement(result.pulls, result.deformation.mesh.nodes))
+        doubts.push_back(std::move(*doubt));
     return doubts;
 }
 

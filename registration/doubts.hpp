@@ -20,7 +20,7 @@ std::string to_text(double value);
 /// "47 %", for messages.
 std::string percent(double share);
 
-/// Doubts about the course of the rounds and the tissue, whatever the data.
+/// Doubts about the course of the rounds, the tissue and the placement, whatever the data.
 std::vector<Doubt> doubts_of_course(const UpdateResult& result);
 
 }  // namespace tissuewarp::registration::detail

@@ -114,7 +114,7 @@ struct Registration {
     Round solve(const RoundPlan& plan) {
         const Round record = rounds.solve(plan, at);
         at.result.rounds.push_back(record);
-        if (terms.free_placement()) give_rigid_part_to_placement(prepared, at.state);
+        give_rigid_part_to_placement(prepared.model.mesh.nodes, at.result.pulls.placed_by(), at.state);
         return record;
     }
 

@@ -19,6 +19,16 @@ std::vector<PulledNode> LastPulls::data() const {
     return result;
 }
 
+std::vector<tled::Spring> LastPulls::placed_by() const {
+    if (prior_moves == PriorMoves::WithSurface) return of(Origin::Prior);
+    std::vector<tled::Spring> shown;
+    if (prior_moves == PriorMoves::Not) return shown;
+    for (const PulledNode& pulled : data())
+        if (pulled.shows_mm >= 0)
+            shown.push_back({pulled.spring.node, Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero()});
+    return shown;
+}
+
 const char* name_of(Severity severity) {
     return severity == Severity::Notice ? "notice" : "doubt";
 }

@@ -91,21 +91,32 @@ struct PulledNode {
     double shows_mm = 0;
 };
 
+/// What the springs of the prior move along with, so that they hold no motion of it as a whole.
+enum class PriorMoves {
+    Not,          ///< they stay where the headers or a search placed the organ
+    WithSurface,  ///< the organ's surface, all over
+    WithData      ///< tissue that data show
+};
+
 /// What pulled at the tissue in the last round.
 struct LastPulls {
     std::vector<PulledNode> springs;                              ///< in the order of their origins
     Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();  ///< moving → fixed, as it was in that round
     Eigen::Matrix3Xd loads;                                       ///< on the nodes, 3 × N, mN, those found among them
-    double energy = 1;            ///< mN mm that weighs as much as one standard deviation of a datum
-    bool free_placement = false;  ///< nothing but the data says where the organ lies: the prior moves with it
-    bool parts_alone = false;     ///< points of it: neither labels nor an image show the organ as a whole
-    double load_size = 0;         ///< of unknown loads that were found: they strain tissue by about its square times
-                                  ///< `energy`; 0: none
+    double energy = 1;  ///< mN mm that weighs as much as one standard deviation of a datum
+    PriorMoves prior_moves = PriorMoves::Not;
+    bool parts_alone = false;       ///< points of it: neither labels nor an image show the organ as a whole
+    bool placement_sought = false;  ///< by the data: neither headers nor what does not move place the organ
+    double load_size = 0;           ///< of unknown loads that were found: they strain tissue by about its square times
+                                    ///< `energy`; 0: none
 
     /// The springs of one origin.
     [[nodiscard]] std::vector<tled::Spring> of(Origin origin) const;
     /// Those of the data, with what else is known of them.
     [[nodiscard]] std::vector<PulledNode> data() const;
+    /// Springs at the nodes whose rigid motion the prior moves along with, each as stiff as the node weighs; none where
+    /// the prior does not move.
+    [[nodiscard]] std::vector<tled::Spring> placed_by() const;
 };
 
 /// What a doubt says of the result.

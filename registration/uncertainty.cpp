@@ -2,6 +2,7 @@
 
 #include "core/errors.hpp"
 #include "meshing/search/point_tree.hpp"
+#include "registration/doubts.hpp"
 #include "registration/loads/coarse_twin.hpp"
 #include "registration/springs/pull.hpp"
 #include "registration/uncertainty/data_uncertainty.hpp"
@@ -51,7 +52,7 @@ tled::NodalConditions conditions_of(const PreparedModel& prepared, const LastPul
 /// Points of a part of the surface alone: where an organ of smooth shape lies may be told wrong, by more than any
 /// estimate about the place that was found says.
 bool place_is_uncertain(const UpdateResult& result) {
-    return result.pulls.free_placement && result.surface && !result.points && !result.curves;
+    return result.pulls.prior_moves == PriorMoves::WithSurface && result.surface && !result.points && !result.curves;
 }
 
 /// x with Φ(x) = probability, by Newton's method.
@@ -146,9 +147,8 @@ Eigen::RowVectorXd traces(const Covariances& covariances) {
 
 }  // namespace
 
-Uncertainty::Uncertainty(meshing::TetMesh mesh, NodalErrors nodal, std::optional<HeldOut> held_out,
-                         std::optional<ExpectedError> expected)
-    : mesh_(std::move(mesh)), locator_(mesh_), nodal_(std::move(nodal)), held_out_(held_out), expected_(expected) {}
+Uncertainty::Uncertainty(meshing::TetMesh mesh, NodalErrors nodal, std::optional<HeldOut> held_out)
+    : mesh_(std::move(mesh)), locator_(mesh_), nodal_(std::move(nodal)), held_out_(held_out) {}
 
 ErrorEstimate Uncertainty::at(int tet, const Eigen::Vector4d& barycentric) const {
     const auto corners = mesh_.tets.col(tet);
@@ -214,6 +214,7 @@ UncertaintySummary summarise(const Uncertainty& uncertainty) {
         sum.interval_mm += share[n] * here.interval_mm;
         if (here.trust == Trust::Shown) sum.shown_share += share[n];
         if (here.trust == Trust::Unknown) sum.unknown_share += share[n];
+        if (here.interval_mm > data_doubt_limits.failed_mm) sum.failed_share += share[n];
         if (here.interval_mm <= sum.worst_interval_mm) continue;
         sum.worst_interval_mm = here.interval_mm;
         sum.worst_place = mesh.nodes.col(n);
@@ -232,6 +233,16 @@ std::optional<Doubt> doubt_of_solver(const UncertaintySummary& summary, double t
     return Doubt{"solver.short", summary.algebraic_mm, tolerance_mm, text};
 }
 
+std::optional<Doubt> doubt_of_data(const UncertaintySummary& summary) {
+    constexpr DataDoubtLimits limits = data_doubt_limits;
+    if (summary.failed_share <= limits.failed_share) return std::nullopt;
+    return Doubt{"data.show_too_little", summary.failed_share, limits.failed_share,
+                 "the data show too little of the organ: " + detail::percent(summary.failed_share) +
+                     " of its tissue may lie more than " + std::to_string(int(limits.failed_mm)) +
+                     " mm off, and the place known least " + detail::to_text(summary.worst_interval_mm) + " mm",
+                 "show more of it, or give landmarks"};
+}
+
 std::optional<Doubt> doubt_of_held_out(const HeldOut& held_out) {
     constexpr double most_z = held_out_doubt_limits.most_z;
     if (held_out.z <= most_z) return std::nullopt;
@@ -245,12 +256,12 @@ std::optional<Doubt> doubt_of_held_out(const HeldOut& held_out) {
 }
 
 std::vector<Doubt> doubts_of(const Uncertainty& uncertainty, double tolerance_mm) {
+    const UncertaintySummary summary = summarise(uncertainty);
     std::vector<Doubt> doubts;
-    if (auto doubt = doubt_of_solver(summarise(uncertainty), tolerance_mm)) doubts.push_back(std::move(*doubt));
+    if (auto doubt = doubt_of_solver(summary, tolerance_mm)) doubts.push_back(std::move(*doubt));
     if (uncertainty.held_out())
         if (auto doubt = doubt_of_held_out(*uncertainty.held_out())) doubts.push_back(std::move(*doubt));
-    if (!uncertainty.expected()) return doubts;
-    if (auto doubt = doubt_of_data(*uncertainty.expected())) doubts.push_back(std::move(*doubt));
+    if (auto doubt = doubt_of_data(summary)) doubts.push_back(std::move(*doubt));
     return doubts;
 }
 
@@ -294,7 +305,7 @@ Uncertainty uncertainty(const PreparedModel& prepared, const UpdateResult& resul
     }
     nodal.shown = shown_nodes(prepared, result.pulls);
     nodal.placed = !place_is_uncertain(result);
-    return {prepared.model.mesh, std::move(nodal), open.data.held_out, open.data.expected};
+    return {prepared.model.mesh, std::move(nodal), open.data.held_out};
 }
 
 double interval_mm(const ErrorEstimate& estimate, double probability) {

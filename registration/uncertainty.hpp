@@ -18,32 +18,6 @@
 
 namespace tissuewarp::registration {
 
-/// How far off tissue is expected to lie where points alone show the organ, from the deviations of the data and the
-/// prior alone; nothing of what was found enters but where the data pull. Root mean square over places all over the
-/// organ, and the place that is known least.
-struct ExpectedError {
-    double mean_mm = 0, worst_mm = 0;
-    Eigen::Vector3d worst_place = Eigen::Vector3d::Zero();  ///< moving frame, LPS mm
-};
-
-/// Makes a factor of the stiffness; uncertainty() gives the same with its own. Throws InvalidInput for a result of
-/// labels or an image, which show the organ as a whole.
-ExpectedError expected_error(const PreparedModel& prepared, const UpdateResult& result);
-
-/// When data are said to show too little. A registration that leaves tissue 5 mm off has failed; the expected error is
-/// a root mean square over patients like this one, of whom one in twenty-five is 1.7 times as far off. Chosen on draws
-/// 1 to 50 of the liver phantom's surface, with SurfaceDoubtLimits reported on draws that nothing was chosen on
-/// (docs/results.md).
-struct DataDoubtLimits {
-    double failed_mm = 5.0;          ///< of tissue
-    double error_of_expected = 1.7;  ///< such an error over the expected one
-};
-inline constexpr DataDoubtLimits data_doubt_limits{};
-
-/// In words, where the data show too little of the organ to tell a registration from one that failed (tissue 5 mm off),
-/// and what would help; otherwise empty.
-std::optional<Doubt> doubt_of_data(const ExpectedError& expected);
-
 struct UncertaintyOptions {
     int samples = 64;        ///< of the posterior; a deviation is known to 1/√(6 · samples), 5 %. By hand
     std::uint64_t seed = 1;  ///< of these
@@ -91,10 +65,8 @@ struct NodalErrors {
 /// whose corners all are. Tables, volumes and summaries say the same of one place.
 class Uncertainty {
 public:
-    /// `expected`: what was expected beforehand, where points alone show the organ. `held_out`: see HeldOut, where
-    /// there were data enough.
-    Uncertainty(meshing::TetMesh mesh, NodalErrors nodal, std::optional<HeldOut> held_out = {},
-                std::optional<ExpectedError> expected = {});
+    /// `held_out`: see HeldOut, where there were data enough.
+    Uncertainty(meshing::TetMesh mesh, NodalErrors nodal, std::optional<HeldOut> held_out = {});
 
     /// Of places of the moving frame, 3 × P mm; nothing for places farther than half an element outside the mesh.
     [[nodiscard]] std::vector<std::optional<ErrorEstimate>> at(const Eigen::Matrix3Xd& points) const;
@@ -102,8 +74,6 @@ public:
     [[nodiscard]] std::vector<ErrorEstimate> at_nodes() const;
     /// In the moving frame.
     [[nodiscard]] const meshing::TetMesh& mesh() const { return mesh_; }
-    /// What data and prior alone let expect, where neither labels nor an image show the organ as a whole.
-    [[nodiscard]] const std::optional<ExpectedError>& expected() const { return expected_; }
     [[nodiscard]] const std::optional<HeldOut>& held_out() const { return held_out_; }
     [[nodiscard]] const NodalErrors& nodal() const { return nodal_; }
     /// At barycentric coordinates of an element.
@@ -114,7 +84,6 @@ private:
     meshing::PointLocator locator_;
     NodalErrors nodal_;
     std::optional<HeldOut> held_out_;
-    std::optional<ExpectedError> expected_;
 };
 
 /// The estimate over the tissue, by volume.
@@ -124,8 +93,20 @@ struct UncertaintySummary {
     double worst_interval_mm = 0;
     Eigen::Vector3d worst_place = Eigen::Vector3d::Zero();  ///< moving frame, LPS mm
     double shown_share = 0, unknown_share = 0;              ///< of the tissue: Trust::Shown, Trust::Unknown
+    double failed_share = 0;                                ///< of the tissue: may lie DataDoubtLimits::failed_mm off
 };
 UncertaintySummary summarise(const Uncertainty& uncertainty);
+
+/// When data are said to show too little. Errors of a centimetre are what a failed registration has; the half is a
+/// matter of words.
+struct DataDoubtLimits {
+    double failed_mm = 10;      ///< radius of 95 % of tissue that may as well lie anywhere
+    double failed_share = 0.5;  ///< of the tissue
+};
+inline constexpr DataDoubtLimits data_doubt_limits{};
+
+/// In words, where more than half of the tissue may lie a centimetre off, and what would help; otherwise nothing.
+std::optional<Doubt> doubt_of_data(const UncertaintySummary& summary);
 
 /// In words, where the solver stopped farther from equilibrium than the tolerance it was given, mm; otherwise nothing.
 std::optional<Doubt> doubt_of_solver(const UncertaintySummary& summary, double tolerance_mm);

@@ -97,8 +97,8 @@ std::vector<CoverageRow> rows_of(const Phantom& phantom, Patient& patient, Evide
     const registration::Uncertainty uncertainty =
         registration::uncertainty(prepared, result, options.uncertainty, observer);
     const auto estimates = uncertainty.at(phantom.targets.moving);
-    const std::size_t doubts =
-        result.doubts.size() + doubts_of(uncertainty, options.update.equilibrium.tolerance_mm).size();
+    const int doubts = count_of_severe(result.doubts) +
+                       count_of_severe(doubts_of(uncertainty, options.update.equilibrium.tolerance_mm));
     const Eigen::Matrix3Xd is = result.deformation.placement.inverse() * phantom.targets.fixed;
     const meshing::PointLocator locator(prepared.model.mesh);
     const Eigen::MatrixXd& nodal = result.deformation.displacement;
@@ -111,7 +111,7 @@ std::vector<CoverageRow> rows_of(const Phantom& phantom, Patient& patient, Evide
         if (!estimates[k] || !place) continue;  // in the organ, out of its mesh
         const Eigen::Vector3d u = meshing::interpolate(prepared.model.mesh, nodal, *place);
         rows.push_back({phantom.seed, evidence, static_cast<int>(k), X + u - is.col(column), z,
-                        static_cast<int>(doubts), u.norm(), patient.in_view(evidence, column), *estimates[k]});
+                        doubts, u.norm(), patient.in_view(evidence, column), *estimates[k]});
     }
     return rows;
 }

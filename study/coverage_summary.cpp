@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <limits>
 #include <map>
-#include <set>
 
 namespace tissuewarp::study {
 
@@ -63,24 +62,48 @@ double percentile(std::vector<double> values, double share) {
     return values[rank];
 }
 
+bool has_failed(const Rows& rows) {
+    std::vector<double> errors, ratios;
+    for (const CoverageRow* row : rows) {
+        errors.push_back(row->error.norm());
+        ratios.push_back(row->error.norm() / row->estimate.interval_mm);
+    }
+    return percentile(errors, 0.95) > coverage_failure.error_mm ||
+           percentile(ratios, 0.95) > coverage_failure.error_of_radius;
+}
+
+/// Whether those that failed are doubted, and those that did not are not.
+void add_doubts(Coverage& result, const std::map<std::uint64_t, Rows>& by_phantom) {
+    int failed = 0, doubted_failures = 0, doubted_successes = 0;
+    for (const auto& [seed, rows] : by_phantom) {
+        const bool has_doubt = rows.front()->doubts > 0, fails = has_failed(rows);
+        failed += fails;
+        (fails ? doubted_failures : doubted_successes) += has_doubt;
+    }
+    const auto share = [](int part, int all) {
+        return all > 0 ? double(part) / all : std::numeric_limits<double>::quiet_NaN();
+    };
+    result.doubted_share = share(doubted_failures + doubted_successes, result.phantoms);
+    result.failed_share = share(failed, result.phantoms);
+    result.doubted_failures = share(doubted_failures, failed);
+    result.doubted_successes = share(doubted_successes, result.phantoms - failed);
+}
+
 void add_classes(Coverage& result, const Rows& rows) {
     Rows shown;
     std::vector<double> errors, radii;
-    std::set<std::uint64_t> doubted;
     int unknown = 0;
     for (const CoverageRow* row : rows) {
         errors.push_back(row->error.norm());
         radii.push_back(row->estimate.interval_mm);
         if (row->estimate.trust == registration::Trust::Shown) shown.push_back(row);
         unknown += row->estimate.trust == registration::Trust::Unknown;
-        if (row->doubts > 0) doubted.insert(row->seed);
     }
     result.shown_share = double(shown.size()) / double(rows.size());
     result.unknown_share = double(unknown) / double(rows.size());
     result.held_95_shown =
         shown.empty() ? std::numeric_limits<double>::quiet_NaN() : share_held(shown, nominal_shares[level_95]);
     result.sharpness = percentile(errors, 0.95) / percentile(radii, 0.5);
-    result.doubted_share = double(doubted.size()) / double(result.phantoms);
 }
 
 Coverage summary_of(Evidence evidence, bool in_view, const Rows& rows) {
@@ -108,6 +131,7 @@ Coverage summary_of(Evidence evidence, bool in_view, const Rows& rows) {
     result.true_mm = true_mm(rows);
     result.bins = binned(rows);
     add_classes(result, rows);
+    add_doubts(result, by_phantom);
     return result;
 }
 
@@ -128,16 +152,17 @@ std::vector<Coverage> coverage_of(const std::vector<CoverageRow>& rows) {
 std::string table_of(const std::vector<Coverage>& coverage) {
     std::string table =
         "evidence               phantoms targets  within 50 %   80 %   95 %        99 %  sharpness  true rms  "
-        "estimated, mm  phantoms within, %  shown, %  of these within 95 %  unknown, %  doubted, %\n";
+        "estimated, mm  phantoms within, %  shown, %  of these within 95 %  unknown, %  doubted, %  failed, %  of these doubted, %  of the others doubted, %\n";
     for (const Coverage& c : coverage) {
-        char line[300];
+        char line[400];
         std::snprintf(
             line, sizeof line,
-            "%-22s %8d %7d %12.1f %6.1f %6.1f ±%4.1f %6.1f %10.2f %9.2f %14.2f %19.0f %9.0f %21.1f %11.0f %11.0f\n",
+            "%-22s %8d %7d %12.1f %6.1f %6.1f ±%4.1f %6.1f %10.2f %9.2f %14.2f %19.0f %9.0f %21.1f %11.0f %11.0f %10.0f %19.0f %23.0f\n",
             (std::string(name_of(c.evidence)) + (c.in_view ? "" : ", unseen")).c_str(), c.phantoms, c.targets,
             100 * c.held[0], 100 * c.held[1], 100 * c.held[2], 100 * c.held_95_error, 100 * c.held[3], c.sharpness,
             c.true_mm, c.estimated_mm, 100 * c.phantoms_within, 100 * c.shown_share, 100 * c.held_95_shown,
-            100 * c.unknown_share, 100 * c.doubted_share);
+            100 * c.unknown_share, 100 * c.doubted_share, 100 * c.failed_share, 100 * c.doubted_failures,
+            100 * c.doubted_successes);
         table += line;
     }
     return table;

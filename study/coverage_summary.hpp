@@ -17,6 +17,13 @@ struct ReliabilityBin {
     double estimated_mm = 0, true_mm = 0;  ///< roots of mean squares
 };
 
+/// When a registration has failed: so far off, or so much farther than it says, at the 95th percentile of its targets.
+struct CoverageFailure {
+    double error_mm = 10;
+    double error_of_radius = 2;  ///< over the stated radius of 95 %
+};
+inline constexpr CoverageFailure coverage_failure{};
+
 /// Of one kind of evidence: of the targets in view, or of those out of it.
 struct Coverage {
     Evidence evidence = Evidence::Labels;
@@ -25,7 +32,10 @@ struct Coverage {
     double shown_share = 0, unknown_share = 0;  ///< of the targets, by the class that they are given
     double held_95_shown = 0;                   ///< as `held` at 95 %, of those shown; NaN where none is
     double sharpness = 0;  ///< 95th percentile of the errors over the median radius of 95 %: 1 where radii tell apart
-    double doubted_share = 0;                          ///< of phantoms, whose registration the program doubted
+    double doubted_share = 0;  ///< of phantoms, whose registration the program doubted
+    double failed_share = 0;   ///< of phantoms: see CoverageFailure
+    /// Of the phantoms that failed, and of those that did not, the share that was doubted; NaN where there is none.
+    double doubted_failures = 0, doubted_successes = 0;
     std::array<double, nominal_shares.size()> held{};  ///< share of targets within the interval of each probability
     /// Standard error of the share at 95 %, from how it varies among phantoms: targets of one phantom are not
     /// independent.

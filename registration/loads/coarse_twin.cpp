@@ -141,8 +141,9 @@ LastPulls pulls_on(const PreparedModel& coarse, const PreparedModel& prepared, c
     for (const Origin origin : {Origin::Prior, Origin::Support})
         add(pulls, {{}, origin}, moved(given.of(origin), nodes, mesh, locator));
     pulls.energy = given.energy;
-    pulls.free_placement = given.free_placement;
+    pulls.prior_moves = given.prior_moves;
     pulls.parts_alone = given.parts_alone;
+    pulls.placement_sought = given.placement_sought;
     return pulls;
 }
 

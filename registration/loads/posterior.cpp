@@ -3,8 +3,10 @@
 #include "registration/pose/rigid_part.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <Eigen/QR>
 
-#include <cmath>
+#include <algorithm>
 
 namespace tissuewarp::registration::detail {
 
@@ -26,24 +28,20 @@ Columns times(const std::vector<tled::Spring>& springs, const Columns& vectors) 
     return result;
 }
 
-/// Unit forces at nodes along the axes, 3N × 3 per node.
-Columns unit_forces(const std::vector<int>& nodes, Eigen::Index rows) {
-    Columns forces = Columns::Zero(rows, 3 * static_cast<Eigen::Index>(nodes.size()));
-    for (Eigen::Index k = 0; k < forces.cols(); ++k) forces(3 * nodes[static_cast<std::size_t>(k / 3)] + k % 3, k) = 1;
-    return forces;
+/// (Rᵀ W R)⁻¹ Rᵀ W, 6 × 3N; a motion that W feels nothing of is not followed.
+Columns rigid_part(const Columns& motions, const std::vector<tled::Spring>& weights) {
+    const Columns weighed = times(weights, motions);
+    return (motions.transpose() * weighed).completeOrthogonalDecomposition().solve(weighed.transpose());
 }
 
-/// Of a symmetric matrix whose eigenvalues are to be no smaller than `least`.
-Columns bounded_inverse(const Columns& matrix, double least) {
-    const Eigen::SelfAdjointEigenSolver<Columns> modes(matrix);
-    return modes.eigenvectors() * modes.eigenvalues().cwiseMax(least).cwiseInverse().asDiagonal() *
-           modes.eigenvectors().transpose();
+double least_eigenvalue(const Columns& symmetric) {
+    return Eigen::SelfAdjointEigenSolver<Columns>(symmetric, Eigen::EigenvaluesOnly).eigenvalues()[0];
 }
 
 }  // namespace
 
 WeighedSprings without_data(const LastPulls& pulls) {
-    return {pulls.of(Origin::Support), pulls.of(Origin::Prior), pulls.energy, pulls.free_placement};
+    return {pulls.of(Origin::Support), pulls.of(Origin::Prior), pulls.energy, pulls.placed_by()};
 }
 
 WeighedSprings with_data(const LastPulls& pulls) {
@@ -63,34 +61,33 @@ std::pair<Posterior, Posterior> Posterior::both(const PreparedModel& prepared, c
     return {Posterior(prepared, first, std::move(one)), Posterior(prepared, second, std::move(other))};
 }
 
-Posterior::Posterior(const PreparedModel& prepared, const WeighedSprings& springs, tled::RestStiffness stiffness)
-    : stiffness_(std::move(stiffness)),
-      rows_(3 * Eigen::Index(prepared.rest.node_count)),
-      energy_(springs.energy),
-      freed_(rows_, 0) {
-    if (!springs.free_placement) return;
-    const Columns motions = rigid_motions(prepared.model.mesh.nodes), held = times(springs.ground, motions);
-    freed_ = stiffness_.solve_columns(held);
-    middle_ = bounded_inverse(motions.transpose() * held - held.transpose() * freed_,
-                              energy_ / (posterior_options.least_known_mm * posterior_options.least_known_mm));
+// Of a motion R c that no datum shows, what is left of the prior is (1 − s) cᵀ A c, A = Rᵀ G R: s so that it counts as
+// known to 100 mm.
+Prior::Prior(const Eigen::Matrix3Xd& nodes, const WeighedSprings& springs)
+    : springs_(springs.ground), held_(nodes.size(), 0), followed_(0, nodes.size()) {
+    if (springs.placed_by.empty() || springs_.empty()) return;
+    const Columns motions = rigid_motions(nodes);
+    held_ = times(springs_, motions);
+    const double known = posterior_options.least_known_mm,
+                 left = springs.energy / (known * known * least_eigenvalue(motions.transpose() * held_));
+    followed_ = (1 - std::min(1.0, left)) * rigid_part(motions, springs.placed_by);
 }
 
-std::vector<Eigen::Matrix3d> Posterior::covariances(const std::vector<int>& nodes) const {
-    const Columns answers = stiffness_.solve_columns(unit_forces(nodes, rows_));
-    std::vector<Eigen::Matrix3d> result;
-    for (std::size_t n = 0; n < nodes.size(); ++n) {
-        const Eigen::Index row = 3 * Eigen::Index(nodes[n]);
-        result.emplace_back(energy_ * answers.block<3, 3>(row, 3 * Eigen::Index(n)));
-        if (freed_.cols() == 0) continue;
-        const Eigen::Matrix<double, 3, Eigen::Dynamic> share = freed_.middleRows<3>(row);
-        result.back() += energy_ * share * middle_ * share.transpose();
-    }
-    return result;
+Eigen::MatrixXd Prior::forces(const Eigen::MatrixXd& displacements) const {
+    return times(springs_, displacements) - held_ * (followed_ * displacements);
+}
+
+Posterior::Posterior(const PreparedModel& prepared, const WeighedSprings& springs, tled::RestStiffness stiffness)
+    : stiffness_(std::move(stiffness)), prior_(prepared.model.mesh.nodes, springs), freed_(prior_.held()) {
+    if (freed_.cols() == 0) return;
+    const Columns held = stiffness_.solve_columns(freed_);
+    const Columns middle = Columns::Identity(6, 6) - prior_.followed() * held;
+    freed_ = held * middle.partialPivLu().inverse();
 }
 
 Eigen::MatrixXd Posterior::inverse(const Eigen::MatrixXd& forces) const {
     Columns result = stiffness_.solve_columns(forces);
-    if (freed_.cols() > 0) result += freed_ * (middle_ * (freed_.transpose() * forces));
+    if (freed_.cols() > 0) result += freed_ * (prior_.followed() * result);
     return result;
 }
 

@@ -23,7 +23,7 @@ inline constexpr PosteriorOptions posterior_options{};
 struct WeighedSprings {
     std::vector<tled::Spring> data, ground;
     double energy = 1;
-    bool free_placement = false;  ///< the organ may lie anywhere: the ground moves with it
+    std::vector<tled::Spring> placed_by = {};  ///< LastPulls::placed_by(): the ground moves along with these
 };
 
 /// Supports and prior of pulls alone.
@@ -31,10 +31,27 @@ WeighedSprings without_data(const LastPulls& pulls);
 /// The same with the data.
 WeighedSprings with_data(const LastPulls& pulls);
 
+/// What is expected of an organ without data: springs G, which move along with the rigid motion R P u, in least
+/// squares, of the nodes that springs W hold: P = (Rᵀ W R)⁻¹ Rᵀ W, R the six motions of the organ as a whole. P is
+/// taken a little short, so that motions that no datum shows count as known to 100 mm.
+class Prior {
+public:
+    /// At nodes of these places (3 × N, mm).
+    Prior(const Eigen::Matrix3Xd& nodes, const WeighedSprings& springs);
+    /// G (u − R P u), 3N × k, mN.
+    [[nodiscard]] Eigen::MatrixXd forces(const Eigen::MatrixXd& displacements) const;
+    /// G R, 3N × 6; 3N × 0 where the prior does not move.
+    [[nodiscard]] const Eigen::MatrixXd& held() const { return held_; }
+    /// P, 6 × 3N, or 0 × 3N.
+    [[nodiscard]] const Eigen::MatrixXd& followed() const { return followed_; }
+
+private:
+    std::vector<tled::Spring> springs_;
+    Eigen::MatrixXd held_, followed_;
+};
+
 /// exp(−Π/energy) is Gaussian for small displacements, of covariance energy · K⁻¹, K the stiffness at rest with all
-/// springs (Bayes' rule with strain energy as the prior, e.g. Szeliski 1990). Where the placement is free, the ground
-/// G is G − G R (Rᵀ G R)⁻¹ Rᵀ G, R the six rigid motions: it holds no motion as a whole. Such motions that
-/// the data do not show either are taken to be known to 100 mm.
+/// springs (Bayes' rule with strain energy as the prior, e.g. Szeliski 1990) and a prior that may move along.
 class Posterior {
 public:
     /// Throws InvalidInput where the springs do not hold the tissue.
@@ -43,25 +60,20 @@ public:
     static std::pair<Posterior, Posterior> both(const PreparedModel& prepared, const WeighedSprings& first,
                                                 const WeighedSprings& second);
 
-    /// Covariances of the displacements of nodes, mm².
-    [[nodiscard]] std::vector<Eigen::Matrix3d> covariances(const std::vector<int>& nodes) const;
-
-    /// The inverse of K times forces, 3N × k, mN: displacements, mm. Where
-    /// the placement is free, the ground's hold on motions as a whole is taken out of K.
+    /// The inverse of K times forces, 3N × k, mN: displacements, mm.
     [[nodiscard]] Eigen::MatrixXd inverse(const Eigen::MatrixXd& forces) const;
 
-    /// K, taken out.
+    [[nodiscard]] const Prior& prior() const { return prior_; }
+    /// K with a prior that stays, taken out.
     [[nodiscard]] tled::RestStiffness stiffness() && { return std::move(stiffness_); }
 
 private:
     Posterior(const PreparedModel& prepared, const WeighedSprings& springs, tled::RestStiffness stiffness);
 
     tled::RestStiffness stiffness_;
-    Eigen::Index rows_;  // 3 N
-    double energy_;
-    // (K − G R A⁻¹ Rᵀ G)⁻¹ = K⁻¹ + K⁻¹ H (A − Hᵀ K⁻¹ H)⁻¹ Hᵀ K⁻¹ with H = G R, A = Rᵀ G R (Woodbury):
-    Eigen::MatrixXd freed_;   // K⁻¹ H, 3N × 6, or 3N × 0 where the placement is not free
-    Eigen::MatrixXd middle_;  // (A − Hᵀ K⁻¹ H)⁻¹
+    Prior prior_;
+    // (K − H P)⁻¹ = K⁻¹ + K⁻¹ H (1 − P K⁻¹ H)⁻¹ P K⁻¹ with H = G R (Woodbury):
+    Eigen::MatrixXd freed_;  // K⁻¹ H (1 − P K⁻¹ H)⁻¹, 3N × 6 or 3N × 0
 };
 
 }  // namespace tissuewarp::registration::detail

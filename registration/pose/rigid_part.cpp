@@ -30,13 +30,13 @@ Eigen::MatrixXd rigid_motions(const Eigen::Matrix3Xd& nodes) {
     return motions;
 }
 
-void give_rigid_part_to_placement(const PreparedModel& prepared, State& state) {
-    const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
-    Eigen::VectorXd weights = Eigen::VectorXd::Zero(nodes.cols());
-    for (const InterfaceNode& node : prepared.interfaces.nodes())
-        if (node.outer == 0) weights[node.node] += node.area;
+void give_rigid_part_to_placement(const Eigen::Matrix3Xd& nodes, const std::vector<tled::Spring>& weights,
+                                  State& state) {
+    if (weights.empty()) return;
+    Eigen::VectorXd weight = Eigen::VectorXd::Zero(nodes.cols());
+    for (const tled::Spring& spring : weights) weight[spring.node] += spring.stiffness.trace();
     const Eigen::Matrix3Xd moved = nodes + state.displacement;
-    const Eigen::Isometry3d motion = closest_motion(nodes, moved, weights);
+    const Eigen::Isometry3d motion = closest_motion(nodes, moved, weight);
     state.placement = state.placement * motion;
     state.displacement = (motion.inverse() * moved) - nodes;
 }

@@ -1,8 +1,12 @@
 #pragma once
 /// Rigid motions that come closest to displacements.
 
-#include "registration/prepare.hpp"
 #include "registration/state.hpp"
+#include "tled/conditions.hpp"
+
+#include <Eigen/Geometry>
+
+#include <vector>
 
 namespace tissuewarp::registration::detail {
 
@@ -13,9 +17,10 @@ Eigen::Isometry3d closest_motion(const Eigen::Matrix3Xd& x, const Eigen::Matrix3
 /// of the nodes (3 × N), each of mean square 1 or less.
 Eigen::MatrixXd rigid_motions(const Eigen::Matrix3Xd& nodes);
 
-/// Moves the placement by the rigid motion that comes closest to the displacement of the outer surface (least squares
-/// by area) and leaves the rest to the displacement; no tissue moves. The ground, whose springs have the same weights,
-/// then pulls the organ nowhere as a whole.
-void give_rigid_part_to_placement(const PreparedModel& prepared, State& state);
+/// Moves the placement by the rigid motion that comes closest to the displacement of the nodes (3 × N) that springs
+/// hold, each weighed by its stiffness, and leaves the rest to the displacement; no tissue moves. Nothing without
+/// springs.
+void give_rigid_part_to_placement(const Eigen::Matrix3Xd& nodes, const std::vector<tled::Spring>& weights,
+                                  State& state);
 
 }  // namespace tissuewarp::registration::detail

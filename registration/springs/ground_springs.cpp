@@ -38,7 +38,7 @@ void expect_free_motion(LastPulls& pulls, const PreparedModel& prepared, double 
     for (const tled::Spring& spring :
          ground_springs(prepared, pulls.energy, [&](const InterfaceNode&) { return motion_mm; }))
         pulls.springs.push_back({spring, Origin::Prior});
-    pulls.free_placement = true;
+    pulls.prior_moves = PriorMoves::WithSurface;
 }
 
 }  // namespace tissuewarp::registration::detail

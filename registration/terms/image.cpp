@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <optional>
 
 namespace tissuewarp::registration::detail {
 
@@ -73,10 +74,12 @@ void ImageTerm::search(const State& state, Observer& observer) {
 
 Alignment ImageTerm::pose(const Eigen::Isometry3d& /*start*/, Observer& observer) {
     search({Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, prepared_.rest.node_count)}, observer);
-    return {rigid_motion(), 0};
+    const std::optional<Eigen::Isometry3d> motion = rigid_motion();
+    has_placed_ = motion.has_value();
+    return {motion.value_or(Eigen::Isometry3d::Identity()), 0};
 }
 
-Eigen::Isometry3d ImageTerm::rigid_motion() const {
+std::optional<Eigen::Isometry3d> ImageTerm::rigid_motion() const {
     if (matches_.matches.size() < image_pose_options.fewest_blocks)
         throw InvalidInput("only " + std::to_string(matches_.matches.size()) +
                            " blocks of the moving image were found in the fixed one; check that they show the same "
@@ -87,10 +90,11 @@ Eigen::Isometry3d ImageTerm::rigid_motion() const {
         moving.col(n) = matches_.matches[static_cast<std::size_t>(n)].moving;
         fixed.col(n) = matches_.matches[static_cast<std::size_t>(n)].fixed;
     }
-    if (prior_.share_in_view() < image_pose_options.whole_view &&
-        median_distance(moving, fixed) < options_.headers_within_mm)
-        return Eigen::Isometry3d::Identity();
-    return least_trimmed_motion(moving, fixed);
+    const Eigen::Isometry3d motion = least_trimmed_motion(moving, fixed);
+    if (prior_.share_in_view() >= image_pose_options.whole_view) return motion;
+    const double without = median_distance(moving, fixed), with = median_distance(motion * moving, fixed);
+    const bool deforms = with > image_pose_options.most_left * without && without < options_.headers_within_mm;
+    return deforms ? std::nullopt : std::optional(motion);
 }
 
 const std::vector<ImageTerm::PulledMatch>& ImageTerm::pulled(const State& state) {

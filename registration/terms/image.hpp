@@ -6,6 +6,8 @@
 #include "registration/terms/term.hpp"
 #include "registration/terms/view_prior.hpp"
 
+#include <optional>
+
 namespace tissuewarp::registration::detail {
 
 /// How an image places the organ beside ImageOptions::headers_within_mm.
@@ -14,6 +16,9 @@ struct ImagePoseOptions {
     /// Share of the organ's surface in view, below which the headers' placement stays: the part in view would turn the
     /// organ by its deformation. The rule was found on the degraded sag (docs/method.md, 8.1), the number by hand.
     double whole_view = 0.9;
+    /// Of the blocks' distances, median: where a rigid motion leaves less, it is no deformation that it takes for one.
+    /// Chosen by hand; 0.6 was left on the degraded sag.
+    double most_left = 0.25;
 };
 inline constexpr ImagePoseOptions image_pose_options{};
 
@@ -40,8 +45,10 @@ public:
     [[nodiscard]] PoseClaim pose_claim() const override { return PoseClaim::Search; }
     /// The rigid motion that most matches of a first search agree on, the rest of them is for the tissue. Where part of
     /// the organ is out of view, a deformation of the part in view would turn it as a whole: then none, unless the
-    /// headers are far off. Throws InvalidInput when too few blocks were found.
+    /// headers are far off or a rigid motion explains nearly all; the placement then follows the tissue in view. Throws
+    /// InvalidInput when too few blocks were found.
     [[nodiscard]] Alignment pose(const Eigen::Isometry3d& start, Observer& observer) override;
+    [[nodiscard]] bool has_placed() const override { return has_placed_; }
     [[nodiscard]] int searches() const override { return search_.count(); }
     [[nodiscard]] bool gains() const override { return search_.gains(); }
     /// Pulls of the matches on the nodes, after a search where one is due, and what is expected of the surface.
@@ -61,6 +68,7 @@ private:
     ImageSearch search_;
     ViewPrior prior_;
     imaging::Geometry fixed_grid_;
+    bool has_placed_ = false;
     LocatedMatches matches_;         // of the last search
     std::vector<double> strongest_;  // of each of these: the largest eigenvalue of its information
     NodalShares shares_;             // of the nodes in them
@@ -69,7 +77,7 @@ private:
     std::vector<PullForce> forces_;
 
     void search(const State& state, Observer& observer);
-    [[nodiscard]] Eigen::Isometry3d rigid_motion() const;
+    [[nodiscard]] std::optional<Eigen::Isometry3d> rigid_motion() const;
     /// Of all matches, in `pulled_`.
     const std::vector<PulledMatch>& pulled(const State& state);
     [[nodiscard]] ImageFit fit(const State& state);

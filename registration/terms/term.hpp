@@ -67,6 +67,9 @@ public:
     /// The rigid placement, near `start` where the claim is no more than that. Throws InvalidInput, Cancelled.
     [[nodiscard]] virtual Alignment pose(const Eigen::Isometry3d& start, Observer& observer);
 
+    /// Whether the placement is a motion that its data made, which the prior then moves along with.
+    [[nodiscard]] virtual bool has_placed() const { return false; }
+
     /// Searches of an image that the rounds are to make room for.
     [[nodiscard]] virtual int searches() const { return 0; }
     /// Whether a further search may bring the model nearer.

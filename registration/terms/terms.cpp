@@ -35,7 +35,8 @@ Terms::Terms(std::vector<std::unique_ptr<Term>> terms, double energy, bool align
     const bool boundary = any_shows(Shows::Boundary), volume = any_shows(Shows::Volume),
                placed = any_shows(Shows::Place);
     parts_alone_ = !boundary && !volume;
-    free_placement_ = parts_alone_ && align && !placed;
+    placement_sought_ = align && !placed;
+    free_placement_ = parts_alone_ && placement_sought_;
     take_own_metric_ = volume || !boundary || placed;
     if (free_placement_) unknown_loads_ = LoadKind::Smooth;
     if (boundary && !volume && !placed) unknown_loads_ = LoadKind::Weight;
@@ -45,9 +46,19 @@ bool Terms::any_shows(Shows what) const {
     return std::any_of(terms_.begin(), terms_.end(), [&](const auto& term) { return term->shows() == what; });
 }
 
-Alignment Terms::pose(Observer& observer) {
+Term& Terms::best_placed() const {
     const auto less = [](const auto& a, const auto& b) { return a->pose_claim() < b->pose_claim(); };
-    Term& best = **std::max_element(terms_.begin(), terms_.end(), less);
+    return **std::max_element(terms_.begin(), terms_.end(), less);
+}
+
+PriorMoves Terms::prior_moves() const {
+    if (free_placement_) return PriorMoves::WithSurface;
+    const bool placed = std::any_of(terms_.begin(), terms_.end(), [](const auto& term) { return term->has_placed(); });
+    return placed ? PriorMoves::WithData : PriorMoves::Not;
+}
+
+Alignment Terms::pose(Observer& observer) {
+    Term& best = best_placed();
     Eigen::Isometry3d start = Eigen::Isometry3d::Identity();
     for (const auto& term : terms_)
         if (term->pose_claim() == PoseClaim::Shift) start = term->pose(start, observer).placement;
@@ -84,6 +95,10 @@ bool Terms::settled(const State& state) const {
 
 void Terms::judge(const State& state, UpdateResult& result) {
     for (const auto& term : terms_) term->judge(state, result);
+    if (placement_sought_ && best_placed().pose_claim() == PoseClaim::Shift)
+        result.doubts.push_back({"placement.turn_unknown", 0, 1,
+                                 "the data tell how far the organ was shifted, not how it is turned",
+                                 "give three pairs of points or more that are not on a line, or more of the organ"});
 }
 
 Terms terms_of(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options,

@@ -21,8 +21,10 @@ public:
 
     /// Points alone show the organ.
     [[nodiscard]] bool parts_alone() const { return parts_alone_; }
-    /// Points show the organ wherever it lies, and nothing says where that is.
-    [[nodiscard]] bool free_placement() const { return free_placement_; }
+    /// With the surface where points show the organ wherever it lies, and nothing says where that is.
+    [[nodiscard]] PriorMoves prior_moves() const;
+    /// The data say where the organ lies as a whole.
+    [[nodiscard]] bool placement_sought() const { return placement_sought_; }
     /// Loads that nobody stated and that data may tell: of points of a free organ all, tractions too, since these also
     /// move what no point shows; of labels, which show the boundary all over, whatever presses on it there, a force
     /// within. Otherwise none.
@@ -44,10 +46,11 @@ public:
 private:
     std::vector<std::unique_ptr<Term>> terms_;
     double energy_;
-    bool parts_alone_, free_placement_, take_own_metric_;
+    bool parts_alone_, placement_sought_, free_placement_, take_own_metric_;
     std::optional<LoadKind> unknown_loads_;
 
     [[nodiscard]] bool any_shows(Shows what) const;
+    [[nodiscard]] Term& best_placed() const;
 };
 
 /// Terms of what was seen, of what the model has about it and of the loads stated, with what is expected of tissue that

@@ -1,10 +1,12 @@
 #include "registration/uncertainty/data_uncertainty.hpp"
 
 #include "registration/loads/unknown_loads.hpp"
+#include "registration/pose/rigid_part.hpp"
+#include "registration/pose/shown_motions.hpp"
 #include "registration/springs/ground_springs.hpp"
 #include "registration/uncertainty/error_model.hpp"
-#include "registration/uncertainty/expected_error.hpp"
 #include "registration/uncertainty/held_out.hpp"
+#include "tled/model/symmetric.hpp"
 #include "tled/stiffness/tangent_stiffness.hpp"
 
 #include <algorithm>
@@ -18,15 +20,19 @@ namespace {
 using Covariances = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 using Eigen::MatrixXd;
 
-/// Of every node's displacement over the samples (3N × k of mean 0).
-Covariances covariances_of(const MatrixXd& samples) {
-    Covariances result(6, samples.rows() / 3);
+/// Of every node's displacement, the sum over 3N × k of d dᵀ.
+Covariances sum_of_squares(const MatrixXd& displacements) {
+    Covariances result(6, displacements.rows() / 3);
     for (Eigen::Index n = 0; n < result.cols(); ++n) {
-        const Eigen::Matrix<double, 3, Eigen::Dynamic> drawn = samples.middleRows<3>(3 * n);
-        const Eigen::Matrix3d c = drawn * drawn.transpose() / double(samples.cols());
-        result.col(n) << c(0, 0), c(1, 1), c(2, 2), c(0, 1), c(1, 2), c(0, 2);
+        const Eigen::Matrix<double, 3, Eigen::Dynamic> here = displacements.middleRows<3>(3 * n);
+        result.col(n) = tled::symmetric_entries(here * here.transpose());
     }
     return result;
+}
+
+/// Over samples of mean 0.
+Covariances covariances_of(const MatrixXd& samples) {
+    return sum_of_squares(samples) / double(samples.cols());
 }
 
 /// Displacements under loads, both times a factor: as large as the tissue was seen to strain, by strain energy, where
@@ -80,6 +86,25 @@ LastPulls nothing_seen(const PreparedModel& prepared, LastPulls pulls) {
     return pulls;
 }
 
+/// One deviation of each motion of the organ as a whole that the data do not show, 3N × k, mm.
+MatrixXd unseen_motions(const LastPulls& pulls, const Eigen::Matrix3Xd& nodes) {
+    if (!pulls.placement_sought) return MatrixXd(nodes.size(), 0);
+    const ShownMotions shown = shown_motions(pulls, nodes);
+    const Eigen::Index unseen = (shown.shares.array() < shown_motion_limits.least_share).count();
+    return error_model.unseen_motion_mm * shown.motions.leftCols(unseen);
+}
+
+/// What is missed if the tissue was not deformed but moved as a whole, as nearly as data show it move (3N × 1, mm):
+/// where the prior holds the rest back, A⁻¹ G' u.
+MatrixXd missed_if_rigid(const LastPulls& pulls, const Eigen::Matrix3Xd& nodes, const Eigen::Matrix3Xd& displacement,
+                         const LinearRegistration& registration) {
+    if (!pulls.placement_sought || pulls.prior_moves != PriorMoves::Not) return MatrixXd(nodes.size(), 0);
+    const MatrixXd motions = rigid_motions(nodes), weighed = forces_of(pulls.of(Origin::Datum), motions);
+    const MatrixXd motion =
+        motions * (motions.transpose() * weighed).ldlt().solve(weighed.transpose() * displacement.reshaped());
+    return registration.inverse(forces_of(pulls.of(Origin::Prior), motion));
+}
+
 bool has_prior(const LastPulls& pulls) {
     return std::any_of(pulls.springs.begin(), pulls.springs.end(),
                        [](const PulledNode& pulled) { return pulled.origin == Origin::Prior; });
@@ -103,11 +128,14 @@ OpenParts open_parts(const PreparedModel& prepared, const LastPulls& given, cons
     DataUncertainty result;
     result.covariance = covariances_of(beside(on.error, in.error)) +
                         covariances_of(registration.inverse(forces_of(data, errors, prepared.rest.node_count)));
+    const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
+    const Covariances placement =
+        sum_of_squares(beside(unseen_motions(pulls, nodes), missed_if_rigid(pulls, nodes, displacement, registration)));
     result.held_out =
         held_out(prepared, pulls, unseen, displacement, few_of(on.truths, in.truths, held_out_options.draws),
                  few_of(errors, held_out_options.draws));
     if (result.held_out) result.covariance *= std::max(1.0, result.held_out->z * result.held_out->z);
-    if (pulls.parts_alone) result.expected = expected_error(prepared.model.mesh.nodes, registration.posterior());
+    result.covariance += placement;
     return {std::move(result), std::move(registration).stiffness()};
 }
 

@@ -15,7 +15,6 @@ namespace tissuewarp::registration::detail {
 struct DataUncertainty {
     Eigen::Matrix<double, 6, Eigen::Dynamic> covariance;  ///< 6 × N mm², in the order of tled/model/symmetric.hpp
     std::optional<HeldOut> held_out;
-    std::optional<ExpectedError> expected;  ///< where points alone show the organ
 };
 
 /// The estimate, and the stiffness with the springs that it factorised.

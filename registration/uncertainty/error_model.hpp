@@ -12,6 +12,7 @@ struct ErrorModel {
     double shared_over_mm = 10;  ///< length over which the errors that neighbouring data share vary. By hand
     double least_energy = 0.2;   ///< of the strain energy unit, that unknown loads have at least. As the noise
     double freedom_of_size = 6;  ///< the size of the loads is known as a variance is from so many numbers. As the noise
+    double unseen_motion_mm = 20;  ///< of the organ as a whole where no datum shows it; as TissuePrior::free_motion_mm
     double failed_mm = 5;        ///< places known no better (95 %) are not known. A matter of words
 };
 inline constexpr ErrorModel error_model{};

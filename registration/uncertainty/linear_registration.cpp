@@ -60,27 +60,28 @@ MatrixXd forces_of(const std::vector<PulledNode>& data, const DataErrors& errors
     return result;
 }
 
-LinearRegistration::LinearRegistration(Posterior posterior, const LastPulls& pulls, const LastPulls& unseen)
+LinearRegistration::LinearRegistration(Posterior posterior, const PreparedModel& prepared, const LastPulls& pulls,
+                                       const LastPulls& unseen)
     : posterior_(std::move(posterior)) {
-    if (pulls.free_placement && unseen.free_placement) return;  // one and the same
-    prior_ = pulls.of(Origin::Prior);
-    expected_ = unseen.of(Origin::Prior);
+    if (pulls.prior_moves == PriorMoves::WithSurface) return;  // one and the same
+    expected_.emplace(prepared.model.mesh.nodes, without_data(unseen));
 }
 
 LinearRegistration::LinearRegistration(const PreparedModel& prepared, const LastPulls& pulls, const LastPulls& unseen)
-    : LinearRegistration(Posterior(prepared, with_data(pulls)), pulls, unseen) {}
+    : LinearRegistration(Posterior(prepared, with_data(pulls)), prepared, pulls, unseen) {}
 
 std::pair<LinearRegistration, Posterior> LinearRegistration::with_unseen(const PreparedModel& prepared,
                                                                          const LastPulls& pulls,
                                                                          const LastPulls& unseen) {
     auto [seen, without] = Posterior::both(prepared, with_data(pulls), without_data(unseen));
-    return {LinearRegistration(std::move(seen), pulls, unseen), std::move(without)};
+    return {LinearRegistration(std::move(seen), prepared, pulls, unseen), std::move(without)};
 }
 
 // A (u − û) = (K + G') u = f + (G' − G) u
 MatrixXd LinearRegistration::missed(const Truths& truths) const {
-    if (prior_.empty() && expected_.empty()) return inverse(truths.loads);
-    return inverse(truths.loads + forces_of(prior_, truths.displacement) - forces_of(expected_, truths.displacement));
+    if (!expected_) return inverse(truths.loads);
+    const MatrixXd& u = truths.displacement;
+    return inverse(truths.loads + posterior_.prior().forces(u) - expected_->forces(u));
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include <cstdint>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -47,10 +48,11 @@ public:
     [[nodiscard]] tled::RestStiffness stiffness() && { return std::move(posterior_).stiffness(); }
 
 private:
-    LinearRegistration(Posterior posterior, const LastPulls& pulls, const LastPulls& unseen);
+    LinearRegistration(Posterior posterior, const PreparedModel& prepared, const LastPulls& pulls,
+                       const LastPulls& unseen);
 
     Posterior posterior_;
-    std::vector<tled::Spring> prior_, expected_;  // G' and G, where they differ
+    std::optional<Prior> expected_;  // G, where it is not the posterior's prior G'
 };
 
 /// K_D ε, 3N × k, mN, for N nodes.

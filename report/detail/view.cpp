@@ -273,10 +273,6 @@ json data_view(const json& report) {
                         number(at(curves, "residual_mm"), 2) + " mm beside them (root mean square); half of all were " +
                         number(at(curves, "to_lines", "before", "median"), 2) + " mm away or more before, and " +
                         number(at(curves, "to_lines", "after", "median"), 2) + " mm after.");
-    if (const json& expected = at(report, "expected_error"); expected.is_object())
-        lines.push_back("By their deviations and the prior of the tissue alone, tissue is expected to lie " +
-                        number(at(expected, "mean_mm"), 1) + " mm off, and " + number(at(expected, "worst_mm"), 1) +
-                        " mm where least is known.");
     return lines;
 }
 

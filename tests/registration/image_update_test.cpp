@@ -7,6 +7,7 @@
 #include "registration/matching/image_mask.hpp"
 #include "registration/matching/image_matching.hpp"
 #include "registration/prepared_io.hpp"
+#include "registration/uncertainty.hpp"
 #include "tests/registration/textured_phantom.hpp"
 #include "tests/support/label_shapes.hpp"
 
@@ -147,6 +148,30 @@ TEST(ImageUpdate, FindsTheRigidMotionFirst) {
     const Eigen::Isometry3d pose = motion(8, {1, 2, -1}, {5, -3, 4});
     const auto result = update(prepared, {.image = after(prepared, pose)}, quick());
     EXPECT_LT(summarise(node_errors(result, pose)).mean, 0.22);
+}
+
+/// What a scanner shows whose field of view ends at a plane.
+Volume left_of(double x_mm, Volume image) {
+    const imaging::Geometry grid = image.geometry;
+    for_each_voxel(image, [&](const Eigen::Vector3d& index, std::int64_t n) {
+        if (grid.point(index)[0] > x_mm) image.data<float>()[n] = 0;
+    });
+    return image;
+}
+
+// Where the part in view turned and moved by far, tissue out of it goes along. Held where the first blocks place it, it
+// was 2.64 mm off in the mean, and 48 % of the organ within what was stated.
+TEST(ImageUpdate, TissueOutOfViewMovesAlongWithThePartInView) {
+    const PreparedModel prepared = textured_model();
+    const Eigen::Isometry3d pose = motion(8, {1, 2, -1}, {9, -6, 7});
+    const auto result = update(prepared, {.image = left_of(0, after(prepared, pose))}, quick());
+    const std::vector<double> errors = node_errors(result, pose);
+    EXPECT_EQ(result.pulls.prior_moves, PriorMoves::WithData);
+    EXPECT_LT(summarise(errors).mean, 2.55);
+    const std::vector<ErrorEstimate> stated = uncertainty(prepared, result).at_nodes();
+    int within = 0;
+    for (std::size_t n = 0; n < errors.size(); ++n) within += errors[n] <= stated[n].interval_mm;
+    EXPECT_GT(within, 0.85 * double(errors.size()));
 }
 
 // Without blocks tissue comes nearer by a voxel and a half at most with each search: two of them leave 0.47 mm.

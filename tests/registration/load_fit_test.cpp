@@ -37,7 +37,8 @@ UpdateOptions with_shapes(int count) {
 }
 
 detail::WeighedSprings prior(const PreparedModel& prepared, double energy) {
-    return {{}, detail::ground_springs(prepared, energy, [](const InterfaceNode&) { return 20.0; }), energy, true};
+    const auto ground = detail::ground_springs(prepared, energy, [](const InterfaceNode&) { return 20.0; });
+    return {{}, ground, energy, ground};
 }
 
 /// What smooth loads do to the free organ, 4 mm in root mean square: of a draw that no fit knows.
@@ -77,7 +78,7 @@ TEST(LoadFit, IsTheMeanUnderThePriorOfSmoothLoads) {
     const PreparedModel prepared = organ(12);
     const double energy = 60, stiffness = 40, size = 3;
     detail::WeighedSprings unseen = prior(prepared, energy);
-    unseen.free_placement = false;
+    unseen.placed_by.clear();
     detail::WeighedSprings seen = unseen;
     const Matrix3Xd truth = bent(prepared);
     std::vector<int> held;

@@ -4,6 +4,7 @@
 #include "registration/pose/rigid_part.hpp"
 #include "registration/pose/surface_data.hpp"
 #include "registration/pose/surface_pose.hpp"
+#include "registration/springs/ground_springs.hpp"
 #include "registration/update.hpp"
 #include "tests/registration/shapes.hpp"
 #include "tests/support/label_shapes.hpp"
@@ -131,11 +132,12 @@ TEST(RigidPart, GoesToThePlacementAndMovesNothing) {
     detail::State state{test::motion(15, {0, 1, 1}, {30, 20, 10}), (turn * nodes) - nodes};
     state.displacement.row(0).array() += 0.02 * nodes.row(1).array().square() / 10;  // a bend
     const Eigen::Matrix3Xd before = state.placement * (nodes + state.displacement);
-    detail::give_rigid_part_to_placement(prepared, state);
+    const auto surface = detail::ground_springs(prepared, 1, [](const InterfaceNode&) { return 1.0; });
+    detail::give_rigid_part_to_placement(nodes, surface, state);
     EXPECT_LT((state.placement * (nodes + state.displacement) - before).cwiseAbs().maxCoeff(), 1e-9);
     EXPECT_LT(state.displacement.colwise().norm().maxCoeff(), 1.82);  // of more than 15
     const detail::State once = state;
-    detail::give_rigid_part_to_placement(prepared, state);
+    detail::give_rigid_part_to_placement(nodes, surface, state);
     EXPECT_LT((state.displacement - once.displacement).cwiseAbs().maxCoeff(), 1e-9);
 }
 

@@ -86,6 +86,9 @@ TEST(Coverage, TellsClassesAndViewsApart) {
     EXPECT_NEAR(coverage[0].shown_share, 2.0 / 3, 1e-12);
     EXPECT_NEAR(coverage[0].unknown_share, 1.0 / 3, 1e-12);
     EXPECT_NEAR(coverage[0].doubted_share, 1.0 / 3, 1e-12);
+    EXPECT_NEAR(coverage[0].failed_share, 1.0 / 3, 0.01);  // a hundred times too far off
+    EXPECT_GT(coverage[0].doubted_failures, 0.98);         // the others have twice the radius by chance
+    EXPECT_LT(coverage[0].doubted_successes, 0.01);
     EXPECT_NEAR(coverage[0].held_95_shown, 0.95, 0.015);
     EXPECT_LT(coverage[0].held[2], 0.7);
     EXPECT_NEAR(coverage[1].held[2], 0.95, 0.02);
