@@ -30,7 +30,7 @@ struct ContourOptions {
     double pixel_mm = 1;         // where no image gives one
     double margin_mm = 2;        // about all contours
     double most_even = 0.1;      // of a step, that a plane may lie off the grid's
-    double gap = 1.6;            // a region's usual step times this is left empty
+    double gap = 2.5;            // a region's usual step times this is left empty
     double most_overlap = 0.05;  // of the smaller region, that two regions share or do not where one holds the other
     double most_voxels = 3e8;    // more are no patient's
     double farthest_mm = 3000;   // an extent of more is no patient's

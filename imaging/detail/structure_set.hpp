@@ -32,7 +32,7 @@ std::optional<StructureSet> read_structure_set(const std::filesystem::path& path
 /// Labels are the regions' numbers. A voxel is within a region where its centre is within an odd number of contours of
 /// its plane, so that contours within contours are holes. Between two planes of a region the mean of the signed
 /// distances to the contours of both, weighed by nearness, decides (Raya and Udupa, IEEE TMI 9 (1990) 32); steps of
-/// more than 1.6 times the region's usual one are gaps. Voxels are those of `image`, if given; without one, or where
+/// more than 2.5 times the region's usual one are gaps. Voxels are those of `image`, if given; without one, or where
 /// its slices are not parallel to the contours, labels are drawn on pixels of 1 mm in the contours' planes. Where one
 /// region holds nineteen twentieths of a smaller one (a tumour in an organ), or at most one (a rim), the voxels that
 /// they share go to the smaller, with a note. Throws InvalidInput on other overlaps, by name, on contours that are not
