@@ -26,12 +26,16 @@ namespace fs = std::filesystem;
 using imaging::Volume;
 
 void evaluate_labels(const EvaluateOptions& options, Observer& observer, ScoreSheet& sheet) {
-    const Volume labels = read_noted_labels(options.labels, observer);
+    const imaging::ReadResult labels = imaging::read_labels_with_notes(options.labels);
+    for (const std::string& note : notes_of(labels, options.labels)) observer.note(note);
     Volume reference = read_noted_labels(options.reference_labels, observer);
-    require_same_grid(reference.geometry, labels.geometry, options.reference_labels.string(), options.labels.string(),
-                      "resample one onto the other");
-    reference.geometry = labels.geometry;
-    sheet.add(overlap(labels, reference));
+    require_same_grid(reference.geometry, labels.volume.geometry, options.reference_labels.string(),
+                      options.labels.string(), "resample one onto the other");
+    reference.geometry = labels.volume.geometry;
+    imaging::LabelNames names;
+    if (!options.label_names.empty()) names = imaging::read_label_names(options.label_names);
+    names.insert(labels.label_names.begin(), labels.label_names.end());
+    sheet.add(overlap(labels.volume, reference), names);
 }
 
 Volume read_field(const fs::path& path, Observer& observer) {

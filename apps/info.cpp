@@ -47,13 +47,14 @@ const char* type_name(int cv_depth) {
     }
 }
 
-void print_labels(const imaging::ReadResult& image, const fs::path& path) {
+void print_labels(const imaging::ReadResult& image, const fs::path& path, imaging::LabelNames names) {
     const imaging::ReadResult labels = imaging::as_labels(image, path);
+    names.insert(labels.label_names.begin(), labels.label_names.end());
     fmt::print("  {:<8}{:>10}{:>14}{:>8}  {}\n", "label", "voxels", "volume (mm3)", "pieces", "centroid (mm, LPS)");
     for (const auto& [label, s] : imaging::label_statistics(labels.volume)) {
-        const auto name = labels.label_names.find(label);
+        const auto name = names.find(label);
         fmt::print("  {:<8}{:>10}{:>14.1f}{:>8}  {}{}{}\n", label, s.voxels, s.volume_mm3, s.components,
-                   point_text(s.centroid), name == labels.label_names.end() ? "" : "  '" + name->second + "'",
+                   point_text(s.centroid), name == names.end() ? "" : "  '" + name->second + "'",
                    s.touches_border ? "  touches the border of the image" : "");
     }
 }
@@ -67,7 +68,7 @@ std::pair<double, double> value_range(const cv::Mat& voxels) {
     return {least, most};
 }
 
-void print_image(const fs::path& path, bool labels) {
+void print_image(const fs::path& path, const InfoOptions& options) {
     const imaging::ReadResult image = imaging::read_volume_with_notes(path);
     const imaging::Volume& volume = image.volume;
     const imaging::Geometry& g = volume.geometry;
@@ -80,7 +81,9 @@ void print_image(const fs::path& path, bool labels) {
     const auto [least, most] = value_range(volume.voxels);
     fmt::print("  values           {:g} to {:g}\n", least, most);
     for (const std::string& note : image.notes) fmt::print("  note: {}\n", note);
-    if (labels) print_labels(image, path);
+    if (!options.labels) return;
+    print_labels(image, path,
+                 options.label_names.empty() ? imaging::LabelNames() : imaging::read_label_names(options.label_names));
 }
 
 void print_mesh(const meshing::TetMesh& mesh) {
@@ -135,13 +138,13 @@ void print_devices() {
                    device.problem.empty() ? "" : "  (unusable: " + device.problem + ")");
 }
 
-void print_file(const fs::path& path, bool labels) {
+void print_file(const fs::path& path, const InfoOptions& options) {
     std::error_code failure;
     if (!fs::exists(path, failure)) throw IoError("cannot read '" + path.string() + "': no such file");
     fmt::print("{}: ", path.string());
     switch (file_kind(path)) {
         case FileKind::Image:
-            return print_image(path, labels);
+            return print_image(path, options);
         case FileKind::Mesh:
             return print_mesh(meshing::read_vtu(path));
         case FileKind::Points:
@@ -162,7 +165,7 @@ void print_file(const fs::path& path, bool labels) {
 void run_info(const InfoOptions& options) {
     if (options.files.empty() && !options.devices) throw InvalidInput("nothing to look at; give a file, or --devices");
     if (options.devices) print_devices();
-    for (const fs::path& path : options.files) print_file(path, options.labels);
+    for (const fs::path& path : options.files) print_file(path, options);
 }
 
 }  // namespace tissuewarp::apps

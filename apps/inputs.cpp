@@ -207,6 +207,17 @@ void read_point_files(RegistrationInputs& inputs, const RegisterOptions& options
     if (!options.surface.empty()) inputs.surface = read_tissue_surface(options.surface, notes);
 }
 
+/// Side by side, but for contours, which are drawn on the image's voxels. What is not given stays as it is.
+void read_image_and_labels(const fs::path& image_path, const fs::path& labels_path, imaging::ReadResult& image,
+                           imaging::ReadResult& labels) {
+    const bool contours = !image_path.empty() && !labels_path.empty() && imaging::is_structure_set(labels_path);
+    tbb::task_group tasks;
+    if (!image_path.empty()) tasks.run([&] { image = imaging::read_volume_with_notes(image_path); });
+    if (!labels_path.empty() && !contours) tasks.run([&] { labels = imaging::read_labels_with_notes(labels_path); });
+    tasks.wait();
+    if (contours) labels = imaging::read_structures_on(labels_path, image.volume.geometry);
+}
+
 }  // namespace
 
 RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observer) {
@@ -225,6 +236,7 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
                                                                      {"moving-curves", &options.curves.moving},
                                                                      {"fixed-curves", &options.curves.fixed},
                                                                      {"materials", &options.materials},
+                                                                     {"label-names", &options.label_names},
                                                                      {"initial-transform", &options.initial_transform},
                                                                      {"landmarks", &options.landmarks.csv},
                                                                      {"landmarks-moving", &options.landmarks.moving},
@@ -233,17 +245,14 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
                                                                      {"surface", &options.surface}};
     for (const auto& [role, path] : roles) add_file(inputs, role, *path);
     if (!options.materials.empty()) inputs.materials = read_materials(options.materials);
+    if (!options.label_names.empty()) inputs.label_names = imaging::read_label_names(options.label_names);
     read_point_files(inputs, options);
     observer.checkpoint("reading", 0.1);
 
     imaging::ReadResult moving, fixed, moving_labels, fixed_labels;
     tbb::task_group tasks;
-    if (!options.moving_labels.empty())
-        tasks.run([&] { moving_labels = imaging::read_labels_with_notes(options.moving_labels); });
-    if (!options.fixed_labels.empty())
-        tasks.run([&] { fixed_labels = imaging::read_labels_with_notes(options.fixed_labels); });
-    if (!options.moving.empty()) tasks.run([&] { moving = imaging::read_volume_with_notes(options.moving); });
-    if (!options.fixed.empty()) tasks.run([&] { fixed = imaging::read_volume_with_notes(options.fixed); });
+    tasks.run([&] { read_image_and_labels(options.moving, options.moving_labels, moving, moving_labels); });
+    tasks.run([&] { read_image_and_labels(options.fixed, options.fixed_labels, fixed, fixed_labels); });
     tasks.run([&] {
         for (InputFile& file : inputs.files)
             if (fs::is_regular_file(file.path)) file.sha256 = sha256_of_file(file.path);
@@ -263,6 +272,9 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
     inputs.moving_label_names = moving_labels.label_names;
     inputs.fixed_label_names = fixed_labels.label_names;
     find_organ(inputs, options);
+    for (const imaging::LabelNames* names : {&inputs.moving_label_names, &inputs.fixed_label_names})
+        inputs.label_names.insert(names->begin(), names->end());
+    for (const auto& [label, tissue] : inputs.materials) inputs.label_names.emplace(label, tissue.name);
     exclude_unmatched(inputs, options);
     take_initial_transform(inputs, options);
     observer.checkpoint("reading", 1.0);

@@ -6,6 +6,7 @@
 #include "core/observer.hpp"
 #include "imaging/foreground.hpp"
 #include "imaging/image_io.hpp"
+#include "imaging/label_names.hpp"
 #include "meshing/tet_mesh.hpp"
 #include "registration/evaluation.hpp"
 #include "registration/intraoperative.hpp"
@@ -37,10 +38,11 @@ struct RegistrationInputs {
     std::optional<registration::Curves> curves;
     std::optional<registration::StartPose> start;  ///< in place of the headers' placement
     std::optional<registration::Landmarks> landmarks;
-    std::optional<Eigen::Matrix3Xd> points;                            ///< moving frame, LPS mm
-    std::optional<meshing::SurfaceMesh> surface;                       ///< to carry along, moving frame, LPS mm
-    std::map<int, TissueEntry> materials;                              ///< empty without a table
-    std::map<int, std::string> moving_label_names, fixed_label_names;  ///< of segmentations that name their segments
+    std::optional<Eigen::Matrix3Xd> points;                     ///< moving frame, LPS mm
+    std::optional<meshing::SurfaceMesh> surface;                ///< to carry along, moving frame, LPS mm
+    std::map<int, TissueEntry> materials;                       ///< empty without a table
+    imaging::LabelNames moving_label_names, fixed_label_names;  ///< of segmentations that name their segments
+    imaging::LabelNames label_names;                            ///< of both, after those of --label-names
     std::vector<InputFile> files;
     std::vector<std::string> notes;  ///< what the readers had to decide
 

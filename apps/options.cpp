@@ -15,6 +15,9 @@ namespace tissuewarp::apps {
 
 namespace {
 
+constexpr const char* label_names_text =
+    "Names of the labels: a colour table of 3D Slicer (.ctbl, .txt, .csv) or a label file of ITK-SNAP";
+
 /// All verbs with the structs that they fill.
 struct Parser {
     CLI::App app{
@@ -77,6 +80,7 @@ struct Parser {
             "may, as in elastix and ANTs");
         verb.path("--fixed-mask", o.fixed_mask, "The same over --fixed");
         verb.path("--fixed-labels", o.fixed_labels, "Intraoperative label map: what is matched");
+        verb.path("--label-names", o.label_names, label_names_text);
         verb.path("--fixed-surface", o.fixed_surface,
                   "Intraoperative points of a part of the surface: .ply, .stl, .obj, .vtk, .vtp, .csv, .xyz (mm, LPS)");
         verb.number("--surface-sd", o.surface_deviation, "MM", 1e-3, 100.0,
@@ -194,6 +198,7 @@ struct Parser {
         CLI::Option* reference = verb.path("--reference-labels", o.reference_labels, "Label map that is the truth");
         labels->needs(reference);
         reference->needs(labels);
+        verb.path("--label-names", o.label_names, label_names_text)->needs(labels);
         verb.landmarks(o.landmarks);
         CLI::Option* field = verb.path("--displacement", o.displacement,
                                        "Field moving_to_fixed (mm, LPS): maps the landmarks, gives det J");
@@ -240,6 +245,7 @@ struct Parser {
                         "Images, label maps, meshes (.vtu), surfaces or records (.h5); lengths in mm")
             ->type_name("FILE");
         verb.flag("--labels", o.labels, "Label statistics of an integer image (volumes in mm3)");
+        verb.path("--label-names", o.label_names, label_names_text);
         verb.flag("--devices", o.devices, "List the EGL devices that --device gpu:<index> counts");
         verb.common(o.common);
     }

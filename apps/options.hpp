@@ -53,6 +53,7 @@ struct RegisterOptions {
     CurveFiles curves;
     LandmarkFiles landmarks;
     std::filesystem::path initial_transform;      ///< fixed → moving points
+    std::filesystem::path label_names;            ///< a colour table or label file
     std::filesystem::path points, surface;        ///< of the moving frame, carried along
     std::optional<double> accuracy, time_budget;  ///< mm; s: they choose the mesh
     double edge_length = 0.0;                     ///< mm; 0: from the volume of the organ and what is given
@@ -98,7 +99,7 @@ struct WarpOptions {
 
 struct EvaluateOptions {
     CommonOptions common;
-    std::filesystem::path labels, reference_labels, displacement, inverse, mask, json;
+    std::filesystem::path labels, reference_labels, label_names, displacement, inverse, mask, json;
     LandmarkFiles landmarks;
     double moved = 2.0;                                 ///< mm
     std::filesystem::path moving_labels;                ///< where the organ's surface is, moving frame
@@ -112,6 +113,7 @@ struct InfoOptions {
     CommonOptions common;
     std::vector<std::filesystem::path> files;
     bool labels = false, devices = false;
+    std::filesystem::path label_names;  ///< a colour table or label file
 };
 
 struct BenchOptions {

@@ -263,6 +263,7 @@ void run_register(const RegisterOptions& options) {
     }
     if (run.dial) doubt_dial(run);
     doubt_field(run);
+    for (Doubt& doubt : run.result.doubts) doubt.text = imaging::with_label_names(doubt.text, run.inputs.label_names);
 
     progress.begin("writing and scoring", 0.65, 0.88);
     auto silenced = std::make_unique<SilencedStandardError>();

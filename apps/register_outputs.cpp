@@ -217,7 +217,8 @@ std::string summary_text(const RegistrationRun& run, double total_seconds) {
     if (const auto& error = run.products.uncertainty) text += estimate_text(registration::summarise(*error));
     if (!run.scores.after.empty()) text += "Dice                      before   after\n";
     for (const auto& [label, after] : run.scores.after)
-        text += fmt::format("  {:<22}{:>8.3f}{:>8.3f}\n", label == 0 ? "all labels" : fmt::format("label {}", label),
+        text += fmt::format("  {:<22}{:>8.3f}{:>8.3f}\n",
+                            label == 0 ? "all labels" : imaging::label_title(label, run.inputs.label_names),
                             run.scores.before.contains(label) ? run.scores.before.at(label).dice : 0.0, after.dice);
     text +=
         fmt::format("det J of the mesh: minimum {:.3f}, folded {}\n", run.scores.mesh.minimum, run.scores.mesh.folded);

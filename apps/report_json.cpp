@@ -262,13 +262,15 @@ json to_json(const registration::JacobianReport& report) {
             {"folded_places_mm", places}};
 }
 
-json to_json(const std::map<int, registration::Overlap>& overlaps) {
+json to_json(const std::map<int, registration::Overlap>& overlaps, const imaging::LabelNames& names) {
     json object = json::object();
-    for (const auto& [label, overlap] : overlaps)
-        object[label == 0 ? "all" : std::to_string(label)] = {
-            {"dice", number(overlap.dice)},
-            {"hausdorff_95_mm", number(overlap.hausdorff_95_mm)},
-            {"mean_surface_distance_mm", number(overlap.mean_surface_distance_mm)}};
+    for (const auto& [label, overlap] : overlaps) {
+        json& entry = object[label == 0 ? "all" : std::to_string(label)];
+        entry = {{"dice", number(overlap.dice)},
+                 {"hausdorff_95_mm", number(overlap.hausdorff_95_mm)},
+                 {"mean_surface_distance_mm", number(overlap.mean_surface_distance_mm)}};
+        if (const auto named = names.find(label); named != names.end()) entry["name"] = named->second;
+    }
     return object;
 }
 
@@ -328,7 +330,8 @@ json report_json(const RegistrationRun& run, double total_seconds) {
     report["estimated_error_mm"] =
         run.result.rounds.empty() ? json(nullptr) : number(run.result.rounds.back().estimated_error_mm);
     if (!scores.after.empty())
-        report["overlap"] = {{"before", to_json(scores.before)}, {"after", to_json(scores.after)}};
+        report["overlap"] = {{"before", to_json(scores.before, run.inputs.label_names)},
+                             {"after", to_json(scores.after, run.inputs.label_names)}};
     if (run.inputs.foreground) report["foreground"] = foreground(*run.inputs.foreground);
     if (run.inputs.start) report["initial_transform"] = start(*run.inputs.start);
     add_fits(report, run.result);

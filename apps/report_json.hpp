@@ -18,7 +18,7 @@ nlohmann::json to_json(const registration::Summary& summary);
 nlohmann::json to_json(const registration::TargetError& error);
 nlohmann::json to_json(const registration::JacobianReport& report);
 /// Keys "1", "2", ... and "all" for the union of the labels.
-nlohmann::json to_json(const std::map<int, registration::Overlap>& overlaps);
+nlohmann::json to_json(const std::map<int, registration::Overlap>& overlaps, const imaging::LabelNames& names);
 nlohmann::json to_json(const meshing::Distribution& distribution);
 nlohmann::json to_json(const meshing::QualityReport& quality);
 nlohmann::json to_json(const meshing::Fidelity& fidelity);

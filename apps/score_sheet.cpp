@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace tissuewarp::apps {
@@ -36,12 +37,14 @@ void ScoreSheet::row(const std::string& name, const Summary& s) {
                              s.percentile_95, s.maximum);
 }
 
-void ScoreSheet::add(const std::map<int, registration::Overlap>& overlaps) {
-    json_["overlap"] = to_json(overlaps);
-    text_ += fmt::format("{:<16}{:>8}{:>12}{:>12}\n", "overlap", "Dice", "HD95 (mm)", "mean (mm)");
+void ScoreSheet::add(const std::map<int, registration::Overlap>& overlaps, const imaging::LabelNames& names) {
+    json_["overlap"] = to_json(overlaps, names);
+    const auto title = [&](int label) { return label == 0 ? "all labels" : imaging::label_title(label, names); };
+    std::size_t width = 14;
+    for (const auto& [label, o] : overlaps) width = std::max(width, title(label).size());
+    text_ += fmt::format("{:<{}}{:>8}{:>12}{:>12}\n", "overlap", width + 2, "Dice", "HD95 (mm)", "mean (mm)");
     for (const auto& [label, o] : overlaps)
-        text_ += fmt::format("  {:<14}{:>8.4f}{:>12.3f}{:>12.3f}\n",
-                             label == 0 ? "all labels" : fmt::format("label {}", label), o.dice, o.hausdorff_95_mm,
+        text_ += fmt::format("  {:<{}}{:>8.4f}{:>12.3f}{:>12.3f}\n", title(label), width, o.dice, o.hausdorff_95_mm,
                              o.mean_surface_distance_mm);
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 /// What `evaluate` found, as a table to read and as JSON.
 
+#include "imaging/label_names.hpp"
 #include "registration/evaluation/curve_residual.hpp"
 #include "registration/evaluation/inverse_consistency.hpp"
 #include "registration/evaluation/surface_residual.hpp"
@@ -32,7 +33,7 @@ struct CurveErrors {
 /// JSON.
 class ScoreSheet {
 public:
-    void add(const std::map<int, registration::Overlap>& overlaps);
+    void add(const std::map<int, registration::Overlap>& overlaps, const imaging::LabelNames& names);
     /// `mapped`: a field carried the landmarks, so that there is an error after.
     void add(const registration::TargetError& error, bool mapped);
     void add(const BinnedErrors& errors);

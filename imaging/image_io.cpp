@@ -6,6 +6,7 @@
 #include "imaging/detail/gzip.hpp"
 #include "imaging/detail/image_header.hpp"
 #include "imaging/detail/itk_image_io.hpp"
+#include "imaging/detail/structure_set.hpp"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -233,6 +234,20 @@ Volume read_labels(const fs::path& path) {
 
 ReadResult read_labels_with_notes(const fs::path& path) {
     return as_labels(read_volume_with_notes(path), path);
+}
+
+bool is_structure_set(const fs::path& path) {
+    std::error_code ignored;
+    return fs::is_regular_file(path, ignored) && !format_named(lower_case_name(path)) && detail::is_dicom_file(path) &&
+           detail::read_structure_set(path).has_value();
+}
+
+ReadResult read_structures_on(const fs::path& path, const Geometry& image) {
+    return naming(path, [&] {
+        const auto set = detail::read_structure_set(path);
+        if (!set) throw InvalidInput("is no structure set (RTSTRUCT)");
+        return detail::labels_of(*set, path, &image);
+    });
 }
 
 ReadResult as_labels(ReadResult read, const fs::path& path) {

@@ -1,12 +1,12 @@
 #pragma once
 /// Reading and writing image files. Every format lands in LPS mm: NIfTI (.nii, .nii.gz, .hdr with .img), NRRD (.nrrd,
-/// .nhdr, segmentations of 3D Slicer), MetaImage (.mha, .mhd), a folder that holds one DICOM series, and one DICOM file
-/// of many frames.
+/// .nhdr, segmentations of 3D Slicer), MetaImage (.mha, .mhd), a folder that holds one DICOM series, one DICOM file of
+/// many frames, and DICOM contours.
 
+#include "imaging/label_names.hpp"
 #include "imaging/volume.hpp"
 
 #include <filesystem>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -16,7 +16,7 @@ namespace tissuewarp::imaging {
 struct ReadResult {
     Volume volume;
     std::vector<std::string> notes;
-    std::map<int, std::string> label_names;  ///< of a segmentation that names its segments (.seg.nrrd, DICOM SEG)
+    LabelNames label_names;  ///< of a segmentation that names its segments (.seg.nrrd, DICOM SEG)
 };
 
 /// True where the name is of an image (in any case), or the file begins as DICOM files do, or it is a folder.
@@ -40,6 +40,13 @@ Volume read_volume(const std::filesystem::path& path);
 /// Reads a label map: integer values kept exactly as int32. A floating-point file is accepted when every voxel is an
 /// integer. Throws InvalidInput on fractional or negative labels, and on a grey image.
 ReadResult read_labels_with_notes(const std::filesystem::path& path);
+
+/// True for a DICOM structure set (RTSTRUCT): contours, which have no voxels of their own. read_labels() draws them on
+/// pixels of 1 mm in their planes.
+bool is_structure_set(const std::filesystem::path& path);
+
+/// Labels of a structure set on the voxels of an image.
+ReadResult read_structures_on(const std::filesystem::path& path, const Geometry& image);
 
 /// As above, without the notes.
 Volume read_labels(const std::filesystem::path& path);

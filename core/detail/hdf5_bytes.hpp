@@ -62,6 +62,11 @@ public:
     [[noreturn]] void fail(const std::string& what) const {
         throw IoError("'" + path_.string() + "' is damaged: " + what + "; copy the file again, or write it anew");
     }
+    /// Of files that may be in order.
+    [[noreturn]] void refuse(const std::string& what) const {
+        throw IoError("'" + path_.string() + "' is written in a form of HDF5 that is not read here: " + what +
+                      "; write it anew for earlier versions, a transform as text (.tfm)");
+    }
 
 private:
     std::filesystem::path path_;

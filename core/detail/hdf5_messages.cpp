@@ -28,7 +28,7 @@ Hdf5Type hdf5_type(const Hdf5Bytes& file, Hdf5Range message) {
     require_in(file, message, at, 8);
     const int kind = file.at<std::uint8_t>(at) & 15, version = file.at<std::uint8_t>(at) >> 4;
     const std::uint64_t bytes = file.at<std::uint32_t>(at + 4);
-    if (version < 1 || version > 3) file.fail("a type of unknown version");
+    if (version < 1 || version > 3) file.refuse("a type of unknown version");
     if (kind == Integer) {
         require_in(file, message, at + 8, 4);
         const bool narrow = bytes == 1 || bytes == 2 || bytes == 4 || bytes == 8;
@@ -42,7 +42,7 @@ Hdf5Type hdf5_type(const Hdf5Bytes& file, Hdf5Range message) {
         return {bytes, false};
     }
     if (kind == Text && bytes >= 1 && bytes <= 65536) return {bytes, false};
-    if (kind != Variable || bytes != 16) file.fail("values that are neither numbers nor texts");
+    if (kind != Variable || bytes != 16) file.refuse("values that are neither numbers nor texts");
     if (hdf5_type(file, {at + 8, message.end}).bytes != 1) file.fail("lists of values");
     return {16, true};
 }
@@ -52,7 +52,7 @@ Hdf5Space hdf5_space(const Hdf5Bytes& file, Hdf5Range message) {
     const int version = file.at<std::uint8_t>(message.begin), rank = file.at<std::uint8_t>(message.begin + 1);
     const auto flags = file.at<std::uint8_t>(message.begin + 2);
     constexpr int most_rank = 32;
-    if ((version != 1 && version != 2) || rank > most_rank) file.fail("a shape of unknown version");
+    if ((version != 1 && version != 2) || rank > most_rank) file.refuse("a shape of unknown version");
     const bool none = version == 2 && file.at<std::uint8_t>(message.begin + 3) == 2;
     const std::uint64_t sizes = message.begin + (version == 1 ? 8 : 4);
     require_in(file, message, sizes, 8U * static_cast<unsigned>(rank) * ((flags & 1U) ? 2U : 1U));
@@ -70,7 +70,7 @@ Hdf5Space hdf5_space(const Hdf5Bytes& file, Hdf5Range message) {
 
 Hdf5Layout hdf5_layout(const Hdf5Bytes& file, Hdf5Range message) {
     require_in(file, message, message.begin, 2);
-    if (file.at<std::uint8_t>(message.begin) != 3) file.fail("a dataset's layout is of another version than 3");
+    if (file.at<std::uint8_t>(message.begin) != 3) file.refuse("a dataset's layout is of another version than 3");
     const std::uint64_t at = message.begin + 2;
     Hdf5Layout layout;
     switch (file.at<std::uint8_t>(message.begin + 1)) {
@@ -92,7 +92,7 @@ Hdf5Layout hdf5_layout(const Hdf5Bytes& file, Hdf5Range message) {
                 layout.chunk.push_back(file.at<std::uint32_t>(at + 9 + 4U * axis));
             return layout;
         default:
-            file.fail("a dataset's layout is unknown");
+            file.refuse("a dataset's layout is unknown");
     }
 }
 
@@ -100,14 +100,14 @@ void require_hdf5_filters(const Hdf5Bytes& file, Hdf5Range message) {
     enum Filter { Deflate = 1, Shuffle = 2, Fletcher32 = 3 };
     require_in(file, message, message.begin, 2);
     const int version = file.at<std::uint8_t>(message.begin), count = file.at<std::uint8_t>(message.begin + 1);
-    if ((version != 1 && version != 2) || count > 8) file.fail("a list of filters is of unknown version");
+    if ((version != 1 && version != 2) || count > 8) file.refuse("a list of filters is of unknown version");
     std::uint64_t at = message.begin + (version == 1 ? 8 : 2);
     for (int left = count; left > 0; --left) {
         const bool named = version == 1;  // in version 2 the filters of HDF5 have no names
         require_in(file, message, at, named ? 8 : 6);
         const int filter = file.at<std::uint16_t>(at);
         if (filter != Deflate && filter != Shuffle && filter != Fletcher32)
-            file.fail("data are packed by filter " + std::to_string(filter) + ", which is not read");
+            file.refuse("data are packed by filter " + std::to_string(filter) + ", which is not read");
         const std::uint64_t name = named ? file.at<std::uint16_t>(at + 2) : 0;
         const std::uint64_t values = file.at<std::uint16_t>(at + (named ? 6 : 4));
         if (name % 8 != 0 && named) file.fail("a filter's name has an odd length");
@@ -121,7 +121,7 @@ std::uint64_t hdf5_fill_bytes(const Hdf5Bytes& file, Hdf5Range message, bool old
     if (!old) {
         require_in(file, message, at, 2);
         const int version = file.at<std::uint8_t>(at);
-        if (version < 1 || version > 3) file.fail("a fill value is of unknown version");
+        if (version < 1 || version > 3) file.refuse("a fill value is of unknown version");
         if (version == 3 && (file.at<std::uint8_t>(at + 1) & 0x20U) == 0) return 0;
         if (version < 3) require_in(file, message, at, 4);
         if (version == 2 && file.at<std::uint8_t>(at + 3) == 0) return 0;

@@ -48,9 +48,9 @@ public:
         constexpr std::string_view signature = "\x89HDF\r\n\x1a\n";
         if (!file_.begins(0, signature)) file_.fail("it does not begin as HDF5 does");
         const int version = file_.at<std::uint8_t>(8);
-        if (version > 3) file_.fail("it is of an unknown version of HDF5");
+        if (version > 3) file_.refuse("it is of an unknown version of HDF5");
         const std::uint64_t sizes = version < 2 ? 13 : 9;
-        if (file_.at<std::uint16_t>(sizes) != 0x0808) file_.fail("its addresses do not have eight bytes");
+        if (file_.at<std::uint16_t>(sizes) != 0x0808) file_.refuse("its addresses do not have eight bytes");
         version < 2 ? begin_old(version) : begin_new();
     }
 
@@ -69,14 +69,14 @@ private:
         const std::uint64_t addresses = version == 0 ? 24 : 28;
         if (file_.at<std::uint64_t>(addresses) != 0 || file_.at<std::uint64_t>(addresses + 8) != hdf5_nowhere ||
             file_.at<std::uint64_t>(addresses + 24) != hdf5_nowhere)
-            file_.fail("it has a driver or a list of free space");
+            file_.refuse("it has a driver or a list of free space");
         file_.require(0, file_.at<std::uint64_t>(addresses + 16));
         take_entry(addresses + 32, {});
     }
 
     void begin_new() {
         if (file_.at<std::uint64_t>(12) != 0 || file_.at<std::uint64_t>(20) != hdf5_nowhere)
-            file_.fail("it does not begin at its first byte, or its superblock is extended");
+            file_.refuse("it does not begin at its first byte, or its superblock is extended");
         file_.require(0, file_.at<std::uint64_t>(28));
         take_header(file_.at<std::uint64_t>(36));
     }
@@ -115,7 +115,7 @@ private:
 
     void take_new_header(std::uint64_t at, Object& object) {
         const auto flags = file_.at<std::uint8_t>(at + 5);
-        if (file_.at<std::uint8_t>(at + 4) != 2) file_.fail("an object header of unknown version");
+        if (file_.at<std::uint8_t>(at + 4) != 2) file_.refuse("an object header of unknown version");
         const std::uint64_t width = 1U << (flags & 3U), order = (flags & 4U) ? 2 : 0;
         at += 6 + ((flags & 0x20U) ? 16 : 0) + ((flags & 0x10U) ? 4 : 0);
         take_new_messages(at + width, file_.whole(at, width), order, object);
@@ -143,7 +143,7 @@ private:
     }
 
     void take_message(int type, int flags, Hdf5Range body, Object& object, bool is_new) {
-        if (type != Nothing && (flags & 2) != 0) file_.fail("a message is shared");
+        if (type != Nothing && (flags & 2) != 0) file_.refuse("a message is shared");
         switch (type) {
             case Space:
                 object.space = hdf5_space(file_, body);
@@ -188,7 +188,7 @@ private:
             case References:
                 break;
             default:
-                file_.fail("a header holds a message of type " + std::to_string(type) + ", which is not read");
+                file_.refuse("a header holds a message of type " + std::to_string(type) + ", which is not read");
         }
     }
 
@@ -197,7 +197,7 @@ private:
         const std::uint64_t at =
             body.begin + 2 + ((file_.at<std::uint8_t>(body.begin + 1) & 1U) != 0 ? index_bytes : 0);
         if (at + 8 > body.end || file_.at<std::uint64_t>(at) != hdf5_nowhere)
-            file_.fail("a group has more than eight parts, as those of no transform have");
+            file_.refuse("a group has more than eight parts, listed as of HDF5 1.8");
     }
 
     void take_continuation(std::uint64_t at, std::uint64_t bytes, Object& object, bool is_new) {
@@ -210,7 +210,7 @@ private:
         if (body.end - body.begin < 8) file_.fail("an attribute is cut short");
         const int version = file_.at<std::uint8_t>(body.begin);
         if (version < 1 || version > 3 || file_.at<std::uint8_t>(body.begin + 1) != 0)
-            file_.fail("an attribute of unknown version");
+            file_.refuse("an attribute of unknown version");
         const auto padded = [&](std::uint64_t bytes) { return version == 1 ? (bytes + 7) / 8 * 8 : bytes; };
         const std::uint64_t name = file_.at<std::uint16_t>(body.begin + 2),
                             type = file_.at<std::uint16_t>(body.begin + 4),
@@ -352,7 +352,7 @@ private:
     void take_entry(std::uint64_t at, const Heap& heap) {
         if (heap.bytes > 0) require_name(heap, file_.at<std::uint64_t>(at));
         const std::uint32_t cached = file_.at<std::uint32_t>(at + 16);
-        if (cached > 1) file_.fail("a name is a link to another one");
+        if (cached > 1) file_.refuse("a name is a link to another one");
         take_header(file_.at<std::uint64_t>(at + 8));
         if (cached == 1) take_group(file_.at<std::uint64_t>(at + 24), file_.at<std::uint64_t>(at + 32));
     }
@@ -361,7 +361,7 @@ private:
         if (body.end - body.begin < 3 || file_.at<std::uint8_t>(body.begin) != 1) file_.fail("a link is cut short");
         const auto flags = file_.at<std::uint8_t>(body.begin + 1);
         std::uint64_t at = body.begin + 2;
-        if ((flags & 8U) != 0 && file_.at<std::uint8_t>(at++) != 0) file_.fail("a name is a link to another one");
+        if ((flags & 8U) != 0 && file_.at<std::uint8_t>(at++) != 0) file_.refuse("a name is a link to another one");
         at += ((flags & 4U) != 0 ? 8 : 0) + ((flags & 16U) != 0 ? 1 : 0);
         const std::uint64_t width = 1U << (flags & 3U), name = file_.whole(at, width);
         if (at + width > body.end || name > body.end - at - width || body.end - at - width - name < 8)

@@ -3,6 +3,7 @@
 #include "imaging/detail/dicom_file.hpp"
 #include "imaging/detail/header_checks.hpp"
 #include "imaging/detail/segments.hpp"
+#include "imaging/detail/structure_set.hpp"
 
 #include <Eigen/Geometry>
 
@@ -72,7 +73,7 @@ std::vector<DicomFile> read_series(const fs::path& path) {
     if (files.empty())
         throw unusable_series(path, std::string("it holds no DICOM images") +
                                         (paths.empty() ? "" : " (plans, contours and reports have no pixels)") +
-                                        "; give the folder of one series");
+                                        "; give the folder of one series, or a structure set (RTSTRUCT) as a file");
     std::set<std::string> series;
     for (const DicomFile& file : files) series.insert(file.series);
     if (series.size() > 1)
@@ -337,6 +338,9 @@ bool is_dicom_file(const fs::path& path) {
 }
 
 ReadResult read_dicom(const fs::path& path) {
+    std::error_code ignored;
+    if (fs::is_regular_file(path, ignored))
+        if (const auto set = read_structure_set(path)) return labels_of(*set, path, nullptr);
     const std::vector<DicomFile> files = read_series(path);
     std::vector<Slice> slices = slices_of(path, files);
     const bool segmentation = std::any_of(files.begin(), files.end(), [](const DicomFile& file) {

@@ -2,6 +2,7 @@
 
 #include "core/errors.hpp"
 #include "registration/pose/label_distance.hpp"
+#include "registration/pose/label_rivals.hpp"
 #include "registration/pose/pose_search.hpp"
 #include "registration/pose/surface_pose.hpp"
 
@@ -10,8 +11,21 @@ namespace tissuewarp::registration {
 Alignment align_labels(const imaging::Volume& moving_labels, const imaging::Volume& fixed_labels,
                        const AlignmentOptions& options, Observer& observer) {
     const detail::LabelDistance cost(moving_labels.as(CV_32S), fixed_labels.as(CV_32S), options.samples);
-    return detail::search_pose(cost, cost.forward.points(), cost.backward.points().rowwise().mean(),
-                               detail::PoseFreedom::Similarity, options, observer);
+    const Eigen::Vector3d fixed_centroid = cost.backward.points().rowwise().mean();
+    const auto search_from = [&](const Eigen::Isometry3d& start) -> Alignment {
+        const auto moved_on = [&](const Eigen::Affine3d& map, double trim, int stride) {
+            return cost(map * Eigen::Affine3d(start.matrix()), trim, stride);
+        };
+        const Alignment found = detail::search_pose(moved_on, start * cost.forward.points(), fixed_centroid,
+                                                    detail::PoseFreedom::Similarity, options, observer);
+        return {found.placement * start, found.mean_distance_mm};
+    };
+    const Alignment found = search_from(Eigen::Isometry3d::Identity());
+    if (found.mean_distance_mm < detail::label_rival_options.look_above_mm) return found;
+    const detail::LabelRivals rivals =
+        detail::label_rivals(moving_labels, fixed_labels, found.placement, options, observer);
+    if (!detail::is_better_rival(rivals.turned_mm, rivals.found_mm)) return found;
+    return search_from(rivals.turned);
 }
 
 Alignment align_surfaces(const meshing::SurfaceMesh& moving, const SurfacePoints& fixed,

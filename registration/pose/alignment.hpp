@@ -20,7 +20,8 @@ struct LabelPoseOptions {
 
 /// Minimises the symmetric mean truncated distance between moving and fixed boundaries (distance maps), of all labels
 /// together and of the four largest that both maps hold, by BOBYQA (Powell 2009) from several starts: as the headers
-/// say, centroids matched, and rotations about them. A change of size is fitted along with the pose and then left to
+/// say, centroids matched, and rotations about them; where boundaries stay apart, from all that turn a cube into itself
+/// too (label_rivals.hpp). A change of size is fitted along with the pose and then left to
 /// the tissue: the placement is rigid, and turned no further than the boundaries demand. Throws InvalidInput when the
 /// maps share no label.
 Alignment align_labels(const imaging::Volume& moving_labels, const imaging::Volume& fixed_labels,

@@ -29,12 +29,17 @@ std::vector<Eigen::Matrix3d> symmetries_of_a_cube() {
 
 }  // namespace
 
+bool is_better_rival(double rival_mm, double than_mm) {
+    return rival_mm < label_rival_options.better * than_mm && rival_mm < than_mm - label_rival_options.better_mm;
+}
+
 LabelRivals label_rivals(const imaging::Volume& moving, const imaging::Volume& fixed,
                          const Eigen::Isometry3d& placement, const AlignmentOptions& options, Observer& observer) {
-    const LabelDistance distance(moving.as(CV_32S), fixed.as(CV_32S), LabelRivalOptions().samples);
+    const LabelDistance distance(moving.as(CV_32S), fixed.as(CV_32S), label_rival_options.samples);
     const Eigen::Matrix3Xd& points = distance.forward.points();
     const Eigen::Vector3d centre = points.rowwise().mean(), fixed_centre = distance.backward.points().rowwise().mean();
-    LabelRivals rivals{0, std::numeric_limits<double>::infinity(), 0, std::numeric_limits<double>::infinity()};
+    LabelRivals rivals;
+    rivals.turned_mm = rivals.mirrored_mm = std::numeric_limits<double>::infinity();
     for (const Eigen::Matrix3d& symmetry : symmetries_of_a_cube()) {
         Eigen::Affine3d about_centre = Eigen::Affine3d::Identity();
         about_centre.linear() = symmetry;
@@ -51,7 +56,8 @@ LabelRivals label_rivals(const imaging::Volume& moving, const imaging::Volume& f
             rivals.mirrored_mm = std::min(rivals.mirrored_mm, found.mean_distance_mm);
         } else if (found.mean_distance_mm < rivals.turned_mm) {
             rivals.turned_mm = found.mean_distance_mm;
-            const Eigen::Matrix3d turn = placement.linear().transpose() * found.placement.linear() * start.linear();
+            rivals.turned = found.placement * Eigen::Isometry3d(start.matrix());
+            const Eigen::Matrix3d turn = placement.linear().transpose() * rivals.turned.linear();
             rivals.turned_deg = Eigen::AngleAxisd(turn).angle() * 180 / EIGEN_PI;
         }
     }

@@ -46,8 +46,11 @@ CurvePoints made_ready(const Curves& curves, const CurveOptions& options) {
     return data;
 }
 
+}  // namespace
+
 /// Across a line an unbiased point lies √2 deviations off in root mean square.
-void doubt(const CurveFit& fit, double deviation_mm, std::vector<Doubt>& doubts) {
+std::vector<Doubt> doubts_of(const CurveFit& fit, double deviation_mm) {
+    std::vector<Doubt> doubts;
     const auto& [least_inliers, most_residual] = curve_doubt_limits;
     if (fit.inlier_share < least_inliers)
         doubts.push_back({"curves.outliers", fit.inlier_share, least_inliers,
@@ -60,9 +63,8 @@ void doubt(const CurveFit& fit, double deviation_mm, std::vector<Doubt>& doubts)
                           "points along vessels lie " + to_text(fit.residual_mm) + " mm across from the curves where " +
                               to_text(deviation_mm) + " mm along each axis were stated",
                           "state how far off the points are (--curves-sd), or check that they show these vessels"});
+    return doubts;
 }
-
-}  // namespace
 
 CurveTerm::CurveTerm(const PreparedModel& prepared, const Curves& curves, const CurveOptions& options, double energy)
     : prepared_(prepared), options_(options), energy_(energy), data_(made_ready(curves, options)) {
@@ -185,7 +187,7 @@ CurveFit CurveTerm::fit(const State& state) const {
 
 void CurveTerm::judge(const State& state, UpdateResult& result) {
     result.curves = fit(state);
-    doubt(*result.curves, data_.deviation_mm, result.doubts);
+    for (Doubt& doubt : doubts_of(*result.curves, data_.deviation_mm)) result.doubts.push_back(std::move(doubt));
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -19,6 +19,9 @@ struct CurveSampling {
 };
 inline constexpr CurveSampling curve_sampling{};
 
+/// What is to be said against a registration that fits so.
+std::vector<Doubt> doubts_of(const CurveFit& fit, double deviation_mm);
+
 /// What points along vessels may show without a doubt. Chosen by hand; on which data is not recorded.
 struct CurveDoubtLimits {
     double least_inliers = 0.5;  ///< share of the points within the scale of the last round of a line

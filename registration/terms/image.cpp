@@ -26,7 +26,10 @@ double median_distance(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
     return *middle;
 }
 
-void doubt(const ImageFit& fit, std::vector<Doubt>& doubts) {
+}  // namespace
+
+std::vector<Doubt> doubts_of(const ImageFit& fit) {
+    std::vector<Doubt> doubts;
     constexpr ImageDoubtLimits limits = image_doubt_limits;
     if (fit.matched < limits.least_matched * fit.blocks)
         doubts.push_back({"image.blocks_lost", fit.matched / double(fit.blocks), limits.least_matched,
@@ -48,9 +51,8 @@ void doubt(const ImageFit& fit, std::vector<Doubt>& doubts) {
             {"image.apart", fit.residual_mm, limits.most_residual_mm,
              "blocks found in the fixed image lie " + to_text(fit.residual_mm) + " mm from where the tissue went",
              "look where image and result differ; give labels or landmarks beside the image"});
+    return doubts;
 }
-
-}  // namespace
 
 ImageTerm::ImageTerm(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
                      ImageTools& tools, double energy)
@@ -174,7 +176,7 @@ ImageFit ImageTerm::fit(const State& state) {
 
 void ImageTerm::judge(const State& state, UpdateResult& result) {
     result.image = fit(state);
-    doubt(*result.image, result.doubts);
+    for (Doubt& doubt : doubts_of(*result.image)) result.doubts.push_back(std::move(doubt));
 }
 
 }  // namespace tissuewarp::registration::detail

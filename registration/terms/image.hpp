@@ -22,6 +22,9 @@ struct ImagePoseOptions {
 };
 inline constexpr ImagePoseOptions image_pose_options{};
 
+/// What is to be said against a registration that fits so.
+std::vector<Doubt> doubts_of(const ImageFit& fit);
+
 /// What an image may show without a doubt. Chosen by hand, but for the agreement; on which data is not recorded.
 struct ImageDoubtLimits {
     double least_matched = 0.1;     ///< share of the blocks that were found

@@ -228,19 +228,15 @@ std::optional<Doubt> doubt_of_pairing(const LabelFits& fits) {
 }
 
 std::optional<Doubt> doubt_of_pose(const LabelFits& fits, const UpdateOptions& options, const UpdateResult& result) {
-    constexpr LabelPoseLimits pose = label_pose_limits;
     const LabelRivals rivals = label_rivals(fits.moving(), fits.fixed(), result.alignment.placement, options.alignment);
-    const auto is_better = [&](double rival, double than) {
-        return rival < pose.better * than && rival < than - pose.better_mm;
-    };
     const double found = rivals.found_mm, best = std::min(found, rivals.turned_mm);
-    if (is_better(rivals.mirrored_mm, best))
-        return Doubt{"labels.mirrored", rivals.mirrored_mm, pose.better * best,
+    if (is_better_rival(rivals.mirrored_mm, best))
+        return Doubt{"labels.mirrored", rivals.mirrored_mm, label_rival_options.better * best,
                      "the mirror image of the moving labels fits better: its boundaries lie " +
                          to_text(rivals.mirrored_mm) + " mm from the fixed ones instead of " + to_text(best) + " mm",
                      "check the orientation of both label maps: left and right seem to be exchanged in one"};
-    if (rivals.turned_deg > pose.least_turn_deg && is_better(rivals.turned_mm, found))
-        return Doubt{"labels.turned", rivals.turned_mm, pose.better * found,
+    if (rivals.turned_deg > label_rival_options.least_turn_deg && is_better_rival(rivals.turned_mm, found))
+        return Doubt{"labels.turned", rivals.turned_mm, label_rival_options.better * found,
                      "the labels fit better turned by another " + std::to_string(std::lround(rivals.turned_deg)) +
                          "°: their boundaries lie " + to_text(rivals.turned_mm) + " mm apart instead of " +
                          to_text(found) + " mm",

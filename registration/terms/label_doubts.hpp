@@ -27,13 +27,9 @@ struct LabelFitLimits {
 };
 inline constexpr LabelFitLimits label_fit_limits{};
 
-/// What tells that a placement is wrong. Chosen on the same data: the right placements had mean distances of up to
-/// 1.2 mm and no rival; a map turned by 180° 4.1 and 0.0, a mirrored one 3.5 and 0.9.
+/// What tells that a placement is wrong, beside LabelRivalOptions and on the same data.
 struct LabelPoseLimits {
     double most_distance_mm = 3;  ///< of the boundaries after alignment, mean, truncated at AlignmentOptions::trim_mm
-    double better = 0.6;          ///< a rival's distance over that of the placement found
-    double better_mm = 1;         ///< and the least difference between them
-    double least_turn_deg = 30;   ///< a rival is turned by more
 };
 inline constexpr LabelPoseLimits label_pose_limits{};
 

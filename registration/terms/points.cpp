@@ -38,16 +38,18 @@ double median(const Eigen::RowVectorXd& given) {
     return *middle;
 }
 
-void doubt(const PointFit& fit, std::vector<Doubt>& doubts) {
+}  // namespace
+
+std::vector<Doubt> doubts_of(const PointFit& fit) {
+    std::vector<Doubt> doubts;
     constexpr double most_outliers = point_doubt_limits.most_outliers;
     if (fit.outliers > most_outliers * fit.used)
         doubts.push_back({"points.outliers", fit.outliers / double(fit.used), most_outliers,
                           std::to_string(fit.outliers) + " of " + std::to_string(fit.used) +
                               " pairs of points do not fit the tissue",
                           "check that they are the same places in both images"});
+    return doubts;
 }
-
-}  // namespace
 
 PointTerm::PointTerm(const PreparedModel& prepared, const PointPairs& pairs, const PointOptions& options, double energy)
     : prepared_(prepared), options_(options), energy_(energy), deviation_mm_(pairs.deviation_mm) {
@@ -139,7 +141,7 @@ PointFit PointTerm::fit(const State& state) const {
 
 void PointTerm::judge(const State& state, UpdateResult& result) {
     result.points = fit(state);
-    doubt(*result.points, result.doubts);
+    for (Doubt& doubt : doubts_of(*result.points)) result.doubts.push_back(std::move(doubt));
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -21,6 +21,9 @@ struct PointPoseOptions {
 };
 inline constexpr PointPoseOptions point_pose_options{};
 
+/// What is to be said against a registration that fits so.
+std::vector<Doubt> doubts_of(const PointFit& fit);
+
 /// What pairs of points may show without a doubt. Chosen by hand; on which data is not recorded.
 struct PointDoubtLimits {
     double most_outliers = 0.2;  ///< share of the pairs beyond the scale of the last round

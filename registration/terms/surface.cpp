@@ -13,7 +13,10 @@ namespace {
 
 constexpr double least_deviation_mm = surface_pull_options.least_deviation_mm;
 
-void doubt(const SurfaceFit& fit, double deviation_mm, std::vector<Doubt>& doubts) {
+}  // namespace
+
+std::vector<Doubt> doubts_of(const SurfaceFit& fit, double deviation_mm) {
+    std::vector<Doubt> doubts;
     const double least_inliers = surface_doubt_limits.least_inliers, most_residual = surface_doubt_limits.most_residual,
                  most_rival_support = surface_doubt_limits.most_rival_support,
                  least_coverage = surface_doubt_limits.least_coverage;
@@ -27,7 +30,7 @@ void doubt(const SurfaceFit& fit, double deviation_mm, std::vector<Doubt>& doubt
                           "points of the intraoperative surface lie " + to_text(fit.residual_mm) +
                               " mm from the model where " + to_text(deviation_mm) + " mm were stated",
                           "state how far off the points are (--surface-sd), or leave out what is not of this organ"});
-    if (!fit.pose_searched) return;
+    if (!fit.pose_searched) return doubts;
     if (fit.coverage < least_coverage)
         doubts.push_back(
             {"surface.too_small", fit.coverage, least_coverage,
@@ -39,9 +42,8 @@ void doubt(const SurfaceFit& fit, double deviation_mm, std::vector<Doubt>& doubt
             {"surface.two_poses", fit.rival_support, most_rival_support,
              "the points fit about as well with the organ placed " + to_text(fit.rival_mm) + " mm elsewhere",
              "give a wider patch, or landmarks"});
+    return doubts;
 }
-
-}  // namespace
 
 SurfaceTerm::SurfaceTerm(const PreparedModel& prepared, const SurfacePoints& surface, const SurfaceOptions& options,
                          const AlignmentOptions& alignment, double energy)
@@ -173,7 +175,7 @@ SurfaceFit SurfaceTerm::fit(const State& state) const {
 
 void SurfaceTerm::judge(const State& state, UpdateResult& result) {
     result.surface = fit(state);
-    doubt(*result.surface, data_.deviation_mm, result.doubts);
+    for (Doubt& doubt : doubts_of(*result.surface, data_.deviation_mm)) result.doubts.push_back(std::move(doubt));
     if (inward_)
         result.doubts.push_back(
             {"surface.normals_inward", 1, 0,

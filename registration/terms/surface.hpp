@@ -19,6 +19,9 @@ struct SurfacePullOptions {
 };
 inline constexpr SurfacePullOptions surface_pull_options{};
 
+/// What is to be said against a registration that fits so.
+std::vector<Doubt> doubts_of(const SurfaceFit& fit, double deviation_mm);
+
 /// What points of a surface may show without a doubt. Chosen by hand, but for the coverage; on which data is not
 /// recorded.
 struct SurfaceDoubtLimits {

@@ -114,7 +114,9 @@ json rounds_view(const json& rounds) {
 }
 
 json overlap_row(const std::string& label, const json& before, const json& after) {
-    return {{"label", label == "all" || label == "0" ? "" : label},
+    const json& name = at(after, "name");
+    const std::string title = name.is_string() ? label + " " + name.get<std::string>() : label;
+    return {{"label", label == "all" || label == "0" ? "" : title},
             {"all", label == "all" || label == "0"},
             {"dice_before", number(at(before, "dice"), 3)},
             {"dice_after", number(at(after, "dice"), 3)},

@@ -93,6 +93,22 @@ class InitialTransform(PhantomTest):
             self.assertLess(start, 10, path)
             self.assertNotIn("wrong way", text)
 
+    def test_forms_of_hdf5_that_are_not_read_are_not_called_damaged(self):
+        def written(name, libver, parts):
+            with h5py.File(self.phantom.folder / name, "w", libver=libver) as h5:
+                for n in range(parts):
+                    group = h5.create_group(f"TransformGroup/{n}")
+                    kind = "AffineTransform_double_3_3" if n else "CompositeTransform_double_3_3"
+                    group.create_dataset("TransformType", data=[kind], dtype=h5py.string_dtype())
+                    if n:
+                        group["TransformParameters"] = numpy.array([1, 0, 0, 0, 1, 0, 0, 0, 1, *(-FAR / (parts - 1))])
+                        group["TransformFixedParameters"] = numpy.zeros(3)
+            return self.phantom.folder / name
+
+        self.assertLess(self.dry_start(written("many.h5", "earliest", 12))[0], 10)
+        result = self.register(written("latest.h5", "latest", 3), "--dry-run")
+        self.assert_refused(result, 3, "latest.h5", "in a form of HDF5 that is not read here", ".tfm")
+
     def test_the_other_direction_is_said(self):
         start, text = self.dry_start(self.file("t.txt", self.affine_text(FAR, "TranslationTransform_double_3_3")))
         self.assertGreater(start, 200)

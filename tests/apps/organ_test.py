@@ -1,6 +1,7 @@
 """Where the organ is said by something other than a label map: the image alone, a surface, tetrahedra."""
 
 import json
+import struct
 import unittest
 
 import numpy
@@ -15,6 +16,38 @@ def organ_image(affine, centre, axes, labels):
     """A textured organ in the dark of air, which is nowhere quite dark, with a hole."""
     grey = numpy.where(labels == 1, texture(affine, centre, axes), 20)
     return (grey + numpy.random.default_rng(2).normal(0, 3, labels.shape)).astype(numpy.float32)
+
+
+def element(group, number, kind, value):
+    """Of DICOM, in explicit little-endian transfer syntax."""
+    data = value if isinstance(value, bytes) else value.encode()
+    data += b" " * (len(data) % 2)
+    head = struct.pack("<HH", group, number) + kind.encode()
+    return head + (struct.pack("<HI", 0, len(data)) if kind == "SQ" else struct.pack("<H", len(data))) + data
+
+
+def sequence(group, number, items):
+    return element(group, number, "SQ", b"".join(struct.pack("<HHI", 0xfffe, 0xe000, len(item)) + item
+                                                 for item in items))
+
+
+def contours_of_ellipsoid(centre, axes, heights):
+    """A structure set that draws an ellipsoid, at these heights about its middle."""
+    turns = numpy.linspace(0, 2 * numpy.pi, 60, endpoint=False)
+    planes = []
+    for height in heights:
+        radius = numpy.sqrt(max(0, 1 - (height / axes[2]) ** 2))
+        if radius < 0.1:
+            continue
+        points = [(centre[0] + axes[0] * radius * numpy.cos(turn), centre[1] + axes[1] * radius * numpy.sin(turn),
+                   centre[2] + height) for turn in turns]
+        planes.append(element(0x3006, 0x42, "CS", "CLOSED_PLANAR") +
+                      element(0x3006, 0x50, "DS", "\\".join(f"{value:.3f}" for point in points for value in point)))
+    data = (element(8, 0x60, "CS", "RTSTRUCT") +
+            sequence(0x3006, 0x20, [element(0x3006, 0x22, "IS", "1") + element(0x3006, 0x26, "LO", "Left kidney")]) +
+            sequence(0x3006, 0x39, [sequence(0x3006, 0x40, planes) + element(0x3006, 0x84, "IS", "1")]))
+    meta = element(2, 0x10, "UI", b"1.2.840.10008.1.2.1\0")
+    return b"\0" * 128 + b"DICM" + element(2, 0, "UL", struct.pack("<I", len(meta))) + meta + data
 
 
 class ImagesAlone(PhantomTest):
@@ -118,6 +151,18 @@ class WithoutImages(PhantomTest):
                                            "--fixed-labels", labels, "--edge-length", 4))
         self.assertGreater(report["overlap"]["after"]["1"]["dice"], 0.97)
         self.assertTrue((self.phantom.output / "warped.nii.gz").exists())
+
+    def test_contours_are_drawn_on_the_voxels_of_their_image(self):
+        contours = self.phantom.folder / "rtss.dcm"
+        contours.write_bytes(contours_of_ellipsoid(CENTRE_LPS, MOVING_AXES, numpy.arange(-14, 15, 2)))
+        labels = save((self.phantom.fixed_labels_array > 0).astype(numpy.uint8), FIXED_AFFINE,
+                      self.phantom.folder / "organ.nii.gz")
+        result = self.register("--moving-labels", contours, "--moving", self.phantom.moving, "--fixed-labels", labels,
+                               "--edge-length", 4)
+        report = self.report(result)
+        self.assertGreater(report["overlap"]["after"]["1"]["dice"], 0.97)
+        self.assertIn("label 1 (Left kidney)", result.stdout)
+        self.assertTrue(any("drawn on the image's voxels" in note for note in report["notes"]))
 
     def test_tetrahedra_are_taken_as_they_are(self):
         mesh = self.phantom.folder / "organ.vtu"

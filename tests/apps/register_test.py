@@ -34,7 +34,10 @@ class Register(unittest.TestCase):
         row = ",".join(map(str, [*CENTRE_LPS, *(CENTRE_LPS + SHIFT_LPS)]))
         landmarks.write_text("pre_x,pre_y,pre_z,intra_x,intra_y,intra_z\n" + row + "\n")
         points.write_text("x,y,z\n" + ",".join(map(str, CENTRE_LPS)) + "\n")
-        cls.result = phantom.register("--edge-length", 4, "--landmarks", landmarks, "--points", points)
+        names = phantom.folder / "names.ctbl"
+        names.write_text("# Color table file\n0 Background 0 0 0 0\n2 right_lobe 128 174 128 255\n")
+        cls.result = phantom.register("--edge-length", 4, "--landmarks", landmarks, "--points", points,
+                                      "--label-names", names)
         if cls.result.returncode == 0:
             cls.report = json.loads((phantom.output / "report.json").read_text())
 
@@ -113,6 +116,14 @@ class Register(unittest.TestCase):
         self.assertAlmostEqual(numpy.sqrt(numpy.nanmean(values ** 2)), estimate["deviation_mm"],
                                delta=0.2 * estimate["deviation_mm"])
 
+    def test_labels_have_their_names_everywhere(self):
+        self.assertEqual(self.report["overlap"]["after"]["2"]["name"], "right lobe")
+        self.assertNotIn("name", self.report["overlap"]["after"]["1"])
+        self.assertIn("label 2 (right lobe)", self.result.stdout)
+        self.assertIn("<td>2 right lobe</td>", (self.phantom.output / "report.html").read_text())
+        result = run("info", "--labels", self.phantom.fixed_labels, "--label-names", self.phantom.folder / "names.ctbl")
+        self.assertIn("'right lobe'", result.stdout)
+
     def test_report_holds_every_chapter(self):
         for key in ("schema", "schema_version", "program", "version", "versions", "started", "inputs", "parameters",
                     "materials", "device", "mesh", "alignment", "rounds", "overlap", "jacobian", "doubts", "notes",
@@ -168,7 +179,9 @@ class Register(unittest.TestCase):
     def test_evaluate_repeats_the_scores(self):
         scores = self.phantom.folder / "scores.json"
         result = run("evaluate", "--labels", self.phantom.output / "warped_labels.nii.gz", "--reference-labels",
-                     self.phantom.fixed_labels, "--json", scores)
+                     self.phantom.fixed_labels, "--json", scores, "--label-names",
+                     self.phantom.folder / "names.ctbl")
+        self.assertIn("label 2 (right lobe)", result.stdout)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertEqual(json.loads(scores.read_text())["overlap"], self.report["overlap"]["after"])
 

@@ -150,6 +150,44 @@ TEST(Layers, FilesAndFoldersStaySmall) {
     }
 }
 
+/// Data members of a class whose body begins at `body`, those of classes within it left out: names that end in "_".
+int members_of(const std::string& text, std::size_t body) {
+    static const std::regex member(R"(\b\w+_(?=\s*[;,={]))");
+    int count = 0, depth = 0;
+    std::string statement;
+    for (std::size_t at = body; at < text.size() && depth >= 0; ++at) {
+        const char c = text[at];
+        if (c == '{') ++depth;
+        if (c == '}') --depth;
+        if (depth > 0 || c == '}') continue;
+        statement += c;
+        if (c != ';') continue;
+        if (statement.find('(') == std::string::npos)
+            count +=
+                static_cast<int>(std::distance(std::sregex_iterator(statement.begin(), statement.end(), member), {}));
+        statement.clear();
+    }
+    return count;
+}
+
+TEST(Layers, ClassesOfRegistrationHoldFewThings) {
+    static const std::regex begin(R"(\nclass \w[^;{]*\{)"), remark(R"(//[^\n]*)");
+    int seen = 0, most = 0;
+    for (const auto& entry : fs::recursive_directory_iterator(fs::path(TISSUEWARP_SOURCE_DIR) / "registration")) {
+        if (entry.path().extension() != ".hpp" && entry.path().extension() != ".cpp") continue;
+        std::ifstream file(entry.path());
+        std::string text(std::istreambuf_iterator<char>(file), {});
+        text = std::regex_replace(text, remark, "");
+        for (std::sregex_iterator at(text.begin(), text.end(), begin), end; at != end; ++at, ++seen) {
+            const int members = members_of(text, static_cast<std::size_t>(at->position() + at->length()));
+            most = std::max(most, members);
+            EXPECT_LE(members, 12) << entry.path() << at->str();
+        }
+    }
+    EXPECT_GT(seen, 30);
+    EXPECT_GT(most, 9);
+}
+
 // Equilibria are sought by means of a RestStiffness of the caller's: the one room that a public header opens.
 TEST(Layers, PublicHeadersOfTledIncludeNoRoom) {
     for (const Include& include : includes()) {

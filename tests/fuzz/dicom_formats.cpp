@@ -210,6 +210,40 @@ std::vector<Seed> frame_seeds(const std::filesystem::path&) {
             segmentation()};
 }
 
+/// A box in three planes, and what is no tissue.
+std::vector<Seed> contour_seeds(const std::filesystem::path&) {
+    std::vector<Elements> names, drawn, observations;
+    for (const int number : {1, 2}) {
+        Elements name, contours, observation;
+        std::vector<Elements> planes;
+        for (int k = 0; k < slices; ++k) {
+            Elements plane;
+            const std::string z = std::to_string(3 * k);
+            plane.text(0x3006, 0x42, "CS", k == 1 ? "CLOSEDPLANAR_XOR" : "CLOSED_PLANAR");
+            plane.text(0x3006, 0x46, "IS", "4");
+            plane.text(0x3006, 0x50, "DS",
+                       "-5.5\\-4\\" + z + "\\6\\-4\\" + z + "\\6\\7.25\\" + z + "\\-5.5\\7.25\\" + z);
+            planes.push_back(plane);
+        }
+        name.text(0x3006, 0x22, "IS", std::to_string(number));
+        name.text(0x3006, 0x26, "LO", number == 1 ? "liver" : "BODY");
+        contours.sequence(0x3006, 0x40, planes);
+        contours.text(0x3006, 0x84, "IS", std::to_string(number));
+        observation.text(0x3006, 0x84, "IS", std::to_string(number));
+        observation.text(0x3006, 0xa4, "CS", number == 1 ? "ORGAN" : "EXTERNAL");
+        names.push_back(name);
+        drawn.push_back(contours);
+        observations.push_back(observation);
+    }
+    Elements data;
+    data.text(8, 0x60, "CS", "RTSTRUCT");
+    data.sequence(0x3006, 0x20, names);
+    data.sequence(0x3006, 0x39, drawn);
+    data.sequence(0x3006, 0x80, observations);
+    const std::string contours = "1.2.840.10008.5.1.4.1.1.481.3";
+    return {{{{"rtss.dcm", dicom_file(contours, data, imaging::test::explicit_little_endian)}}, "rtss.dcm"}};
+}
+
 /// Lengths of elements and values of two bytes: they follow upper-case representations.
 std::vector<Field> element_fields(const std::string& bytes) {
     const auto upper = [](char c) { return c >= 'A' && c <= 'Z'; };
@@ -229,7 +263,8 @@ std::vector<Field> element_fields(const std::string& bytes) {
 std::vector<Format> dicom_formats() {
     return {{"dicom-series", series_seeds, read_image, element_fields},
             {"dicom-frames", frame_seeds, read_image, element_fields},
-            {"dicom-packed", packed_seeds, read_image, element_fields}};
+            {"dicom-packed", packed_seeds, read_image, element_fields},
+            {"dicom-contours", contour_seeds, read_image, element_fields}};
 }
 
 }  // namespace tissuewarp::fuzz

@@ -2,6 +2,7 @@
 // too.
 
 #include "core/errors.hpp"
+#include "imaging/label_names.hpp"
 #include "meshing/point_table.hpp"
 #include "registration/dial/fronts_io.hpp"
 #include "registration/evaluation.hpp"
@@ -58,6 +59,17 @@ void read_pairs(const std::filesystem::path& path, Digest& digest) {
 
 void read_fronts(const std::filesystem::path& path, Digest& digest) {
     digest.text(registration::to_json_text(registration::fronts_from_json(bytes_at(path), path.string())));
+}
+
+void read_names(const std::filesystem::path& path, Digest& digest) {
+    for (const auto& [label, name] : imaging::read_label_names(path)) digest.text(std::to_string(label) + name);
+}
+
+std::vector<Seed> name_seeds(const std::filesystem::path&) {
+    return {single("a.ctbl", "# Color table file\n0 Background 0 0 0 0\n1 left_lung 128 174 128 255\n2 b 1 2 3 255\n"),
+            single("b.csv",
+                   "LabelValue,Name,Color_R,Color_G,Color_B,Type_CodeMeaning\n1,\"a, b\",1,2,3,Lung\n2,,1,2,3,Heart\n"),
+            single("c.txt", "# IDX\n 0 0 0 0 0 0 0 \"Clear\"\n 1 255 0 0 0.5 1 1 \"left lung\"\n")};
 }
 
 std::vector<Seed> table_seeds(const std::filesystem::path&) {
@@ -120,11 +132,9 @@ std::vector<Seed> front_seeds(const std::filesystem::path&) {
 }  // namespace
 
 std::vector<Format> point_formats() {
-    return {{"table", table_seeds, read_table},
-            {"pairs", pair_seeds, read_pairs},
-            {"elastix-points", elastix_seeds, read_points},
-            {"markups", markup_seeds, read_points},
-            {"fcsv", fcsv_seeds, read_points},
+    return {{"table", table_seeds, read_table},     {"label-names", name_seeds, read_names},
+            {"pairs", pair_seeds, read_pairs},      {"elastix-points", elastix_seeds, read_points},
+            {"markups", markup_seeds, read_points}, {"fcsv", fcsv_seeds, read_points},
             {"fronts", front_seeds, read_fronts}};
 }
 

@@ -5,6 +5,7 @@
 #include "registration/springs/ground_springs.hpp"
 #include "registration/terms/anchors.hpp"
 #include "registration/update.hpp"
+#include "tests/registration/doubt_codes.hpp"
 #include "tests/registration/shapes.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -152,6 +153,19 @@ TEST(Contact, AnOrganThatLiesOnItsNeighbourAndDidNotMoveIsNotMoved) {
     const UpdateResult result = update(model, {.labels = labels}, on_cpu());
     EXPECT_LT(result.deformation.displacement.colwise().norm().maxCoeff(), 0.01);
     EXPECT_TRUE(result.doubts.empty()) << result.doubts.front().text;
+}
+
+TEST(Contact, AnOrganThatEnteredItsNeighbourIsDoubted) {
+    const PreparedModel model = prepare(ball_on_plate(), coarse({plate}));
+    detail::ContactTerm term(model, detail::strain_energy_unit(model, {}));
+    const auto said = [&](double down_mm) {
+        UpdateResult result;
+        term.judge({Eigen::Isometry3d::Identity(), Vector3d(0, 0, -down_mm).replicate(1, model.rest.node_count)},
+                   result);
+        return test::codes(result.doubts);
+    };
+    EXPECT_THAT(said(2), testing::IsEmpty());
+    EXPECT_THAT(said(4), testing::ElementsAre("contact.entered"));
 }
 
 TEST(Contact, SameBitsForOneThreadAndMany) {

@@ -6,12 +6,14 @@
 #include "registration/pose/surface_pose.hpp"
 #include "registration/springs/ground_springs.hpp"
 #include "registration/update.hpp"
+#include "tests/registration/doubt_codes.hpp"
 #include "tests/registration/shapes.hpp"
 #include "tests/support/label_shapes.hpp"
 #include "tests/support/numbers.hpp"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <numeric>
 
 namespace tissuewarp::registration {
@@ -184,10 +186,8 @@ TEST(SurfaceTerm, ASmallPatchDoesNotTellWhereAnOrganLies) {
         const auto seen = seen_part(pear_surface(8), {0, 1, 0}, share, 500, 0.5, 0, numbers, true);
         UpdateOptions options = on_cpu();
         options.align = align;
-        const auto doubts = texts(update(prepared, {.surface = seen}, options).doubts);
-        return std::any_of(doubts.begin(), doubts.end(), [](const std::string& reason) {
-            return reason.find("too little to tell where it lies") != std::string::npos;
-        });
+        const auto doubts = test::codes(update(prepared, {.surface = seen}, options).doubts);
+        return std::count(doubts.begin(), doubts.end(), "surface.too_small") > 0;
     };
     EXPECT_TRUE(said(0.1, true));
     EXPECT_FALSE(said(0.1, false));
@@ -204,11 +204,8 @@ TEST(SurfaceTerm, NormalsThatPointInwardsAreSaid) {
         auto seen = moved(seen_part(ellipsoid, {0, 1, 0}, 0.2, 800, 0.5, 0.05, numbers, true),
                           test::motion(0, {1, 0, 0}, {0, -6, 0}));  // sunken
         seen.normals *= sign;
-        const auto doubts = texts(update(prepared, {.surface = seen}, on_cpu()).doubts);
-        const bool said = std::any_of(doubts.begin(), doubts.end(), [](const std::string& reason) {
-            return reason.find("point inwards") != std::string::npos;
-        });
-        EXPECT_EQ(said, sign < 0);
+        const auto doubts = test::codes(update(prepared, {.surface = seen}, on_cpu()).doubts);
+        EXPECT_EQ(std::count(doubts.begin(), doubts.end(), "surface.normals_inward"), sign < 0);
     }
 }
 

@@ -145,36 +145,36 @@ void GpuBlockEngine::begin_search(const Search& search, std::span<const MatchSou
     way_back.is_way_back = 1;
     there_.upload(std::array{parameters(search, blocks.size())});
     back_.upload(std::array{way_back});
-    reserve(sought_, device, blocks.size(), "blocks sought");
-    reserve(sought_back_, device, blocks.size(), "blocks found");
-    reserve(looks_, device, blocks.size() * places, "costs of first looks");
-    reserve(walks_, device, blocks.size(), "walks");
-    reserve(walks_back_, device, blocks.size(), "walks back");
-    sought_->upload(blocks);
+    reserve(room_.sought, device, blocks.size(), "blocks sought");
+    reserve(room_.sought_back, device, blocks.size(), "blocks found");
+    reserve(room_.looks, device, blocks.size() * places, "costs of first looks");
+    reserve(room_.walks, device, blocks.size(), "walks");
+    reserve(room_.walks_back, device, blocks.size(), "walks back");
+    room_.sought->upload(blocks);
     const GpuBlocks there{{"MatchSearch", &there_},
-                          {"MatchBlocks", &*sought_},
-                          {"MatchLooks", &*looks_},
-                          {"MatchWalks", &*walks_},
-                          {"MatchBack", &*sought_back_}};
+                          {"MatchBlocks", &*room_.sought},
+                          {"MatchLooks", &*room_.looks},
+                          {"MatchWalks", &*room_.walks},
+                          {"MatchBack", &*room_.sought_back}};
     const GpuBlocks back{{"MatchSearch", &back_},
-                         {"MatchBlocks", &*sought_back_},
-                         {"MatchLooks", &*looks_},
-                         {"MatchWalks", &*walks_back_},
-                         {"MatchBack", &*sought_}};
+                         {"MatchBlocks", &*room_.sought_back},
+                         {"MatchLooks", &*room_.looks},
+                         {"MatchWalks", &*room_.walks_back},
+                         {"MatchBack", &*room_.sought}};
     run(MatchPass::Look, blocks.size() * places, search, there);
     const auto workgroup = static_cast<std::size_t>(matching_.program(MatchPass::Walk).workgroup_size());
     run(MatchPass::Walk, blocks.size() * workgroup, search, there);
     run(MatchPass::Walk, blocks.size() * workgroup, home, back);
     shaders::flush();
-    look_bytes_ = blocks.size() * places * sizeof(float);
-    walk_bytes_ = blocks.size() * sizeof(MatchWalk);
+    room_.look_bytes = blocks.size() * places * sizeof(float);
+    room_.walk_bytes = blocks.size() * sizeof(MatchWalk);
 }
 
 GpuBlockEngine::Sights GpuBlockEngine::found() {
     const shaders::CurrentContext current = matching_.device().make_current();
-    const auto found = matching_.fetch(std::array{shaders::Readback::Piece{*looks_, look_bytes_},
-                                                  shaders::Readback::Piece{*walks_, walk_bytes_},
-                                                  shaders::Readback::Piece{*walks_back_, walk_bytes_}});
+    const auto found = matching_.fetch(std::array{shaders::Readback::Piece{*room_.looks, room_.look_bytes},
+                                                  shaders::Readback::Piece{*room_.walks, room_.walk_bytes},
+                                                  shaders::Readback::Piece{*room_.walks_back, room_.walk_bytes}});
     return {found[0], found[1], found[2]};
 }
 

@@ -54,15 +54,20 @@ private:
         std::optional<GpuWords> words, shown;
     };
 
+    /// What a search reads and leaves, and how much of it.
+    struct Room {
+        std::optional<shaders::Buffer<MatchSoughtBlock>> sought, sought_back;
+        std::optional<GpuFloats> looks;
+        std::optional<shaders::Buffer<MatchWalk>> walks, walks_back;
+        std::size_t look_bytes = 0, walk_bytes = 0;  // of the search begun
+    };
+
     MatchDevice& matching_;
     std::vector<DescribedOnDevice> moving_;
     std::vector<Described> fixed_;  // of each level
     int radius_;
     shaders::Buffer<MatchSearchBlock> there_, back_;
-    std::optional<shaders::Buffer<MatchSoughtBlock>> sought_, sought_back_;
-    std::optional<GpuFloats> looks_;
-    std::optional<shaders::Buffer<MatchWalk>> walks_, walks_back_;
-    std::size_t look_bytes_ = 0, walk_bytes_ = 0;  // of the search begun
+    Room room_;
 
     [[nodiscard]] MatchSearchBlock parameters(const Search& search, std::size_t blocks) const;
     void run(shaders::MatchPass pass, std::size_t invocations, const Search& search, const GpuBlocks& own);

@@ -54,20 +54,20 @@ MatchDevice::MatchDevice(int gpu_index)
 }
 
 void MatchDevice::set_image(const imaging::Volume& fixed) {
-    fixed_ = fixed;
-    const std::size_t voxels = fixed_.voxels.total();
-    reserve(fixed_voxels_, device_, voxels, "fixed image");
-    reserve(blurred_, device_, voxels, "fixed image along one axis");
+    fixed_.image = fixed;
+    const std::size_t voxels = fixed_.image.voxels.total();
+    reserve(fixed_.voxels, device_, voxels, "fixed image");
+    reserve(fixed_.blurred, device_, voxels, "fixed image along one axis");
     const shaders::CurrentContext current = device_.make_current();
-    send(image_upload_, std::as_bytes(std::span(fixed_.data<float>(), voxels)), *fixed_voxels_);
-    for (auto& [spacing, smoothed] : smoothed_) smoothed.current = false;
+    send(fixed_.image_upload, std::as_bytes(std::span(fixed_.image.data<float>(), voxels)), *fixed_.voxels);
+    for (auto& [spacing, smoothed] : fixed_.smoothed) smoothed.current = false;
 }
 
 void MatchDevice::set_seen(const imaging::Volume& seen) {
     const std::size_t voxels = seen.voxels.total();
-    reserve(fixed_seen_, device_, (voxels + 3) / 4, "what the fixed image shows");
+    reserve(fixed_.seen, device_, (voxels + 3) / 4, "what the fixed image shows");
     const shaders::CurrentContext current = device_.make_current();
-    send(seen_upload_, std::as_bytes(std::span(seen.data<std::uint8_t>(), voxels)), *fixed_seen_);
+    send(fixed_.seen_upload, std::as_bytes(std::span(seen.data<std::uint8_t>(), voxels)), *fixed_.seen);
 }
 
 /// In all threads: one alone takes longer than the way to the device.
@@ -104,26 +104,26 @@ void MatchDevice::run(MatchPass pass, std::size_t invocations, std::initializer_
 
 GpuBlocks MatchDevice::fixed_for(const imaging::Geometry& wide, double spacing, const Eigen::Isometry3d& placement,
                                  const std::array<int, 3>& cells) {
-    grid_.upload(std::array{match_grid_block(wide, fixed_.geometry, cells, placement)});
-    return {{"MatchFixed", &smoothed_for(spacing)}, {"MatchFixedSeen", &*fixed_seen_}};
+    grid_.upload(std::array{match_grid_block(wide, fixed_.image.geometry, cells, placement)});
+    return {{"MatchFixed", &smoothed_for(spacing)}, {"MatchFixedSeen", &*fixed_.seen}};
 }
 
 void MatchDevice::begin_smoothing(double spacing) {
     const shaders::CurrentContext current = device_.make_current();
-    const imaging::Geometry& fixed = fixed_.geometry;
+    const imaging::Geometry& fixed = fixed_.image.geometry;
     grid_.upload(std::array{match_grid_block(fixed, fixed, {1, 1, 1}, Eigen::Isometry3d::Identity())});
     smoothed_for(spacing);
     shaders::flush();
 }
 
 const GpuFloats& MatchDevice::smoothed_for(double spacing) {
-    Smoothed& smoothed = smoothed_[spacing];
-    reserve(smoothed.voxels, device_, fixed_.voxels.total(), "smoothed image");
+    Smoothed& smoothed = fixed_.smoothed[spacing];
+    reserve(smoothed.voxels, device_, fixed_.image.voxels.total(), "smoothed image");
     if (!smoothed.current) {
         const double deviation = working_deviation(spacing);
-        blur(0, deviation, *fixed_voxels_, *smoothed.voxels);
-        blur(1, deviation, *smoothed.voxels, *blurred_);
-        blur(2, deviation, *blurred_, *smoothed.voxels);
+        blur(0, deviation, *fixed_.voxels, *smoothed.voxels);
+        blur(1, deviation, *smoothed.voxels, *fixed_.blurred);
+        blur(2, deviation, *fixed_.blurred, *smoothed.voxels);
         smoothed.current = true;
     }
     return *smoothed.voxels;
@@ -133,8 +133,8 @@ void MatchDevice::blur(std::uint32_t axis, double deviation_mm, const GpuFloats&
     const GpuBlocks own{{"MatchSource", &from}, {"MatchTarget", &to}};
     program(MatchPass::Blur).set(0, axis);
     program(MatchPass::Blur)
-        .set(1, static_cast<float>(deviation_mm / fixed_.geometry.spacing[static_cast<Eigen::Index>(axis)]));
-    run(MatchPass::Blur, fixed_.voxels.total(), {&own});
+        .set(1, static_cast<float>(deviation_mm / fixed_.image.geometry.spacing[static_cast<Eigen::Index>(axis)]));
+    run(MatchPass::Blur, fixed_.image.voxels.total(), {&own});
 }
 
 void MatchDevice::reserve_wide(std::size_t voxels) {
@@ -184,12 +184,12 @@ std::span<const std::byte> MatchDevice::fetch(const shaders::StorageBuffer& sour
 
 std::vector<std::span<const std::byte>> MatchDevice::fetch(std::span<const shaders::Readback::Piece> pieces) {
     const std::size_t bytes = shaders::Readback::bytes_of(pieces);
-    if (bytes > readback_bytes_) {
-        readback_.reset();
-        readback_ = std::make_unique<shaders::Readback>(device_, bytes, "results of matching on their way down");
-        readback_bytes_ = bytes;
+    if (bytes > down_.bytes) {
+        down_.way.reset();
+        down_.way = std::make_unique<shaders::Readback>(device_, bytes, "results of matching on their way down");
+        down_.bytes = bytes;
     }
-    return readback_->fetch(pieces);
+    return down_.way->fetch(pieces);
 }
 
 }  // namespace tissuewarp::registration::detail

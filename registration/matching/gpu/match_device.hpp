@@ -85,19 +85,28 @@ private:
         bool current = false;
     };
 
+    /// The intraoperative image.
+    struct Fixed {
+        imaging::Volume image;
+        std::optional<GpuFloats> voxels, blurred;
+        std::optional<GpuWords> seen;
+        std::map<double, Smoothed> smoothed;  // by spacing, mm
+        std::unique_ptr<shaders::Upload> image_upload, seen_upload;
+    };
+    /// The way down, for as many bytes as were ever asked for.
+    struct Down {
+        std::unique_ptr<shaders::Readback> way;
+        std::size_t bytes = 0;
+    };
+
     shaders::Device device_;
     shaders::ProgramCache programs_;
     shaders::Buffer<MatchGridBlock> grid_;
     shaders::Buffer<std::array<float, 2>> partial_;
     GpuFloats mean_;
-    imaging::Volume fixed_;
-    std::optional<GpuFloats> fixed_voxels_, blurred_;
-    std::optional<GpuWords> fixed_seen_;
-    std::map<double, Smoothed> smoothed_;  // by spacing, mm
+    Fixed fixed_;
     std::optional<Scratch> scratch_;
-    std::unique_ptr<shaders::Upload> image_upload_, seen_upload_;
-    std::unique_ptr<shaders::Readback> readback_;
-    std::size_t readback_bytes_ = 0;
+    Down down_;
 
     void send(std::unique_ptr<shaders::Upload>& way, std::span<const std::byte> bytes,
               const shaders::StorageBuffer& target);
