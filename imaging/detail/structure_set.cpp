@@ -59,12 +59,18 @@ ContouredRegion region_of(const DicomSet& contours, int number, std::string name
     return region;
 }
 
+/// A number of a region; nothing where it is none.
+std::optional<int> region_number(const DicomSet& set, DicomTag tag) {
+    const auto number = set.number(tag);
+    if (!number || std::abs(*number) > 1e9) return std::nullopt;
+    return static_cast<int>(*number);
+}
+
 /// Of regions by number: what kind of thing they are (RT ROI Interpreted Type).
 std::map<int, std::string> types_of(const DicomSet& file) {
     std::map<int, std::string> types;
     for (const DicomSet& observation : file.items(0x30060080))
-        if (const auto number = observation.number(0x30060084))
-            types[static_cast<int>(*number)] = observation.text(0x300600a4);
+        if (const auto number = region_number(observation, 0x30060084)) types[*number] = observation.text(0x300600a4);
     return types;
 }
 
@@ -80,12 +86,12 @@ bool is_tissue(const std::string& type) {
 StructureSet regions_of(const DicomSet& file, const fs::path& path) {
     std::map<int, std::string> names;
     for (const DicomSet& region : file.items(0x30060020))
-        if (const auto number = region.number(0x30060022)) names[static_cast<int>(*number)] = region.text(0x30060026);
+        if (const auto number = region_number(region, 0x30060022)) names[*number] = region.text(0x30060026);
     std::map<int, std::string> types = types_of(file);
     StructureSet set;
     for (const DicomSet& contours : file.items(0x30060039)) {
         std::set<std::string> left_out;
-        const auto number = static_cast<int>(contours.number(0x30060084).value_or(0));
+        const int number = region_number(contours, 0x30060084).value_or(0);
         std::string name = names[number].empty() ? "region " + std::to_string(number) : names[number];
         if (!is_tissue(types[number])) {
             set.notes.push_back("'" + name + "' is no tissue (" + types[number] + ") and left out");

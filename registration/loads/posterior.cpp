@@ -21,24 +21,23 @@ tled::RestStiffness stiffness_with(const PreparedModel& prepared, const WeighedS
     return {prepared.rest, tled::nodal_conditions(all, prepared.rest.node_count), prepared.stiffness};
 }
 
-Columns times(const std::vector<tled::Spring>& springs, const Columns& vectors) {
-    Columns result = Columns::Zero(vectors.rows(), vectors.cols());
-    for (const tled::Spring& spring : springs)
-        result.middleRows<3>(3 * spring.node) += spring.stiffness * vectors.middleRows<3>(3 * spring.node);
-    return result;
-}
-
-/// (Rᵀ W R)⁻¹ Rᵀ W, 6 × 3N; a motion that W feels nothing of is not followed.
-Columns rigid_part(const Columns& motions, const std::vector<tled::Spring>& weights) {
-    const Columns weighed = times(weights, motions);
-    return (motions.transpose() * weighed).completeOrthogonalDecomposition().solve(weighed.transpose());
-}
-
 double least_eigenvalue(const Columns& symmetric) {
     return Eigen::SelfAdjointEigenSolver<Columns>(symmetric, Eigen::EigenvaluesOnly).eigenvalues()[0];
 }
 
 }  // namespace
+
+Eigen::MatrixXd forces_of(const std::vector<tled::Spring>& springs, const Eigen::MatrixXd& displacements) {
+    Columns result = Columns::Zero(displacements.rows(), displacements.cols());
+    for (const tled::Spring& spring : springs)
+        result.middleRows<3>(3 * spring.node) += spring.stiffness * displacements.middleRows<3>(3 * spring.node);
+    return result;
+}
+
+Eigen::MatrixXd rigid_part(const Eigen::MatrixXd& motions, const std::vector<tled::Spring>& weights) {
+    const Columns weighed = forces_of(weights, motions);
+    return (motions.transpose() * weighed).completeOrthogonalDecomposition().solve(weighed.transpose());
+}
 
 WeighedSprings without_data(const LastPulls& pulls) {
     return {pulls.of(Origin::Support), pulls.of(Origin::Prior), pulls.energy, pulls.placed_by()};
@@ -67,14 +66,14 @@ Prior::Prior(const Eigen::Matrix3Xd& nodes, const WeighedSprings& springs)
     : springs_(springs.ground), held_(nodes.size(), 0), followed_(0, nodes.size()) {
     if (springs.placed_by.empty() || springs_.empty()) return;
     const Columns motions = rigid_motions(nodes);
-    held_ = times(springs_, motions);
+    held_ = forces_of(springs_, motions);
     const double known = posterior_options.least_known_mm,
                  left = springs.energy / (known * known * least_eigenvalue(motions.transpose() * held_));
     followed_ = (1 - std::min(1.0, left)) * rigid_part(motions, springs.placed_by);
 }
 
 Eigen::MatrixXd Prior::forces(const Eigen::MatrixXd& displacements) const {
-    return times(springs_, displacements) - held_ * (followed_ * displacements);
+    return forces_of(springs_, displacements) - held_ * (followed_ * displacements);
 }
 
 Posterior::Posterior(const PreparedModel& prepared, const WeighedSprings& springs, tled::RestStiffness stiffness)

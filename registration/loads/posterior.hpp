@@ -26,13 +26,20 @@ struct WeighedSprings {
     std::vector<tled::Spring> placed_by = {};  ///< LastPulls::placed_by(): the ground moves along with these
 };
 
+/// Springs times displacements, 3N × k, mN.
+Eigen::MatrixXd forces_of(const std::vector<tled::Spring>& springs, const Eigen::MatrixXd& displacements);
+
+/// P = (Rᵀ W R)⁻¹ Rᵀ W, 6 × 3N, of motions R (3N × 6) and springs W: P u are the coefficients of the motion that comes
+/// closest to u where the springs pull. A motion that they feel nothing of has none.
+Eigen::MatrixXd rigid_part(const Eigen::MatrixXd& motions, const std::vector<tled::Spring>& weights);
+
 /// Supports and prior of pulls alone.
 WeighedSprings without_data(const LastPulls& pulls);
 /// The same with the data.
 WeighedSprings with_data(const LastPulls& pulls);
 
 /// What is expected of an organ without data: springs G, which move along with the rigid motion R P u, in least
-/// squares, of the nodes that springs W hold: P = (Rᵀ W R)⁻¹ Rᵀ W, R the six motions of the organ as a whole. P is
+/// squares, of the nodes that springs W hold: P = rigid_part(R, W), R the six motions of the organ as a whole. P is
 /// taken a little short, so that motions that no datum shows count as known to 100 mm.
 class Prior {
 public:

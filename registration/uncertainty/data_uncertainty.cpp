@@ -99,9 +99,8 @@ MatrixXd unseen_motions(const LastPulls& pulls, const Eigen::Matrix3Xd& nodes) {
 MatrixXd missed_if_rigid(const LastPulls& pulls, const Eigen::Matrix3Xd& nodes, const Eigen::Matrix3Xd& displacement,
                          const LinearRegistration& registration) {
     if (!pulls.placement_sought || pulls.prior_moves != PriorMoves::Not) return MatrixXd(nodes.size(), 0);
-    const MatrixXd motions = rigid_motions(nodes), weighed = forces_of(pulls.of(Origin::Datum), motions);
-    const MatrixXd motion =
-        motions * (motions.transpose() * weighed).ldlt().solve(weighed.transpose() * displacement.reshaped());
+    const MatrixXd motions = rigid_motions(nodes);
+    const MatrixXd motion = motions * (rigid_part(motions, pulls.of(Origin::Datum)) * displacement.reshaped());
     return registration.inverse(forces_of(pulls.of(Origin::Prior), motion));
 }
 

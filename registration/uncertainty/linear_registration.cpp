@@ -15,13 +15,6 @@ namespace tissuewarp::registration::detail {
 
 using Eigen::MatrixXd;
 
-MatrixXd forces_of(const std::vector<tled::Spring>& springs, const MatrixXd& displacements) {
-    MatrixXd result = MatrixXd::Zero(displacements.rows(), displacements.cols());
-    for (const tled::Spring& spring : springs)
-        result.middleRows<3>(3 * spring.node) += spring.stiffness * displacements.middleRows<3>(3 * spring.node);
-    return result;
-}
-
 namespace {
 
 /// Roots of a share of the covariance energy · K⁻¹; 0 along directions in which a spring does not pull.

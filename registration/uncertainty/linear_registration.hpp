@@ -57,7 +57,5 @@ private:
 
 /// K_D ε, 3N × k, mN, for N nodes.
 Eigen::MatrixXd forces_of(const std::vector<PulledNode>& data, const DataErrors& errors, int nodes);
-/// Springs times displacements, 3N × k, mN.
-Eigen::MatrixXd forces_of(const std::vector<tled::Spring>& springs, const Eigen::MatrixXd& displacements);
 
 }  // namespace tissuewarp::registration::detail

@@ -2,7 +2,7 @@
 
 #include "tests/fuzz/format.hpp"
 #include "tests/fuzz/image_reading.hpp"
-#include "tests/imaging/dicom_elements.hpp"
+#include "tests/imaging/dicom_contours.hpp"
 
 #include <gdcmImage.h>
 #include <gdcmImageChangeTransferSyntax.h>
@@ -210,38 +210,16 @@ std::vector<Seed> frame_seeds(const std::filesystem::path&) {
             segmentation()};
 }
 
-/// A box in three planes, and what is no tissue.
+/// A box, and an outline that is no tissue.
 std::vector<Seed> contour_seeds(const std::filesystem::path&) {
-    std::vector<Elements> names, drawn, observations;
-    for (const int number : {1, 2}) {
-        Elements name, contours, observation;
-        std::vector<Elements> planes;
-        for (int k = 0; k < slices; ++k) {
-            Elements plane;
-            const std::string z = std::to_string(3 * k);
-            plane.text(0x3006, 0x42, "CS", k == 1 ? "CLOSEDPLANAR_XOR" : "CLOSED_PLANAR");
-            plane.text(0x3006, 0x46, "IS", "4");
-            plane.text(0x3006, 0x50, "DS",
-                       "-5.5\\-4\\" + z + "\\6\\-4\\" + z + "\\6\\7.25\\" + z + "\\-5.5\\7.25\\" + z);
-            planes.push_back(plane);
-        }
-        name.text(0x3006, 0x22, "IS", std::to_string(number));
-        name.text(0x3006, 0x26, "LO", number == 1 ? "liver" : "BODY");
-        contours.sequence(0x3006, 0x40, planes);
-        contours.text(0x3006, 0x84, "IS", std::to_string(number));
-        observation.text(0x3006, 0x84, "IS", std::to_string(number));
-        observation.text(0x3006, 0xa4, "CS", number == 1 ? "ORGAN" : "EXTERNAL");
-        names.push_back(name);
-        drawn.push_back(contours);
-        observations.push_back(observation);
-    }
-    Elements data;
-    data.text(8, 0x60, "CS", "RTSTRUCT");
-    data.sequence(0x3006, 0x20, names);
-    data.sequence(0x3006, 0x39, drawn);
-    data.sequence(0x3006, 0x80, observations);
-    const std::string contours = "1.2.840.10008.5.1.4.1.1.481.3";
-    return {{{{"rtss.dcm", dicom_file(contours, data, imaging::test::explicit_little_endian)}}, "rtss.dcm"}};
+    std::vector<imaging::test::Contour> planes;
+    for (int k = 0; k < slices; ++k)
+        planes.push_back({{{-5.5, -4, 3.0 * k}, {6, -4, 3.0 * k}, {6, 7.25, 3.0 * k}, {-5.5, 7.25, 3.0 * k}},
+                          k == 1 ? "CLOSEDPLANAR_XOR" : "CLOSED_PLANAR"});
+    const Elements data = imaging::test::structure_set({{1, "liver", planes}, {2, "BODY", planes, "EXTERNAL"}});
+    return {
+        {{{"rtss.dcm", dicom_file(imaging::test::structure_set_storage, data, imaging::test::explicit_little_endian)}},
+         "rtss.dcm"}};
 }
 
 /// Lengths of elements and values of two bytes: they follow upper-case representations.

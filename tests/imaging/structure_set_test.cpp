@@ -3,7 +3,7 @@
 
 #include "core/errors.hpp"
 #include "imaging/labels.hpp"
-#include "tests/imaging/dicom_elements.hpp"
+#include "tests/imaging/dicom_contours.hpp"
 #include "tests/imaging/test_volumes.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -19,19 +19,6 @@ namespace {
 using namespace test;
 using Eigen::Vector3d;
 using testing::HasSubstr;
-
-/// A closed contour, and its kind.
-struct Contour {
-    std::vector<Vector3d> points;
-    const char* kind = "CLOSED_PLANAR";
-};
-
-struct Region {
-    int number;
-    std::string name;
-    std::vector<Contour> contours;
-    std::string type = "ORGAN";
-};
 
 /// In the plane at a height, with so many corners, area that of the circle.
 Contour circle(const Vector3d& middle, double radius, int corners = 180) {
@@ -59,36 +46,7 @@ std::vector<double> heights(double first, double step, int count) {
 
 std::filesystem::path written(const TemporaryFolder& folder, const std::vector<Region>& regions,
                               const Eigen::Matrix3d& turn = Eigen::Matrix3d::Identity()) {
-    std::vector<Elements> names, drawn, observations;
-    for (const Region& region : regions) {
-        Elements name, contours;
-        name.text(0x3006, 0x22, "IS", std::to_string(region.number));
-        name.text(0x3006, 0x26, "LO", region.name);
-        names.push_back(name);
-        std::vector<Elements> items;
-        for (const Contour& contour : region.contours) {
-            Elements item;
-            std::string data;
-            for (const Vector3d& point : contour.points) data.append("\\").append(decimals(turn * point));
-            item.text(0x3006, 0x42, "CS", contour.kind);
-            item.text(0x3006, 0x46, "IS", std::to_string(contour.points.size()));
-            item.text(0x3006, 0x50, "DS", data.substr(1));
-            items.push_back(item);
-        }
-        contours.sequence(0x3006, 0x40, items);
-        contours.text(0x3006, 0x84, "IS", std::to_string(region.number));
-        drawn.push_back(contours);
-        Elements observation;
-        observation.text(0x3006, 0x84, "IS", std::to_string(region.number));
-        observation.text(0x3006, 0xa4, "CS", region.type);
-        observations.push_back(observation);
-    }
-    Elements data;
-    data.text(8, 0x60, "CS", "RTSTRUCT");
-    data.sequence(0x3006, 0x20, names);
-    data.sequence(0x3006, 0x39, drawn);
-    data.sequence(0x3006, 0x80, observations);
-    write_dicom(folder / "rtss.dcm", "1.2.840.10008.5.1.4.1.1.481.3", "1.2.3", data);
+    write_dicom(folder / "rtss.dcm", structure_set_storage, "1.2.3", structure_set(regions, turn));
     return folder / "rtss.dcm";
 }
 
@@ -160,13 +118,13 @@ TEST(StructureSets, AMissingPlaneIsInterpolatedAndAGapStaysOne) {
     const auto apart = written(folder, {{2, "ends", both}});
     EXPECT_EQ(label_statistics(read_labels(apart)).at(2).components, 2);
     // every other plane of one region: between two of its own it goes on, for the other one has planes there
-    const auto tubes =
-        written(folder, {{1, "fine", straight(heights(0, 2, 20), 5)}, {2, "coarse", [&] {
-                                                                           std::vector<Contour> moved;
-                                                                           for (const double z : heights(0, 4, 10))
-                                                                               moved.push_back(circle({40.3, 0.2, z}, 5));
-                                                                           return moved;
-                                                                       }()}});
+    const auto tubes = written(
+        folder, {{1, "fine", straight(heights(0, 2, 20), 5)}, {2, "coarse", [&] {
+                                                                   std::vector<Contour> moved;
+                                                                   for (const double z : heights(0, 4, 10))
+                                                                       moved.push_back(circle({40.3, 0.2, z}, 5));
+                                                                   return moved;
+                                                               }()}});
     const auto statistics = label_statistics(read_labels(tubes));
     EXPECT_EQ(statistics.at(2).components, 1);
     EXPECT_NEAR(statistics.at(2).volume_mm3 / (25 * EIGEN_PI * 38), 1, 0.05);

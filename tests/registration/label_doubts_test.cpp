@@ -96,7 +96,7 @@ TEST(LabelDoubts, NoTurnEndsInAWrongPoseThatIsNotDoubted) {
                    {.labels = map_of([&](const Vector3d& x) -> Vector3d { return turn.inverse() * x; }, {60, 60, 60})},
                    on_cpu());
         const Eigen::Matrix3Xd& nodes = model().model.mesh.nodes;
-        const bool right = (result.deformation.deformed_nodes() - turn * nodes).colwise().norm().maxCoeff() < 3;
+        const bool right = (result.deformation.deformed_nodes() - turn * nodes).colwise().norm().maxCoeff() < 0.85;
         found += right;
         doubted += count_of_severe(result.doubts) > 0;
         EXPECT_TRUE(right || count_of_severe(result.doubts) > 0) << "turned by " << 40 + 12 * n << "°";
