@@ -94,9 +94,10 @@ detail::OpenParts open_parts(const PreparedModel& prepared, const UpdateResult& 
     // has.
     LastPulls residuals = result.pulls;
     for (PulledNode& pulled : residuals.springs) pulled.spring.target -= displacement.col(pulled.spring.node);
-    detail::DataUncertainty data = detail::open_parts(coarse, detail::pulls_on(coarse, prepared, residuals),
-                                                      Eigen::Matrix3Xd::Zero(3, mesh.nodes.cols()), energy, options)
-                                       .data;
+    LastPulls pulls = detail::pulls_on(coarse, prepared, residuals);
+    const Eigen::Matrix3Xd there = detail::carried(prepared.model.mesh, displacement, mesh.nodes);
+    for (PulledNode& pulled : pulls.springs) pulled.spring.target += there.col(pulled.spring.node);
+    detail::DataUncertainty data = detail::open_parts(coarse, pulls, there, energy, options).data;
     data.covariance = detail::carried(mesh, data.covariance, prepared.model.mesh.nodes);
     return {std::move(data), {prepared.rest, conditions_of(prepared, result.pulls), prepared.stiffness}};
 }

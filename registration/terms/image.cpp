@@ -43,9 +43,9 @@ std::vector<Doubt> doubts_of(const ImageFit& fit) {
                           "trust the map uncertainty_trust, or show more of the organ", Severity::Notice});
     if (fit.agreement && *fit.agreement < limits.least_agreement)
         doubts.push_back({"image.disagree", *fit.agreement, limits.least_agreement,
-                          "the images agree where the organ lies hardly better than by chance (" +
-                              to_text(*fit.agreement) + "; 0 is chance, 1 the same image)",
-                          "check that they show the same organ"});
+                          "the images agree too little where the organ lies (" + to_text(*fit.agreement) +
+                              "; 0 is chance, 1 the same image)",
+                          "check that they show the same organ, and look where the result lies"});
     if (fit.residual_mm > limits.most_residual_mm)
         doubts.push_back(
             {"image.apart", fit.residual_mm, limits.most_residual_mm,

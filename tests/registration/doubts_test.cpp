@@ -35,7 +35,7 @@ std::string code(const std::optional<Doubt>& doubt) {
 }
 
 TEST(Doubts, OfImages) {
-    const ImageFit good{1000, 101, 0.99, 0.51, 0.11};
+    const ImageFit good{1000, 101, 0.99, 0.51, 0.26};
     EXPECT_THAT(of(good), IsEmpty());
     ImageFit bad = good;
     bad.matched = 99;
@@ -45,7 +45,7 @@ TEST(Doubts, OfImages) {
     EXPECT_THAT(of(bad), ElementsAre("image.out_of_view"));
     EXPECT_EQ(count_of_severe(detail::doubts_of(bad)), 0);
     bad = good;
-    bad.agreement = 0.09;
+    bad.agreement = 0.24;
     EXPECT_THAT(of(bad), ElementsAre("image.disagree"));
     bad.agreement.reset();
     EXPECT_THAT(of(bad), IsEmpty());
