@@ -150,7 +150,7 @@ struct UpdateResult {
     LastPulls pulls;
     std::string engine;  ///< description of the device that solved
     double min_jacobian = 1;
-    std::optional<ImageFit> image;      ///< where a bare volume was given
+    std::vector<ImageFit> images;       ///< of the bare volume and its contrasts, where given
     std::optional<SurfaceFit> surface;  ///< where points of a surface were given
     std::optional<PointFit> points;     ///< where pairs of points were given
     std::optional<CurveFit> curves;     ///< where points along vessels were given

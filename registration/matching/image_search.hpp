@@ -20,9 +20,9 @@ inline constexpr SearchGain search_gain{};
 
 class ImageSearch {
 public:
-    /// `prepared.image` is there. Model, options and tools outlive this.
-    ImageSearch(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
-                ImageTools& tools);
+    /// Of a moving image of the tissue that is meshed. Mesh, image, options and tools outlive this.
+    ImageSearch(const meshing::TetMesh& mesh, const ImageModel& moving, const imaging::Volume& fixed,
+                const ImageOptions& options, ImageTools& tools);
 
     /// What a search about where the model is finds, at places of the mesh. After the last of count() the last grid is
     /// searched again.
@@ -42,7 +42,8 @@ public:
     [[nodiscard]] const imaging::Volume& seen() const { return fixed_.seen; }
 
 private:
-    const PreparedModel& prepared_;
+    const meshing::TetMesh& mesh_;
+    const ImageModel& moving_;
     const ImageOptions& options_;
     const meshing::PointLocator& locator_;
     SeenImage fixed_;

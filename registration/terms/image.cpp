@@ -4,6 +4,7 @@
 #include "registration/doubts.hpp"
 #include "registration/matching/image_matching.hpp"
 #include "registration/pose/least_trimmed_motion.hpp"
+#include "registration/terms/view_prior.hpp"
 
 #include <Eigen/Eigenvalues>
 
@@ -14,6 +15,7 @@
 #include <cmath>
 #include <functional>
 #include <optional>
+#include <utility>
 
 namespace tissuewarp::registration::detail {
 
@@ -28,39 +30,41 @@ double median_distance(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
 
 }  // namespace
 
-std::vector<Doubt> doubts_of(const ImageFit& fit) {
+std::vector<Doubt> doubts_of(const ImageFit& fit, const std::string& name) {
     std::vector<Doubt> doubts;
     constexpr ImageDoubtLimits limits = image_doubt_limits;
     if (fit.matched < limits.least_matched * fit.blocks)
         doubts.push_back({"image.blocks_lost", fit.matched / double(fit.blocks), limits.least_matched,
                           "only " + std::to_string(fit.matched) + " of " + std::to_string(fit.blocks) +
-                              " blocks of the moving image were found in the fixed one",
+                              " blocks of the moving " + name + " were found in the fixed one",
                           "check that both show the same organ, within the search range of each other"});
     if (fit.shown_share < limits.least_shown)
         doubts.push_back({"image.out_of_view", fit.shown_share, limits.least_shown,
-                          "the fixed image shows only " + percent(fit.shown_share) +
+                          "the fixed " + name + " shows only " + percent(fit.shown_share) +
                               " of the organ; the rest is where mechanics alone put it",
                           "trust the map uncertainty_trust, or show more of the organ", Severity::Notice});
     if (fit.agreement && *fit.agreement < limits.least_agreement)
         doubts.push_back({"image.disagree", *fit.agreement, limits.least_agreement,
-                          "the images agree too little where the organ lies (" + to_text(*fit.agreement) +
+                          "the moving and the fixed " + name + " agree too little where the organ lies (" + to_text(*fit.agreement) +
                               "; 0 is chance, 1 the same image)",
                           "check that they show the same organ, and look where the result lies"});
     if (fit.residual_mm > limits.most_residual_mm)
         doubts.push_back(
             {"image.apart", fit.residual_mm, limits.most_residual_mm,
-             "blocks found in the fixed image lie " + to_text(fit.residual_mm) + " mm from where the tissue went",
+             "blocks found in the fixed " + name + " lie " + to_text(fit.residual_mm) + " mm from where the tissue went",
              "look where image and result differ; give labels or landmarks beside the image"});
     return doubts;
 }
 
-ImageTerm::ImageTerm(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
-                     ImageTools& tools, double energy)
+ImageTerm::ImageTerm(const PreparedModel& prepared, const ImageModel& moving, const imaging::Volume& fixed,
+                     std::string name, const ImageOptions& options, ImageTools& tools, double energy)
     : prepared_(prepared),
+      moving_(moving),
+      name_(std::move(name)),
       options_(options),
       energy_(energy),
-      search_(prepared, fixed, options, tools),
-      prior_(prepared, search_.seen(), options, energy),
+      search_(prepared.model.mesh, moving, fixed, options, tools),
+      view_(search_.seen()),
       fixed_grid_(fixed.geometry) {}
 
 void ImageTerm::search(const State& state, Observer& observer) {
@@ -93,7 +97,7 @@ std::optional<Eigen::Isometry3d> ImageTerm::rigid_motion() const {
         fixed.col(n) = matches_.matches[static_cast<std::size_t>(n)].fixed;
     }
     const Eigen::Isometry3d motion = least_trimmed_motion(moving, fixed);
-    if (prior_.share_in_view() >= image_pose_options.whole_view) return motion;
+    if (share_in_view(prepared_, view_) >= image_pose_options.whole_view) return motion;
     const double without = median_distance(moving, fixed), with = median_distance(motion * moving, fixed);
     const bool deforms = with > image_pose_options.most_left * without && without < options_.headers_within_mm;
     return deforms ? std::nullopt : std::optional(motion);
@@ -136,25 +140,23 @@ Contribution ImageTerm::linearise(const RoundPlan& plan, const State& state, Obs
         forces_[n] = {weight * matches[n].pull.stiffness, weight * matches[n].pull.force};
     });
     result.candidates =
-        std::max(static_cast<int>(prepared_.image->blocks.points().cols()), static_cast<int>(matches.size()));
+        std::max(static_cast<int>(moving_.blocks.points().cols()), static_cast<int>(matches.size()));
     result.matched = static_cast<int>(matches.size());
     result.mean_residual_mm = mean_residual(matches);
-    const DatumKind kind = image_kind(prepared_.image->image.geometry, fixed_grid_,
+    const DatumKind kind = image_kind(moving_.image.geometry, fixed_grid_,
                                       search_.agreement().value_or(shared_errors.full_agreement));
     result.springs = pulled_by(kind, lumped_springs(shares_, forces_, state.displacement));
     for (PulledNode& pulled : result.springs)
-        if (!prior_.in_view(state.placement * (prepared_.model.mesh.nodes.col(pulled.spring.node) +
-                                               state.displacement.col(pulled.spring.node))))
+        if (view_.distance(state.placement * (prepared_.model.mesh.nodes.col(pulled.spring.node) +
+                                              state.displacement.col(pulled.spring.node))) >= 0)
             pulled.shows_mm = -1;
-    for (const tled::Spring& spring : prior_.springs(state.placement))
-        result.springs.push_back({spring, Origin::Prior});
     return result;
 }
 
 ImageFit ImageTerm::fit(const State& state) {
     const Eigen::Matrix3Xd& nodes = prepared_.model.mesh.nodes;
     ImageFit fit;
-    fit.blocks = static_cast<int>(prepared_.image->blocks.points().cols());
+    fit.blocks = static_cast<int>(moving_.blocks.points().cols());
     fit.matched = static_cast<int>(search_.blocks_found());
     std::vector<Eigen::Vector3d> places;
     places.reserve(matches_.matches.size());
@@ -175,8 +177,8 @@ ImageFit ImageTerm::fit(const State& state) {
 }
 
 void ImageTerm::judge(const State& state, UpdateResult& result) {
-    result.image = fit(state);
-    for (Doubt& doubt : doubts_of(*result.image)) result.doubts.push_back(std::move(doubt));
+    result.images.push_back(fit(state));
+    for (Doubt& doubt : doubts_of(result.images.back(), name_)) result.doubts.push_back(std::move(doubt));
 }
 
 }  // namespace tissuewarp::registration::detail
