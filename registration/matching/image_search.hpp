@@ -38,6 +38,8 @@ public:
     [[nodiscard]] std::optional<double> agreement() const { return agreement_; }
     /// Blocks that the first search found.
     [[nodiscard]] std::size_t blocks_found() const { return blocks_.matches.size(); }
+    /// Where points of the moving image are in the fixed one.
+    [[nodiscard]] Eigen::Matrix3Xd deformed(const Eigen::Matrix3Xd& points, const State& state) const;
     /// Where the fixed image shows something.
     [[nodiscard]] const imaging::Volume& seen() const { return fixed_.seen; }
 
@@ -57,8 +59,6 @@ private:
 
     [[nodiscard]] LocatedMatches block_search(const State& state, Observer& observer) const;
     [[nodiscard]] LocatedMatches dense_search(const State& state);
-    /// Where points of the moving image are in the fixed one.
-    [[nodiscard]] Eigen::Matrix3Xd deformed(const Eigen::Matrix3Xd& points, const State& state) const;
     /// Those that lie in the model.
     [[nodiscard]] LocatedMatches located(const std::vector<BlockMatch>& matches) const;
 };

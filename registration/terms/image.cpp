@@ -36,7 +36,7 @@ std::vector<Doubt> doubts_of(const ImageFit& fit, const std::string& name) {
     if (fit.matched < limits.least_matched * fit.blocks)
         doubts.push_back({"image.blocks_lost", fit.matched / double(fit.blocks), limits.least_matched,
                           "only " + std::to_string(fit.matched) + " of " + std::to_string(fit.blocks) +
-                              " blocks of the moving " + name + " were found in the fixed one",
+                              " blocks of the moving " + name + " that lie in view were found in the fixed one",
                           "check that both show the same organ, within the search range of each other"});
     if (fit.shown_share < limits.least_shown)
         doubts.push_back({"image.out_of_view", fit.shown_share, limits.least_shown,
@@ -153,10 +153,17 @@ Contribution ImageTerm::linearise(const RoundPlan& plan, const State& state, Obs
     return result;
 }
 
+int ImageTerm::blocks_in_view(const State& state) const {
+    const Eigen::Matrix3Xd places = search_.deformed(moving_.blocks.points(), state);
+    int count = 0;
+    for (Eigen::Index n = 0; n < places.cols(); ++n) count += view_.distance(places.col(n)) < 0;
+    return std::max(count, static_cast<int>(search_.blocks_found()));
+}
+
 ImageFit ImageTerm::fit(const State& state) {
     const Eigen::Matrix3Xd& nodes = prepared_.model.mesh.nodes;
     ImageFit fit;
-    fit.blocks = static_cast<int>(moving_.blocks.points().cols());
+    fit.blocks = blocks_in_view(state);
     fit.matched = static_cast<int>(search_.blocks_found());
     std::vector<Eigen::Vector3d> places;
     places.reserve(matches_.matches.size());

@@ -90,6 +90,8 @@ private:
     [[nodiscard]] std::optional<Eigen::Isometry3d> rigid_motion() const;
     /// Of all matches, in `pulled_`.
     const std::vector<PulledMatch>& pulled(const State& state);
+    /// Blocks whose places in this state the fixed image shows.
+    [[nodiscard]] int blocks_in_view(const State& state) const;
     [[nodiscard]] ImageFit fit(const State& state);
 
     static double mean_residual(const std::vector<PulledMatch>& matches);
