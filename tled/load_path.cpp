@@ -67,6 +67,7 @@ private:
         EquilibriumOptions options = options_.equilibrium;
         constexpr double loose = 10;  // of the tolerance, on the way
         if (load < 1) options.tolerance_mm *= loose;
+        if (result_.method == EquilibriumMethod::Newton) options.method = EquilibriumMethod::Newton;  // others failed
         const bool first = from_rest_ && !before_ && now_.load == 0;
         const Matrix3Xd prediction = predicted(load, partial);
         try {

@@ -68,14 +68,16 @@ ImageTerm::ImageTerm(const PreparedModel& prepared, const ImageModel& moving, co
       fixed_grid_(fixed.geometry) {}
 
 void ImageTerm::search(const State& state, Observer& observer) {
-    matches_ = search_.search(state, observer);
-    strongest_.resize(matches_.matches.size());
-    tbb::parallel_for(std::size_t{0}, strongest_.size(), [&](std::size_t n) {
+    LocatedMatches located = search_.search(state, observer);
+    found_.matches = std::move(located.matches);
+    found_.places = std::move(located.places);
+    found_.strongest.resize(found_.matches.size());
+    tbb::parallel_for(std::size_t{0}, found_.strongest.size(), [&](std::size_t n) {
         Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
-        axes.computeDirect(matches_.matches[n].information, Eigen::EigenvaluesOnly);
-        strongest_[n] = axes.eigenvalues()[2];
+        axes.computeDirect(found_.matches[n].information, Eigen::EigenvaluesOnly);
+        found_.strongest[n] = axes.eigenvalues()[2];
     });
-    shares_ = NodalShares(prepared_.model.mesh, matches_.places);
+    found_.shares = NodalShares(prepared_.model.mesh, found_.places);
 }
 
 Alignment ImageTerm::pose(const Eigen::Isometry3d& /*start*/, Observer& observer) {
@@ -86,15 +88,15 @@ Alignment ImageTerm::pose(const Eigen::Isometry3d& /*start*/, Observer& observer
 }
 
 std::optional<Eigen::Isometry3d> ImageTerm::rigid_motion() const {
-    if (matches_.matches.size() < image_pose_options.fewest_blocks)
-        throw InvalidInput("only " + std::to_string(matches_.matches.size()) +
+    if (found_.matches.size() < image_pose_options.fewest_blocks)
+        throw InvalidInput("only " + std::to_string(found_.matches.size()) +
                            " blocks of the moving image were found in the fixed one; check that they show the same "
                            "organ, and bring them within the search range of each other");
-    const auto count = static_cast<Eigen::Index>(matches_.matches.size());
+    const auto count = static_cast<Eigen::Index>(found_.matches.size());
     Eigen::Matrix3Xd moving(3, count), fixed(3, count);
     for (Eigen::Index n = 0; n < count; ++n) {
-        moving.col(n) = matches_.matches[static_cast<std::size_t>(n)].moving;
-        fixed.col(n) = matches_.matches[static_cast<std::size_t>(n)].fixed;
+        moving.col(n) = found_.matches[static_cast<std::size_t>(n)].moving;
+        fixed.col(n) = found_.matches[static_cast<std::size_t>(n)].fixed;
     }
     const Eigen::Isometry3d motion = least_trimmed_motion(moving, fixed);
     if (share_in_view(prepared_, view_) >= image_pose_options.whole_view) return motion;
@@ -105,17 +107,17 @@ std::optional<Eigen::Isometry3d> ImageTerm::rigid_motion() const {
 
 const std::vector<ImageTerm::PulledMatch>& ImageTerm::pulled(const State& state) {
     const Eigen::Isometry3d back = state.placement.inverse();
-    pulled_.resize(matches_.matches.size());
-    tbb::parallel_for(std::size_t{0}, pulled_.size(), [&](std::size_t n) {
-        const BlockMatch& match = matches_.matches[n];
-        const meshing::Location& place = matches_.places[n];
+    memory_.pulled.resize(found_.matches.size());
+    tbb::parallel_for(std::size_t{0}, memory_.pulled.size(), [&](std::size_t n) {
+        const BlockMatch& match = found_.matches[n];
+        const meshing::Location& place = found_.places[n];
         const Eigen::Matrix3d information = back.linear() * match.information * back.linear().transpose();
         const Eigen::Vector3d target = back * match.fixed - match.moving,
                               e = target - displacement_at(prepared_.model.mesh, state.displacement, place),
                               force = information * e;
-        pulled_[n] = {{information, force}, match.confidence, std::sqrt(e.dot(force) / strongest_[n])};
+        memory_.pulled[n] = {{information, force}, match.confidence, std::sqrt(e.dot(force) / found_.strongest[n])};
     });
-    return pulled_;
+    return memory_.pulled;
 }
 
 double ImageTerm::mean_residual(const std::vector<PulledMatch>& matches) {
@@ -134,10 +136,10 @@ Contribution ImageTerm::linearise(const RoundPlan& plan, const State& state, Obs
         result.pulls_anew = true;
     }
     const std::vector<PulledMatch>& matches = pulled(state);
-    forces_.resize(matches.size());
+    memory_.forces.resize(matches.size());
     tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t n) {
         const double weight = energy_ * matches[n].confidence * robust_weight(matches[n].residual_mm, plan.scale_mm);
-        forces_[n] = {weight * matches[n].pull.stiffness, weight * matches[n].pull.force};
+        memory_.forces[n] = {weight * matches[n].pull.stiffness, weight * matches[n].pull.force};
     });
     result.candidates =
         std::max(static_cast<int>(moving_.blocks.points().cols()), static_cast<int>(matches.size()));
@@ -145,7 +147,7 @@ Contribution ImageTerm::linearise(const RoundPlan& plan, const State& state, Obs
     result.mean_residual_mm = mean_residual(matches);
     const DatumKind kind = image_kind(moving_.image.geometry, fixed_grid_,
                                       search_.agreement().value_or(shared_errors.full_agreement));
-    result.springs = pulled_by(kind, lumped_springs(shares_, forces_, state.displacement));
+    result.springs = pulled_by(kind, lumped_springs(found_.shares, memory_.forces, state.displacement));
     for (PulledNode& pulled : result.springs)
         if (view_.distance(state.placement * (prepared_.model.mesh.nodes.col(pulled.spring.node) +
                                               state.displacement.col(pulled.spring.node))) >= 0)
@@ -166,8 +168,8 @@ ImageFit ImageTerm::fit(const State& state) {
     fit.blocks = blocks_in_view(state);
     fit.matched = static_cast<int>(search_.blocks_found());
     std::vector<Eigen::Vector3d> places;
-    places.reserve(matches_.matches.size());
-    for (const BlockMatch& match : matches_.matches) places.push_back(match.moving);
+    places.reserve(found_.matches.size());
+    for (const BlockMatch& match : found_.matches) places.push_back(match.moving);
     const meshing::PointTree matched(places);
     const auto shown = tbb::parallel_reduce(
         tbb::blocked_range<Eigen::Index>(0, nodes.cols()), Eigen::Index{0},

@@ -70,6 +70,19 @@ private:
         double residual_mm;  // along what the block shows best
     };
 
+    /// Of the last search.
+    struct Found {
+        std::vector<BlockMatch> matches;
+        std::vector<meshing::Location> places;
+        std::vector<double> strongest;  // of each match: the largest eigenvalue of its information
+        NodalShares shares;             // of the nodes in them
+    };
+    /// Kept from round to round: fresh memory costs more than what is computed in it.
+    struct Memory {
+        std::vector<PulledMatch> pulled;
+        std::vector<PullForce> forces;
+    };
+
     const PreparedModel& prepared_;
     const ImageModel& moving_;
     std::string name_;
@@ -79,16 +92,12 @@ private:
     FieldOfView view_;
     imaging::Geometry fixed_grid_;
     bool has_placed_ = false;
-    LocatedMatches matches_;         // of the last search
-    std::vector<double> strongest_;  // of each of these: the largest eigenvalue of its information
-    NodalShares shares_;             // of the nodes in them
-    // kept from round to round: fresh memory costs more than what is computed in it
-    std::vector<PulledMatch> pulled_;
-    std::vector<PullForce> forces_;
+    Found found_;
+    Memory memory_;
 
     void search(const State& state, Observer& observer);
     [[nodiscard]] std::optional<Eigen::Isometry3d> rigid_motion() const;
-    /// Of all matches, in `pulled_`.
+    /// Of all matches, in `memory_`.
     const std::vector<PulledMatch>& pulled(const State& state);
     /// Blocks whose places in this state the fixed image shows.
     [[nodiscard]] int blocks_in_view(const State& state) const;
