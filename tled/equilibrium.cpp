@@ -51,7 +51,8 @@ std::vector<EquilibriumMethod> escalation(EquilibriumMethod first, const NodalCo
                                           const EquilibriumOptions& options) {
     std::vector<EquilibriumMethod> methods{first};
     if (first != EquilibriumMethod::Lbfgs) methods.push_back(EquilibriumMethod::Lbfgs);
-    if (options.rest != nullptr && !conditions.effects.contact) methods.push_back(EquilibriumMethod::Newton);
+    const bool decides = options.last == EquilibriumMethod::Newton && options.rest != nullptr;
+    if (decides && !conditions.effects.contact) methods.push_back(EquilibriumMethod::Newton);
     return methods;
 }
 

@@ -22,6 +22,7 @@ struct EquilibriumOptions {
     int max_steps = 4000;        ///< force evaluations
     int steps_per_check = 25;    ///< steps of dynamic relaxation recorded between two looks at the state
     EquilibriumMethod method = EquilibriumMethod::Automatic;
+    EquilibriumMethod last = EquilibriumMethod::Newton;  ///< that Automatic escalates to: this or Lbfgs
     double known_highest = 0;         ///< EquilibriumResult::highest of a state and springs like these: self-checked
                                       ///< relaxation then goes without a search for it, unless it finds it wrong
     const RestState* rest = nullptr;  ///< that of the engine: lets L-BFGS factorise a metric near the answer for tissue

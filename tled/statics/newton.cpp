@@ -16,7 +16,7 @@ namespace {
 
 constexpr double contraction_kept = 0.2;  // of corrections, above which the tangent is taken anew
 constexpr int most_iterations = 60;
-constexpr int most_idle = 12;  // iterations without the correction falling by a tenth
+constexpr int most_idle = 15;  // iterations without the correction falling by a tenth
 
 /// The start as it is, with the imposed displacements in place; from rest the linear-elastic solution as far as no
 /// tetrahedron is turned inside out.
@@ -44,9 +44,12 @@ EquilibriumResult newton(EquilibriumSearch& search, const Matrix3Xd* start) {
             renew = true;
             continue;
         }
-        const double error = correction / (1 - contraction);
-        search.keep(u, error);
-        if (error <= search.options.tolerance_mm && tangent.shift() == 0) return search.finish();
+        search.keep(u, correction);
+        if (correction <= search.options.tolerance_mm && tangent.shift() == 0) {
+            if (renew) return search.finish();
+            renew = true;  // accepted by the tangent where the tissue is alone
+            continue;
+        }
         if (iteration == 0 || correction < 0.9 * least) {
             least = correction;
             idle = 0;
