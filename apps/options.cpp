@@ -452,8 +452,8 @@ std::vector<std::string> not_given(const std::vector<std::string>& from_file, co
     std::vector<std::string> result;
     for (std::size_t i = 0; i < from_file.size(); ++i) {
         const std::string& name = from_file[i];
-        const bool is_switch = std::find(known.switches.begin(), known.switches.end(), name.substr(2)) !=
-                               known.switches.end();
+        const bool is_switch =
+            std::find(known.switches.begin(), known.switches.end(), name.substr(2)) != known.switches.end();
         const bool wins = std::any_of(given.begin(), given.end(), [&](const std::string& argument) {
             return argument == name || argument.starts_with(name + "=");
         });

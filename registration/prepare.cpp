@@ -65,8 +65,17 @@ PreparedModel of_mesh(meshing::TetMesh mesh, const imaging::Volume& moving_label
     tled::RestStiffness stiffness(rest, springs);
     make_ready(stiffness);
     times.push_back({"rest stiffness", stopwatch.lap()});
-    return {std::move(model),     std::move(organ), options, std::move(interfaces), std::move(rest),
-            std::move(stiffness), std::move(times), nullptr, std::move(neighbours), nullptr, {}};
+    return {std::move(model),
+            std::move(organ),
+            options,
+            std::move(interfaces),
+            std::move(rest),
+            std::move(stiffness),
+            std::move(times),
+            nullptr,
+            std::move(neighbours),
+            nullptr,
+            {}};
 }
 
 }  // namespace

@@ -93,7 +93,7 @@ struct PreparedModel {
     std::vector<StageTime> times;
     std::shared_ptr<const ImageModel> image;  ///< see prepare_image; null without
     std::optional<RigidNeighbours> neighbours;
-    std::unique_ptr<PreparedModel> coarse;  ///< of the same organ, see prepare_loads
+    std::unique_ptr<PreparedModel> coarse;                     ///< of the same organ, see prepare_loads
     std::vector<std::shared_ptr<const ImageModel>> contrasts;  ///< see prepare_contrast
 };
 

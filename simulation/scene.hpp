@@ -161,9 +161,9 @@ struct Solve {
     double tolerance_mm = 0.05;  ///< of an equilibrium
     tled::EquilibriumMethod method = tled::EquilibriumMethod::Automatic;
     tled::Scalar precision = tled::Scalar::Float32;  ///< of forces; Float64 on the CPU alone
-    int load_steps = 1;  ///< equal parts of its load to try first
-    double damping = 2.0;        ///< 1/s, of dynamics
-    double step = 0.0;           ///< s; 0: nine tenths of the critical one
+    int load_steps = 1;                              ///< equal parts of its load to try first
+    double damping = 2.0;                            ///< 1/s, of dynamics
+    double step = 0.0;                               ///< s; 0: nine tenths of the critical one
     Device device = Device::Auto;
     int gpu_index = -1;
     std::optional<tled::Element> element;  ///< none: suggested_element()

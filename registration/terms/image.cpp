@@ -45,14 +45,14 @@ std::vector<Doubt> doubts_of(const ImageFit& fit, const std::string& name) {
                           "trust the map uncertainty_trust, or show more of the organ", Severity::Notice});
     if (fit.agreement && *fit.agreement < limits.least_agreement)
         doubts.push_back({"image.disagree", *fit.agreement, limits.least_agreement,
-                          "the moving and the fixed " + name + " agree too little where the organ lies (" + to_text(*fit.agreement) +
-                              "; 0 is chance, 1 the same image)",
+                          "the moving and the fixed " + name + " agree too little where the organ lies (" +
+                              to_text(*fit.agreement) + "; 0 is chance, 1 the same image)",
                           "check that they show the same organ, and look where the result lies"});
     if (fit.residual_mm > limits.most_residual_mm)
-        doubts.push_back(
-            {"image.apart", fit.residual_mm, limits.most_residual_mm,
-             "blocks found in the fixed " + name + " lie " + to_text(fit.residual_mm) + " mm from where the tissue went",
-             "look where image and result differ; give labels or landmarks beside the image"});
+        doubts.push_back({"image.apart", fit.residual_mm, limits.most_residual_mm,
+                          "blocks found in the fixed " + name + " lie " + to_text(fit.residual_mm) +
+                              " mm from where the tissue went",
+                          "look where image and result differ; give labels or landmarks beside the image"});
     return doubts;
 }
 
@@ -141,12 +141,11 @@ Contribution ImageTerm::linearise(const RoundPlan& plan, const State& state, Obs
         const double weight = energy_ * matches[n].confidence * robust_weight(matches[n].residual_mm, plan.scale_mm);
         memory_.forces[n] = {weight * matches[n].pull.stiffness, weight * matches[n].pull.force};
     });
-    result.candidates =
-        std::max(static_cast<int>(moving_.blocks.points().cols()), static_cast<int>(matches.size()));
+    result.candidates = std::max(static_cast<int>(moving_.blocks.points().cols()), static_cast<int>(matches.size()));
     result.matched = static_cast<int>(matches.size());
     result.mean_residual_mm = mean_residual(matches);
-    const DatumKind kind = image_kind(moving_.image.geometry, fixed_grid_,
-                                      search_.agreement().value_or(shared_errors.full_agreement));
+    const DatumKind kind =
+        image_kind(moving_.image.geometry, fixed_grid_, search_.agreement().value_or(shared_errors.full_agreement));
     result.springs = pulled_by(kind, lumped_springs(found_.shares, memory_.forces, state.displacement));
     for (PulledNode& pulled : result.springs)
         if (view_.distance(state.placement * (prepared_.model.mesh.nodes.col(pulled.spring.node) +

@@ -40,7 +40,8 @@ void require_usable(const PreparedModel& prepared, const Intraoperative& seen, s
 /// One for the image and each of its contrasts, and what is expected of tissue by what the image has in view.
 void add_images(std::vector<std::unique_ptr<Term>>& terms, const PreparedModel& prepared, const Intraoperative& seen,
                 const ImageOptions& options, std::vector<ImageTools>& tools, double energy) {
-    auto image = std::make_unique<ImageTerm>(prepared, *prepared.image, *seen.image, "image", options, tools[0], energy);
+    auto image =
+        std::make_unique<ImageTerm>(prepared, *prepared.image, *seen.image, "image", options, tools[0], energy);
     auto prior = std::make_unique<ViewPrior>(prepared, image->view(), options, energy);
     terms.push_back(std::move(image));
     for (std::size_t n = 0; n < seen.contrasts.size(); ++n)

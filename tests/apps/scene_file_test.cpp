@@ -243,7 +243,9 @@ TEST_F(SceneFiles, OpenInterfacesBetweenLabelsOrSets) {
 
 TEST_F(SceneFiles, SayHowAnEquilibriumIsSought) {
     const simulation::Solve by_default = read(cube).solve,
-                            forced = read(cube + "[solve]\nmethod = \"newton\"\nload_steps = 7\nprecision = \"float64\"\n").solve;
+                            forced =
+                                read(cube + "[solve]\nmethod = \"newton\"\nload_steps = 7\nprecision = \"float64\"\n")
+                                    .solve;
     EXPECT_EQ(by_default.method, tled::EquilibriumMethod::Automatic);
     EXPECT_EQ(by_default.precision, tled::Scalar::Float32);
     EXPECT_EQ(forced.method, tled::EquilibriumMethod::Newton);

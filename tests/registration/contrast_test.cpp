@@ -55,8 +55,7 @@ PreparedModel model(const std::vector<Side>& sides) {
     organ.inclusion_radius = 0;
     PrepareOptions options;
     options.meshing.edge_length = 6;
-    PreparedModel prepared =
-        prepare(shapes::organ_labels(organ, Eigen::Isometry3d::Identity(), spacing_mm), options);
+    PreparedModel prepared = prepare(shapes::organ_labels(organ, Eigen::Isometry3d::Identity(), spacing_mm), options);
     prepare_image(prepared, before(prepared, sides.front()), image_options());
     for (std::size_t n = 1; n < sides.size(); ++n)
         prepare_contrast(prepared, before(prepared, sides[n]), image_options());

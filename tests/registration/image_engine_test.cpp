@@ -68,7 +68,8 @@ double deviation(const DenseForce& force) {
 /// axis moves the image pulled back by tenths of voxels.
 TEST(ImageEngine, TheDeviceSaysWhatTheProcessorSays) {
     const Scene scene;
-    const auto cpu = make_cpu_image_engine(scene.prepared.model.mesh, *scene.prepared.image), gpu = make_gpu_image_engine(scene.prepared.model.mesh, *scene.prepared.image);
+    const auto cpu = make_cpu_image_engine(scene.prepared.model.mesh, *scene.prepared.image),
+               gpu = make_gpu_image_engine(scene.prepared.model.mesh, *scene.prepared.image);
     cpu->set_fixed(SeenImage(scene.fixed));
     gpu->set_fixed(SeenImage(scene.fixed));
     for (const std::size_t level : {0U, 1U}) {
@@ -133,7 +134,8 @@ TEST(ImageEngine, TheDeviceFindsTheBlocksThatTheProcessorFinds) {
     BlockMatchingOptions options;
     options.rotation = scene.state.placement.linear();
     options.search_mm = 12;
-    const auto cpu = make_cpu_image_engine(scene.prepared.model.mesh, *scene.prepared.image), gpu = make_gpu_image_engine(scene.prepared.model.mesh, *scene.prepared.image);
+    const auto cpu = make_cpu_image_engine(scene.prepared.model.mesh, *scene.prepared.image),
+               gpu = make_gpu_image_engine(scene.prepared.model.mesh, *scene.prepared.image);
     const auto& size = scene.fixed.geometry.size;
     const SeenImage seen(imaging::crop(scene.fixed, {0, 0, 0}, {2 * size[0] / 3, size[1], size[2]}));
     for (const auto& engine : {&cpu, &gpu}) (*engine)->set_fixed(seen);
@@ -187,7 +189,8 @@ TEST(ImageEngine, TheDeviceComparesBlocksOfEverySizeAsTheProcessor) {
                 ->look(blocks, 3, 0.05, [&](std::size_t n, const BlockSight& sight) { result[n] = sight; });
             return result;
         };
-        const auto by_cpu = sights(make_cpu_image_engine(prepared.model.mesh, *prepared.image)), by_gpu = sights(make_gpu_image_engine(prepared.model.mesh, *prepared.image));
+        const auto by_cpu = sights(make_cpu_image_engine(prepared.model.mesh, *prepared.image)),
+                   by_gpu = sights(make_gpu_image_engine(prepared.model.mesh, *prepared.image));
         int found = 0, elsewhere = 0;
         const auto compare = [&](const std::optional<CostLattice>& cpu, const std::optional<CostLattice>& gpu) {
             if (!cpu && !gpu) return;

@@ -2,9 +2,9 @@
 #include "tled/load_path.hpp"
 
 #include "core/errors.hpp"
+#include "tests/tled/equilibrium_scenes.hpp"
 #include "tled/reference/newton.hpp"
 #include "tled/stiffness/tangent_factor.hpp"
-#include "tests/tled/equilibrium_scenes.hpp"
 
 #include <gtest/gtest.h>
 

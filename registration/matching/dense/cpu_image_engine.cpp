@@ -1,8 +1,8 @@
 #include "registration/field.hpp"
 #include "registration/field/rasterisation.hpp"
 #include "registration/matching/dense/image_engine.hpp"
-#include "registration/matching/points/template_images.hpp"
 #include "registration/matching/image_matching.hpp"
+#include "registration/matching/points/template_images.hpp"
 #include "registration/prepare.hpp"
 
 #include <algorithm>

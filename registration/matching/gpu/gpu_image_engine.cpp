@@ -187,7 +187,8 @@ private:
 
 }  // namespace
 
-std::unique_ptr<ImageEngine> make_gpu_image_engine(const meshing::TetMesh& mesh, const ImageModel& image, int gpu_index) {
+std::unique_ptr<ImageEngine> make_gpu_image_engine(const meshing::TetMesh& mesh, const ImageModel& image,
+                                                   int gpu_index) {
     return std::make_unique<GpuImageEngine>(mesh, image, gpu_index);
 }
 
