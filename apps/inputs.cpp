@@ -218,6 +218,18 @@ void read_image_and_labels(const fs::path& image_path, const fs::path& labels_pa
     if (contours) labels = imaging::read_structures_on(labels_path, image.volume.geometry);
 }
 
+std::vector<Volume> read_contrasts(const std::vector<fs::path>& paths, std::vector<std::string>& notes) {
+    std::vector<Volume> result;
+    for (const fs::path& path : paths) {
+        const imaging::ReadResult read = imaging::read_volume_with_notes(path);
+        require_grey(read.volume, path);
+        require_millimetres(read.volume.geometry, path);
+        for (const std::string& note : notes_of(read, path)) notes.push_back(note);
+        result.push_back(read.volume);
+    }
+    return result;
+}
+
 }  // namespace
 
 RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observer) {
@@ -244,6 +256,8 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
                                                                      {"points", &options.points},
                                                                      {"surface", &options.surface}};
     for (const auto& [role, path] : roles) add_file(inputs, role, *path);
+    for (const fs::path& path : options.moving_contrasts) add_file(inputs, "moving", path);
+    for (const fs::path& path : options.fixed_contrasts) add_file(inputs, "fixed", path);
     if (!options.materials.empty()) inputs.materials = read_materials(options.materials);
     if (!options.label_names.empty()) inputs.label_names = imaging::read_label_names(options.label_names);
     read_point_files(inputs, options);
@@ -271,6 +285,8 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
     inputs.fixed_labels = fixed_labels.volume;
     inputs.moving_label_names = moving_labels.label_names;
     inputs.fixed_label_names = fixed_labels.label_names;
+    inputs.moving_contrasts = read_contrasts(options.moving_contrasts, inputs.notes);
+    inputs.fixed_contrasts = read_contrasts(options.fixed_contrasts, inputs.notes);
     find_organ(inputs, options);
     for (const imaging::LabelNames* names : {&inputs.moving_label_names, &inputs.fixed_label_names})
         inputs.label_names.insert(names->begin(), names->end());

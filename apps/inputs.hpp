@@ -27,9 +27,10 @@ struct InputFile {
 };
 
 struct RegistrationInputs {
-    imaging::Volume moving, fixed;                             ///< grey images; empty when not given
-    imaging::Volume moving_labels, fixed_labels;               ///< the latter empty when not given
-    imaging::Volume moving_matched, fixed_matched;             ///< the images without what their masks exclude
+    imaging::Volume moving, fixed;                                   ///< grey images; empty when not given
+    imaging::Volume moving_labels, fixed_labels;                     ///< the latter empty when not given
+    imaging::Volume moving_matched, fixed_matched;                   ///< the images without what their masks exclude
+    std::vector<imaging::Volume> moving_contrasts, fixed_contrasts;  ///< further pairs, likewise
     std::optional<imaging::Foreground> foreground;             ///< whose labels are the moving ones, without any given
     std::optional<meshing::TetMesh> moving_mesh;               ///< where it was made elsewhere
     imaging::Volume fixed_labels_as_given;                     ///< the same before they were resampled

@@ -17,14 +17,16 @@ std::string excluded_text(const imaging::Volume& image, const imaging::Volume& m
     return fmt::format("excludes {:.3g} % of the image from matching, where it is 0", 100 * share);
 }
 
-imaging::Volume matched(const imaging::Volume& image, const std::filesystem::path& path,
-                        std::vector<std::string>& notes) {
+/// The image, and its contrasts, which change.
+imaging::Volume matched(const imaging::Volume& image, std::vector<imaging::Volume>& contrasts,
+                        const std::filesystem::path& path, std::vector<std::string>& notes) {
     if (path.empty()) return image;
     imaging::ReadResult mask = imaging::read_volume_with_notes(path);
     for (const std::string& note : notes_of(mask, path)) notes.push_back(note);
     if (mask.volume.channels() > 1) throw InvalidInput(fmt::format("'{}' is no mask: it holds vectors", path.string()));
     try {
         imaging::Volume result = registration::without_unmatched(image, mask.volume);
+        for (imaging::Volume& contrast : contrasts) contrast = registration::without_unmatched(contrast, mask.volume);
         notes.push_back(fmt::format("'{}' {}", path.string(), excluded_text(image, mask.volume)));
         return result;
     } catch (const InvalidInput& problem) {
@@ -35,8 +37,8 @@ imaging::Volume matched(const imaging::Volume& image, const std::filesystem::pat
 }  // namespace
 
 void exclude_unmatched(RegistrationInputs& inputs, const RegisterOptions& options) {
-    inputs.moving_matched = matched(inputs.moving, options.moving_mask, inputs.notes);
-    inputs.fixed_matched = matched(inputs.fixed, options.fixed_mask, inputs.notes);
+    inputs.moving_matched = matched(inputs.moving, inputs.moving_contrasts, options.moving_mask, inputs.notes);
+    inputs.fixed_matched = matched(inputs.fixed, inputs.fixed_contrasts, options.fixed_mask, inputs.notes);
 }
 
 }  // namespace tissuewarp::apps

@@ -8,6 +8,8 @@
 #include "apps/versions.hpp"
 #include "core/errors.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <deque>
 
@@ -60,7 +62,9 @@ struct Parser {
             "Example:\n  tissuewarp register --moving preop.nii.gz --fixed intraop.nii.gz --output out\n"
             "  tissuewarp register --moving preop.nii.gz --moving-labels preop_labels.nii.gz \\\n"
             "    --fixed intraop.nii.gz --fixed-labels intraop_labels.nii.gz --output out");
-        verb.path("--moving", o.moving, "Preoperative grey image; without it no warped image is written");
+        verb.paths("--moving", o.moving, o.moving_contrasts,
+                   "Preoperative grey image; without it no warped image is written. Repeatable with --fixed: further "
+                   "contrasts, matched pair by pair");
         verb.path("--moving-labels", o.moving_labels,
                   "Preoperative label map: what is meshed; without it, what is bright in --moving");
         verb.path(
@@ -73,7 +77,8 @@ struct Parser {
                 "Tetrahedra of the organ in their place: .vtu, .msh (Gmsh), .inp (Abaqus) (mm, LPS), taken as they are")
             ->excludes("--moving-labels")
             ->excludes("--moving-surface");
-        verb.path("--fixed", o.fixed, "Intraoperative grey image: gives the output grid; alone, it is what is matched");
+        verb.paths("--fixed", o.fixed, o.fixed_contrasts,
+                   "Intraoperative grey image: gives the output grid; alone, it is what is matched. Repeatable");
         verb.path(
             "--moving-mask", o.moving_mask,
             "Mask over --moving: 0 where it may not be matched (instruments, lesions, artefacts), nonzero where it "
@@ -350,6 +355,7 @@ struct Parser {
                           "--fixed-curves, or several"
                         : "matching the fixed image takes the moving one; give --moving");
             require_organ(registration);
+            require_pairs(registration);
             if (!registration.match_image && !(registration.moving_mask.empty() && registration.fixed_mask.empty()))
                 throw InvalidInput(
                     "--moving-mask and --fixed-mask say what of the images is matched, and they are not; add "
@@ -380,6 +386,17 @@ struct Parser {
                 "--time-budget");
         if (!o.rigid_neighbours.empty())
             throw InvalidInput("--rigid-neighbour is not meshed, and --moving-mesh is; give --moving-labels instead");
+    }
+
+    /// Contrasts are matched pair by pair, and only where images are matched.
+    static void require_pairs(const RegisterOptions& o) {
+        if (o.moving_contrasts.empty() && o.fixed_contrasts.empty()) return;
+        if (o.moving_contrasts.size() != o.fixed_contrasts.size())
+            throw InvalidInput(fmt::format(
+                "--moving is given {} times and --fixed {}; contrasts are matched pair by pair: give both as often",
+                1 + o.moving_contrasts.size(), 1 + o.fixed_contrasts.size()));
+        if (!o.match_image)
+            throw InvalidInput("further contrasts are there to be matched, and images are not; add --match-image");
     }
 
     /// Something must say where the organ is, and what the numbers of other options mean.
@@ -429,9 +446,27 @@ struct Parser {
     }
 };
 
-/// Puts the file that --config names in front of the other arguments, so that those win.
+/// Of the arguments of a file, those of options that the command line does not give.
+std::vector<std::string> not_given(const std::vector<std::string>& from_file, const std::vector<std::string>& given,
+                                   const KnownOptions& known) {
+    std::vector<std::string> result;
+    for (std::size_t i = 0; i < from_file.size(); ++i) {
+        const std::string& name = from_file[i];
+        const bool is_switch =
+            std::find(known.switches.begin(), known.switches.end(), name.substr(2)) != known.switches.end();
+        const bool wins = std::any_of(given.begin(), given.end(), [&](const std::string& argument) {
+            return argument == name || argument.starts_with(name + "=");
+        });
+        const std::size_t end = i + (is_switch ? 1 : 2);
+        if (!wins) result.insert(result.end(), from_file.begin() + long(i), from_file.begin() + long(end));
+        i = end - 1;
+    }
+    return result;
+}
+
+/// Puts the file that --config names in front of the other arguments, which replace what it says of the same option.
 std::vector<std::string> with_config(const std::vector<std::string>& arguments, const KnownOptions& known) {
-    std::vector<std::string> expanded{arguments.front()}, rest;
+    std::vector<std::string> expanded{arguments.front()}, from_files, rest;
     for (std::size_t i = 1; i < arguments.size(); ++i) {
         const bool separate = arguments[i] == "--config" && i + 1 < arguments.size();
         if (!separate && !arguments[i].starts_with("--config=")) {
@@ -439,8 +474,11 @@ std::vector<std::string> with_config(const std::vector<std::string>& arguments, 
             continue;
         }
         const auto more = read_config(separate ? arguments[++i] : arguments[i].substr(9), known);
-        expanded.insert(expanded.end(), more.begin(), more.end());
+        from_files = not_given(from_files, more, known);  // of two files the later one
+        from_files.insert(from_files.end(), more.begin(), more.end());
     }
+    from_files = not_given(from_files, rest, known);
+    expanded.insert(expanded.end(), from_files.begin(), from_files.end());
     expanded.insert(expanded.end(), rest.begin(), rest.end());
     return expanded;
 }

@@ -44,6 +44,7 @@ struct CurveFiles {
 struct RegisterOptions {
     CommonOptions common;
     std::filesystem::path moving, moving_labels, fixed, fixed_labels, output;
+    std::vector<std::filesystem::path> moving_contrasts, fixed_contrasts;  ///< further pairs of images, in their order
     std::filesystem::path moving_surface, moving_mesh;  ///< of the organ; one of labels, surface and mesh, or none: the
                                                         ///< foreground of the image
     std::filesystem::path moving_mask, fixed_mask;      ///< 0 where the image may not be matched

@@ -115,7 +115,10 @@ imaging::Geometry output_grid(const RegistrationRun& run) {
 Intraoperative seen(const RegistrationInputs& inputs, const RegisterOptions& options) {
     Intraoperative seen{.surface = inputs.fixed_surface, .points = inputs.point_pairs, .curves = inputs.curves};
     if (inputs.start) seen.start = inputs.start->placement;
-    if (options.match_image) seen.image = inputs.fixed_matched;
+    if (options.match_image) {
+        seen.image = inputs.fixed_matched;
+        seen.contrasts = inputs.fixed_contrasts;
+    }
     // An image that is only the grid of the output must not coarsen the boundary that is matched.
     if (!inputs.fixed_labels.empty())
         seen.labels = options.match_image ? inputs.fixed_labels : inputs.fixed_labels_as_given;
@@ -242,7 +245,11 @@ void run_register(const RegisterOptions& options) {
     }
     progress.begin("preparing the model", 0.02, 0.20);
     run.prepared = std::make_unique<PreparedModel>(prepared_model(run, progress));
-    if (options.match_image) prepare_image(*run.prepared, run.inputs.moving_matched, {}, progress);
+    if (options.match_image) {
+        prepare_image(*run.prepared, run.inputs.moving_matched, {}, progress);
+        for (const imaging::Volume& contrast : run.inputs.moving_contrasts)
+            prepare_contrast(*run.prepared, contrast, {}, progress);
+    }
     if (looks_for_loads(run)) prepare_loads(*run.prepared, progress);
     append(run.times, run.prepared->times);
 

@@ -195,9 +195,12 @@ std::string summary_text(const RegistrationRun& run, double total_seconds) {
         text += "curves to lines (mm)     count    mean  median    95th     max\n";
         text += summary_row("before", curves->before) + summary_row("after", curves->after);
     }
-    if (const auto& fit = run.result.image)
-        text += fmt::format("image: {} of {} blocks found, {:.2f} mm from the tissue; near {:.0f} % of the organ\n",
-                            fit->matched, fit->blocks, fit->residual_mm, 100 * fit->shown_share);
+    for (std::size_t n = 0; n < run.result.images.size(); ++n) {
+        const registration::ImageFit& fit = run.result.images[n];
+        text += fmt::format("{}: {} of {} blocks found, {:.2f} mm from the tissue; near {:.0f} % of the organ\n",
+                            n == 0 ? "image" : fmt::format("contrast {}", n + 1), fit.matched, fit.blocks,
+                            fit.residual_mm, 100 * fit.shown_share);
+    }
     if (const auto& fit = run.result.surface)
         text += fmt::format("surface points: {:.0f} % on the model, {:.2f} mm from it (root mean square)\n",
                             100 * fit->inlier_share, fit->residual_mm);

@@ -166,14 +166,18 @@ json mesh(const RegistrationRun& run) {
     return object;
 }
 
+json to_json(const registration::ImageFit& fit) {
+    return {{"blocks", fit.blocks},
+            {"matched", fit.matched},
+            {"residual_mm", number(fit.residual_mm)},
+            {"agreement", fit.agreement ? number(*fit.agreement) : json()},
+            {"shown_share", number(fit.shown_share)}};
+}
+
 /// How points agree with the model, and what is expected where they are all there is.
 void add_fits(json& report, const registration::UpdateResult& result) {
-    if (const auto& fit = result.image)
-        report["image"] = {{"blocks", fit->blocks},
-                           {"matched", fit->matched},
-                           {"residual_mm", number(fit->residual_mm)},
-                           {"agreement", fit->agreement ? number(*fit->agreement) : json()},
-                           {"shown_share", number(fit->shown_share)}};
+    if (!result.images.empty()) report["image"] = to_json(result.images.front());
+    for (std::size_t n = 1; n < result.images.size(); ++n) report["contrasts"].push_back(to_json(result.images[n]));
     if (const auto& fit = result.surface)
         report["surface"] = {{"inlier_share", number(fit->inlier_share)},
                              {"residual_mm", number(fit->residual_mm)},

@@ -57,6 +57,12 @@ void read_fibre_arrays(const std::optional<std::string>& mesh, const std::filesy
     }
 }
 
+tled::EquilibriumMethod method_named(const std::string& name) {
+    if (name == "relaxation") return tled::EquilibriumMethod::SelfCheckedRelaxation;
+    if (name == "lbfgs") return tled::EquilibriumMethod::Lbfgs;
+    return name == "newton" ? tled::EquilibriumMethod::Newton : tled::EquilibriumMethod::Automatic;
+}
+
 }  // namespace
 
 void read_geometry(TomlReader& file, const std::filesystem::path& folder, Scene& scene, const NameUses& uses,
@@ -96,6 +102,10 @@ void read_solve(TomlReader& file, Scene& scene) {
     solve.duration = reader->number("duration_s", {1e-6, 1e6, "s"}).value_or(solve.duration);
     solve.frames = reader->whole("frames", 1, 100000).value_or(solve.frames);
     solve.tolerance_mm = reader->number("tolerance_mm", {1e-6, 10.0, "mm"}).value_or(solve.tolerance_mm);
+    solve.method = method_named(reader->one_of("method", {"auto", "relaxation", "lbfgs", "newton"}, "auto"));
+    solve.load_steps = reader->whole("load_steps", 1, 1000).value_or(solve.load_steps);
+    const std::string precision = reader->one_of("precision", {"float32", "float64"}, "float32");
+    solve.precision = precision == "float64" ? tled::Scalar::Float64 : tled::Scalar::Float32;
     solve.damping = reader->number("damping_per_s", {0.0, 1e6, "1/s"}).value_or(solve.damping);
     solve.step = reader->number("step_s", {0.0, 1.0, "s"}).value_or(solve.step);
     const std::string element = reader->one_of("element", {"auto", "t4", "averaged-pressure"}, "auto");

@@ -26,6 +26,18 @@ public:
                                     ->type_name("FILE")
                                     ->take_last());
     }
+    /// A file, and more of them where the option is repeated.
+    CLI::Option* paths(const std::string& names, std::filesystem::path& first, std::vector<std::filesystem::path>& rest,
+                       const char* what) {
+        const auto take = [&first, &rest](const std::vector<std::string>& values) {
+            first = values.front();
+            rest.assign(values.begin() + 1, values.end());
+        };
+        return keep(Kind::Text, app_.add_option_function<std::vector<std::string>>(names, take, what)
+                                    ->type_name("FILE")
+                                    ->allow_extra_args(false)
+                                    ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll));
+    }
     CLI::Option* text(const std::string& names, std::string& target, const char* what) {
         return keep(Kind::Text, app_.add_option(names, target, what)->capture_default_str()->take_last());
     }
@@ -80,7 +92,9 @@ public:
             else if (!option->get_default_str().empty() && kind != Kind::TextList)
                 parameter.values = {option->get_default_str()};
             if (parameter.values.empty()) continue;
-            if (kind != Kind::TextList) parameter.values = {parameter.values.back()};
+            const bool all = option->get_multi_option_policy() == CLI::MultiOptionPolicy::TakeAll;
+            if (all && parameter.values.size() > 1) parameter.kind = Kind::TextList;
+            if (parameter.kind != Kind::TextList) parameter.values = {parameter.values.back()};
             result.push_back(parameter);
         }
         return result;

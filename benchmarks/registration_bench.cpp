@@ -243,8 +243,8 @@ void print_row(const std::string& name, const UpdateResult& result, const Landma
                 name.c_str(), error.after.mean, error.after.median, error.after.percentile_95, error.moved_after.mean,
                 error.moved_after.median, error.moved_after.percentile_95, result.rounds.size(), evaluations,
                 last.matched, last.interface_nodes, last.mean_residual_mm, result.min_jacobian, seconds);
-    if (result.image && result.image->agreement)
-        std::fprintf(stderr, "  agreement of the images %.3f", *result.image->agreement);
+    if (!result.images.empty() && result.images.front().agreement)
+        std::fprintf(stderr, "  agreement of the images %.3f", *result.images.front().agreement);
     if (result.surface)
         std::fprintf(stderr, "  inliers %.3f, residual %.2f mm, coverage %.2f, rival %.1f mm %.3f",
                      result.surface->inlier_share, result.surface->residual_mm, result.surface->coverage,

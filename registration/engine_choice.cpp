@@ -11,15 +11,15 @@ std::unique_ptr<tled::Engine> make_engine(const PreparedModel& prepared, const U
     return tled::make_suitable_engine(prepared.rest, options.gpu_index, observer);
 }
 
-std::unique_ptr<ImageEngine> make_image_engine(const PreparedModel& prepared, const UpdateOptions& options,
-                                               Observer& observer) {
-    if (options.device == Device::Gpu) return make_gpu_image_engine(prepared, options.gpu_index);
-    if (options.device == Device::Cpu || !tled::has_gpu()) return make_cpu_image_engine(prepared);
+std::unique_ptr<ImageEngine> make_image_engine(const meshing::TetMesh& mesh, const ImageModel& image,
+                                               const UpdateOptions& options, Observer& observer) {
+    if (options.device == Device::Gpu) return make_gpu_image_engine(mesh, image, options.gpu_index);
+    if (options.device == Device::Cpu || !tled::has_gpu()) return make_cpu_image_engine(mesh, image);
     try {
-        return make_gpu_image_engine(prepared, options.gpu_index);
+        return make_gpu_image_engine(mesh, image, options.gpu_index);
     } catch (const GpuUnavailable& reason) {
         observer.note(std::string("the CPU takes over the image's forces from the GPU: ") + reason.what());
-        return make_cpu_image_engine(prepared);
+        return make_cpu_image_engine(mesh, image);
     }
 }
 

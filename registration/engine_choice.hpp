@@ -11,8 +11,8 @@ namespace tissuewarp::registration::detail {
 std::unique_ptr<tled::Engine> make_engine(const PreparedModel& prepared, const UpdateOptions& options,
                                           Observer& observer);
 
-/// The same of dense forces, for which every hardware GPU is worth while. The model has an image.
-std::unique_ptr<ImageEngine> make_image_engine(const PreparedModel& prepared, const UpdateOptions& options,
-                                               Observer& observer);
+/// The same of dense forces, for which every hardware GPU is worth while. Mesh and image outlive it.
+std::unique_ptr<ImageEngine> make_image_engine(const meshing::TetMesh& mesh, const ImageModel& image,
+                                               const UpdateOptions& options, Observer& observer);
 
 }  // namespace tissuewarp::registration::detail

@@ -37,6 +37,8 @@ struct Curves {
 struct Intraoperative {
     std::optional<imaging::Volume> labels = std::nullopt;  ///< label map with the numbers of the preoperative one
     std::optional<imaging::Volume> image = std::nullopt;   ///< grey values of the tissue, not segmented, any modality
+    /// Further images of the tissue, each matched with the contrast of the model that has its number; beside `image`.
+    std::vector<imaging::Volume> contrasts = {};
     std::optional<SurfacePoints> surface = std::nullopt;
     std::optional<PointPairs> points = std::nullopt;
     std::optional<Curves> curves = std::nullopt;

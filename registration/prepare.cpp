@@ -65,8 +65,17 @@ PreparedModel of_mesh(meshing::TetMesh mesh, const imaging::Volume& moving_label
     tled::RestStiffness stiffness(rest, springs);
     make_ready(stiffness);
     times.push_back({"rest stiffness", stopwatch.lap()});
-    return {std::move(model),     std::move(organ), options, std::move(interfaces), std::move(rest),
-            std::move(stiffness), std::move(times), nullptr, std::move(neighbours), nullptr};
+    return {std::move(model),
+            std::move(organ),
+            options,
+            std::move(interfaces),
+            std::move(rest),
+            std::move(stiffness),
+            std::move(times),
+            nullptr,
+            std::move(neighbours),
+            nullptr,
+            {}};
 }
 
 }  // namespace
@@ -113,15 +122,31 @@ PreparedModel with_materials(PreparedModel prepared, const tled::MaterialTable& 
     return prepared;
 }
 
-void prepare_image(PreparedModel& prepared, const imaging::Volume& moving, const ImageModelOptions& options,
-                   Observer& observer) {
+namespace {
+
+std::shared_ptr<const ImageModel> image_model(PreparedModel& prepared, const imaging::Volume& moving,
+                                              const ImageModelOptions& options, Observer& observer) {
     Stopwatch stopwatch;
     observer.checkpoint("feature points", 0.0);
     const FeaturePoints features =
         select_feature_points(moving, imaging::mask_of_all(prepared.labels), options.features);
-    prepared.image = std::make_shared<const ImageModel>(
+    auto result = std::make_shared<const ImageModel>(
         ImageModel{moving, MatchingTemplate(moving, features.points, options.blocks)});
     prepared.times.push_back({"feature points", stopwatch.lap()});
+    return result;
+}
+
+}  // namespace
+
+void prepare_image(PreparedModel& prepared, const imaging::Volume& moving, const ImageModelOptions& options,
+                   Observer& observer) {
+    prepared.image = image_model(prepared, moving, options, observer);
+}
+
+void prepare_contrast(PreparedModel& prepared, const imaging::Volume& moving, const ImageModelOptions& options,
+                      Observer& observer) {
+    if (!prepared.image) throw InvalidInput("the model holds no image for a contrast to belong to; call prepare_image");
+    prepared.contrasts.push_back(image_model(prepared, moving, options, observer));
 }
 
 void prepare_loads(PreparedModel& prepared, Observer& observer) {

@@ -93,7 +93,8 @@ struct PreparedModel {
     std::vector<StageTime> times;
     std::shared_ptr<const ImageModel> image;  ///< see prepare_image; null without
     std::optional<RigidNeighbours> neighbours;
-    std::unique_ptr<PreparedModel> coarse;  ///< of the same organ, see prepare_loads
+    std::unique_ptr<PreparedModel> coarse;                     ///< of the same organ, see prepare_loads
+    std::vector<std::shared_ptr<const ImageModel>> contrasts;  ///< see prepare_contrast
 };
 
 /// Label map → mesh → rest state → rest stiffness, its pattern analysed. Throws InvalidInput, Cancelled.
@@ -112,6 +113,11 @@ PreparedModel with_materials(PreparedModel prepared, const tled::MaterialTable& 
 /// in and near the labels. Throws InvalidInput, Cancelled.
 void prepare_image(PreparedModel& prepared, const imaging::Volume& moving, const ImageModelOptions& options = {},
                    Observer& observer = silent_observer());
+
+/// Adds a further image of the tissue, of another contrast, in the frame of the first. Throws InvalidInput where the
+/// model holds no image yet; as prepare_image.
+void prepare_contrast(PreparedModel& prepared, const imaging::Volume& moving, const ImageModelOptions& options = {},
+                      Observer& observer = silent_observer());
 
 /// Adds what updates take that look for loads which nobody stated, from labels alone or from points of a free organ: of
 /// a model of more than 6000 nodes a coarser one, with edges of suggested_edge_length_without_labels, on which they are

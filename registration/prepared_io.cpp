@@ -14,9 +14,14 @@ namespace tissuewarp::registration {
 namespace {
 
 constexpr const char* format = "tissuewarp prepared model";
-constexpr int version = 4, oldest_version = 1;
+constexpr int version = 5, oldest_version = 1;
 constexpr const char* coarse_mesh = "coarse_mesh";  // absent without a coarse model; since version 3
 constexpr const char* image = "image";              // absent without an image model; since version 4
+
+/// Of a further image; since version 5.
+std::string contrast_group(std::size_t number) {
+    return "contrasts/" + std::to_string(number);
+}
 
 std::vector<hsize_t> voxel_shape(const imaging::Geometry& grid) {
     return {static_cast<hsize_t>(grid.size[2]), static_cast<hsize_t>(grid.size[1]), static_cast<hsize_t>(grid.size[0])};
@@ -104,26 +109,26 @@ void read_coarse_model(const Hdf5Input& file, const std::filesystem::path& path,
 }
 
 /// The image and what is looked for of it; the template is made of these again, bit by bit the same.
-void write_image(Hdf5Output& file, const ImageModel& model) {
+void write_image(Hdf5Output& file, const std::string& group, const ImageModel& model) {
     const imaging::Volume grey = model.image.as(CV_32F);
     const TemplateOptions& options = model.blocks.options();
-    detail::write_grid(file, "image/grid", grey.geometry);
-    file.array<float>("image/voxels", grey.data<float>(), voxel_shape(grey.geometry), "1");
-    file.columns<double>("image/points", model.blocks.points(), "mm");
-    file.scalar<double>("image/template/grid_spacing", options.grid_spacing_mm, "mm");
-    file.scalar<int>("image/template/levels", options.levels, "1");
-    file.scalar<int>("image/template/block_radius", options.block_radius, "voxel");
+    detail::write_grid(file, group + "/grid", grey.geometry);
+    file.array<float>(group + "/voxels", grey.data<float>(), voxel_shape(grey.geometry), "1");
+    file.columns<double>(group + "/points", model.blocks.points(), "mm");
+    file.scalar<double>(group + "/template/grid_spacing", options.grid_spacing_mm, "mm");
+    file.scalar<int>(group + "/template/levels", options.levels, "1");
+    file.scalar<int>(group + "/template/block_radius", options.block_radius, "voxel");
 }
 
-ImageModel read_image(const Hdf5Input& file) {
-    const imaging::Geometry grid = detail::read_grid(file, "image/grid");
-    file.require_shape("image/voxels", voxel_shape(grid));
+ImageModel read_image(const Hdf5Input& file, const std::string& group) {
+    const imaging::Geometry grid = detail::read_grid(file, group + "/grid");
+    file.require_shape(group + "/voxels", voxel_shape(grid));
     imaging::Volume grey(grid, CV_32FC1);
-    file.array<float>("image/voxels", grey.data<float>(), voxel_shape(grid));
-    const TemplateOptions options{file.scalar<double>("image/template/grid_spacing"),
-                                  file.scalar<int>("image/template/levels"),
-                                  file.scalar<int>("image/template/block_radius")};
-    return {grey, MatchingTemplate(grey, file.columns<double>("image/points", 3), options)};
+    file.array<float>(group + "/voxels", grey.data<float>(), voxel_shape(grid));
+    const TemplateOptions options{file.scalar<double>(group + "/template/grid_spacing"),
+                                  file.scalar<int>(group + "/template/levels"),
+                                  file.scalar<int>(group + "/template/block_radius")};
+    return {grey, MatchingTemplate(grey, file.columns<double>(group + "/points", 3), options)};
 }
 
 }  // namespace
@@ -140,7 +145,9 @@ void write_prepared(const PreparedModel& prepared, const std::filesystem::path& 
     write_list(file, "options/anchors", prepared.options.anchors);
     write_list(file, "options/rigid_neighbours", prepared.options.rigid_neighbours);
     if (prepared.coarse) detail::write_mesh(file, coarse_mesh, prepared.coarse->model.mesh);
-    if (prepared.image) write_image(file, *prepared.image);
+    if (prepared.image) write_image(file, image, *prepared.image);
+    for (std::size_t n = 0; n < prepared.contrasts.size(); ++n)
+        write_image(file, contrast_group(n), *prepared.contrasts[n]);
     detail::write_stages(file, "stages/prepare", prepared.times);
     file.close();
     target.commit();
@@ -163,7 +170,9 @@ PreparedModel read_checked(const std::filesystem::path& path, Observer& observer
     if (!(options.data_stiffness > 0) || !(options.tangential_ratio > 0))
         throw InvalidInput("'" + path.string() + "': the stiffness of the data must be positive");
     PreparedModel prepared = prepare(std::move(model.mesh), read_label_map(file), options, observer);
-    if (file.holds(image)) prepared.image = std::make_shared<const ImageModel>(read_image(file));
+    if (file.holds(image)) prepared.image = std::make_shared<const ImageModel>(read_image(file, image));
+    for (std::size_t n = 0; prepared.image && file.holds(contrast_group(n)); ++n)
+        prepared.contrasts.push_back(std::make_shared<const ImageModel>(read_image(file, contrast_group(n))));
     if (file.holds(coarse_mesh)) read_coarse_model(file, path, prepared, observer);
     return prepared;
 }

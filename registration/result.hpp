@@ -39,9 +39,9 @@ struct SurfaceFit {
 
 /// What was found of the preoperative image's blocks.
 struct ImageFit {
-    int blocks = 0, matched = 0;
-    double residual_mm = 0;  ///< of the last round, weighted by confidence
-    double shown_share = 0;  ///< of the model's nodes: no further than 15 mm from a match
+    int blocks = 0, matched = 0;  ///< those that lie where the intraoperative image shows something, and those found
+    double residual_mm = 0;       ///< of the last round, weighted by confidence
+    double shown_share = 0;       ///< of the model's nodes: no further than 15 mm from a match
     /// Σ ∇D₁·∇D₂ over Σ ½ (|∇D₁|² + |∇D₂|²) of the images' descriptors, before the last rounds: 1 for the same image,
     /// near 0 for images of different things. Only with descriptors of self-similarity.
     std::optional<double> agreement;
@@ -150,7 +150,7 @@ struct UpdateResult {
     LastPulls pulls;
     std::string engine;  ///< description of the device that solved
     double min_jacobian = 1;
-    std::optional<ImageFit> image;      ///< where a bare volume was given
+    std::vector<ImageFit> images;       ///< of the bare volume and its contrasts, where given
     std::optional<SurfaceFit> surface;  ///< where points of a surface were given
     std::optional<PointFit> points;     ///< where pairs of points were given
     std::optional<CurveFit> curves;     ///< where points along vessels were given

@@ -216,6 +216,7 @@ UncertaintySummary summarise(const Uncertainty& uncertainty) {
         if (here.trust == Trust::Shown) sum.shown_share += share[n];
         if (here.trust == Trust::Unknown) sum.unknown_share += share[n];
         if (here.interval_mm > data_doubt_limits.failed_mm) sum.failed_share += share[n];
+        if (here.interval_mm > data_doubt_limits.poor_mm) sum.poor_share += share[n];
         if (here.interval_mm <= sum.worst_interval_mm) continue;
         sum.worst_interval_mm = here.interval_mm;
         sum.worst_place = mesh.nodes.col(n);
@@ -236,10 +237,14 @@ std::optional<Doubt> doubt_of_solver(const UncertaintySummary& summary, double t
 
 std::optional<Doubt> doubt_of_data(const UncertaintySummary& summary) {
     constexpr DataDoubtLimits limits = data_doubt_limits;
-    if (summary.failed_share <= limits.failed_share) return std::nullopt;
-    return Doubt{"data.show_too_little", summary.failed_share, limits.failed_share,
-                 "the data show too little of the organ: " + detail::percent(summary.failed_share) +
-                     " of its tissue may lie more than " + std::to_string(int(limits.failed_mm)) +
+    const bool failed = summary.failed_share > limits.failed_share;
+    if (!failed && summary.poor_share <= limits.poor_share) return std::nullopt;
+    const double share = failed ? summary.failed_share : summary.poor_share,
+                 limit = failed ? limits.failed_share : limits.poor_share,
+                 apart_mm = failed ? limits.failed_mm : limits.poor_mm;
+    return Doubt{"data.show_too_little", share, limit,
+                 "the data show too little of the organ: " + detail::percent(share) +
+                     " of its tissue may lie more than " + std::to_string(int(apart_mm)) +
                      " mm off, and the place known least " + detail::to_text(summary.worst_interval_mm) + " mm",
                  "show more of it, or give landmarks"};
 }

@@ -8,16 +8,24 @@
 
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace tissuewarp::registration {
 
 namespace {
 
-std::optional<detail::ImageTools> image_tools_of(const PreparedModel& prepared, const UpdateOptions& options,
-                                                 Observer& observer) {
-    if (!prepared.image) return std::nullopt;
-    return detail::ImageTools{
-        detail::make_image_engine(prepared, options, observer), meshing::PointLocator(prepared.model.mesh), {}};
+std::vector<detail::ImageTools> image_tools_of(const PreparedModel& prepared, const UpdateOptions& options,
+                                               Observer& observer) {
+    if (!prepared.image) return {};
+    const meshing::TetMesh& mesh = prepared.model.mesh;
+    const auto locator = std::make_shared<const meshing::PointLocator>(mesh);
+    std::vector<detail::ImageTools> tools;
+    const auto add = [&](const ImageModel& image) {
+        tools.push_back({detail::make_image_engine(mesh, image, options, observer), locator, {}});
+    };
+    add(*prepared.image);
+    for (const auto& contrast : prepared.contrasts) add(*contrast);
+    return tools;
 }
 
 }  // namespace
@@ -26,7 +34,7 @@ struct Updater::Impl {
     std::shared_ptr<const PreparedModel> prepared;
     UpdateOptions options;
     std::unique_ptr<tled::Engine> solver;
-    std::optional<detail::ImageTools> image_tools;  // where the model has an image
+    std::vector<detail::ImageTools> image_tools;  // for the image of the model and each of its contrasts
     detail::LoadFinder load_finder;
 
     Impl(std::shared_ptr<const PreparedModel> model, const UpdateOptions& given, std::unique_ptr<tled::Engine> engine,

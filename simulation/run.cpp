@@ -112,6 +112,7 @@ private:
         tled::EquilibriumOptions options;
         options.tolerance_mm = solve_.tolerance_mm;
         options.rest = &stage.rest;
+        options.method = solve_.method;
         // The first comes from rest, along its load where that is too much at once.
         const Matrix3Xd* start = shown_ == 1 ? nullptr : &state_.displacement;
         Part part(observer_, time / solve_.duration, time / solve_.duration);
@@ -121,7 +122,8 @@ private:
                 unilateral ? tled::equilibrium_in_contact(engine, stage.rest, conditions, {.equilibrium = options},
                                                           start, part)
                                  .equilibrium
-                           : tled::equilibrium_along_load(engine, stiffness, conditions, {.equilibrium = options},
+                           : tled::equilibrium_along_load(engine, stiffness, conditions,
+                                                          {.equilibrium = options, .first_parts = solve_.load_steps},
                                                           start, part);
             state_.displacement = found.displacement;
             summary_.steps += found.force_evaluations;
@@ -181,8 +183,11 @@ private:
 }  // namespace
 
 std::unique_ptr<tled::Engine> engine_for(const Solve& solve, const tled::RestState& rest, Observer& observer) {
+    const bool precise = solve.precision == tled::Scalar::Float64;
+    if (precise && solve.device == Device::Gpu)
+        throw InvalidInput("forces in float64 are computed on the CPU; take precision = \"float32\" or another device");
     if (solve.device == Device::Gpu) return tled::make_gpu_engine(rest, solve.gpu_index);
-    if (solve.device == Device::Cpu) return tled::make_cpu_engine(rest, tled::Scalar::Float32);
+    if (solve.device == Device::Cpu || precise) return tled::make_cpu_engine(rest, solve.precision);
     return tled::make_suitable_engine(rest, solve.gpu_index, observer);
 }
 

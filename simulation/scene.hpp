@@ -8,6 +8,7 @@
 #include "simulation/fibres.hpp"
 #include "simulation/region.hpp"
 #include "simulation/rigid_motion.hpp"
+#include "tled/equilibrium.hpp"
 #include "tled/model.hpp"
 
 #include <map>
@@ -158,8 +159,11 @@ struct Solve {
     double duration = 1.0;       ///< s
     int frames = 1;              ///< evenly spaced, the last one at the end; rest is a frame besides
     double tolerance_mm = 0.05;  ///< of an equilibrium
-    double damping = 2.0;        ///< 1/s, of dynamics
-    double step = 0.0;           ///< s; 0: nine tenths of the critical one
+    tled::EquilibriumMethod method = tled::EquilibriumMethod::Automatic;
+    tled::Scalar precision = tled::Scalar::Float32;  ///< of forces; Float64 on the CPU alone
+    int load_steps = 1;                              ///< equal parts of its load to try first
+    double damping = 2.0;                            ///< 1/s, of dynamics
+    double step = 0.0;                               ///< s; 0: nine tenths of the critical one
     Device device = Device::Auto;
     int gpu_index = -1;
     std::optional<tled::Element> element;  ///< none: suggested_element()

@@ -4,6 +4,7 @@
 #include "tled/statics/equilibrium_search.hpp"
 
 #include <cmath>
+#include <vector>
 
 namespace tissuewarp::tled {
 
@@ -45,16 +46,34 @@ Choice choose(const Engine& engine, const RestStiffness& stiffness, const NodalC
     return {EquilibriumMethod::Lbfgs, work};
 }
 
-EquilibriumResult solve(EquilibriumMethod method, detail::EquilibriumSearch& search, const Eigen::Matrix3Xd* start) {
-    switch (method) {
-        case EquilibriumMethod::DynamicRelaxation:
-            return detail::dynamic_relaxation(search, start);
-        case EquilibriumMethod::SelfCheckedRelaxation:
-            return detail::self_checked_relaxation(search, start);
-        case EquilibriumMethod::Lbfgs:
-        case EquilibriumMethod::Automatic:
-            break;
-    }
+/// Those to try one after the other.
+std::vector<EquilibriumMethod> escalation(EquilibriumMethod first, const NodalConditions& conditions,
+                                          const EquilibriumOptions& options) {
+    std::vector<EquilibriumMethod> methods{first};
+    if (first != EquilibriumMethod::Lbfgs) methods.push_back(EquilibriumMethod::Lbfgs);
+    const bool decides = options.last == EquilibriumMethod::Newton && options.rest != nullptr;
+    if (decides && !conditions.effects.contact) methods.push_back(EquilibriumMethod::Newton);
+    return methods;
+}
+
+EquilibriumResult by_newton(Engine& engine, const RestStiffness& stiffness, const NodalConditions& conditions,
+                            const EquilibriumOptions& options, const Eigen::Matrix3Xd* start, Observer& observer) {
+    if (options.rest == nullptr) throw InvalidInput("equilibrium: Newton's method takes the rest state");
+    const auto precise = make_cpu_engine(*options.rest, Scalar::Float64);
+    detail::EquilibriumSearch search(*precise, stiffness, conditions, options, observer);
+    EquilibriumResult result = detail::newton(search, start);
+    engine.set_conditions(conditions);
+    engine.set_state(result.displacement, Eigen::Matrix3Xd::Zero(3, result.displacement.cols()));
+    return result;
+}
+
+EquilibriumResult solve(EquilibriumMethod method, Engine& engine, const RestStiffness& stiffness,
+                        const NodalConditions& conditions, const EquilibriumOptions& options,
+                        const Eigen::Matrix3Xd* start, Observer& observer) {
+    if (method == EquilibriumMethod::Newton) return by_newton(engine, stiffness, conditions, options, start, observer);
+    detail::EquilibriumSearch search(engine, stiffness, conditions, options, observer);
+    if (method == EquilibriumMethod::DynamicRelaxation) return detail::dynamic_relaxation(search, start);
+    if (method == EquilibriumMethod::SelfCheckedRelaxation) return detail::self_checked_relaxation(search, start);
     return detail::lbfgs(search, start);
 }
 
@@ -68,6 +87,8 @@ const char* name_of(EquilibriumMethod method) {
             return "dynamic relaxation";
         case EquilibriumMethod::SelfCheckedRelaxation:
             return "self-checked relaxation";
+        case EquilibriumMethod::Newton:
+            return "Newton's method";
         case EquilibriumMethod::Automatic:
             break;
     }
@@ -83,21 +104,23 @@ EquilibriumResult equilibrium(Engine& engine, const RestStiffness& stiffness, co
         choice = choose(engine, stiffness, conditions);
         observer.note(std::string("equilibrium by ") + name_of(choice.method) + ": " + choice.reason);
     }
-    const auto run = [&] {
-        detail::EquilibriumSearch search(engine, stiffness, conditions, options, observer);
-        EquilibriumResult result = solve(choice.method, search, start);
-        result.method = choice.method;
+    const auto run = [&](EquilibriumMethod method) {
+        EquilibriumResult result = solve(method, engine, stiffness, conditions, options, start, observer);
+        result.method = method;
         result.reason = choice.reason;
         return result;
     };
-    try {
-        return run();
-    } catch (const SolverFailure& failure) {
-        if (!automatic || choice.method == EquilibriumMethod::Lbfgs) throw;
-        choice = {EquilibriumMethod::Lbfgs, std::string(name_of(choice.method)) + " failed (" + failure.what() + ")"};
-        observer.note("equilibrium by L-BFGS: " + choice.reason);
-        return run();
+    if (!automatic) return run(choice.method);
+    const std::vector<EquilibriumMethod> methods = escalation(choice.method, conditions, options);
+    for (std::size_t n = 0; n + 1 < methods.size(); ++n) {
+        try {
+            return run(methods[n]);
+        } catch (const SolverFailure& failure) {
+            choice.reason = std::string(name_of(methods[n])) + " failed (" + failure.what() + ")";
+            observer.note(std::string("equilibrium by ") + name_of(methods[n + 1]) + ": " + choice.reason);
+        }
     }
+    return run(methods.back());
 }
 
 }  // namespace tissuewarp::tled

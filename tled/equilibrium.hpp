@@ -14,6 +14,7 @@ enum class EquilibriumMethod {
     Lbfgs,                  ///< limited-memory BFGS with the factor of K₀ as metric (Liu and Nocedal 1989)
     DynamicRelaxation,      ///< heavy ball with mass diag K₀ (Underwood 1983; Joldes, Wittek, Miller 2011)
     SelfCheckedRelaxation,  ///< the same, started and checked without the factor of K₀
+    Newton,                 ///< with the tangent where the tissue is and forces in float64 (Nocedal and Wright 2006)
 };
 
 struct EquilibriumOptions {
@@ -21,10 +22,11 @@ struct EquilibriumOptions {
     int max_steps = 4000;        ///< force evaluations
     int steps_per_check = 25;    ///< steps of dynamic relaxation recorded between two looks at the state
     EquilibriumMethod method = EquilibriumMethod::Automatic;
+    EquilibriumMethod last = EquilibriumMethod::Newton;  ///< that Automatic escalates to: this or Lbfgs
     double known_highest = 0;         ///< EquilibriumResult::highest of a state and springs like these: self-checked
                                       ///< relaxation then goes without a search for it, unless it finds it wrong
     const RestState* rest = nullptr;  ///< that of the engine: lets L-BFGS factorise a metric near the answer for tissue
-                                      ///< of which almost only the volume is stiff
+                                      ///< of which almost only the volume is stiff, and Newton's method decide
 };
 
 struct EquilibriumResult {
@@ -43,7 +45,9 @@ struct EquilibriumResult {
 /// (3 × N mm) plus the linear-elastic answer to its residual. Accepts by the lifted residual; soon after a linear
 /// start, or with the history of L-BFGS, by a larger estimate (docs/decisions/equilibrium.md). Self-checked relaxation
 /// starts from rest or `start` itself, unless that tears tissue, and accepts by how its movement contracts; it trusts
-/// that the springs of `stiffness` hold the tissue about as those of `conditions` do.
+/// that the springs of `stiffness` hold the tissue about as those of `conditions` do. `Automatic` takes the method that
+/// should be the fastest, then L-BFGS, then, with `rest` and without contact, Newton's, whose error is that of the
+/// tangent; the engine is left where the answer is.
 ///
 /// Throws InvalidInput for options or conditions that cannot be used, and SolverFailure, which names the cause, the
 /// tetrahedron and the last good state: no admissible start, no progress, the precision of the engine reached, too many

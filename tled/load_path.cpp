@@ -34,7 +34,7 @@ public:
             if (advance(load)) {
                 part *= 1.5;
             } else {
-                part = 0.5 * (load - now_.load);
+                part = std::min(0.5 * (load - now_.load), moderate_part());
                 if (part < options_.smallest_part) give_up();
             }
         }
@@ -42,6 +42,8 @@ public:
     }
 
 private:
+    static constexpr double most_of_moderate = 4;
+
     struct Point {
         double load;
         Matrix3Xd displacement;
@@ -53,6 +55,19 @@ private:
         const Matrix3Xd origin = conditions_.constrained.select(origin_, Matrix3Xd::Zero(3, origin_.cols()));
         partial.imposed = origin + load * (conditions_.imposed - origin);
         return partial;
+    }
+
+    /// Of the load, what moves tissue by a moderate part of its size if it were linear; 1 where the size is not known.
+    [[nodiscard]] double moderate_part() {
+        if (!from_rest_ || options_.equilibrium.rest == nullptr) return 1;
+        if (!moderate_part_) {
+            constexpr double of_diagonal = 0.2;
+            const Matrix3Xd& position = options_.equilibrium.rest->position;
+            const double diagonal = (position.rowwise().maxCoeff() - position.rowwise().minCoeff()).norm(),
+                         linear = stiffness_.linear_solution(conditions_).colwise().norm().maxCoeff();
+            moderate_part_ = std::max(of_diagonal * diagonal / linear, 2 * options_.smallest_part);
+        }
+        return now_.load > 0 ? 1 : *moderate_part_;
     }
 
     /// On the line through the last two equilibria; from the first only with the imposed displacements moved.
@@ -67,11 +82,25 @@ private:
         EquilibriumOptions options = options_.equilibrium;
         constexpr double loose = 10;  // of the tolerance, on the way
         if (load < 1) options.tolerance_mm *= loose;
+        if (result_.method == EquilibriumMethod::Newton) options.method = EquilibriumMethod::Newton;  // others failed
         const bool first = from_rest_ && !before_ && now_.load == 0;
+        if (first) options.last = EquilibriumMethod::Lbfgs;
         const Matrix3Xd prediction = predicted(load, partial);
+        const Matrix3Xd* start = first ? nullptr : &prediction;
+        if (found_equilibrium(load, partial, options, start)) return true;
+        // From a linear start far beyond the tissue's size Newton's method takes longer to fail than a path to arrive.
+        const bool decides = options_.equilibrium.last == EquilibriumMethod::Newton &&
+                             options_.equilibrium.method == EquilibriumMethod::Automatic &&
+                             options_.equilibrium.rest != nullptr && !conditions_.effects.contact;
+        if (!first || !decides || load > most_of_moderate * moderate_part()) return false;
+        options.method = EquilibriumMethod::Newton;
+        return found_equilibrium(load, partial, options, start);
+    }
+
+    bool found_equilibrium(double load, const NodalConditions& partial, const EquilibriumOptions& options,
+                           const Matrix3Xd* start) {
         try {
-            EquilibriumResult found =
-                equilibrium(engine_, stiffness_, partial, options, first ? nullptr : &prediction, observer_);
+            EquilibriumResult found = equilibrium(engine_, stiffness_, partial, options, start, observer_);
             found.force_evaluations += result_.force_evaluations;
             found.lifted_residuals += result_.lifted_residuals;
             before_ = std::exchange(now_, {load, found.displacement});
@@ -99,6 +128,7 @@ private:
     Matrix3Xd origin_;
     Point now_;
     std::optional<Point> before_;
+    std::optional<double> moderate_part_;
     std::string cause_;
     EquilibriumResult result_;
 };

@@ -8,14 +8,15 @@
 
 namespace tissuewarp::registration::detail {
 
-ImageSearch::ImageSearch(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
-                         ImageTools& tools)
-    : prepared_(prepared),
+ImageSearch::ImageSearch(const meshing::TetMesh& mesh, const ImageModel& moving, const imaging::Volume& fixed,
+                         const ImageOptions& options, ImageTools& tools)
+    : mesh_(mesh),
+      moving_(moving),
       options_(options),
-      locator_(tools.locator),
+      locator_(*tools.locator),
       fixed_(fixed, tools.memory, [&](const imaging::Volume& image) { tools.engine->begin_fixed(image); }),
       engine_(*tools.engine),
-      dense_(prepared, engine_) {
+      dense_(mesh, moving, engine_) {
     engine_.finish_fixed(fixed_);
 }
 
@@ -27,7 +28,7 @@ LocatedMatches ImageSearch::search(const State& state, Observer& observer) {
 }
 
 LocatedMatches ImageSearch::block_search(const State& state, Observer& observer) const {
-    const MatchingTemplate& blocks = prepared_.image->blocks;
+    const MatchingTemplate& blocks = moving_.blocks;
     BlockMatchingOptions matching = options_.matching;
     matching.rotation = state.placement.linear();
     matching.finest = FinestGrid::UndescribedPoints;
@@ -51,7 +52,7 @@ Eigen::Matrix3Xd ImageSearch::deformed(const Eigen::Matrix3Xd& points, const Sta
     Eigen::Matrix3Xd result = points;
     tbb::parallel_for(Eigen::Index{0}, points.cols(), [&](Eigen::Index n) {
         if (const auto at = locate_near(locator_, points.col(n)))
-            result.col(n) += displacement_at(prepared_.model.mesh, state.displacement, *at);
+            result.col(n) += displacement_at(mesh_, state.displacement, *at);
     });
     return state.placement * result;
 }

@@ -20,9 +20,9 @@ inline constexpr SearchGain search_gain{};
 
 class ImageSearch {
 public:
-    /// `prepared.image` is there. Model, options and tools outlive this.
-    ImageSearch(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
-                ImageTools& tools);
+    /// Of a moving image of the tissue that is meshed. Mesh, image, options and tools outlive this.
+    ImageSearch(const meshing::TetMesh& mesh, const ImageModel& moving, const imaging::Volume& fixed,
+                const ImageOptions& options, ImageTools& tools);
 
     /// What a search about where the model is finds, at places of the mesh. After the last of count() the last grid is
     /// searched again.
@@ -38,11 +38,14 @@ public:
     [[nodiscard]] std::optional<double> agreement() const { return agreement_; }
     /// Blocks that the first search found.
     [[nodiscard]] std::size_t blocks_found() const { return blocks_.matches.size(); }
+    /// Where points of the moving image are in the fixed one.
+    [[nodiscard]] Eigen::Matrix3Xd deformed(const Eigen::Matrix3Xd& points, const State& state) const;
     /// Where the fixed image shows something.
     [[nodiscard]] const imaging::Volume& seen() const { return fixed_.seen; }
 
 private:
-    const PreparedModel& prepared_;
+    const meshing::TetMesh& mesh_;
+    const ImageModel& moving_;
     const ImageOptions& options_;
     const meshing::PointLocator& locator_;
     SeenImage fixed_;
@@ -56,8 +59,6 @@ private:
 
     [[nodiscard]] LocatedMatches block_search(const State& state, Observer& observer) const;
     [[nodiscard]] LocatedMatches dense_search(const State& state);
-    /// Where points of the moving image are in the fixed one.
-    [[nodiscard]] Eigen::Matrix3Xd deformed(const Eigen::Matrix3Xd& points, const State& state) const;
     /// Those that lie in the model.
     [[nodiscard]] LocatedMatches located(const std::vector<BlockMatch>& matches) const;
 };

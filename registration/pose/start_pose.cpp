@@ -102,6 +102,7 @@ Intraoperative seen_from(const Intraoperative& seen, const Eigen::Isometry3d& st
     Intraoperative result = seen;
     if (seen.labels) result.labels = moved(*seen.labels, back);
     if (seen.image) result.image = moved(*seen.image, back);
+    for (imaging::Volume& contrast : result.contrasts) contrast = moved(contrast, back);
     if (seen.surface) {
         result.surface->points = back * seen.surface->points;
         result.surface->normals = back.linear() * seen.surface->normals;

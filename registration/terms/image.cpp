@@ -4,6 +4,7 @@
 #include "registration/doubts.hpp"
 #include "registration/matching/image_matching.hpp"
 #include "registration/pose/least_trimmed_motion.hpp"
+#include "registration/terms/view_prior.hpp"
 
 #include <Eigen/Eigenvalues>
 
@@ -14,6 +15,7 @@
 #include <cmath>
 #include <functional>
 #include <optional>
+#include <utility>
 
 namespace tissuewarp::registration::detail {
 
@@ -28,50 +30,54 @@ double median_distance(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
 
 }  // namespace
 
-std::vector<Doubt> doubts_of(const ImageFit& fit) {
+std::vector<Doubt> doubts_of(const ImageFit& fit, const std::string& name) {
     std::vector<Doubt> doubts;
     constexpr ImageDoubtLimits limits = image_doubt_limits;
     if (fit.matched < limits.least_matched * fit.blocks)
         doubts.push_back({"image.blocks_lost", fit.matched / double(fit.blocks), limits.least_matched,
                           "only " + std::to_string(fit.matched) + " of " + std::to_string(fit.blocks) +
-                              " blocks of the moving image were found in the fixed one",
+                              " blocks of the moving " + name + " that lie in view were found in the fixed one",
                           "check that both show the same organ, within the search range of each other"});
     if (fit.shown_share < limits.least_shown)
         doubts.push_back({"image.out_of_view", fit.shown_share, limits.least_shown,
-                          "the fixed image shows only " + percent(fit.shown_share) +
+                          "the fixed " + name + " shows only " + percent(fit.shown_share) +
                               " of the organ; the rest is where mechanics alone put it",
                           "trust the map uncertainty_trust, or show more of the organ", Severity::Notice});
     if (fit.agreement && *fit.agreement < limits.least_agreement)
         doubts.push_back({"image.disagree", *fit.agreement, limits.least_agreement,
-                          "the images agree too little where the organ lies (" + to_text(*fit.agreement) +
-                              "; 0 is chance, 1 the same image)",
+                          "the moving and the fixed " + name + " agree too little where the organ lies (" +
+                              to_text(*fit.agreement) + "; 0 is chance, 1 the same image)",
                           "check that they show the same organ, and look where the result lies"});
     if (fit.residual_mm > limits.most_residual_mm)
-        doubts.push_back(
-            {"image.apart", fit.residual_mm, limits.most_residual_mm,
-             "blocks found in the fixed image lie " + to_text(fit.residual_mm) + " mm from where the tissue went",
-             "look where image and result differ; give labels or landmarks beside the image"});
+        doubts.push_back({"image.apart", fit.residual_mm, limits.most_residual_mm,
+                          "blocks found in the fixed " + name + " lie " + to_text(fit.residual_mm) +
+                              " mm from where the tissue went",
+                          "look where image and result differ; give labels or landmarks beside the image"});
     return doubts;
 }
 
-ImageTerm::ImageTerm(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
-                     ImageTools& tools, double energy)
+ImageTerm::ImageTerm(const PreparedModel& prepared, const ImageModel& moving, const imaging::Volume& fixed,
+                     std::string name, const ImageOptions& options, ImageTools& tools, double energy)
     : prepared_(prepared),
+      moving_(moving),
+      name_(std::move(name)),
       options_(options),
       energy_(energy),
-      search_(prepared, fixed, options, tools),
-      prior_(prepared, search_.seen(), options, energy),
+      search_(prepared.model.mesh, moving, fixed, options, tools),
+      view_(search_.seen()),
       fixed_grid_(fixed.geometry) {}
 
 void ImageTerm::search(const State& state, Observer& observer) {
-    matches_ = search_.search(state, observer);
-    strongest_.resize(matches_.matches.size());
-    tbb::parallel_for(std::size_t{0}, strongest_.size(), [&](std::size_t n) {
+    LocatedMatches located = search_.search(state, observer);
+    found_.matches = std::move(located.matches);
+    found_.places = std::move(located.places);
+    found_.strongest.resize(found_.matches.size());
+    tbb::parallel_for(std::size_t{0}, found_.strongest.size(), [&](std::size_t n) {
         Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
-        axes.computeDirect(matches_.matches[n].information, Eigen::EigenvaluesOnly);
-        strongest_[n] = axes.eigenvalues()[2];
+        axes.computeDirect(found_.matches[n].information, Eigen::EigenvaluesOnly);
+        found_.strongest[n] = axes.eigenvalues()[2];
     });
-    shares_ = NodalShares(prepared_.model.mesh, matches_.places);
+    found_.shares = NodalShares(prepared_.model.mesh, found_.places);
 }
 
 Alignment ImageTerm::pose(const Eigen::Isometry3d& /*start*/, Observer& observer) {
@@ -82,18 +88,18 @@ Alignment ImageTerm::pose(const Eigen::Isometry3d& /*start*/, Observer& observer
 }
 
 std::optional<Eigen::Isometry3d> ImageTerm::rigid_motion() const {
-    if (matches_.matches.size() < image_pose_options.fewest_blocks)
-        throw InvalidInput("only " + std::to_string(matches_.matches.size()) +
+    if (found_.matches.size() < image_pose_options.fewest_blocks)
+        throw InvalidInput("only " + std::to_string(found_.matches.size()) +
                            " blocks of the moving image were found in the fixed one; check that they show the same "
                            "organ, and bring them within the search range of each other");
-    const auto count = static_cast<Eigen::Index>(matches_.matches.size());
+    const auto count = static_cast<Eigen::Index>(found_.matches.size());
     Eigen::Matrix3Xd moving(3, count), fixed(3, count);
     for (Eigen::Index n = 0; n < count; ++n) {
-        moving.col(n) = matches_.matches[static_cast<std::size_t>(n)].moving;
-        fixed.col(n) = matches_.matches[static_cast<std::size_t>(n)].fixed;
+        moving.col(n) = found_.matches[static_cast<std::size_t>(n)].moving;
+        fixed.col(n) = found_.matches[static_cast<std::size_t>(n)].fixed;
     }
     const Eigen::Isometry3d motion = least_trimmed_motion(moving, fixed);
-    if (prior_.share_in_view() >= image_pose_options.whole_view) return motion;
+    if (share_in_view(prepared_, view_) >= image_pose_options.whole_view) return motion;
     const double without = median_distance(moving, fixed), with = median_distance(motion * moving, fixed);
     const bool deforms = with > image_pose_options.most_left * without && without < options_.headers_within_mm;
     return deforms ? std::nullopt : std::optional(motion);
@@ -101,17 +107,17 @@ std::optional<Eigen::Isometry3d> ImageTerm::rigid_motion() const {
 
 const std::vector<ImageTerm::PulledMatch>& ImageTerm::pulled(const State& state) {
     const Eigen::Isometry3d back = state.placement.inverse();
-    pulled_.resize(matches_.matches.size());
-    tbb::parallel_for(std::size_t{0}, pulled_.size(), [&](std::size_t n) {
-        const BlockMatch& match = matches_.matches[n];
-        const meshing::Location& place = matches_.places[n];
+    memory_.pulled.resize(found_.matches.size());
+    tbb::parallel_for(std::size_t{0}, memory_.pulled.size(), [&](std::size_t n) {
+        const BlockMatch& match = found_.matches[n];
+        const meshing::Location& place = found_.places[n];
         const Eigen::Matrix3d information = back.linear() * match.information * back.linear().transpose();
         const Eigen::Vector3d target = back * match.fixed - match.moving,
                               e = target - displacement_at(prepared_.model.mesh, state.displacement, place),
                               force = information * e;
-        pulled_[n] = {{information, force}, match.confidence, std::sqrt(e.dot(force) / strongest_[n])};
+        memory_.pulled[n] = {{information, force}, match.confidence, std::sqrt(e.dot(force) / found_.strongest[n])};
     });
-    return pulled_;
+    return memory_.pulled;
 }
 
 double ImageTerm::mean_residual(const std::vector<PulledMatch>& matches) {
@@ -130,35 +136,39 @@ Contribution ImageTerm::linearise(const RoundPlan& plan, const State& state, Obs
         result.pulls_anew = true;
     }
     const std::vector<PulledMatch>& matches = pulled(state);
-    forces_.resize(matches.size());
+    memory_.forces.resize(matches.size());
     tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t n) {
         const double weight = energy_ * matches[n].confidence * robust_weight(matches[n].residual_mm, plan.scale_mm);
-        forces_[n] = {weight * matches[n].pull.stiffness, weight * matches[n].pull.force};
+        memory_.forces[n] = {weight * matches[n].pull.stiffness, weight * matches[n].pull.force};
     });
-    result.candidates =
-        std::max(static_cast<int>(prepared_.image->blocks.points().cols()), static_cast<int>(matches.size()));
+    result.candidates = std::max(static_cast<int>(moving_.blocks.points().cols()), static_cast<int>(matches.size()));
     result.matched = static_cast<int>(matches.size());
     result.mean_residual_mm = mean_residual(matches);
-    const DatumKind kind = image_kind(prepared_.image->image.geometry, fixed_grid_,
-                                      search_.agreement().value_or(shared_errors.full_agreement));
-    result.springs = pulled_by(kind, lumped_springs(shares_, forces_, state.displacement));
+    const DatumKind kind =
+        image_kind(moving_.image.geometry, fixed_grid_, search_.agreement().value_or(shared_errors.full_agreement));
+    result.springs = pulled_by(kind, lumped_springs(found_.shares, memory_.forces, state.displacement));
     for (PulledNode& pulled : result.springs)
-        if (!prior_.in_view(state.placement * (prepared_.model.mesh.nodes.col(pulled.spring.node) +
-                                               state.displacement.col(pulled.spring.node))))
+        if (view_.distance(state.placement * (prepared_.model.mesh.nodes.col(pulled.spring.node) +
+                                              state.displacement.col(pulled.spring.node))) >= 0)
             pulled.shows_mm = -1;
-    for (const tled::Spring& spring : prior_.springs(state.placement))
-        result.springs.push_back({spring, Origin::Prior});
     return result;
+}
+
+int ImageTerm::blocks_in_view(const State& state) const {
+    const Eigen::Matrix3Xd places = search_.deformed(moving_.blocks.points(), state);
+    int count = 0;
+    for (Eigen::Index n = 0; n < places.cols(); ++n) count += view_.distance(places.col(n)) < 0;
+    return std::max(count, static_cast<int>(search_.blocks_found()));
 }
 
 ImageFit ImageTerm::fit(const State& state) {
     const Eigen::Matrix3Xd& nodes = prepared_.model.mesh.nodes;
     ImageFit fit;
-    fit.blocks = static_cast<int>(prepared_.image->blocks.points().cols());
+    fit.blocks = blocks_in_view(state);
     fit.matched = static_cast<int>(search_.blocks_found());
     std::vector<Eigen::Vector3d> places;
-    places.reserve(matches_.matches.size());
-    for (const BlockMatch& match : matches_.matches) places.push_back(match.moving);
+    places.reserve(found_.matches.size());
+    for (const BlockMatch& match : found_.matches) places.push_back(match.moving);
     const meshing::PointTree matched(places);
     const auto shown = tbb::parallel_reduce(
         tbb::blocked_range<Eigen::Index>(0, nodes.cols()), Eigen::Index{0},
@@ -175,8 +185,8 @@ ImageFit ImageTerm::fit(const State& state) {
 }
 
 void ImageTerm::judge(const State& state, UpdateResult& result) {
-    result.image = fit(state);
-    for (Doubt& doubt : doubts_of(*result.image)) result.doubts.push_back(std::move(doubt));
+    result.images.push_back(fit(state));
+    for (Doubt& doubt : doubts_of(result.images.back(), name_)) result.doubts.push_back(std::move(doubt));
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -2,11 +2,12 @@
 /// A bare intraoperative volume: blocks of the preoperative image, then all of it, belong where they were found.
 
 #include "registration/matching/image_search.hpp"
+#include "registration/matching/points/field_of_view.hpp"
 #include "registration/springs/pull.hpp"
 #include "registration/terms/term.hpp"
-#include "registration/terms/view_prior.hpp"
 
 #include <optional>
+#include <string>
 
 namespace tissuewarp::registration::detail {
 
@@ -22,8 +23,8 @@ struct ImagePoseOptions {
 };
 inline constexpr ImagePoseOptions image_pose_options{};
 
-/// What is to be said against a registration that fits so.
-std::vector<Doubt> doubts_of(const ImageFit& fit);
+/// What is to be said against a registration that fits an image of this name so.
+std::vector<Doubt> doubts_of(const ImageFit& fit, const std::string& name = "image");
 
 /// What an image may show without a doubt. Chosen by hand, but for the agreement; on which data is not recorded.
 struct ImageDoubtLimits {
@@ -40,10 +41,13 @@ inline constexpr ImageDoubtLimits image_doubt_limits{};
 
 class ImageTerm : public Term {
 public:
-    /// `prepared.image` is there. `energy` (mN mm) weighs as much as one standard deviation of a match. Model, options
-    /// and tools outlive this.
-    ImageTerm(const PreparedModel& prepared, const imaging::Volume& fixed, const ImageOptions& options,
-              ImageTools& tools, double energy);
+    /// Of an image of the model and an intraoperative one, called `name` in doubts. `energy` (mN mm) weighs as much as
+    /// one standard deviation of a match. Model, image, options and tools outlive this.
+    ImageTerm(const PreparedModel& prepared, const ImageModel& moving, const imaging::Volume& fixed, std::string name,
+              const ImageOptions& options, ImageTools& tools, double energy);
+
+    /// What the fixed image shows.
+    [[nodiscard]] const FieldOfView& view() const { return view_; }
 
     [[nodiscard]] Shows shows() const override { return Shows::Volume; }
     [[nodiscard]] PoseClaim pose_claim() const override { return PoseClaim::Search; }
@@ -55,7 +59,7 @@ public:
     [[nodiscard]] bool has_placed() const override { return has_placed_; }
     [[nodiscard]] int searches() const override { return search_.count(); }
     [[nodiscard]] bool gains() const override { return search_.gains(); }
-    /// Pulls of the matches on the nodes, after a search where one is due, and what is expected of the surface.
+    /// Pulls of the matches on the nodes, after a search where one is due.
     [[nodiscard]] Contribution linearise(const RoundPlan& plan, const State& state, Observer& observer) override;
     void judge(const State& state, UpdateResult& result) override;
 
@@ -66,24 +70,37 @@ private:
         double residual_mm;  // along what the block shows best
     };
 
+    /// Of the last search.
+    struct Found {
+        std::vector<BlockMatch> matches;
+        std::vector<meshing::Location> places;
+        std::vector<double> strongest;  // of each match: the largest eigenvalue of its information
+        NodalShares shares;             // of the nodes in them
+    };
+    /// Kept from round to round: fresh memory costs more than what is computed in it.
+    struct Memory {
+        std::vector<PulledMatch> pulled;
+        std::vector<PullForce> forces;
+    };
+
     const PreparedModel& prepared_;
+    const ImageModel& moving_;
+    std::string name_;
     const ImageOptions& options_;
     double energy_;
     ImageSearch search_;
-    ViewPrior prior_;
+    FieldOfView view_;
     imaging::Geometry fixed_grid_;
     bool has_placed_ = false;
-    LocatedMatches matches_;         // of the last search
-    std::vector<double> strongest_;  // of each of these: the largest eigenvalue of its information
-    NodalShares shares_;             // of the nodes in them
-    // kept from round to round: fresh memory costs more than what is computed in it
-    std::vector<PulledMatch> pulled_;
-    std::vector<PullForce> forces_;
+    Found found_;
+    Memory memory_;
 
     void search(const State& state, Observer& observer);
     [[nodiscard]] std::optional<Eigen::Isometry3d> rigid_motion() const;
-    /// Of all matches, in `pulled_`.
+    /// Of all matches, in `memory_`.
     const std::vector<PulledMatch>& pulled(const State& state);
+    /// Blocks whose places in this state the fixed image shows.
+    [[nodiscard]] int blocks_in_view(const State& state) const;
     [[nodiscard]] ImageFit fit(const State& state);
 
     static double mean_residual(const std::vector<PulledMatch>& matches);

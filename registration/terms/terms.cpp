@@ -11,21 +11,44 @@
 #include "registration/terms/loads.hpp"
 #include "registration/terms/points.hpp"
 #include "registration/terms/surface.hpp"
+#include "registration/terms/view_prior.hpp"
 
 #include <algorithm>
+#include <string>
+#include <utility>
 
 namespace tissuewarp::registration::detail {
 
 namespace {
 
-void require_usable(const PreparedModel& prepared, const Intraoperative& seen, bool has_tools) {
+void require_usable(const PreparedModel& prepared, const Intraoperative& seen, std::size_t tools) {
     if (!seen.labels && !seen.image && !seen.surface && !seen.points && !seen.curves)
         throw InvalidInput(
             "nothing to register to; give labels, an image, points of a surface, pairs of points or curves");
-    if (seen.image && !prepared.image)
+    if (!seen.image && !seen.contrasts.empty())
+        throw InvalidInput("contrasts were given without the image that they belong to");
+    if (!seen.image) return;
+    if (!prepared.image)
         throw InvalidInput("a bare volume was given, but the model holds no preoperative image; call prepare_image");
-    if (seen.image && !has_tools)
+    if (seen.contrasts.size() > prepared.contrasts.size())
+        throw InvalidInput("the model holds " + std::to_string(prepared.contrasts.size()) + " contrasts, and " +
+                           std::to_string(seen.contrasts.size()) + " were given; call prepare_contrast for each");
+    if (tools < 1 + seen.contrasts.size())
         throw InvalidInput("the model got its image after its updater was made; make the updater after prepare_image");
+}
+
+/// One for the image and each of its contrasts, and what is expected of tissue by what the image has in view.
+void add_images(std::vector<std::unique_ptr<Term>>& terms, const PreparedModel& prepared, const Intraoperative& seen,
+                const ImageOptions& options, std::vector<ImageTools>& tools, double energy) {
+    auto image =
+        std::make_unique<ImageTerm>(prepared, *prepared.image, *seen.image, "image", options, tools[0], energy);
+    auto prior = std::make_unique<ViewPrior>(prepared, image->view(), options, energy);
+    terms.push_back(std::move(image));
+    for (std::size_t n = 0; n < seen.contrasts.size(); ++n)
+        terms.push_back(std::make_unique<ImageTerm>(prepared, *prepared.contrasts[n], seen.contrasts[n],
+                                                    "contrast " + std::to_string(n + 2), options, tools[n + 1],
+                                                    energy));
+    terms.push_back(std::move(prior));
 }
 
 }  // namespace
@@ -102,13 +125,12 @@ void Terms::judge(const State& state, UpdateResult& result) {
 }
 
 Terms terms_of(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options,
-               std::optional<ImageTools>& image_tools) {
-    require_usable(prepared, seen, image_tools.has_value());
+               std::vector<ImageTools>& image_tools) {
+    require_usable(prepared, seen, image_tools.size());
     const double energy = strain_energy_unit(prepared, options.tissue);
     std::vector<std::unique_ptr<Term>> terms;
     if (seen.labels) terms.push_back(std::make_unique<LabelTerm>(prepared, *seen.labels, options));
-    if (seen.image)
-        terms.push_back(std::make_unique<ImageTerm>(prepared, *seen.image, options.image, *image_tools, energy));
+    if (seen.image) add_images(terms, prepared, seen, options.image, image_tools, energy);
     if (seen.surface)
         terms.push_back(
             std::make_unique<SurfaceTerm>(prepared, *seen.surface, options.surface, options.alignment, energy));

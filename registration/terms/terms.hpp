@@ -54,10 +54,10 @@ private:
 };
 
 /// Terms of what was seen, of what the model has about it and of the loads stated, with what is expected of tissue that
-/// no datum shows. Model, data and options outlive them; `image_tools` are there where the model has an image. Throws
-/// InvalidInput when there is nothing to register to, an image but no model of one, no label in common, or data that
-/// cannot be used.
+/// no datum shows. Model, data and options outlive them; `image_tools`: one for the image of the model and each of its
+/// contrasts. Throws InvalidInput when there is nothing to register to, an image but no model of one, no label in
+/// common, or data that cannot be used.
 Terms terms_of(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options,
-               std::optional<ImageTools>& image_tools);
+               std::vector<ImageTools>& image_tools);
 
 }  // namespace tissuewarp::registration::detail

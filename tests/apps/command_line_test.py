@@ -55,6 +55,12 @@ class CommandLine(PhantomTest):
         self.assertIn("edges of 9 mm", result.stdout)
         self.assertIn("5 rounds", result.stdout)
 
+    def test_images_on_the_command_line_replace_those_of_the_config(self):
+        path = self.phantom.folder / "config.toml"
+        path.write_text('moving = ["no-such-file.nii.gz", "nor-this.nii.gz"]\nfixed = ["a.nii.gz", "b.nii.gz"]\n')
+        result = self.phantom.register("--config", path, "--dry-run")
+        self.assertEqual(result.returncode, 0, result.stderr)
+
     def test_one_thread_gives_the_same_files_as_many(self):
         outputs = {}
         for threads in (1, 0):

@@ -73,6 +73,32 @@ class FromABareVolume(unittest.TestCase):
 
 
 class WhatCannotBeMatched(PhantomTest):
+    def test_contrasts_are_matched_pair_by_pair(self):
+        phantom = textured_phantom()
+        self.addCleanup(phantom.temporary.cleanup)
+        second = save(700 - texture(MOVING_AFFINE, CENTRE_LPS, MOVING_AXES), MOVING_AFFINE,
+                      phantom.folder / "second.nii.gz")
+        fixed = save(texture(FIXED_AFFINE, CENTRE_LPS + SHIFT_LPS, FIXED_AXES), FIXED_AFFINE,
+                     phantom.folder / "second_fixed.nii.gz")
+        result = phantom.register("--edge-length", 6, "--moving", second, "--fixed", fixed, "--landmarks",
+                                  landmarks_of(phantom), fixed_labels=None)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("contrast 2:", result.stdout)
+        report = json.loads((phantom.output / "report.json").read_text())
+        self.assertLess(report["target_registration_error"]["all"]["after"]["mean"], 0.4)
+        self.assertGreater(report["contrasts"][0]["matched"], 0.5 * report["contrasts"][0]["blocks"])
+        self.assertEqual(report["parameters"]["moving"], [str(phantom.moving), str(second)])
+
+    def test_a_contrast_without_its_pair_is_refused(self):
+        phantom = textured_phantom()
+        self.addCleanup(phantom.temporary.cleanup)
+        result = phantom.register("--moving", phantom.moving, fixed_labels=None)
+        self.assertEqual(result.returncode, INPUT)
+        self.assertIn("--moving is given 2 times and --fixed 1", result.stderr)
+        result = phantom.register("--moving", phantom.moving, "--fixed", phantom.fixed)
+        self.assertEqual(result.returncode, INPUT)
+        self.assertIn("--match-image", result.stderr)
+
     def test_a_moving_image_is_needed(self):
         self.assert_refused(self.phantom.register(moving=None, fixed_labels=None), INPUT, "--moving")
         self.assert_refused(self.phantom.register("--match-image", fixed=None), INPUT, "--fixed")

@@ -241,6 +241,19 @@ TEST_F(SceneFiles, OpenInterfacesBetweenLabelsOrSets) {
     EXPECT_THAT(slides("sets = [\"base\", \"upper\"]\nopenning = \"free\"\n"), HasSubstr("'opening'"));
 }
 
+TEST_F(SceneFiles, SayHowAnEquilibriumIsSought) {
+    const simulation::Solve by_default = read(cube).solve,
+                            forced =
+                                read(cube + "[solve]\nmethod = \"newton\"\nload_steps = 7\nprecision = \"float64\"\n")
+                                    .solve;
+    EXPECT_EQ(by_default.method, tled::EquilibriumMethod::Automatic);
+    EXPECT_EQ(by_default.precision, tled::Scalar::Float32);
+    EXPECT_EQ(forced.method, tled::EquilibriumMethod::Newton);
+    EXPECT_EQ(forced.load_steps, 7);
+    EXPECT_EQ(forced.precision, tled::Scalar::Float64);
+    EXPECT_THAT(refusal(cube + "[solve]\nmethod = \"neuton\"\n"), HasSubstr("did you mean 'newton'"));
+}
+
 TEST_F(SceneFiles, NameTheLineAndTheNearestKey) {
     EXPECT_THAT(refusal(cube + "[solve]\nframse = 3\n"), testing::AllOf(HasSubstr("line 11"), HasSubstr("'frames'")));
     EXPECT_THAT(refusal(cube + "[slove]\n"), testing::AllOf(HasSubstr("line 10"), HasSubstr("'solve'")));

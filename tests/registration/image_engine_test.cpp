@@ -68,7 +68,8 @@ double deviation(const DenseForce& force) {
 /// axis moves the image pulled back by tenths of voxels.
 TEST(ImageEngine, TheDeviceSaysWhatTheProcessorSays) {
     const Scene scene;
-    const auto cpu = make_cpu_image_engine(scene.prepared), gpu = make_gpu_image_engine(scene.prepared);
+    const auto cpu = make_cpu_image_engine(scene.prepared.model.mesh, *scene.prepared.image),
+               gpu = make_gpu_image_engine(scene.prepared.model.mesh, *scene.prepared.image);
     cpu->set_fixed(SeenImage(scene.fixed));
     gpu->set_fixed(SeenImage(scene.fixed));
     for (const std::size_t level : {0U, 1U}) {
@@ -108,7 +109,7 @@ TEST(ImageEngine, InformationAlongOneAxisHasNoNegativeEigenvalue) {
 // What an image leaves behind must not reach the next one.
 TEST(ImageEngine, TheDeviceRepeatsItselfAndTakesAnotherImage) {
     const Scene scene;
-    const auto gpu = make_gpu_image_engine(scene.prepared);
+    const auto gpu = make_gpu_image_engine(scene.prepared.model.mesh, *scene.prepared.image);
     gpu->set_fixed(SeenImage(scene.fixed));
     const DenseForces first = gpu->forces(scene.state, 1);
     Volume still = scene.prepared.image->image;
@@ -133,7 +134,8 @@ TEST(ImageEngine, TheDeviceFindsTheBlocksThatTheProcessorFinds) {
     BlockMatchingOptions options;
     options.rotation = scene.state.placement.linear();
     options.search_mm = 12;
-    const auto cpu = make_cpu_image_engine(scene.prepared), gpu = make_gpu_image_engine(scene.prepared);
+    const auto cpu = make_cpu_image_engine(scene.prepared.model.mesh, *scene.prepared.image),
+               gpu = make_gpu_image_engine(scene.prepared.model.mesh, *scene.prepared.image);
     const auto& size = scene.fixed.geometry.size;
     const SeenImage seen(imaging::crop(scene.fixed, {0, 0, 0}, {2 * size[0] / 3, size[1], size[2]}));
     for (const auto& engine : {&cpu, &gpu}) (*engine)->set_fixed(seen);
@@ -187,7 +189,8 @@ TEST(ImageEngine, TheDeviceComparesBlocksOfEverySizeAsTheProcessor) {
                 ->look(blocks, 3, 0.05, [&](std::size_t n, const BlockSight& sight) { result[n] = sight; });
             return result;
         };
-        const auto by_cpu = sights(make_cpu_image_engine(prepared)), by_gpu = sights(make_gpu_image_engine(prepared));
+        const auto by_cpu = sights(make_cpu_image_engine(prepared.model.mesh, *prepared.image)),
+                   by_gpu = sights(make_gpu_image_engine(prepared.model.mesh, *prepared.image));
         int found = 0, elsewhere = 0;
         const auto compare = [&](const std::optional<CostLattice>& cpu, const std::optional<CostLattice>& gpu) {
             if (!cpu && !gpu) return;
@@ -215,7 +218,7 @@ TEST(ImageEngine, TheDeviceComparesBlocksOfEverySizeAsTheProcessor) {
 TEST(ImageEngine, TheDeviceLooksForFewerBlocksAsForMany) {
     const Scene scene;
     const auto& images = scene.prepared.image->blocks.images();
-    const auto gpu = make_gpu_image_engine(scene.prepared);
+    const auto gpu = make_gpu_image_engine(scene.prepared.model.mesh, *scene.prepared.image);
     gpu->set_fixed(SeenImage(scene.prepared.image->image));
     const imaging::Geometry& grid = images.levels[1].grid;
     std::vector<SoughtBlock> blocks;
@@ -248,7 +251,7 @@ TEST(ImageEngine, RefusesBlocksThatItsSumsDoNotHold) {
     image.blocks.levels = 1;
     image.blocks.block_radius = 9;
     prepare_image(prepared, Volume(prepared.image->image), image);
-    EXPECT_THROW(static_cast<void>(make_gpu_image_engine(prepared)), GpuUnavailable);
+    EXPECT_THROW(static_cast<void>(make_gpu_image_engine(prepared.model.mesh, *prepared.image)), GpuUnavailable);
 }
 
 // A ball grows by the octahedra of the city-block distance; a front that turns a corner too early or leaves the grid

@@ -172,6 +172,9 @@ TEST(ImageUpdate, TissueOutOfViewMovesAlongWithThePartInView) {
     int within = 0;
     for (std::size_t n = 0; n < errors.size(); ++n) within += errors[n] <= stated[n].interval_mm;
     EXPECT_GT(within, 0.85 * double(errors.size()));
+    // Blocks out of view are not lost.
+    EXPECT_LT(result.images[0].blocks, 0.7 * double(prepared.image->blocks.points().cols()));
+    EXPECT_GT(result.images[0].matched, 0.5 * result.images[0].blocks);
 }
 
 // Without blocks tissue comes nearer by a voxel and a half at most with each search: two of them leave 0.47 mm.

@@ -193,7 +193,13 @@ TEST(Uncertainty, DoubtsDataThatLeaveHalfOfTheTissueUnknown) {
     const auto doubt = doubt_of_data(summary);
     ASSERT_TRUE(doubt);
     EXPECT_EQ(doubt->code, "data.show_too_little");
-    EXPECT_NE(doubt->text.find("51 % of its tissue"), std::string::npos) << doubt->text;
+    EXPECT_NE(doubt->text.find("51 % of its tissue may lie more than 10 mm"), std::string::npos) << doubt->text;
+    summary = {};
+    summary.poor_share = 0.74;
+    EXPECT_FALSE(doubt_of_data(summary));
+    summary.poor_share = 0.76;
+    ASSERT_TRUE(doubt_of_data(summary));
+    EXPECT_NE(doubt_of_data(summary)->text.find("76 % of its tissue may lie more than 5 mm"), std::string::npos);
 }
 
 TEST(CoarseTwin, CarriesLinearFieldsAndAllOfTheStiffness) {

@@ -61,6 +61,7 @@ constexpr double least_starting_jacobian = 0.1;
 
 EquilibriumResult lbfgs(EquilibriumSearch& search, const Eigen::Matrix3Xd* start);
 EquilibriumResult dynamic_relaxation(EquilibriumSearch& search, const Eigen::Matrix3Xd* start);
+EquilibriumResult newton(EquilibriumSearch& search, const Eigen::Matrix3Xd* start);  // options.rest is there
 EquilibriumResult self_checked_relaxation(EquilibriumSearch& search, const Eigen::Matrix3Xd* start);
 
 }  // namespace tissuewarp::tled::detail

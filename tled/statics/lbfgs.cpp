@@ -4,11 +4,13 @@
 // direction, the scale of the metric and the estimate of the error.
 
 #include "tled/statics/equilibrium_search.hpp"
+#include "tled/statics/line_search.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <deque>
 #include <optional>
+#include <utility>
 
 namespace tissuewarp::tled::detail {
 
@@ -17,8 +19,6 @@ using Eigen::Matrix3Xd;
 namespace {
 
 constexpr std::size_t most_pairs = 30;
-constexpr double slope_kept = 0.9;        // a step is long enough when |r·d| falls below this part of its start
-constexpr int most_trials = 12;           // of a line search
 constexpr int most_idle_iterations = 25;  // without the error falling by a tenth
 constexpr double volume_dominated = 200;  // volumetric over shear modulus, ν = 0.4975
 
@@ -124,54 +124,22 @@ private:
 
     void advance() {
         Matrix3Xd d = direction();
-        std::optional<double> step = line_search(d);
+        std::optional<LineStep> step = line_search(search_, u_, r_, d);
         if (!step && !pairs_.empty()) {
             pairs_.clear();
             d = Br_;
-            step = line_search(d);
+            step = line_search(search_, u_, r_, d);
         }
         if (!step) search_.fail_stalled();
-        const Matrix3Xd s = *step * d, y = r_ - trial_residual_;
+        const Matrix3Xd s = step->length * d, y = r_ - step->residual;
         u_ += s;
-        r_ = trial_residual_;
+        r_ = std::move(step->residual);
         const Matrix3Xd before = Br_;
         Br_ = lifted(r_);
         Pair pair{s, y, before - Br_, dot(s, y)};
         if (!(pair.ys > 0) || !(dot(pair.y, pair.By) > 0)) return;
         pairs_.push_back(std::move(pair));
         if (pairs_.size() > most_pairs) pairs_.pop_front();
-    }
-
-    Matrix3Xd trial_residual_;
-
-    /// Step along d where the slope r·d has fallen enough and every det F is positive: secant between the ends, since
-    /// engines give forces and no energy. Leaves the residual there in trial_residual_.
-    std::optional<double> line_search(const Matrix3Xd& d) {
-        const double start = dot(r_, d);
-        if (!(start > 0)) return std::nullopt;
-        double low = 0, low_slope = start, step = 1;
-        std::optional<double> high;
-        for (int trial = 0; trial < most_trials; ++trial) {
-            if (!search_.admissible(u_ + step * d)) {
-                high = step;
-                step = 0.5 * (low + step);
-                continue;
-            }
-            trial_residual_ = search_.residual();
-            const double slope = dot(trial_residual_, d);
-            if (std::abs(slope) <= slope_kept * start) return step;
-            const double secant = low + (step - low) * low_slope / (low_slope - slope);
-            if (slope < 0) {
-                high = step;
-                step = std::clamp(secant, low + 0.1 * (step - low), low + 0.9 * (step - low));
-            } else {
-                const double beyond = slope < low_slope ? std::min(secant, 4 * step) : 4 * step;
-                low = step;
-                low_slope = slope;
-                step = high ? std::min(beyond, 0.5 * (low + *high)) : beyond;
-            }
-        }
-        return std::nullopt;
     }
 };
 

@@ -1,8 +1,8 @@
 #include "registration/field.hpp"
 #include "registration/field/rasterisation.hpp"
 #include "registration/matching/dense/image_engine.hpp"
-#include "registration/matching/points/template_images.hpp"
 #include "registration/matching/image_matching.hpp"
+#include "registration/matching/points/template_images.hpp"
 #include "registration/prepare.hpp"
 
 #include <algorithm>
@@ -27,38 +27,38 @@ std::vector<std::uint8_t> voxels_in(const meshing::TetMesh& mesh, const imaging:
 
 class CpuImageEngine : public ImageEngine {
 public:
-    explicit CpuImageEngine(const PreparedModel& prepared) : prepared_(prepared) {}
+    CpuImageEngine(const meshing::TetMesh& mesh, const ImageModel& image) : mesh_(mesh), image_(image) {}
 
     void begin_fixed(const imaging::Volume&) override {}
 
     void finish_fixed(const SeenImage& fixed) override {
         fixed_ = fixed;
-        blocks_ = make_cpu_block_engine(prepared_.image->blocks.images(), *fixed_);
+        blocks_ = make_cpu_block_engine(image_.blocks.images(), *fixed_);
     }
 
     DenseForces forces(const State& state, std::size_t level) override {
-        const meshing::TetMesh& mesh = prepared_.model.mesh;
-        const TemplateImages& images = prepared_.image->blocks.images();
+        const TemplateImages& images = image_.blocks.images();
         const MatchingImage& moving = images.levels.at(level);
-        const imaging::Volume field = displacement_near_mesh({mesh, state.displacement, state.placement},
+        const imaging::Volume field = displacement_near_mesh({mesh_, state.displacement, state.placement},
                                                              GridSamples::with_rim(moving.grid), descriptor_extent);
         const MatchingImage pulled_back =
             pulled_back_image(fixed_->image, fixed_->seen, moving.grid, images.region(moving.grid), field);
-        return dense_forces(moving, pulled_back, voxels_in(mesh, moving.grid));
+        return dense_forces(moving, pulled_back, voxels_in(mesh_, moving.grid));
     }
 
     BlockEngine& blocks() override { return *blocks_; }
 
 private:
-    const PreparedModel& prepared_;
+    const meshing::TetMesh& mesh_;
+    const ImageModel& image_;
     std::optional<SeenImage> fixed_;
     std::unique_ptr<BlockEngine> blocks_;
 };
 
 }  // namespace
 
-std::unique_ptr<ImageEngine> make_cpu_image_engine(const PreparedModel& prepared) {
-    return std::make_unique<CpuImageEngine>(prepared);
+std::unique_ptr<ImageEngine> make_cpu_image_engine(const meshing::TetMesh& mesh, const ImageModel& image) {
+    return std::make_unique<CpuImageEngine>(mesh, image);
 }
 
 }  // namespace tissuewarp::registration::detail

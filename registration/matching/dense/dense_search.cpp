@@ -35,12 +35,12 @@ BlockMatch as_match(const DenseForce& force, const meshing::TetMesh& mesh, const
 
 }  // namespace
 
-DenseSearch::DenseSearch(const PreparedModel& prepared, ImageEngine& engine) : prepared_(prepared), engine_(engine) {}
+DenseSearch::DenseSearch(const meshing::TetMesh& mesh, const ImageModel& image, ImageEngine& engine)
+    : mesh_(mesh), image_(image), engine_(engine) {}
 
 DenseMatches DenseSearch::matches(const State& state, int coarsening, const LocatedMatches& known,
                                   const meshing::PointLocator& locator) const {
-    const meshing::TetMesh& mesh = prepared_.model.mesh;
-    const int finest = prepared_.image->blocks.options().levels - 1;
+    const int finest = image_.blocks.options().levels - 1;
     const DenseForces dense = engine_.forces(state, static_cast<std::size_t>(std::max(0, finest - coarsening)));
     DenseMatches result{{}, dense.agreement};
     LocatedMatches& found = result.found;
@@ -51,7 +51,7 @@ DenseMatches DenseSearch::matches(const State& state, int coarsening, const Loca
         const auto place = locate_near(locator, dense.forces[n].place);
         if (!place) return;
         found.places[n] = *place;
-        found.matches[n] = as_match(dense.forces[n], mesh, state, *place);
+        found.matches[n] = as_match(dense.forces[n], mesh_, state, *place);
     });
     found.drop_unlocated();
     for (std::size_t n = 0; n < known.matches.size(); ++n)

@@ -39,8 +39,8 @@ struct DenseMatches {
 
 class DenseSearch {
 public:
-    /// `engine` has been made for `prepared` and given the fixed image.
-    DenseSearch(const PreparedModel& prepared, ImageEngine& engine);
+    /// `engine` has been made for both and given the fixed image.
+    DenseSearch(const meshing::TetMesh& mesh, const ImageModel& image, ImageEngine& engine);
 
     /// What `known`, found before, and the whole image say about where tissue belongs, on the grid that is `coarsening`
     /// times doubled from the template's finest (or its coarsest): a match for each cell of voxels that has a force,
@@ -50,7 +50,8 @@ public:
                                        const meshing::PointLocator& locator) const;
 
 private:
-    const PreparedModel& prepared_;
+    const meshing::TetMesh& mesh_;
+    const ImageModel& image_;
     ImageEngine& engine_;
 };
 

@@ -31,19 +31,20 @@ public:
     virtual BlockEngine& blocks() = 0;
 };
 
-/// `prepared.image` is there; `prepared` outlives the engine.
-std::unique_ptr<ImageEngine> make_cpu_image_engine(const PreparedModel& prepared);
+/// Of an image of the tissue that is meshed; both outlive the engine.
+std::unique_ptr<ImageEngine> make_cpu_image_engine(const meshing::TetMesh& mesh, const ImageModel& image);
 
 /// The same in shaders; `gpu_index` as for shaders::Device. The descriptors differ from the processor's by rounding: by
 /// one of 255 steps in few channels. Throws GpuUnavailable when there is no device, the images do not fit onto it, or
 /// blocks are too large for its sums.
-std::unique_ptr<ImageEngine> make_gpu_image_engine(const PreparedModel& prepared, int gpu_index = -1);
+std::unique_ptr<ImageEngine> make_gpu_image_engine(const meshing::TetMesh& mesh, const ImageModel& image,
+                                                   int gpu_index = -1);
 
-/// What updates from images share, one after the other: nothing that an image says.
+/// What updates from one image after the other share: nothing that an image says.
 struct ImageTools {
     std::unique_ptr<ImageEngine> engine;
-    meshing::PointLocator locator;  ///< in the model at rest
-    SeenMemory memory;              ///< of the image in hand
+    std::shared_ptr<const meshing::PointLocator> locator;  ///< in the model at rest
+    SeenMemory memory;                                     ///< of the image in hand
 };
 
 }  // namespace tissuewarp::registration::detail

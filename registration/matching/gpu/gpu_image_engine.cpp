@@ -44,10 +44,10 @@ struct Level {
     [[nodiscard]] DescribedOnDevice described() const { return {moving.grid, descriptors, seen}; }
 };
 
-std::vector<Level> levels_of(const shaders::Device& device, const PreparedModel& prepared) {
+std::vector<Level> levels_of(const shaders::Device& device, const meshing::TetMesh& mesh, const ImageModel& image) {
     std::vector<Level> levels;
-    for (const MatchingImage& moving : prepared.image->blocks.images().levels)
-        levels.emplace_back(device, prepared.model.mesh, moving, match_layout(prepared.model.mesh, moving));
+    for (const MatchingImage& moving : image.blocks.images().levels)
+        levels.emplace_back(device, mesh, moving, match_layout(mesh, moving));
     return levels;
 }
 
@@ -80,11 +80,11 @@ struct Memory {
 
 class GpuImageEngine : public ImageEngine {
 public:
-    GpuImageEngine(const PreparedModel& prepared, int gpu_index)
+    GpuImageEngine(const meshing::TetMesh& mesh, const ImageModel& image, int gpu_index)
         : matching_(gpu_index),
-          levels_(levels_of(matching_.device(), prepared)),
-          memory_(matching_.device(), static_cast<std::size_t>(prepared.model.mesh.node_count()), levels_.back()),
-          blocks_(matching_, described(levels_), prepared.image->blocks.options().block_radius) {}
+          levels_(levels_of(matching_.device(), mesh, image)),
+          memory_(matching_.device(), static_cast<std::size_t>(mesh.node_count()), levels_.back()),
+          blocks_(matching_, described(levels_), image.blocks.options().block_radius) {}
 
     /// The device smooths while the processor prepares the first search.
     void begin_fixed(const imaging::Volume& image) override {
@@ -187,8 +187,9 @@ private:
 
 }  // namespace
 
-std::unique_ptr<ImageEngine> make_gpu_image_engine(const PreparedModel& prepared, int gpu_index) {
-    return std::make_unique<GpuImageEngine>(prepared, gpu_index);
+std::unique_ptr<ImageEngine> make_gpu_image_engine(const meshing::TetMesh& mesh, const ImageModel& image,
+                                                   int gpu_index) {
+    return std::make_unique<GpuImageEngine>(mesh, image, gpu_index);
 }
 
 }  // namespace tissuewarp::registration::detail

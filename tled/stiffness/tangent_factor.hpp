@@ -1,0 +1,38 @@
+#pragma once
+/// The tangent stiffness at a state and its factor, for Newton's method.
+
+#include "tled/conditions.hpp"
+#include "tled/rest_state.hpp"
+#include "tled/stiffness/cholmod_factor.hpp"
+#include "tled/stiffness/free_degrees.hpp"
+
+#include <memory>
+
+namespace tissuewarp::tled::detail {
+
+/// ∂²E/∂u² of the tissue and its springs, membranes and sliding pairs as at rest; pressures, fluid and contact are not
+/// in it.
+class TangentFactor {
+public:
+    /// Tissue and conditions outlive this.
+    TangentFactor(const RestState& rest, const NodalConditions& conditions);
+
+    /// Factorises the tangent at a displacement (3 × N, mm), where it is indefinite with the smallest of a series of
+    /// multiples of its diagonal that makes it positive definite: it then leads downhill. False where none does. Throws
+    /// SolverFailure where det F ≤ 0.
+    [[nodiscard]] bool factorise(const Eigen::Matrix3Xd& displacement);
+    /// Of the last factorise(): 0 where the tangent was positive definite.
+    [[nodiscard]] double shift() const { return shift_; }
+
+    /// K⁻¹ f on the free degrees of freedom, 0 on the others (3 × N; mN, mm). Precondition: factorise() was true.
+    [[nodiscard]] Eigen::Matrix3Xd solve(const Eigen::Matrix3Xd& force) const;
+
+private:
+    const RestState& rest_;
+    const NodalConditions& conditions_;
+    FreeDegrees free_;
+    std::unique_ptr<CholmodFactor> factor_;
+    double shift_ = 0;
+};
+
+}  // namespace tissuewarp::tled::detail
