@@ -100,6 +100,28 @@ DistanceGrid grid_of(const HalfSpace& body, const Extent& extent) {
                    [&](const Vector3d& x) { return (x - body.point).dot(body.normal); });
 }
 
+/// The same without an end along the plane: its axes are two of the plane, along which nothing changes, and the normal.
+DistanceGrid endless_grid_of(const HalfSpace& body, const Extent& extent) {
+    constexpr double far = 1e6;  // mm, from sample to sample along the plane
+    constexpr int samples = 10;
+    double lower = 0, upper = 0;  // of the distance, the plane included
+    for (int corner = 0; corner < 8; ++corner) {
+        const double distance = (corner_of(extent, corner) - body.point).dot(body.normal);
+        lower = std::min(lower, distance);
+        upper = std::max(upper, distance);
+    }
+    const double spacing = (upper - lower) / (samples - 4);
+    const Vector3d along = body.normal.unitOrthogonal(), across = body.normal.cross(along);
+    DistanceGrid grid;
+    grid.steps << far * along, far * across, spacing * body.normal;
+    grid.size = Eigen::Vector3i::Constant(samples);
+    const double first = lower - 1.5 * spacing;
+    grid.origin = body.point + first * body.normal - 0.5 * (samples - 1) * far * (along + across);
+    for (int k = 0; k < samples; ++k)
+        grid.distance.insert(grid.distance.end(), samples * samples, static_cast<float>(first + k * spacing));
+    return grid;
+}
+
 DistanceGrid grid_of(const Ball& body, const Extent& extent) {
     const double margin = std::max(body.radius, 0.1 * extent.size().norm());
     const Extent around{body.centre.array() - body.radius - margin, body.centre.array() + body.radius + margin};
@@ -199,15 +221,18 @@ void make_room(tled::Obstacle& obstacle, const Contact& contact, const Matrix3Xd
 tled::Obstacle obstacle(const Contact& contact, const Matrix3Xd& tissue, double overlap, const imaging::Volume* labels,
                         Observer& observer) {
     const Extent extent = where_tissue_may_be(contact, tissue);
+    const auto* const plane = std::get_if<HalfSpace>(&contact.body);
     tled::Obstacle result;
-    result.surface = std::visit(
-        [&](const auto& body) {
-            if constexpr (requires { grid_of(body, extent, labels); })
-                return grid_of(body, extent, labels);
-            else
-                return grid_of(body, extent);
-        },
-        contact.body);
+    result.surface = plane && contact.motion.turn.isZero(0.0)
+                         ? endless_grid_of(*plane, extent)
+                         : std::visit(
+                               [&](const auto& body) {
+                                   if constexpr (requires { grid_of(body, extent, labels); })
+                                       return grid_of(body, extent, labels);
+                                   else
+                                       return grid_of(body, extent);
+                               },
+                               contact.body);
     result.friction = contact.friction;
     result.placement = placement_at(contact.motion, value_at(contact.curve, 0.0, 1.0));  // whatever the duration
     make_room(result, contact, tissue, overlap, observer);

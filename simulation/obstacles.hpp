@@ -10,7 +10,7 @@ namespace tissuewarp::simulation {
 
 /// The body of a contact around tissue (3 × N nodes that may touch it, mm, at rest), reaching as far as the tissue may
 /// move relative to it: a quarter of the tissue's extent besides the body's own motion. `labels` is the volume that
-/// labels of the body are looked up in, or null. A body that overlaps the tissue at the beginning by up to `overlap`
+/// labels of the body are looked up in, or null. A plane that does not turn has no end. A body that overlaps the tissue at the beginning by up to `overlap`
 /// (mm) is made smaller until it only touches; the observer is told.
 ///
 /// The obstacle is where the body is at time 0, which is where overlap is looked for.

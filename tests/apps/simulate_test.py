@@ -57,6 +57,35 @@ class Simulate(unittest.TestCase):
             self.assertEqual((start.tolist(), stride.tolist()), ([frame, 0, 0], [1, 1, 1]))
             self.assertEqual(whole.text, "displacement.h5:/displacement")
 
+    def test_a_plane_has_no_end(self):
+        """A block slides down by six times its length; it fell through where a quarter of that was sampled."""
+        normal, point = numpy.array([0.2588190451, 0, 0.9659258263]), numpy.array([0, 0, -6])
+        for friction, least_mm in ((0.0, 200), (0.1, 100)):
+            self.scene.write_text(f"""
+[geometry]
+box = {{ size_mm = [40, 40, 20], cells = [4, 4, 2] }}
+[label.1]
+youngs_modulus_kpa = 20
+poissons_ratio = 0.4
+[gravity]
+to = [0, 0, -1]
+curve = [[0, 1]]
+[[contact]]
+plane = {{ point_mm = {point.tolist()}, normal = {normal.tolist()} }}
+friction = {friction}
+[solve]
+kind = "dynamics"
+duration_s = 0.5
+""")
+            output = self.folder / f"friction_{friction}"
+            result = run("simulate", self.scene, "--output", output, "--device", "cpu", "--quiet")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            with h5py.File(output / "displacement.h5") as record:
+                moved = record["displacement"][-1]
+                place = record["mesh/nodes"][:] + moved
+            self.assertGreater(numpy.linalg.norm(moved, axis=1).min(), least_mm)
+            self.assertGreater(((place - point) @ normal).min(), -0.1)
+
     def test_files_of_a_run(self):
         done = run("simulate", self.scene, "-o", self.folder / "out")
         self.assertEqual(done.returncode, 0, done.stderr)
