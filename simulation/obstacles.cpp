@@ -2,6 +2,7 @@
 
 #include "core/errors.hpp"
 #include "imaging/filters.hpp"
+#include "imaging/sampling.hpp"
 #include "simulation/surface_distance.hpp"
 #include "tled/nodal_effects.hpp"
 
@@ -198,6 +199,32 @@ DistanceGrid grid_of(const OutsideOfLabels& body, const Extent& extent, const im
     return grid_of_mask(mask_around(required(labels), extent, solid, true));
 }
 
+using IsInside = std::function<bool(const Vector3d&)>;
+
+IsInside inside_of(const HalfSpace& body, const imaging::Volume*) {
+    return [&](const Vector3d& x) { return (x - body.point).dot(body.normal) < 0; };
+}
+
+IsInside inside_of(const Ball& body, const imaging::Volume*) {
+    return [&](const Vector3d& x) { return (x - body.centre).norm() < body.radius; };
+}
+
+IsInside inside_of(const meshing::SurfaceMesh& body, const imaging::Volume*) {
+    return [distance = SurfaceDistance(body)](const Vector3d& x) { return distance(x) < 0; };
+}
+
+IsInside inside_of(const ObstacleLabel& body, const imaging::Volume* labels) {
+    return
+        [&body, labels](const Vector3d& x) { return imaging::nearest_value<std::int32_t>(*labels, x) == body.label; };
+}
+
+IsInside inside_of(const OutsideOfLabels& body, const imaging::Volume* labels) {
+    return [&body, labels](const Vector3d& x) {
+        const int label = imaging::nearest_value<std::int32_t>(*labels, x);  // 0 off the volume
+        return std::find(body.labels.begin(), body.labels.end(), label) == body.labels.end();
+    };
+}
+
 /// Makes the body smaller by `gap`, and by what overlaps.
 void make_room(tled::Obstacle& obstacle, const Contact& contact, const Matrix3Xd& tissue, double most,
                Observer& observer) {
@@ -237,6 +264,23 @@ tled::Obstacle obstacle(const Contact& contact, const Matrix3Xd& tissue, double 
     result.placement = placement_at(contact.motion, value_at(contact.curve, 0.0, 1.0));  // whatever the duration
     make_room(result, contact, tissue, overlap, observer);
     return result;
+}
+
+int unseen_in_body(const Contact& contact, const tled::Obstacle& obstacle, const Matrix3Xd& places,
+                   const imaging::Volume* labels) {
+    const auto& [shift, rotation] = obstacle.placement;
+    const Matrix3Xd here = rotation.transpose() * (places.colwise() - shift);  // as seen from the body
+    const DistanceGrid& grid = *obstacle.surface;
+    const Matrix3Xd index = grid.steps.inverse() * (here.colwise() - grid.origin);
+    std::vector<Vector3d> beyond;
+    for (Eigen::Index n = 0; n < index.cols(); ++n) {
+        const auto x = index.col(n).array();
+        if ((x < 1).any() || (x > grid.size.cast<double>().array() - 2).any()) beyond.push_back(here.col(n));
+    }
+    if (beyond.empty()) return 0;
+    const std::function<bool(const Vector3d&)> inside =
+        std::visit([&](const auto& body) { return inside_of(body, labels); }, contact.body);
+    return static_cast<int>(std::count_if(beyond.begin(), beyond.end(), inside));
 }
 
 double surface_reach(const DistanceGrid& grid, const RigidMotion& motion) {

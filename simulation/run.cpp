@@ -1,8 +1,10 @@
 #include "simulation/run.hpp"
 
 #include "core/errors.hpp"
+#include "simulation/geometry.hpp"
 #include "simulation/limits.hpp"
 #include "simulation/loads.hpp"
+#include "simulation/obstacles.hpp"
 #include "tled/contact.hpp"
 #include "tled/dynamics.hpp"
 #include "tled/engine_choice.hpp"
@@ -72,12 +74,30 @@ private:
     [[nodiscard]] double time_of(int frame) const { return solve_.duration * frame / solve_.frames; }
 
     void show(int index, double time, std::size_t stage, const Matrix3Xd& displacement) {
+        require_seen_contacts(built_.stages[stage], time, displacement);
         summary_.largest_displacement = displacement.colwise().norm().maxCoeff();
         const auto start = std::chrono::steady_clock::now();
         on_frame_({index, time, static_cast<int>(stage), displacement});
         seconds_of_caller_ += seconds_since(start);
         shown_ = index + 1;
         observer_.checkpoint("simulation", time / solve_.duration);
+    }
+
+    /// Bodies are sampled about where the tissue was expected: what went farther must not be in them.
+    void require_seen_contacts(const Stage& stage, double time, const Matrix3Xd& displacement) const {
+        if (!built_.effects.contact) return;
+        const tled::RigidContact contact = *conditions_at(built_, stage, time).effects.contact;
+        const Matrix3Xd places = (stage.rest.position + displacement)(Eigen::all, contact.nodes);
+        for (std::size_t c = 0; c < contact.obstacles.size(); ++c) {
+            const int lost =
+                unseen_in_body(built_.scene.contacts[c], contact.obstacles[c], places, label_volume(built_.scene));
+            if (lost > 0)
+                throw SolverFailure(
+                    "at t = " + std::to_string(time) + " s: " + std::to_string(lost) +
+                    " nodes have passed into the body of contact " + std::to_string(c + 1) +
+                    " where it is not sampled, which is a quarter of the tissue's extent about it; hold "
+                    "the tissue, or bring it nearer to the body");
+        }
     }
 
     /// What is left starts from where it was.

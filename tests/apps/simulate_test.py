@@ -86,6 +86,34 @@ duration_s = 0.5
             self.assertGreater(numpy.linalg.norm(moved, axis=1).min(), least_mm)
             self.assertGreater(((place - point) @ normal).min(), -0.1)
 
+    def test_tissue_that_falls_into_what_is_not_sampled_is_refused(self):
+        corners = [(x, y, z) for z in (-260, -160) for y in (-60, 100) for x in (-60, 100)]
+        faces = [(0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4), (2, 6, 7), (2, 7, 3), (0, 4, 6),
+                 (0, 6, 2), (1, 3, 7), (1, 7, 5)]
+        lines = ["v %g %g %g" % each for each in corners] + ["f %d %d %d" % tuple(i + 1 for i in f) for f in faces]
+        (self.folder / "table.obj").write_text("\n".join(lines) + "\n")
+        self.scene.write_text("""
+[geometry]
+box = { size_mm = [40, 40, 20], cells = [3, 3, 2] }
+[label.1]
+youngs_modulus_kpa = 20
+poissons_ratio = 0.4
+[gravity]
+to = [0, 0, -1]
+curve = [[0, 1]]
+[[contact]]
+surface = "table.obj"
+[solve]
+kind = "dynamics"
+duration_s = 0.24
+frames = 8
+""")
+        output = self.folder / "out"
+        result = run("simulate", self.scene, "--output", output, "--device", "cpu", "--quiet")
+        self.assertNotEqual(result.returncode, 0)
+        self.assertIn("passed into the body of contact 1", result.stderr)
+        self.assertFalse(output.exists())
+
     def test_files_of_a_run(self):
         done = run("simulate", self.scene, "-o", self.folder / "out")
         self.assertEqual(done.returncode, 0, done.stderr)
