@@ -180,7 +180,13 @@ PreparedModel read_checked(const std::filesystem::path& path, Observer& observer
 }  // namespace
 
 PreparedModel read_prepared(const std::filesystem::path& path, Observer& observer) {
-    return naming(path, [&] { return read_checked(path, observer); });
+    return naming(path, [&] {
+        try {
+            return read_checked(path, observer);
+        } catch (const SolverFailure& failure) {  // sizes or materials whose stiffness is no number
+            throw InvalidInput(std::string("its tissue cannot be computed with: ") + failure.what());
+        }
+    });
 }
 
 }  // namespace tissuewarp::registration

@@ -81,15 +81,17 @@ void LabelTerm::judge(const State& /*state*/, UpdateResult& result) {
             {"labels.apart", last_.mean_residual_mm, most_residual,
              "the surfaces still differ by " + to_text(last_.mean_residual_mm) + " mm on average, more than a voxel",
              "look where the labels differ; allow more rounds, or softer tissue"});
+    std::vector<Doubt> about_labels = doubts_of_labels(prepared_, labels_, options_, result);
+    const bool cut = std::any_of(about_labels.begin(), about_labels.end(),
+                                 [](const Doubt& doubt) { return doubt.code == "labels.cut_off"; });
     const double growth = labelled_volume(labels_) / labelled_volume(prepared_.labels);
     const double poisson = largest_poisson_ratio(prepared_.model.materials);
-    if (std::abs(growth - 1) > limits.most_growth && poisson > limits.resisting_poisson)
+    if (!cut && std::abs(growth - 1) > limits.most_growth && poisson > limits.resisting_poisson)
         result.doubts.push_back({"labels.volume_changed", growth, limits.most_growth,
                                  "the labelled volume changed by the factor " + to_text(growth) +
                                      ", which tissue of Poisson's ratio " + to_text(poisson) + " resists",
                                  "for lungs and other tissue that changes volume take 0.3 or less"});
-    for (Doubt& doubt : doubts_of_labels(prepared_, labels_, options_, result))
-        result.doubts.push_back(std::move(doubt));
+    for (Doubt& doubt : about_labels) result.doubts.push_back(std::move(doubt));
 }
 
 }  // namespace tissuewarp::registration::detail

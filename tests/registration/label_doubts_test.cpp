@@ -136,6 +136,9 @@ TEST(LabelDoubts, LabelsOfOneMapAloneAreNamed) {
 
 TEST(LabelDoubts, AnOrganThatTheImageCutsOffIsSaidToBe) {
     EXPECT_THAT(doubts_of(map_of(as_it_is, {44, 50, 40})), Contains("labels.cut_off"));
+    // Of what is not shown the volume says nothing.
+    EXPECT_THAT(doubts_of(map_of(as_it_is, {34, 50, 40})),
+                testing::AllOf(Contains("labels.cut_off"), Not(Contains("labels.volume_changed"))));
 }
 
 TEST(LabelDoubts, AVolumeThatTissueDoesNotGiveUpIsSaid) {

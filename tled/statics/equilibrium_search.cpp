@@ -113,7 +113,7 @@ void EquilibriumSearch::fail_stalled() const {
     constexpr double single_precision = 1e-8;
     if (engine.precision() > single_precision)
         fail("the error stopped falling where float32 forces end (" + place(smallest_) + ")",
-             "take a larger tolerance or the float64 engine");
+             "take a larger tolerance, or of a scene forces in float64");
     fail("the error stopped falling (" + place(smallest_) + ")",
          "take another method, a finer mesh there, or apply the load in parts");
 }
