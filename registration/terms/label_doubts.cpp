@@ -185,8 +185,8 @@ private:
         doubts.push_back({"labels.cut_off", std::abs(more), limits.most_cut,
                           "the border of the image cuts the organ off in the " + cut + " labels and not in the " +
                               whole + " ones (" + percent(std::abs(more)) +
-                              " of its surface): tissue near the cut is drawn to where the image ends",
-                          "do not trust tissue near it; give labels of all of the organ, or cut both maps alike"});
+                              " of its surface): what lies at the cut and beyond is where mechanics alone put it",
+                          "do not trust tissue there; give labels of all of the organ, or cut both maps alike"});
     }
 
     /// The moving labels under the rigid motion that brings all of them together, whatever their numbers, to the fixed.

@@ -9,7 +9,21 @@
 
 namespace tissuewarp::registration::detail {
 
-std::vector<Match> match_interfaces(const PreparedModel& prepared, const LabelBoundaryField& fixed, const State& state,
+namespace {
+
+/// Where the image ends no boundary of the tissue is shown.
+bool at_border(const imaging::Geometry& grid, const Eigen::Vector3d& point) {
+    constexpr double voxels = 0.5;  // within the outermost voxels' outer halves the map may have been cut
+    const Eigen::Vector3d index = grid.index(point);
+    for (int axis = 0; axis < 3; ++axis)
+        if (index[axis] < voxels || index[axis] > grid.size[static_cast<std::size_t>(axis)] - 1 - voxels) return true;
+    return false;
+}
+
+}  // namespace
+
+std::vector<Match> match_interfaces(const PreparedModel& prepared, const LabelBoundaryField& fixed,
+                                    const imaging::Geometry& fixed_grid, const State& state,
                                     const Eigen::Matrix3Xd& normals, const RoundPlan& plan, double max_angle_deg) {
     const auto& nodes = prepared.interfaces.nodes();
     std::vector<Match> matches(nodes.size());
@@ -20,7 +34,7 @@ std::vector<Match> match_interfaces(const PreparedModel& prepared, const LabelBo
         const Eigen::Vector3d point = state.placement * Eigen::Vector3d(prepared.model.mesh.nodes.col(node.node) +
                                                                         state.displacement.col(node.node));
         const double crossing = fixed.crossing(point, normal, node.inner, node.outer, plan.range_mm, max_angle_deg);
-        if (std::isnan(crossing)) return;
+        if (std::isnan(crossing) || at_border(fixed_grid, point + crossing * normal)) return;
         const double distance = crossing - node.offset;
         matches[i].found = true;
         matches[i].held_back = std::abs(distance) > plan.most_step_mm;

@@ -8,8 +8,10 @@
 namespace tissuewarp::registration::detail {
 
 /// Matches every interface node of the deformed mesh to the fixed boundary along its normal, where that boundary's own
-/// normal lies within `max_angle_deg` of it. `normals`: one column per interface node, moving frame.
-std::vector<Match> match_interfaces(const PreparedModel& prepared, const LabelBoundaryField& fixed, const State& state,
+/// normal lies within `max_angle_deg` of it, but to none where the fixed image ends. `normals`: one column per
+/// interface node, moving frame.
+std::vector<Match> match_interfaces(const PreparedModel& prepared, const LabelBoundaryField& fixed,
+                                    const imaging::Geometry& fixed_grid, const State& state,
                                     const Eigen::Matrix3Xd& normals, const RoundPlan& plan, double max_angle_deg);
 
 struct StrayOptions {

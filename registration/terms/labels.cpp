@@ -46,7 +46,8 @@ Alignment LabelTerm::pose(const Eigen::Isometry3d& /*start*/, Observer& observer
 Contribution LabelTerm::linearise(const RoundPlan& plan, const State& state, Observer& /*observer*/) {
     const Interfaces& interfaces = prepared_.interfaces;
     const Eigen::Matrix3Xd normals = interfaces.normals(prepared_.model.mesh.nodes + state.displacement);
-    std::vector<Match> matches = match_interfaces(prepared_, boundaries_, state, normals, plan, options_.max_angle_deg);
+    std::vector<Match> matches =
+        match_interfaces(prepared_, boundaries_, labels_.geometry, state, normals, plan, options_.max_angle_deg);
     leave_out_strays(matches, interfaces, neighbours_, prepared_.model.mesh.nodes, state.displacement, normals);
     weigh(matches, neighbours_, plan.scale_mm);
     bound(matches, plan.most_step_mm);
@@ -86,11 +87,12 @@ void LabelTerm::judge(const State& /*state*/, UpdateResult& result) {
                                  [](const Doubt& doubt) { return doubt.code == "labels.cut_off"; });
     const double growth = labelled_volume(labels_) / labelled_volume(prepared_.labels);
     const double poisson = largest_poisson_ratio(prepared_.model.materials);
-    if (!cut && std::abs(growth - 1) > limits.most_growth && poisson > limits.resisting_poisson)
+    if (std::abs(growth - 1) > limits.most_growth && poisson > limits.resisting_poisson)
         result.doubts.push_back({"labels.volume_changed", growth, limits.most_growth,
                                  "the labelled volume changed by the factor " + to_text(growth) +
                                      ", which tissue of Poisson's ratio " + to_text(poisson) + " resists",
-                                 "for lungs and other tissue that changes volume take 0.3 or less"});
+                                 std::string(cut ? "part of it may be what the image cuts off; " : "") +
+                                     "for lungs and other tissue that changes volume take 0.3 or less"});
     for (Doubt& doubt : about_labels) result.doubts.push_back(std::move(doubt));
 }
 
