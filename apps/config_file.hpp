@@ -16,4 +16,7 @@ struct KnownOptions {
 /// nearest right name for a key that is no option, a table, or a value of a kind that no option takes.
 std::vector<std::string> read_config(const std::filesystem::path& path, const KnownOptions& known);
 
+/// Puts the file that --config names in front of the other arguments, which replace what it says of the same option.
+std::vector<std::string> with_config(const std::vector<std::string>& arguments, const KnownOptions& known);
+
 }  // namespace tissuewarp::apps

@@ -446,43 +446,6 @@ struct Parser {
     }
 };
 
-/// Of the arguments of a file, those of options that the command line does not give.
-std::vector<std::string> not_given(const std::vector<std::string>& from_file, const std::vector<std::string>& given,
-                                   const KnownOptions& known) {
-    std::vector<std::string> result;
-    for (std::size_t i = 0; i < from_file.size(); ++i) {
-        const std::string& name = from_file[i];
-        const bool is_switch =
-            std::find(known.switches.begin(), known.switches.end(), name.substr(2)) != known.switches.end();
-        const bool wins = std::any_of(given.begin(), given.end(), [&](const std::string& argument) {
-            return argument == name || argument.starts_with(name + "=");
-        });
-        const std::size_t end = i + (is_switch ? 1 : 2);
-        if (!wins) result.insert(result.end(), from_file.begin() + long(i), from_file.begin() + long(end));
-        i = end - 1;
-    }
-    return result;
-}
-
-/// Puts the file that --config names in front of the other arguments, which replace what it says of the same option.
-std::vector<std::string> with_config(const std::vector<std::string>& arguments, const KnownOptions& known) {
-    std::vector<std::string> expanded{arguments.front()}, from_files, rest;
-    for (std::size_t i = 1; i < arguments.size(); ++i) {
-        const bool separate = arguments[i] == "--config" && i + 1 < arguments.size();
-        if (!separate && !arguments[i].starts_with("--config=")) {
-            rest.push_back(arguments[i]);
-            continue;
-        }
-        const auto more = read_config(separate ? arguments[++i] : arguments[i].substr(9), known);
-        from_files = not_given(from_files, more, known);  // of two files the later one
-        from_files.insert(from_files.end(), more.begin(), more.end());
-    }
-    from_files = not_given(from_files, rest, known);
-    expanded.insert(expanded.end(), from_files.begin(), from_files.end());
-    expanded.insert(expanded.end(), rest.begin(), rest.end());
-    return expanded;
-}
-
 }  // namespace
 
 Command parse_command_line(std::vector<std::string> arguments) {

@@ -31,6 +31,17 @@ name = "top"
 at_mm = [50, 50, 100]
 """
 
+FALLING_BLOCK = """
+[geometry]
+box = { size_mm = [40, 40, 20], cells = [3, 3, 2] }
+[label.1]
+youngs_modulus_kpa = 20
+poissons_ratio = 0.4
+[gravity]
+to = [0, 0, -1]
+curve = [[0, 1]]
+"""
+
 
 class Simulate(unittest.TestCase):
     def setUp(self):
@@ -61,15 +72,7 @@ class Simulate(unittest.TestCase):
         """A block slides down by six times its length; it fell through where a quarter of that was sampled."""
         normal, point = numpy.array([0.2588190451, 0, 0.9659258263]), numpy.array([0, 0, -6])
         for friction, least_mm in ((0.0, 200), (0.1, 100)):
-            self.scene.write_text(f"""
-[geometry]
-box = {{ size_mm = [40, 40, 20], cells = [4, 4, 2] }}
-[label.1]
-youngs_modulus_kpa = 20
-poissons_ratio = 0.4
-[gravity]
-to = [0, 0, -1]
-curve = [[0, 1]]
+            self.scene.write_text(FALLING_BLOCK + f"""
 [[contact]]
 plane = {{ point_mm = {point.tolist()}, normal = {normal.tolist()} }}
 friction = {friction}
@@ -92,15 +95,7 @@ duration_s = 0.5
                  (0, 6, 2), (1, 3, 7), (1, 7, 5)]
         lines = ["v %g %g %g" % each for each in corners] + ["f %d %d %d" % tuple(i + 1 for i in f) for f in faces]
         (self.folder / "table.obj").write_text("\n".join(lines) + "\n")
-        self.scene.write_text("""
-[geometry]
-box = { size_mm = [40, 40, 20], cells = [3, 3, 2] }
-[label.1]
-youngs_modulus_kpa = 20
-poissons_ratio = 0.4
-[gravity]
-to = [0, 0, -1]
-curve = [[0, 1]]
+        self.scene.write_text(FALLING_BLOCK + """
 [[contact]]
 surface = "table.obj"
 [solve]
