@@ -1,9 +1,12 @@
 #include "apps/blas.hpp"
 
 #include <dlfcn.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <cstdlib>
+#include <cstring>
+#include <vector>
 
 namespace tissuewarp::apps {
 
@@ -24,6 +27,27 @@ const char* known_core() {
 #endif
     return nullptr;
 }
+
+/// OpenBLAS makes a thread per processor while it is loaded, and where it may not it ends the process with words of its
+/// own, before main. Under a limit so low that this may happen the program starts again with OpenBLAS held to one
+/// thread, and main says what is missing (apps/threads.hpp). Runs before the libraries begin, so it may use
+/// nothing of them but memory.
+void start_again_if_blas_may_not_make_threads(int, char** argv, char** environment) {
+    constexpr rlim_t enough = 1024;  // processes of this user, more than any machine's processors and its desktop
+    static char one_thread[] = "OPENBLAS_NUM_THREADS=1";
+    rlimit limit{};
+    if (getrlimit(RLIMIT_NPROC, &limit) != 0 || limit.rlim_cur >= enough) return;
+    std::vector<char*> variables{one_thread};
+    for (char** variable = environment; *variable; ++variable) {
+        if (std::strncmp(*variable, one_thread, sizeof one_thread - 2) == 0) return;  // the user's choice, or ours
+        variables.push_back(*variable);
+    }
+    variables.push_back(nullptr);
+    execve("/proc/self/exe", argv, variables.data());
+}
+
+[[gnu::section(".preinit_array"),
+  gnu::used]] void (*const before_libraries)(int, char**, char**) = start_again_if_blas_may_not_make_threads;
 
 }  // namespace
 

@@ -321,13 +321,15 @@ struct Parser {
             ->type_name("FOLDER");
         verb.list("--problems", o.problems, "NAME",
                   "Of cube, brain, brainshift, liver, phantom:SEED; dial: phantom:FIRST-LAST; coverage: that, "
-                  "bent:FIRST-LAST or organ:FIRST-LAST")
+                  "bent:FIRST-LAST, organ:FIRST-LAST or found:FIRST-LAST")
             ->delimiter(',');
         verb.list("--evidence", o.evidence, "KIND",
                   "What coverage registers to, of labels, surface, surface-and-points, points, curves, image, "
                   "degraded-image, partial-image, other-contrast; otherwise all of them")
             ->delimiter(',');
-        verb.path("--organs", o.organs, "Label map whose organs organ:FIRST-LAST takes");
+        verb.path("--organs", o.organs, "Label map whose organs organ:FIRST-LAST and found:FIRST-LAST take");
+        verb.list("--fields", o.fields, "FILE", "Displacement fields of any program, which bend found:FIRST-LAST")
+            ->delimiter(',');
         verb.path("--data", o.data, "Folder that holds phantom-liver, for the liver")->type_name("FOLDER");
         verb.number("--most-elements", o.most_elements, "COUNT", 1000, 2000000, "Leave larger meshes out");
         verb.number("--repeats", o.repeats, "COUNT", 0, 1000, "Runs of each point; 0: 5, with --quick 2");

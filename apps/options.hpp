@@ -157,7 +157,8 @@ struct StudyOptions {
     std::filesystem::path output, data;  ///< folder of results, which an interrupted study goes on in; shared phantoms
     std::vector<std::string> problems;  ///< "cube", "brain", "brainshift", "liver", "phantom:SEED"; empty: of the study
     std::vector<std::string> evidence;  ///< what coverage registers to; empty: every kind
-    std::filesystem::path organs;       ///< label map whose organs "organ:SEED" takes
+    std::filesystem::path organs;       ///< label map whose organs "organ:SEED" and "found:SEED" take
+    std::vector<std::string> fields;    ///< files of displacements, one of which bends "found:SEED"
     int most_elements = 500000;         ///< of a mesh
     int repeats = 0;                    ///< 0: of the study
     bool quick = false;

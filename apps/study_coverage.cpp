@@ -1,5 +1,6 @@
 // tissuewarp study coverage: whether the intervals of error estimates hold.
 
+#include "apps/displacement_field.hpp"
 #include "apps/progress.hpp"
 #include "apps/study.hpp"
 #include "apps/update_device.hpp"
@@ -23,7 +24,8 @@ namespace {
 /// "bent:7-9" → Bent and "phantom:7-9", which phantom_seeds() reads.
 std::pair<study::Family, std::vector<std::string>> family_of(std::vector<std::string> problems) {
     using study::Family;
-    for (const auto& [name, family] : {std::pair{"bent:", Family::Bent}, std::pair{"organ:", Family::Labelled}})
+    for (const auto& [name, family] :
+         {std::pair{"bent:", Family::Bent}, std::pair{"organ:", Family::Labelled}, std::pair{"found:", Family::Found}})
         if (problems.size() == 1 && problems.front().starts_with(name)) {
             problems.front().replace(0, std::string(name).size(), "phantom:");
             return {family, std::move(problems)};
@@ -40,7 +42,7 @@ study::Evidence evidence_of(const std::string& name) {
     throw InvalidInput(fmt::format("--evidence '{}' is no kind of data; there are: {}", name, fmt::join(names, ", ")));
 }
 
-study::CoverageOptions plan_of(const StudyOptions& options) {
+study::CoverageOptions plan_of(const StudyOptions& options, Observer& observer) {
     study::CoverageOptions plan;
     plan.update = on_device(options.device);
     const auto [family, problems] = family_of(options.problems);
@@ -49,9 +51,12 @@ study::CoverageOptions plan_of(const StudyOptions& options) {
     if (options.quick) plan.last_seed = std::min(plan.last_seed, plan.first_seed + 1);
     if (!options.evidence.empty()) plan.evidence.clear();
     for (const std::string& name : options.evidence) plan.evidence.push_back(evidence_of(name));
-    if (family != study::Family::Labelled) return plan;
+    if (family != study::Family::Labelled && family != study::Family::Found) return plan;
     if (options.organs.empty()) throw InvalidInput("give --organs, the label map whose organs are bent");
     plan.phantom.organs = imaging::read_labels(options.organs);
+    if (family != study::Family::Found) return plan;
+    if (options.fields.empty()) throw InvalidInput("give --fields, the displacement fields that bend organs");
+    for (const std::string& field : options.fields) plan.phantom.fields.push_back(read_displacement(field, observer));
     return plan;
 }
 
@@ -69,8 +74,8 @@ std::vector<study::CoverageRow> measured(const StudyOptions& options, const stud
 
 void run_coverage_study(const StudyOptions& options) {
     if (options.output.empty()) throw InvalidInput("give --output, the folder that keeps each phantom's measurements");
-    const study::CoverageOptions plan = plan_of(options);
     ProgressLine progress(options.common.quiet);
+    const study::CoverageOptions plan = plan_of(options, progress);
     progress.begin("registering phantoms", 0.0, 1.0);
     const auto coverage = study::coverage_of(measured(options, plan, progress));
     progress.clear();

@@ -32,8 +32,8 @@ void require_threads(int count) {
     done.notify_all();
     for (std::thread& thread : made) thread.join();
     if (!problem.empty())
-        throw TooFewThreads("only " + std::to_string(made.size()) + " of " + std::to_string(count) +
-                            " threads can be made (" + problem +
+        throw TooFewThreads(std::to_string(count) + " threads are needed, " + std::to_string(made.size()) +
+                            " can be made (" + problem +
                             "); raise the limit on processes (ulimit -u) or give fewer --threads");
 }
 

@@ -2,6 +2,7 @@
 
 #include "core/errors.hpp"
 #include "study/detail/bent_map.hpp"
+#include "study/detail/field_map.hpp"
 #include "study/detail/label_organ.hpp"
 #include "study/detail/organ_shape.hpp"
 #include "study/detail/phantom_data.hpp"
@@ -15,6 +16,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -33,13 +35,19 @@ void require_between(const char* what, double value, double low, double high) {
                            std::to_string(low) + " and " + std::to_string(high));
 }
 
+bool takes_organs(Family family) {
+    return family == Family::Labelled || family == Family::Found;
+}
+
 void require_valid(const PhantomOptions& options) {
     require_between("the voxel in mm", options.voxel_mm, 0.5, 5);
     require_between("the deviation of boundaries in mm", options.boundary_deviation_mm, 0, 3);
     require_between("the deviation of points in mm", options.point_deviation_mm, 0.01, 5);
     require_between("the number of targets", options.targets, 1, 100000);
-    if (options.family == Family::Labelled && options.organs.voxels.empty())
+    if (takes_organs(options.family) && options.organs.voxels.empty())
         throw InvalidInput("phantom: give the label map whose organs are to be bent");
+    if (options.family == Family::Found && options.fields.empty())
+        throw InvalidInput("phantom: give the displacement fields that are to bend organs");
 }
 
 struct Motion {
@@ -150,6 +158,27 @@ Phantom solved_phantom(std::uint64_t seed, const PhantomOptions& options, Observ
     return phantom;
 }
 
+/// How tissue is bent before it is moved as a whole.
+struct Bend {
+    std::function<Vector3d(const Vector3d&)> forward, backward;
+    double motion_mm;  ///< at most
+};
+
+Bend random_bend(const detail::TrueTissue& tissue, double motion_mm, const PhantomOptions& options,
+                 detail::Random& random) {
+    const auto shared = [](const auto& map, double most_mm) {
+        return Bend{[map](const Vector3d& X) { return map->forward(X); },
+                    [map](const Vector3d& x) { return map->backward(x); }, most_mm};
+    };
+    if (options.family != Family::Found) {
+        const detail::BentMap map(tissue.centre, tissue.length, motion_mm, random);
+        return shared(std::make_shared<const detail::BentMap>(map), motion_mm);
+    }
+    const imaging::Volume& field = options.fields[std::size_t(random.index(int(options.fields.size())))];
+    const detail::FieldMap map(field, tissue, motion_mm, random);
+    return shared(std::make_shared<const detail::FieldMap>(map), map.motion_mm());
+}
+
 /// An organ that a smooth map bends, whatever gives its shape.
 Phantom bent_phantom(detail::TrueTissue tissue, imaging::Volume moving_labels, const std::string& kind,
                      std::uint64_t seed, const PhantomOptions& options, detail::Random& random) {
@@ -157,7 +186,7 @@ Phantom bent_phantom(detail::TrueTissue tissue, imaging::Volume moving_labels, c
     const double motion_mm = random.uniform(3, std::min(15.0, strain * tissue.length));
     const double seen_share = random.uniform(least_seen, most_seen);
     const int pairs = least_pairs + random.index(more_pairs);
-    const detail::BentMap bend(tissue.centre, tissue.length, motion_mm, random);
+    const Bend bend = random_bend(tissue, motion_mm, options, random);
     const Eigen::Isometry3d placement = random_motion(tissue.centre, bent_motion, random);
     tissue.forward = [=](const Vector3d& X) { return Vector3d(placement * bend.forward(X)); };
     tissue.backward = [=](const Vector3d& x) { return bend.backward(placement.inverse() * x); };
@@ -171,7 +200,7 @@ Phantom bent_phantom(detail::TrueTissue tissue, imaging::Volume moving_labels, c
     phantom.targets = detail::places(tissue, options.targets, target_depth_mm, random);
     char text[200];
     std::snprintf(text, sizeof text, "%s, %.0f mm; bent by up to %.1f mm; %.0f %% of the surface and %d places seen",
-                  kind.c_str(), tissue.length, motion_mm, 100 * seen_share, pairs);
+                  kind.c_str(), tissue.length, bend.motion_mm, 100 * seen_share, pairs);
     phantom.story = text;
     add_vessels_and_images(phantom, tissue, seed, options);
     return phantom;
@@ -188,7 +217,7 @@ Phantom drawn_phantom(std::uint64_t seed, const PhantomOptions& options, Observe
         tissue.reach = shape->reach();
         tissue.length = shape->length();
     };
-    if (options.family == Family::Labelled) {
+    if (takes_organs(options.family)) {
         constexpr double least_ml = 45;
         const auto organ =
             std::make_shared<const detail::LabelOrgan>(detail::random_label_organ(options.organs, least_ml, random));

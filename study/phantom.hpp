@@ -11,24 +11,27 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <vector>
 
 namespace tissuewarp::study {
 
 /// Where the truth comes from.
 enum class Family {
-    Solved,   ///< drawn organs; quadratic tetrahedra of tissue that the registration does not know, on a mesh of their
-              ///< own
-    Bent,     ///< drawn organs; a smooth map that conserves volume and solves no equation
-    Labelled  ///< organs of a real label map; such a map
+    Solved,    ///< drawn organs; quadratic tetrahedra of tissue that the registration does not know, on a mesh of their
+               ///< own
+    Bent,      ///< drawn organs; a smooth map that conserves volume and solves no equation
+    Labelled,  ///< organs of a real label map; such a map
+    Found      ///< organs of a real label map; a motion that another program found between images
 };
 
 struct PhantomOptions {
     Family family = Family::Solved;
-    imaging::Volume organs = {};         ///< label map whose organs are taken, where they are Labelled
-    double voxel_mm = 2;                 ///< of both label maps
-    double boundary_deviation_mm = 0.5;  ///< of the boundaries drawn in the intraoperative map, smooth over 10 mm
-    double point_deviation_mm = 0.7;     ///< of surface points and pairs, along each axis
-    int targets = 150;                   ///< places all over the organ
+    imaging::Volume organs = {};               ///< label map whose organs are taken, where they are Labelled or Found
+    std::vector<imaging::Volume> fields = {};  ///< displacements (float32, LPS mm), of which Found takes one
+    double voxel_mm = 2;                       ///< of both label maps
+    double boundary_deviation_mm = 0.5;        ///< of the boundaries drawn in the intraoperative map, smooth over 10 mm
+    double point_deviation_mm = 0.7;           ///< of surface points and pairs, along each axis
+    int targets = 150;                         ///< places all over the organ
 };
 
 struct Ball {

@@ -192,20 +192,23 @@ class Threads(PhantomTest):
         self.assertRegex(result.stderr, r"note: 1000 threads on \d+ processors; \d+ are used\n")
 
     def test_threads_that_cannot_be_made(self):
-        def limit():
+        def limit(processes):
             if os.getuid() == 0:
                 os.setgid(65534)
                 os.setuid(65534)
-            resource.setrlimit(resource.RLIMIT_NPROC, (2, 2))
+            resource.setrlimit(resource.RLIMIT_NPROC, (processes, processes))
 
         os.chmod(self.phantom.folder, 0o755)
-        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
-        result = subprocess.run([PROGRAM, *map(str, self.arguments())], capture_output=True, text=True, timeout=110,
-                                env=environment, preexec_fn=limit)
-        if result.returncode == 0:
-            self.skipTest("this machine does not limit threads")
-        self.assertEqual(result.returncode, 1)
-        self.assertRegex(result.stderr, r"only \d+ of \d+ threads can be made .*ulimit -u")
+        environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+        for processes in (1, 2, 3):
+            with self.subTest(processes=processes):
+                result = subprocess.run([PROGRAM, *map(str, self.arguments())], capture_output=True, text=True,
+                                        timeout=110, env=environment, preexec_fn=lambda: limit(processes))
+                if result.returncode == 0:
+                    self.skipTest("this machine does not limit threads")
+                self.assertEqual(result.returncode, 1)
+                self.assertRegex(result.stderr, r"^tissuewarp: \d+ threads are needed, \d+ can be made .*ulimit -u")
+
 
 
 if __name__ == "__main__":

@@ -173,6 +173,13 @@ class StudyOptions(PhantomTest):
         self.assert_refused(study(self.phantom.output, "liver", "--data", self.phantom.folder), INPUT, "phantom-liver",
                             "--data")
 
+    def test_organs_that_a_found_motion_bends_need_both(self):
+        found = ["study", "coverage", "--problems", "found:1", "--output", self.phantom.output]
+        self.assert_refused(run(*found), INPUT, "--organs")
+        labels = ["--organs", self.phantom.fixed_labels]
+        self.assert_refused(run(*found, *labels), INPUT, "--fields")
+        self.assert_refused(run(*found, *labels, "--fields", self.phantom.fixed_labels), INPUT, "1 components")
+
     def test_without_output(self):
         self.assert_refused(run("study", "accuracy-time", "--quick"), INPUT, "--output")
 

@@ -1,5 +1,6 @@
 /// Phantoms that a smooth map bends, their images and vessels, each against something simpler.
 #include "study/detail/bent_map.hpp"
+#include "study/detail/field_map.hpp"
 #include "study/detail/label_organ.hpp"
 #include "study/phantom.hpp"
 
@@ -72,6 +73,57 @@ TEST(LabelOrgan, IsTheLargestPieceOfALabelOfSomeSize) {
     EXPECT_THROW(static_cast<void>(detail::random_label_organ(labels, 100, random)), InvalidInput);
 }
 
+/// Displacements of up to 20 mm on a grid of 4 mm, which vary over some 60 mm and change volume.
+imaging::Volume waves() {
+    imaging::Volume field({{50, 45, 40}, Vector3d(-300, 10, 5), Vector3d(4, 4, 4)}, CV_32FC3);
+    auto* voxel = field.data<cv::Vec3f>();
+    for (int k = 0; k < 40; ++k)
+        for (int j = 0; j < 45; ++j)
+            for (int i = 0; i < 50; ++i, ++voxel)
+                *voxel = cv::Vec3f(float(20 * std::sin(0.4 * i)), float(15 * std::cos(0.3 * k + 0.2 * j)),
+                                   float(10 * std::sin(0.3 * i + 0.3 * k)));
+    return field;
+}
+
+void give_data_to(PhantomOptions& options) {
+    if (options.family == Family::Labelled || options.family == Family::Found) options.organs = two_balls();
+    if (options.family == Family::Found) options.fields = {waves()};
+}
+
+TEST(FieldMap, BendsTheTissueAndIsUndone) {
+    detail::TrueTissue tissue;
+    tissue.centre = Vector3d(500, -100, 20);
+    tissue.reach = 40;
+    tissue.outer_distance = [&](const Vector3d& X) { return (X - tissue.centre).norm() - 40; };
+    for (const double motion_mm : {5.0, 500.0}) {
+        detail::Random random(4);
+        const detail::FieldMap map(waves(), tissue, motion_mm, random);
+        double most_mm = 0;
+        for (int k = 0; k < 300; ++k) {
+            const Vector3d X = tissue.centre + 50 * random.uniform() * random.direction();
+            EXPECT_LT((map.backward(map.forward(X)) - X).norm(), 1e-3);
+            most_mm = std::max(most_mm, (map.forward(X) - X).norm());
+            const Vector3d step = 4 * random.direction();
+            EXPECT_LT((map.forward(X + step) - map.forward(X) - step).norm(), 4 * 0.8);
+        }
+        EXPECT_LE(map.motion_mm(), motion_mm);
+        EXPECT_GT(map.motion_mm(), 4.9);
+        EXPECT_LT(map.motion_mm(), 60);  // the strain allows no more
+        EXPECT_LT(most_mm, 1.05 * map.motion_mm());
+        EXPECT_GT(most_mm, 0.6 * map.motion_mm());
+    }
+}
+
+TEST(FieldMap, AFieldThatMovesAllAlikeIsRefused) {
+    imaging::Volume field = waves();
+    field.voxels = cv::Scalar(3, 4, 5);
+    detail::TrueTissue tissue;
+    tissue.reach = 20;
+    tissue.outer_distance = [](const Vector3d& X) { return X.norm() - 20; };
+    detail::Random random(1);
+    EXPECT_THROW(detail::FieldMap(field, tissue, 5, random), InvalidInput);
+}
+
 /// Mean difference of grey values between where targets were and where they went, and of the same pairs interchanged.
 std::pair<double, double> grey_differences(const Phantom& phantom, const PhantomImages& images) {
     const imaging::LinearSampler before(images.moving), after(images.fixed);
@@ -91,7 +143,7 @@ class PhantomsOf : public testing::TestWithParam<Family> {};
 TEST_P(PhantomsOf, ImagesFollowTheTissue) {
     PhantomOptions options;
     options.family = GetParam();
-    if (options.family == Family::Labelled) options.organs = two_balls();
+    give_data_to(options);
     const Phantom phantom = random_phantom(8, options);
     const PhantomImages images = phantom.images();
     const auto [same, other] = grey_differences(phantom, images);
@@ -116,7 +168,7 @@ TEST_P(PhantomsOf, VesselsAndLabelsFollowTheTissue) {
     PhantomOptions options;
     options.family = GetParam();
     options.boundary_deviation_mm = 0;
-    if (options.family == Family::Labelled) options.organs = two_balls();
+    give_data_to(options);
     const Phantom phantom = random_phantom(8, options);
     ASSERT_GE(phantom.curves.moving.size(), 3u);
     EXPECT_GT(phantom.curves.fixed.cols(), 40);
@@ -134,7 +186,8 @@ TEST_P(PhantomsOf, VesselsAndLabelsFollowTheTissue) {
     EXPECT_GT(phantom.surface.points.cols(), 100);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, PhantomsOf, testing::Values(Family::Solved, Family::Bent, Family::Labelled));
+INSTANTIATE_TEST_SUITE_P(All, PhantomsOf,
+                         testing::Values(Family::Solved, Family::Bent, Family::Labelled, Family::Found));
 
 }  // namespace
 }  // namespace tissuewarp::study
