@@ -72,7 +72,7 @@ void print_image(const fs::path& path, const InfoOptions& options) {
     const imaging::ReadResult image = imaging::read_volume_with_notes(path);
     const imaging::Volume& volume = image.volume;
     const imaging::Geometry& g = volume.geometry;
-    fmt::print("image of {} x {} x {} voxels, {}{}\n", g.size[0], g.size[1], g.size[2],
+    fmt::print("{}: image of {} x {} x {} voxels, {}{}\n", path.string(), g.size[0], g.size[1], g.size[2],
                type_name(volume.voxels.depth()),
                volume.channels() == 1 ? "" : fmt::format(", {} components", volume.channels()));
     fmt::print("  spacing (mm)     {}\n  origin (mm, LPS) {}\n", point_text(g.spacing), point_text(g.origin));
@@ -98,6 +98,12 @@ void print_mesh(const meshing::TetMesh& mesh) {
         fmt::print("  label {:<11}{:.1f} mm3\n", label, volume);
 }
 
+void print_mesh_file(const fs::path& path) {
+    const meshing::TetMesh mesh = meshing::read_vtu(path);
+    fmt::print("{}: ", path.string());
+    print_mesh(mesh);
+}
+
 void print_surface(const fs::path& path) {
     ProgressLine notes(true);
     meshing::Surface surface;
@@ -105,8 +111,8 @@ void print_surface(const fs::path& path) {
         surface.mesh.nodes = registration::read_points(path, notes);
     else
         surface = meshing::read_surface(path, notes);
-    fmt::print("{} points, {} triangles{}\n", surface.mesh.node_count(), surface.mesh.triangle_count(),
-               surface.normals.cols() > 0 ? ", with normals" : "");
+    fmt::print("{}: {} points, {} triangles{}\n", path.string(), surface.mesh.node_count(),
+               surface.mesh.triangle_count(), surface.normals.cols() > 0 ? ", with normals" : "");
     if (surface.mesh.node_count() == 0) return;
     fmt::print("  box (mm, LPS)    {} to {}\n", point_text(surface.mesh.nodes.rowwise().minCoeff()),
                point_text(surface.mesh.nodes.rowwise().maxCoeff()));
@@ -121,7 +127,7 @@ void print_surface(const fs::path& path) {
 
 void print_record(const fs::path& path) {
     const registration::Record record = registration::read_record(path);
-    fmt::print("record of a registration, format {}\n", record.format_version);
+    fmt::print("{}: record of a registration, format {}\n", path.string(), record.format_version);
     print_mesh(record.deformation.mesh);
     const Eigen::VectorXd moved = record.deformation.displacement.colwise().norm();
     fmt::print("  displacement     up to {:.3f} mm, mean {:.3f} mm, before the rigid placement\n", moved.maxCoeff(),
@@ -141,12 +147,11 @@ void print_devices() {
 void print_file(const fs::path& path, const InfoOptions& options) {
     std::error_code failure;
     if (!fs::exists(path, failure)) throw IoError("cannot read '" + path.string() + "': no such file");
-    fmt::print("{}: ", path.string());
     switch (file_kind(path)) {
         case FileKind::Image:
             return print_image(path, options);
         case FileKind::Mesh:
-            return print_mesh(meshing::read_vtu(path));
+            return print_mesh_file(path);
         case FileKind::Points:
         case FileKind::Surface:
             return print_surface(path);

@@ -166,6 +166,13 @@ class SmallVerbs(PhantomTest):
             count = numpy.count_nonzero(self.phantom.moving_labels_array == label)
             self.assertRegex(result.stdout, rf"\n  {label} +{count} ")
 
+    def test_info_says_nothing_of_a_file_that_it_cannot_read(self):
+        path = self.phantom.folder / "damaged.nii.gz"
+        path.write_bytes(b"garbage")
+        result = run("info", path)
+        self.assertEqual(result.stdout, "")
+        self.assertRegex(result.stderr, r"^tissuewarp info: cannot read '.*damaged\.nii\.gz'")
+
     def test_info_of_an_unknown_kind(self):
         path = self.phantom.folder / "a.docx"
         path.write_text("")

@@ -207,7 +207,7 @@ class Threads(PhantomTest):
                 if result.returncode == 0:
                     self.skipTest("this machine does not limit threads")
                 self.assertEqual(result.returncode, 1)
-                self.assertRegex(result.stderr, r"^tissuewarp: \d+ threads are needed, \d+ can be made .*ulimit -u")
+                self.assertRegex(result.stderr, r"^tissuewarp evaluate: \d+ threads are needed, \d+ can be made .*ulimit -u")
 
 
 
