@@ -123,7 +123,7 @@ double volumetric_of(const NeoHookeanLnJ& law) {
     return law.lame_lambda;
 }
 double volumetric_of(const NeoHookeanStable& law) {
-    return law.lame_lambda + 5 * law.shear_modulus / 6;
+    return law.lame_lambda + law.shear_modulus / 2;  // λ' − μ'/4
 }
 
 template <class Law>

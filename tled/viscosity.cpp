@@ -21,9 +21,9 @@ struct ScaledShear {
         return law;
     }
     Material operator()(NeoHookeanStable law) const {
-        const double volumetric = volumetric_modulus(law);  // λ + 5μ/6
+        const double volumetric = volumetric_modulus(law);  // λ + μ/2
         law.shear_modulus *= factor;
-        law.lame_lambda = volumetric - 5 * law.shear_modulus / 6;
+        law.lame_lambda = volumetric - law.shear_modulus / 2;
         return law;
     }
     Material operator()(Polynomial law) const {

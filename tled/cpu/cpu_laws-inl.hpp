@@ -113,8 +113,9 @@ template <>
 struct Response<NeoHookeanStable> : QuadraticVolume {
     static constexpr bool admits_inversion = true, has_fibre = false;
 
-    /// P = μ' (1 − 1/(tr C + 1)) F − ¾ μ' cof F; with tr C + 1 = 4 + x the bracket of F is ¾ + x/(4 (4 + x)), so
-    /// P = μ' [¾ (F − cof F) + x/(4 (4 + x)) F]. As a product with E it would divide by J, which may be 0 here.
+    /// P = μ' (1 − 1/(tr C + 1)) F + μ' (¼ (J − 1) − ¾) cof F; with tr C + 1 = 4 + x the bracket of F is ¾ + x/(4 (4 +
+    /// x)), so P = μ' [¾ (F − cof F) + x/(4 (4 + x)) F + ¼ (J − 1) cof F]. As a product with E it would divide by J,
+    /// which may be 0 here.
     template <class D>
     static HWY_INLINE void shear_stress(D d, const Strain<D>& strain, const Tissue<D>& tissue, Vec<D> volume,
                                         Vec<D> (&P)[3][3]) {
@@ -123,10 +124,13 @@ struct Response<NeoHookeanStable> : QuadraticVolume {
         const auto three_quarters = mu * hn::Set(d, Scalar<D>(0.75));
         const auto four = hn::Set(d, 4);
         const auto growth = mu * excess / (four * (four + excess));
+        const auto quarter_change = mu * hn::Set(d, Scalar<D>(0.25)) * strain.change;
         for (int i = 0; i < 3; ++i)
             for (int j = 0; j < 3; ++j) {
                 const auto F = i == j ? strain.H[i][j] + one : strain.H[i][j];
-                P[i][j] = hn::MulAdd(three_quarters, strain.H[i][j] - strain.K[i][j], growth * F);
+                const auto cofactor = i == j ? strain.K[i][j] + one : strain.K[i][j];
+                P[i][j] = hn::MulAdd(three_quarters, strain.H[i][j] - strain.K[i][j],
+                                     hn::MulAdd(growth, F, quarter_change * cofactor));
             }
     }
 };

@@ -26,22 +26,25 @@ Matrix3d shear_derivative_of(const NeoHookeanLnJ& law, const Matrix3d& F, const 
     return law.shear_modulus * (dF + G * dF.transpose() * G);
 }
 
-// Smith, de Goes, Kim (2018). λ'/2 (J − α)² = λ'/2 (J − 1)² − ¾ μ' (J − 1) + constant, so the volumetric part is
-// λ' (J − 1)²/2 and Ψ = μ'/2 (tr C − 3) − μ'/2 ln((tr C + 1)/4) − ¾ μ' (J − 1).
+// Smith, de Goes, Kim (2018). λ'/2 (J − α)² = λ'/2 (J − 1)² − ¾ μ' (J − 1) + constant. All of λ' in the volumetric part
+// would leave Ψ = −0.56 μ' e² for a change e of all lengths, and where that part is averaged, volumes that alternate
+// from element to element would have no resistance. So a μ'/4 of λ' stays here, Ψ(e) = 0.56 μ' e², and the
+// volumetric part is (λ' − μ'/4)(J − 1)²/2.
 double shear_energy_of(const NeoHookeanStable& law, const Matrix3d& F) {
-    const double mu = 4.0 / 3.0 * law.shear_modulus, trace = F.squaredNorm();
-    return 0.5 * mu * (trace - 3.0 - std::log((trace + 1.0) / 4.0)) - 0.75 * mu * (F.determinant() - 1.0);
+    const double mu = 4.0 / 3.0 * law.shear_modulus, trace = F.squaredNorm(), change = F.determinant() - 1.0;
+    return 0.5 * mu * (trace - 3.0 - std::log((trace + 1.0) / 4.0)) + mu * change * (0.125 * change - 0.75);
 }
 
 Matrix3d shear_stress_of(const NeoHookeanStable& law, const Matrix3d& F) {
     const double mu = 4.0 / 3.0 * law.shear_modulus;
-    return mu * (1.0 - 1.0 / (F.squaredNorm() + 1.0)) * F - 0.75 * mu * cofactor(F);
+    return mu * (1.0 - 1.0 / (F.squaredNorm() + 1.0)) * F + mu * (0.25 * (F.determinant() - 1.0) - 0.75) * cofactor(F);
 }
 
 Matrix3d shear_derivative_of(const NeoHookeanStable& law, const Matrix3d& F, const Matrix3d& dF) {
     const double mu = 4.0 / 3.0 * law.shear_modulus, denominator = F.squaredNorm() + 1.0;
-    return mu * ((1.0 - 1.0 / denominator) * dF + 2.0 * contract(F, dF) / (denominator * denominator) * F) -
-           0.75 * mu * cofactor_derivative(F, dF);
+    return mu * ((1.0 - 1.0 / denominator) * dF + 2.0 * contract(F, dF) / (denominator * denominator) * F) +
+           mu * (0.25 * (F.determinant() - 1.0) - 0.75) * cofactor_derivative(F, dF) +
+           0.25 * mu * contract(cofactor(F), dF) * cofactor(F);
 }
 
 }  // namespace tissuewarp::tled::detail

@@ -150,10 +150,8 @@ void RestStiffness::Impl::factorise() const {
     auto numbers = std::make_unique<detail::CholmodFactor>(analysis->factor->analysis());
     if (!numbers->factorize(lower))
         throw InvalidInput(
-            "the stiffness at rest is not positive definite: a node without tetrahedra; tissue that the springs and "
-            "prescribed displacements hold too weakly (hold it at more nodes or with stiffer springs); or "
-            "neo-hookean-stable tissue that is nearly incompressible, with averaged pressure (take another law, or "
-            "linear tetrahedra)");
+            "the stiffness at rest is not positive definite: a node without tetrahedra, or tissue that the springs and "
+            "prescribed displacements hold too weakly (hold it at more nodes or with stiffer springs)");
     made = std::move(numbers);
 }
 
