@@ -54,6 +54,13 @@ TEST_F(PointTables, SeparatorsDecimalMarksAndLineEndsAreTold) {
     EXPECT_THAT(noted("x;y;z\n-5,5;49,03;12\n"), HasSubstr("a.csv': its numbers have decimal commas"));
 }
 
+/// A field of quotation marks alone once took a time with the square of its length.
+TEST_F(PointTables, AnyNumberOfQuotationMarksIsReadInTime) {
+    const PointTable table = read("x,y,z,name\n-5.5,49.03,12,\"" + std::string(8'000'000, '"') + "\"\n");
+    ASSERT_EQ(table.points.cols(), 1);
+    EXPECT_EQ(table.points.col(0), first);
+}
+
 TEST_F(PointTables, TheHeaderIsObeyed) {
     for (const std::string text : {
              "z,y,x\n12,49.03,-5.5\n3,-19,25\n",
