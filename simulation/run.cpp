@@ -142,9 +142,9 @@ private:
                 unilateral ? tled::equilibrium_in_contact(engine, stage.rest, conditions, {.equilibrium = options},
                                                           start, part)
                                  .equilibrium
-                           : tled::equilibrium_along_load(engine, stiffness, conditions,
-                                                          {.equilibrium = options, .first_parts = solve_.load_steps},
-                                                          start, part);
+                           : tled::equilibrium_along_load_or_motion(
+                                 engine, stiffness, conditions,
+                                 {.equilibrium = options, .first_parts = solve_.load_steps}, start, part);
             state_.displacement = found.displacement;
             summary_.steps += found.force_evaluations;
             summary_.estimated_error_mm = std::max(summary_.estimated_error_mm, found.estimated_error_mm);

@@ -1,6 +1,7 @@
 #include "tled/contact.hpp"
 
 #include "core/errors.hpp"
+#include "tled/damped_motion.hpp"
 #include "tled/load_path.hpp"
 
 #include <algorithm>
@@ -62,7 +63,19 @@ public:
 
     ContactResult run(const Matrix3Xd* start) {
         Matrix3Xd u = start ? *start : Matrix3Xd::Zero(3, rest_.node_count);
-        begin(u);
+        begin(u, 0);
+        if (!start) approach(u);
+        return rounds(u, start);
+    }
+
+    /// From tissue that lies on the bodies already.
+    ContactResult run_resting(Matrix3Xd u) {
+        begin(u, 0.1);
+        return rounds(u, &u);
+    }
+
+private:
+    ContactResult rounds(Matrix3Xd& u, const Matrix3Xd* start) {
         for (result_.rounds = 1;; ++result_.rounds) {
             solve(u, result_.rounds == 1 ? start : &u);
             const bool changed = follow(u);
@@ -74,7 +87,6 @@ public:
         return std::move(result_);
     }
 
-private:
     [[nodiscard]] Gap gap(const Candidate& candidate, std::size_t obstacle, const Matrix3Xd& u) const {
         const Distance d = distance_to(contact_.obstacles[obstacle], candidate.X + u.col(candidate.node));
         const double steepness = d.gradient.norm();
@@ -82,13 +94,61 @@ private:
         return {d.value / steepness, d.gradient / steepness};
     }
 
+    /// Which nodes will touch, by linear elasticity, and where tissue will about be: from rest it falls until those
+    /// that touch carry it. Without them tissue that only soft springs hold sinks through the bodies, as far as no
+    /// equilibrium of theirs leads back.
+    void approach(Matrix3Xd& u) {
+        constexpr int most_stops = 20;
+        for (int stop = 0; stop < most_stops; ++stop) {
+            const NodalConditions conditions = with_springs(u);
+            const Matrix3Xd way = RestStiffness(rest_, conditions, *without_springs_).linear_solution(conditions) - u;
+            const double part = part_until_deep(u, way);
+            u += part * way;
+            follow_bodies(u);
+            if (part == 1) return;
+        }
+    }
+
+    /// The part of the way after which a node that did not touch is half an edge deep.
+    [[nodiscard]] double part_until_deep(const Matrix3Xd& u, const Matrix3Xd& way) const {
+        const double deep = std::cbrt(rest_.volume.mean());
+        const auto is_deep = [&](double part) {
+            const Matrix3Xd there = u + part * way;
+            for (std::size_t i = 0; i < candidates_.size(); ++i)
+                if (const auto obstacle = deepest_obstacle(candidates_[i], there);
+                    obstacle && !touches_[i] && gap(candidates_[i], *obstacle, there).distance < -deep)
+                    return true;
+            return false;
+        };
+        // Sampled densely, since far on its way tissue may have left what is known of a body, or the body itself.
+        constexpr double most_samples = 1024;
+        constexpr int halvings = 10;
+        const double samples = std::clamp(std::ceil(way.colwise().norm().maxCoeff() / deep), 1.0, most_samples);
+        double shallow = 0, part = 0;
+        for (double k = 1; !is_deep(part = k / samples); ++k) {
+            if (k >= samples) return 1;
+            shallow = part;
+        }
+        for (int halving = 0; halving < halvings; ++halving) {
+            const double middle = 0.5 * (shallow + part);
+            (is_deep(middle) ? part : shallow) = middle;
+        }
+        return part;
+    }
+
     /// From `start`, or from rest; by way of smaller loads where all is too much at once.
     void solve(Matrix3Xd& u, const Matrix3Xd* start) {
         const NodalConditions conditions = with_springs(u);
         const RestStiffness stiffness(rest_, conditions, *without_springs_);
         const EquilibriumResult& before = result_.equilibrium;
-        EquilibriumResult found = equilibrium_along_load(engine_, stiffness, conditions,
-                                                         {.equilibrium = options_.equilibrium}, start, observer_);
+        EquilibriumOptions options = options_.equilibrium;
+        if (before.method == EquilibriumMethod::Newton) {  // others failed
+            options.method = before.method;
+            // A start within the tolerance is taken as it is, and the springs' ends would move on without the tissue.
+            options.tolerance_mm = std::min(options.tolerance_mm, 0.5 * options_.penetration_mm);
+        }
+        EquilibriumResult found =
+            equilibrium_along_load(engine_, stiffness, conditions, {.equilibrium = options}, start, observer_);
         found.force_evaluations += before.force_evaluations;
         found.lifted_residuals += before.lifted_residuals;
         u = found.displacement;
@@ -134,8 +194,9 @@ private:
         return result;
     }
 
-    void begin(const Matrix3Xd& u) {
-        follow_bodies(u);
+    /// Nodes within `near` (mm) of a body touch it.
+    void begin(const Matrix3Xd& u, double near) {
+        follow_bodies(u, near);
         for (std::size_t p = 0; p < pairs_.size(); ++p) pairs_[p].closed = overlap(stated_.parting[p], u) >= 0;
         decide_pairs();
     }
@@ -172,7 +233,7 @@ private:
     }
 
     /// Moves the ends of the springs on, lets go and takes hold; whether the set of touching nodes has changed.
-    bool follow_bodies(const Matrix3Xd& u) {
+    bool follow_bodies(const Matrix3Xd& u, double near = 0) {
         bool changed = false;
         for (std::size_t i = 0; i < candidates_.size(); ++i) {
             std::optional<Touch>& touch = touches_[i];
@@ -181,7 +242,7 @@ private:
                 if (touch->push > 0) continue;
                 touch.reset();
                 changed = true;
-            } else if (const std::optional<std::size_t> entered = deepest_obstacle(candidates_[i], u)) {
+            } else if (const std::optional<std::size_t> entered = deepest_obstacle(candidates_[i], u, near)) {
                 touch = Touch{*entered, 0.0};
                 changed = true;
             }
@@ -189,9 +250,10 @@ private:
         return changed;
     }
 
-    [[nodiscard]] std::optional<std::size_t> deepest_obstacle(const Candidate& candidate, const Matrix3Xd& u) const {
+    [[nodiscard]] std::optional<std::size_t> deepest_obstacle(const Candidate& candidate, const Matrix3Xd& u,
+                                                              double near = 0) const {
         std::optional<std::size_t> found;
-        double deepest = 0;
+        double deepest = near;
         for (std::size_t o = 0; o < contact_.obstacles.size(); ++o)
             if (const double distance = gap(candidate, o, u).distance; distance < deepest) {
                 deepest = distance;
@@ -269,7 +331,23 @@ void require_usable(const NodalConditions& conditions, const ContactOptions& opt
 ContactResult equilibrium_in_contact(Engine& engine, const RestState& rest, const NodalConditions& conditions,
                                      const ContactOptions& options, const Eigen::Matrix3Xd* start, Observer& observer) {
     require_usable(conditions, options);
-    return Rounds(engine, rest, conditions, options, observer).run(start);
+    try {
+        return Rounds(engine, rest, conditions, options, observer).run(start);
+    } catch (const SolverFailure& failure) {
+        if (!rest.viscosity.empty()) throw;
+        observer.note(std::string("contact by damped motion first: ") + failure.what());
+    }
+    const Matrix3Xd from = start ? *start : Matrix3Xd::Zero(3, rest.node_count);
+    const auto loads = [&](double part) { return start ? conditions : scaled(conditions, part); };
+    try {
+        return Rounds(engine, rest, conditions, options, observer)
+            .run_resting(displacement_after_motion(engine, rest, loads, from, observer));
+    } catch (const SolverFailure& failure) {
+        throw SolverFailure(std::string("no equilibrium in contact, also not from where damped motion leads (") +
+                            failure.what() +
+                            "); tissue that almost nothing keeps from rolling or sliding on a body needs more that "
+                            "holds it, or dynamics");
+    }
 }
 
 }  // namespace tissuewarp::tled

@@ -1,7 +1,10 @@
 #include "tled/load_path.hpp"
 
+#include "tled/damped_motion.hpp"
+
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <optional>
 #include <string>
 #include <utility>
@@ -28,6 +31,18 @@ public:
           now_{0, origin_} {}
 
     EquilibriumResult run() {
+        if (!follow()) give_up();
+        return std::move(result_);
+    }
+
+    EquilibriumResult run_with_motion() {
+        if (!follow() && !found_after_motion()) give_up();
+        return std::move(result_);
+    }
+
+private:
+    /// Whether the path leads to the whole load.
+    bool follow() {
         double part = 1.0 / options_.first_parts;
         while (now_.load < 1) {
             const double load = now_.load + part > 1 - 1e-9 ? 1 : now_.load + part;
@@ -35,13 +50,12 @@ public:
                 part *= 1.5;
             } else {
                 part = std::min(0.5 * (load - now_.load), moderate_part());
-                if (part < options_.smallest_part) give_up();
+                if (part < options_.smallest_part || !leads_on()) return false;
             }
         }
-        return std::move(result_);
+        return true;
     }
 
-private:
     static constexpr double most_of_moderate = 4;
 
     struct Point {
@@ -55,6 +69,11 @@ private:
         const Matrix3Xd origin = conditions_.constrained.select(origin_, Matrix3Xd::Zero(3, origin_.cols()));
         partial.imposed = origin + load * (conditions_.imposed - origin);
         return partial;
+    }
+
+    /// Whether a part of the load is another problem than all of it.
+    [[nodiscard]] bool leads_on() const {
+        return from_rest_ || (conditions_.constrained.array() && conditions_.imposed.array() != origin_.array()).any();
     }
 
     /// Of the load, what moves tissue by a moderate part of its size if it were linear; 1 where the size is not known.
@@ -89,10 +108,7 @@ private:
         const Matrix3Xd* start = first ? nullptr : &prediction;
         if (found_equilibrium(load, partial, options, start)) return true;
         // From a linear start far beyond the tissue's size Newton's method takes longer to fail than a path to arrive.
-        const bool decides = options_.equilibrium.last == EquilibriumMethod::Newton &&
-                             options_.equilibrium.method == EquilibriumMethod::Automatic &&
-                             options_.equilibrium.rest != nullptr && !conditions_.effects.contact;
-        if (!first || !decides || load > most_of_moderate * moderate_part()) return false;
+        if (!first || !decides() || load > most_of_moderate * moderate_part()) return false;
         options.method = EquilibriumMethod::Newton;
         return found_equilibrium(load, partial, options, start);
     }
@@ -110,6 +126,48 @@ private:
             cause_ = failure.what();
             return false;
         }
+    }
+
+    /// Beyond a limit point or a buckling load equilibria lie elsewhere, where only motion leads.
+    bool found_after_motion() {
+        const RestState* rest = options_.equilibrium.rest;
+        if (!decides() || !rest->viscosity.empty()) return false;
+        const double reached = now_.load;
+        const std::string cause = cause_;  // rather than that of the motion
+        observer_.note("no equilibrium near " + percent(reached) + " of the load: damped motion leads on from there");
+        if (!leads_to_equilibrium(*rest, reached)) {
+            cause_ = cause;
+            return false;
+        }
+        observer_.note("at " + percent(reached) +
+                       " of the load the tissue buckles, snaps through or topples: the equilibrium is the one to which "
+                       "damped motion leads from there");
+        return true;
+    }
+
+    bool leads_to_equilibrium(const RestState& rest, double reached) {
+        EquilibriumOptions options = options_.equilibrium;
+        options.method = EquilibriumMethod::Newton;
+        const auto loads = [&](double part) { return at(reached + part * (1 - reached)); };
+        try {
+            const Matrix3Xd start = displacement_after_motion(engine_, rest, loads, now_.displacement, observer_);
+            return found_equilibrium(1, conditions_, options, &start);
+        } catch (const SolverFailure&) {
+            return false;
+        }
+    }
+
+    static std::string percent(double load) {
+        char digits[16];
+        std::snprintf(digits, sizeof digits, "%.1f %%", 100 * load);
+        return digits;
+    }
+
+    /// Whether Newton's method may be taken as the last resort.
+    [[nodiscard]] bool decides() const {
+        const EquilibriumOptions& options = options_.equilibrium;
+        return options.last == EquilibriumMethod::Newton && options.method == EquilibriumMethod::Automatic &&
+               options.rest != nullptr && !conditions_.effects.contact;
     }
 
     [[noreturn]] void give_up() {
@@ -133,14 +191,25 @@ private:
     EquilibriumResult result_;
 };
 
+void require_usable(const LoadPathOptions& options) {
+    if (options.first_parts < 1 || !(options.smallest_part > 0))
+        throw InvalidInput("a load path needs at least one part and a positive smallest part");
+}
+
 }  // namespace
 
 EquilibriumResult equilibrium_along_load(Engine& engine, const RestStiffness& stiffness,
                                          const NodalConditions& conditions, const LoadPathOptions& options,
                                          const Matrix3Xd* start, Observer& observer) {
-    if (options.first_parts < 1 || !(options.smallest_part > 0))
-        throw InvalidInput("a load path needs at least one part and a positive smallest part");
+    require_usable(options);
     return LoadPath(engine, stiffness, conditions, options, start, observer).run();
+}
+
+EquilibriumResult equilibrium_along_load_or_motion(Engine& engine, const RestStiffness& stiffness,
+                                                   const NodalConditions& conditions, const LoadPathOptions& options,
+                                                   const Matrix3Xd* start, Observer& observer) {
+    require_usable(options);
+    return LoadPath(engine, stiffness, conditions, options, start, observer).run_with_motion();
 }
 
 }  // namespace tissuewarp::tled

@@ -251,6 +251,22 @@ TEST(Simulate, BodyInContactStopsTheTissue) {
     }
 }
 
+TEST(Simulate, TissueThatOnlySoftSpringsHoldRestsOnAPlane) {
+    // The springs alone would let it sink by ten metres: it found no way back from there.
+    Scene scene = cube(8);
+    scene.fixed.clear();
+    keep_upright(scene);
+    scene.springs.push_back({"everything", 0.0, 1.0, Springs::Along::AllDirections});
+    scene.gravity = Gravity{std::nullopt, {0, 0, -1}, 9810.0, {}};
+    Contact table;
+    table.body = HalfSpace{{0, 0, -3}, {0, 0, 1}};
+    scene.contacts.push_back(table);
+    const BuiltScene built = build(scene);
+    const Result result = run(built);
+    EXPECT_NEAR(mean_on(built, "below", result.displacement), -3, 0.01);
+    EXPECT_NEAR(mean_on(built, "above", result.displacement), -3 + sag_of_top(9810.0), 0.07);
+}
+
 TEST(Simulate, LayersSlideOnOneAnother) {
     // Joined, the upper layer would drag the lower one along; apart, each keeps its shape.
     Scene scene = cube();
@@ -305,6 +321,30 @@ TEST(Simulate, RefusesFrictionInEquilibrium) {
     table.friction = 0.3;
     scene.contacts.push_back(table);
     EXPECT_THROW(simulate(build(scene)), InvalidInput);
+}
+
+struct Listening : Observer {
+    std::string notes;
+    void note(std::string_view text) override { notes.append(text) += "\n"; }
+};
+
+TEST(Simulate, AColumnThatBucklesUnderItsWeightIsFollowedToWhereItHangs) {
+    // Held at its foot it stands up to (7.84 E I/(ρ g A))^⅓ = 51 mm (Greenhill 1881), and is 90 mm high.
+    Scene scene;
+    scene.geometry = BoxGeometry{Eigen::Vector3d::Zero(), {20, 24, 90}, {3, 4, 12}};
+    scene.tissues[1].material = tled::neo_hookean_lnj(5.0, 0.3);
+    scene.sets["foot"].side = Side{2, false, 0.0};
+    scene.fixed.push_back({"foot", {true, true, true}});
+    scene.gravity = Gravity{std::nullopt, {0, 0, -1}, 9810.0, {}};
+    scene.solve.device = Device::Cpu;
+    const BuiltScene built = build(scene);
+    Listening observer;
+    Matrix3Xd u;
+    const RunSummary summary = simulate(
+        built, [&](const Frame& frame) { u = frame.displacement; }, observer);
+    EXPECT_LE(summary.estimated_error_mm, scene.solve.tolerance_mm);
+    EXPECT_LT(u.row(2).minCoeff(), -100) << "its head hangs below its foot";
+    EXPECT_NE(observer.notes.find("buckles"), std::string::npos) << observer.notes;
 }
 
 struct Cancelling : Observer {

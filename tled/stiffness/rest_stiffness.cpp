@@ -88,6 +88,7 @@ struct RestStiffness::Impl {
         conditions = present;
         free = detail::FreeDegrees(present.constrained);
     }
+    [[nodiscard]] bool factorises() const;
     void factorise() const;
     [[nodiscard]] const detail::CholmodFactor& factor() const;
     [[nodiscard]] detail::BlockRows free_rows(const NodalConditions& springs) const;
@@ -144,15 +145,21 @@ void RestStiffness::Impl::analyse(const std::function<Eigen::SparseMatrix<double
                    [&] { analysis->factor = std::make_unique<const detail::CholmodFactor>(lower(), free.nodes()); });
 }
 
-void RestStiffness::Impl::factorise() const {
+/// Makes the factor; false where the stiffness is not positive definite.
+bool RestStiffness::Impl::factorises() const {
     const Eigen::SparseMatrix<double> lower = lower_triangle();
     analyse([&] { return lower; });
     auto numbers = std::make_unique<detail::CholmodFactor>(analysis->factor->analysis());
-    if (!numbers->factorize(lower))
+    if (!numbers->factorize(lower)) return false;
+    made = std::move(numbers);
+    return true;
+}
+
+void RestStiffness::Impl::factorise() const {
+    if (made == nullptr && !factorises())
         throw InvalidInput(
             "the stiffness at rest is not positive definite: a node without tetrahedra, or tissue that the springs and "
             "prescribed displacements hold too weakly (hold it at more nodes or with stiffer springs)");
-    made = std::move(numbers);
 }
 
 /// Precondition: something is free.
@@ -234,6 +241,8 @@ RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& condi
     impl_->take(std::move(metric));
     impl_->position = rest.position;
     impl_->take(conditions);
+    if (impl_->free.count() > 0 && !impl_->factorises())
+        throw SolverFailure("the stiffness of a far state cannot be factorised: apply the load in parts");
 }
 
 RestStiffness::RestStiffness(const RestState& rest, const NodalConditions& conditions, const RestStiffness& other)

@@ -20,8 +20,8 @@ class RestStiffness {
 public:
     RestStiffness(const RestState& rest, const NodalConditions& conditions);
     /// The same with the pressure part V_a M_a U''(J_a) ∇J_a ∇J_aᵀ taken at `displacement` (3 × N, mm): a metric near
-    /// that state, always positive definite, for tissue of which almost only the volume is stiff. Throws SolverFailure
-    /// where det F ≤ 0.
+    /// that state, always positive definite, for tissue of which almost only the volume is stiff; factorised at once.
+    /// Throws SolverFailure where det F ≤ 0 or the state is too far for the factor's digits.
     RestStiffness(const RestState& rest, const NodalConditions& conditions, const Eigen::Matrix3Xd& displacement);
     /// The same tissue, constraints and surface effects as `other` under other springs: K₀ and the analysis of its
     /// pattern are taken over, only the numbers are factorised again. Throws InvalidInput for other constraints.

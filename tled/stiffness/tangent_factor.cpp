@@ -10,7 +10,7 @@ using Eigen::Matrix3Xd;
 
 namespace {
 
-constexpr double first_shift = 1e-3, shift_growth = 4, last_shift = 1e3;  // of the diagonal
+constexpr double first_shift = 1e-6, shift_growth = 10, last_shift = 1e3;  // of the diagonal
 
 }  // namespace
 
