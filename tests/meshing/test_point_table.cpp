@@ -179,6 +179,13 @@ TEST_F(PointTables, SurfacesAreTurnedFromTheFrameThatTheyName) {
         "endfacet\nendsolid\n";
     EXPECT_EQ(read_surface(file("a.stl", "solid 3D Slicer output. SPACE=RAS\n" + solid)).mesh.nodes.col(1),
               Eigen::Vector3d(-1, -2, 3));
+    const std::string binary = std::string(80, 'x') + std::string("\1\0\0\0", 4) + std::string(50 + 50, '\0');
+    try {
+        (void)read_surface(file("long.stl", binary));
+        ADD_FAILURE() << "accepted";
+    } catch (const Error& error) {
+        EXPECT_THAT(error.what(), HasSubstr("it has 184 bytes, and the 1 triangles that it states take 134"));
+    }
     EXPECT_EQ(read_surface(file("b.stl", "solid color space=sRGB\n" + solid)).mesh.nodes.col(1),
               Eigen::Vector3d(1, 2, 3));
 }
@@ -200,6 +207,10 @@ TEST_F(PointTables, FieldsOfVtkFilesStandAnywhere) {
                                std::string(8, '\0') + "\nSPACE 1 1 string\n\xC3RAS\n";
     const Surface surface = read_surface(file("c.vtk", binary + "POINTS 1 float\n" + std::string(12, '\0') + "\n"));
     EXPECT_EQ(surface.mesh.node_count(), 1);
+    const std::string small =
+        "# vtk DataFile Version 3.0\nx\nascii\ndataset polydata\npoints 3 float\n0 0 0 1 2 3 0 1 0\n"
+        "polygons 1 4\n3 0 1 2\npoint_data 3\nnormals n float\n0 0 1 0 0 1 0 0 1\n";
+    EXPECT_EQ(read_surface(file("small.vtk", small)).normals.cols(), 3);
     EXPECT_THROW(read_surface(file("d.vtk", head + points + "POLYGONES 1 4\n3 0 1 2\n")), IoError);
     EXPECT_THROW(read_surface(file("e.vtk", head + "FIELD f 1\na 1000000000 9 double\n" + points)), IoError);
 }
