@@ -95,7 +95,7 @@ TetMesh refine_every_label(const LabelGrid& grid, const detail::LabelField& fiel
     constexpr int most_attempts = 5;  // the last one with a sixteenth of the edge
     std::vector<char> thin(edges.size(), 0);
     for (int attempt = 1;; ++attempt) {
-        const auto seeds = detail::surface_seeds(grid, field, edges, thin);
+        const auto seeds = detail::surface_seeds(grid, field, edges, thin, observer);
         const auto refine =
             options.refinement == Refinement::Parallel ? detail::refine_parallel : detail::refine_sequential;
         TetMesh mesh = refine({grid, field, seeds, edges, facet_distance, options}, observer);
