@@ -199,11 +199,15 @@ void TextTable::find_header() {
 }
 
 int TextTable::blank_line() const {
-    if (rows_.empty()) return 0;
-    const auto first = std::upper_bound(blank_lines_.begin(), blank_lines_.end(), rows_.front().line);
-    const auto end = std::lower_bound(blank_lines_.begin(), blank_lines_.end(), rows_.back().line);
-    const bool behind_every_row = rows_.size() > 2 && static_cast<std::size_t>(end - first) + 1 >= rows_.size();
-    return first == end || behind_every_row ? 0 : *first;
+    int found = 0;
+    std::size_t gaps = 0;
+    for (std::size_t r = 1; r < rows_.size(); ++r) {
+        const auto blank = std::upper_bound(blank_lines_.begin(), blank_lines_.end(), rows_[r - 1].line);
+        if (blank == blank_lines_.end() || *blank > rows_[r].line) continue;
+        if (gaps++ == 0) found = *blank;
+    }
+    const bool behind_every_row = rows_.size() > 2 && gaps + 1 == rows_.size();
+    return behind_every_row ? 0 : found;
 }
 
 bool TextTable::has_commas_of_both_kinds() const {

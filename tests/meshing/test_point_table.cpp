@@ -138,6 +138,7 @@ TEST_F(PointTables, FirstRowsThatAreNoPointsAreTold) {
 
 TEST_F(PointTables, AnEmptyLineBetweenPointsWithoutNamesIsNoted) {
     EXPECT_THAT(noted("x,y,z\n1,2,3\n\n4,5,6\n"), HasSubstr("line 3 is empty and others follow"));
+    EXPECT_THAT(noted("x,y,z\n1,2,3\n4,5,6\n\n\n7,8,9\n"), HasSubstr("line 4 is empty"));
     EXPECT_EQ(noted("x,y,z,name\n1,2,3,a\n\n4,5,6,b\n"), "");
     EXPECT_EQ(noted("x,y,z\n\n1,2,3\n4,5,6\n\n"), "");
     EXPECT_EQ(noted("x,y,z\r\r\n1,2,3\r\r\n4,5,6\r\r\n7,8,9\r\r\n"), "");
