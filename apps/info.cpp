@@ -108,7 +108,7 @@ void print_surface(const fs::path& path) {
     ProgressLine notes(true);
     meshing::Surface surface;
     if (registration::is_slicer_markups(path))
-        surface.mesh.nodes = registration::read_points(path, notes);
+        surface.mesh.nodes = registration::read_slicer_markups(path, notes).points;
     else
         surface = meshing::read_surface(path, notes);
     fmt::print("{}: {} points, {} triangles{}\n", path.string(), surface.mesh.node_count(),
@@ -117,9 +117,9 @@ void print_surface(const fs::path& path) {
     fmt::print("  box (mm, LPS)    {} to {}\n", point_text(surface.mesh.nodes.rowwise().minCoeff()),
                point_text(surface.mesh.nodes.rowwise().maxCoeff()));
     for (const std::string& note : notes.notes()) fmt::print("  note: {}\n", note);
-    if (surface.mesh.triangle_count() == 0) return;
     try {
-        registration::detail::require_millimetres(surface.mesh.nodes, "the surface is");
+        registration::detail::require_millimetres_of_points(
+            surface.mesh.nodes, surface.mesh.triangle_count() > 0 ? "the surface is" : "the points are");
     } catch (const InvalidInput& doubt) {
         fmt::print("  note: {}\n", doubt.what());
     }

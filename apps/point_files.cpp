@@ -12,7 +12,7 @@
 namespace tissuewarp::apps {
 
 Eigen::Matrix3Xd read_points(const std::filesystem::path& path, Observer& observer) {
-    if (file_kind(path) == FileKind::Surface) return meshing::read_surface(path, observer).mesh.nodes;
+    if (file_kind(path) == FileKind::Surface) return read_tissue_surface(path, observer).nodes;
     return registration::read_points(path, observer);
 }
 

@@ -102,6 +102,13 @@ char separator_of(std::string_view line) {
     return trimmed(line).find('\t') != std::string_view::npos ? '\t' : blanks;
 }
 
+/// "0", "1", "2", ...: names of columns that have none, as tables of data frames write them.
+bool numbers_columns(const std::vector<std::string>& fields) {
+    for (std::size_t f = 0; f < fields.size(); ++f)
+        if (fields[f] != std::to_string(f)) return false;
+    return fields.size() > 2;
+}
+
 /// The text behind the sign of a remark; nothing where the line is none.
 std::optional<std::string_view> remark_in(std::string_view line) {
     line = trimmed(line);
@@ -153,26 +160,79 @@ void TextTable::take_lines(std::string_view text) {
         const std::size_t end = std::min(text.find_first_of("\r\n", start), text.size());
         const std::string_view line = text.substr(start, end - start);
         start = end + (text.substr(end).starts_with("\r\n") ? 2 : 1);
-        ++number;
-        if (trimmed(line).empty()) continue;
-        if (const auto remark = remark_in(line)) {
-            remarks_.push_back({number, std::string(*remark)});
-        } else if (rows_.empty() && line.size() == 5 && lower_case(line).starts_with("sep=")) {
-            separator_ = line[4];  // as spreadsheets write it
-        } else {
-            if (separator_ == 0) separator_ = separator_of(line);
-            std::vector<std::string> fields = split(line, separator_);
-            const bool empty = std::all_of(fields.begin(), fields.end(), [](auto& field) { return field.empty(); });
-            if (!empty) rows_.push_back({number, std::move(fields)});
-        }
+        take_line(++number, line);
+    }
+}
+
+void TextTable::take_line(int number, std::string_view line) {
+    const bool blank = trimmed(line).empty(), separated = separator_ == '\t' && line.find('\t') < line.size();
+    if (blank) {
+        (separated ? empty_rows_ : blank_lines_).push_back(number);
+    } else if (const auto remark = remark_in(line)) {
+        remarks_.push_back({number, std::string(*remark)});
+    } else if (rows_.empty() && line.size() == 5 && lower_case(line).starts_with("sep=")) {
+        separator_ = line[4];  // as spreadsheets write it
+    } else {
+        const char separator = separator_ == 0 ? separator_of(line) : separator_;
+        std::vector<std::string> fields = split(line, separator);
+        if (fields.size() > 1) separator_ = separator;  // one word does not show what stands between columns
+        const bool empty = std::all_of(fields.begin(), fields.end(), [](auto& field) { return field.empty(); });
+        if (empty)
+            empty_rows_.push_back(number);
+        else
+            rows_.push_back({number, std::move(fields)});
     }
 }
 
 void TextTable::find_header() {
-    if (rows_.empty() || std::any_of(rows_[0].fields.begin(), rows_[0].fields.end(), is_number)) return;
-    header_ = std::move(rows_[0].fields);
-    header_line_ = rows_[0].line;
+    if (rows_.empty()) return;
+    Row& first = rows_[0];
+    if (std::none_of(first.fields.begin(), first.fields.end(), is_number)) {
+        header_ = std::move(first.fields);
+        header_line_ = first.line;
+    } else if (separator_ != blanks && rows_.size() > 1 && numbers_columns(first.fields)) {
+        line_of_numbers_ = first.line;
+    } else {
+        return;
+    }
     rows_.erase(rows_.begin());
+}
+
+int TextTable::blank_line() const {
+    int found = 0;
+    std::size_t gaps = 0;
+    for (std::size_t r = 1; r < rows_.size(); ++r) {
+        const auto blank = std::upper_bound(blank_lines_.begin(), blank_lines_.end(), rows_[r - 1].line);
+        if (blank == blank_lines_.end() || *blank > rows_[r].line) continue;
+        if (gaps++ == 0) found = *blank;
+    }
+    const bool behind_every_row = rows_.size() > 2 && gaps + 1 == rows_.size();
+    return behind_every_row ? 0 : found;
+}
+
+bool TextTable::has_commas_of_both_kinds() const {
+    bool leading_zeros = false;
+    for (const Row& row : rows_)
+        for (std::size_t f = 0; f < row.fields.size(); ++f) {
+            const std::string& field = row.fields[f];
+            const bool fraction = f % 2 == 1;
+            if (field.find_first_not_of(fraction ? "0123456789" : "+-0123456789") < field.size()) return false;
+            leading_zeros = leading_zeros || (fraction && field.size() > 1 && field[0] == '0');
+        }
+    return separator_ == ',' && leading_zeros;
+}
+
+long long TextTable::take_count() {
+    if (!header_.empty() || rows_.size() < 2 || rows_[0].fields.size() != 1 || rows_.back().fields.size() == 1)
+        return 0;
+    const std::string& text = rows_[0].fields[0];
+    const std::size_t behind = rows_.size() - 1;
+    if (text.find_first_not_of("0123456789") < text.size()) return 0;
+    if (text != std::to_string(behind))
+        refuse(rows_[0].line, "'" + text + "' looks like the number of points, and " + std::to_string(behind) +
+                                  " rows follow; correct it, or take out the lines before the points");
+    rows_.erase(rows_.begin());
+    return static_cast<long long>(behind);
 }
 
 void TextTable::find_decimal_mark() {
@@ -189,6 +249,10 @@ void TextTable::find_decimal_mark() {
 
 void TextTable::require_even_rows() {
     if (rows_.empty()) return;
+    const int first_line = header_.empty() ? rows_.front().line : header_line_;
+    for (const int line : empty_rows_)
+        if (line > first_line && line < rows_.back().line)
+            refuse(line, "the row is empty and others follow; a point may be missing: fill it in, or take the row out");
     if (header_.size() > 1 && header_.back().empty()) header_.pop_back();
     if (header_.empty() && rows_[0].fields.back().empty()) rows_[0].fields.pop_back();
     const std::size_t columns = header_.empty() ? rows_[0].fields.size() : header_.size();

@@ -10,8 +10,8 @@ namespace tissuewarp {
 
 /// The rows of a file whose columns stand between semicolons, tabulators, commas or blanks, whichever its first row
 /// shows. Numbers may have decimal commas where columns are separated otherwise; one file has commas or points.
-/// Byte-order marks, empty rows, quotation marks and every kind of line end are seen through; what follows #, % or //
-/// at the beginning of a line is a remark.
+/// Byte-order marks, quotation marks and every kind of line end are seen through, and empty rows before and behind all
+/// others; what follows #, % or // at the beginning of a line is a remark.
 class TextTable {
 public:
     struct Row {
@@ -37,9 +37,19 @@ public:
     };
     [[nodiscard]] const std::vector<Remark>& remarks() const { return remarks_; }
     [[nodiscard]] bool has_decimal_commas() const { return decimal_commas_; }
+    /// The line of a first row that numbers the columns (0,1,2), which is no row here; 0 where there is none.
+    [[nodiscard]] int line_of_numbers() const { return line_of_numbers_; }
+    /// The first empty line between two rows; 0 where there is none, or one behind every row.
+    [[nodiscard]] int blank_line() const;
+    /// True where commas stand between columns and for decimal marks alike ("1,50,2,05,3,00").
+    [[nodiscard]] bool has_commas_of_both_kinds() const;
 
-    /// Throws InvalidInput, naming the line, unless every row has as many fields as the header or the first row. One
-    /// empty field behind the others does not count.
+    /// Takes a first row that is a whole number alone for the count of the rows behind it, and returns it; 0 where
+    /// there is none. Throws InvalidInput where it counts otherwise.
+    long long take_count();
+
+    /// Throws InvalidInput, naming the line, unless every row has as many fields as the header or the first row, and no
+    /// row of separators alone lies between others. One empty field behind the others does not count.
     void require_even_rows();
 
     /// A finite coordinate in mm, at most 1 km; throws InvalidInput with line and value for anything else.
@@ -56,8 +66,11 @@ private:
     std::vector<Row> rows_;
     std::vector<Remark> remarks_;
     bool decimal_commas_ = false;
+    int line_of_numbers_ = 0;
+    std::vector<int> blank_lines_, empty_rows_;  ///< lines with nothing, or separators alone
 
     void take_lines(std::string_view text);
+    void take_line(int number, std::string_view line);
     void find_header();
     void find_decimal_mark();
 };

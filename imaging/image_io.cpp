@@ -78,7 +78,7 @@ void require_finite(const Volume& volume, const fs::path& path) {
     throw InvalidInput(message.str());
 }
 
-/// Components to LPS; positions become displacements from where the voxels lie.
+/// Components to LPS mm; positions become displacements from where the voxels lie.
 template <class T>
 void turn_vectors(Volume& volume, const detail::ImageHeader& header) {
     const auto [nx, ny, nz] = volume.geometry.size;
@@ -97,6 +97,10 @@ void turn_vectors(Volume& volume, const detail::ImageHeader& header) {
 void turn_vectors(ReadResult& result, const detail::ImageHeader& header) {
     if (result.volume.channels() != 3) return;
     if (header.vector_axes.isIdentity(1e-6) && !header.positions) return;
+    if (header.converted)
+        result.notes.emplace_back(
+            "its vectors are taken in the unit that the header states for its space, and were "
+            "converted to mm too");
     if (result.volume.voxels.depth() < CV_32F) result.volume = result.volume.as(CV_32F);
     if (result.volume.voxels.depth() == CV_32F)
         turn_vectors<float>(result.volume, header);

@@ -24,14 +24,15 @@ bool is_image(const std::filesystem::path& path);
 
 /// Reads a scalar or three-component volume. Every voxel is read from the file: files that are cut short, lists of
 /// slices that do not fit the header, and damaged packed data are refused. Integer types wider than OpenCV's become
-/// int32 when every value fits and float64 otherwise; slope and intercept are applied. Units of length become mm, with
-/// a note where they were others. Layers of a segmentation become one label map; overlaps are refused. Vectors in
-/// NIfTI: intent 1007 (vector) holds LPS components, as ITK and ANTs write them; intent 1006 (displacement) holds RAS
-/// components, as ITK reads them from version 5.3 on, and is turned to LPS, with a note. A file of intent 1006 that
-/// holds LPS components must be relabelled 1007. Vectors in NRRD are turned from the header's space to LPS. When sform
-/// and qform disagree, ITK's choice is taken and noted. Throws IoError (missing, truncated, damaged, unreadable) or
-/// InvalidInput (2-D, one voxel thick, time series, zero or infinite spacing, unknown units, skewed axes, non-finite
-/// voxels, more than 2^31 values, several DICOM series, missing or tilted slices, frames without positions).
+/// int32 when every value fits and float64 otherwise; slope and intercept are applied. Units of length become mm, those
+/// of vectors too, with a note where they were others. Layers of a segmentation become one label map; overlaps are
+/// refused. Vectors in NIfTI: intent 1007 (vector) holds LPS components, as ITK and ANTs write them; intent 1006
+/// (displacement) holds RAS components, as ITK reads them from version 5.3 on, and is turned to LPS, with a note. A
+/// file of intent 1006 that holds LPS components must be relabelled 1007. Vectors in NRRD are turned from the header's
+/// space to LPS. When sform and qform disagree, ITK's choice is taken and noted. Throws IoError (missing, truncated,
+/// damaged, unreadable) or InvalidInput (2-D, one voxel thick, time series, zero or infinite spacing, unknown units,
+/// skewed axes, non-finite voxels, more than 2^31 values, several DICOM series, missing or tilted slices, frames
+/// without positions).
 ReadResult read_volume_with_notes(const std::filesystem::path& path);
 
 /// As above, without the notes.

@@ -8,6 +8,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <sstream>
 #include <string>
 
 namespace tissuewarp::meshing {
@@ -93,7 +95,7 @@ TetMesh refine_every_label(const LabelGrid& grid, const detail::LabelField& fiel
     constexpr int most_attempts = 5;  // the last one with a sixteenth of the edge
     std::vector<char> thin(edges.size(), 0);
     for (int attempt = 1;; ++attempt) {
-        const auto seeds = detail::surface_seeds(grid, field, edges, thin);
+        const auto seeds = detail::surface_seeds(grid, field, edges, thin, observer);
         const auto refine =
             options.refinement == Refinement::Parallel ? detail::refine_parallel : detail::refine_sequential;
         TetMesh mesh = refine({grid, field, seeds, edges, facet_distance, options}, observer);
@@ -114,6 +116,31 @@ TetMesh refine_every_label(const LabelGrid& grid, const detail::LabelField& fiel
         }
         if (attempt == most_attempts) return mesh;
     }
+}
+
+/// What is thinner than its elements may leave a few of them, which stand for nothing.
+void require_volume(const TetMesh& mesh, const LabelGrid& grid, const std::vector<double>& edges, Observer& observer) {
+    constexpr double least_share = 0.5;
+    std::vector<double> meshed(edges.size(), 0.0), stated(edges.size(), 0.0);
+    const Eigen::VectorXd volumes = tet_volumes(mesh);
+    for (Eigen::Index t = 0; t < volumes.size(); ++t) meshed[static_cast<std::size_t>(mesh.labels[t])] += volumes[t];
+    for (const std::uint16_t c : grid.classes) stated[c] += grid.spacing.prod();
+    meshed[0] = stated[0] = 0.0;
+    const auto what = [](double volume, double of, double edge) {
+        std::ostringstream text;
+        text << volume << " of " << of << " mm3 are meshed: it is thinner than its elements; give it an edge length "
+             << "below " << 0.5 * edge << " mm, or thicken it";
+        return text.str();
+    };
+    const double all_meshed = std::accumulate(meshed.begin(), meshed.end(), 0.0),
+                 all_stated = std::accumulate(stated.begin(), stated.end(), 0.0);
+    if (all_meshed < least_share * all_stated)
+        throw InvalidInput("mesh_labels: of the tissue " +
+                           what(all_meshed, all_stated, *std::max_element(edges.begin(), edges.end())));
+    for (std::size_t c = 1; c < edges.size(); ++c)
+        if (meshed[c] < least_share * stated[c])
+            observer.note("meshing: of label " + std::to_string(grid.values[c]) + " " +
+                          what(meshed[c], stated[c], edges[c]));
 }
 
 /// Local frame → LPS, classes → label values, orientation repaired where the image's axes are left-handed.
@@ -146,6 +173,7 @@ TetMesh mesh_labels(const imaging::Volume& labels, const MeshingOptions& options
     require_valid(mesh, "refined labels");
     observer.checkpoint("relaxing the mesh", 0.9);
     detail::relax(mesh, {field, edges, grid.spacing.minCoeff(), distance, options.min_dihedral_deg});
+    require_volume(mesh, grid, edges, observer);
     place(mesh, grid, labels.geometry);
     require_valid(mesh, "mesh_labels");
     observer.progress("meshing", 1.0);

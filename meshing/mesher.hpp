@@ -36,7 +36,8 @@ struct MeshingOptions {
 /// that facets straddle the interfaces (no loss of volume) and the worst elements allow a longer time step.
 ///
 /// Throws InvalidInput (no voxel
-/// of a requested label, edge length not positive or finer than a memory guard) and Cancelled.
+/// of a requested label, less than half of the tissue's volume meshed, edge length not positive or finer than a memory
+/// guard) and Cancelled.
 TetMesh mesh_labels(const imaging::Volume& labels, const MeshingOptions& options = {},
                     Observer& observer = silent_observer());
 

@@ -132,6 +132,7 @@ public:
         if (table_.rows().empty() && table_.header().empty())
             throw InvalidInput(table_.path().string() +
                                ": the file is empty; a header that names x,y,z and one row per point are needed");
+        take_first_lines();
         table_.require_even_rows();
         header_ = table_.header().empty() ? header_in_remark() : table_.header();
         find_columns();
@@ -152,6 +153,18 @@ private:
     std::vector<std::string> left_out_;
     PointTable result_;
 
+    /// Lines that stand before the columns in files of some programs: a count of the points, a title.
+    void take_first_lines() {
+        if (const long long count = table_.take_count())
+            note("its first row, " + std::to_string(count) + ", is the number of points that follow");
+        if (table_.line_of_numbers() > 0)
+            note("line " + std::to_string(table_.line_of_numbers()) + " numbers the columns and is no point");
+        if (table_.header().empty() || table_.rows().empty() || axis_columns(table_, table_.header())) return;
+        if (axis_columns(table_, words_of(joined(table_.rows()[0].fields))))
+            table_.refuse(table_.header_line(),
+                          "this line stands before the names of the columns; take it out, or begin it with #");
+    }
+
     /// "# x,y,z" or "//X Y Z": the remark before the first row, where it has as many words as rows have fields.
     std::vector<std::string> header_in_remark() {
         const std::size_t columns = table_.rows().front().fields.size();
@@ -168,6 +181,9 @@ private:
     void find_columns() {
         if (!header_.empty()) return find_named_columns();
         const std::size_t columns = table_.rows().front().fields.size();
+        if (table_.has_commas_of_both_kinds())
+            table_.refuse(table_.rows().front().line,
+                          "commas stand between columns and for decimal marks alike; separate columns by semicolons");
         if (columns != 3 && columns != 6)
             table_.refuse(table_.rows().front().line,
                           std::to_string(columns) +
@@ -256,6 +272,10 @@ private:
         result_.normals = matrix(directions_);
         if (!left_out_.empty()) note("points that are not placed or hidden are left out: " + joined(left_out_));
         if (table_.has_decimal_commas()) note("its numbers have decimal commas");
+        result_.blank_line = table_.blank_line();
+        if (result_.blank_line > 0 && result_.names.empty())
+            note("line " + std::to_string(result_.blank_line) +
+                 " is empty and others follow; is a point missing there?");
     }
 };
 

@@ -37,6 +37,7 @@ struct PointTable {
     std::vector<std::string> names;   ///< as many, of the column `label` or `name`; or none
     std::vector<std::string> groups;  ///< as many, of the column `line`; or none
     std::vector<std::string> notes;   ///< what was turned, left out or taken, with the file's name
+    int blank_line = 0;               ///< the first empty line between points, where one may be missing; or 0
 };
 
 /// Reads a table of points. Its header, or the remark before its first row, names the columns; without either, a file

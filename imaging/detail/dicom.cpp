@@ -158,8 +158,32 @@ void require_upright(const fs::path& path, const Slice& first, const Slice& last
                                     "instance");
 }
 
-/// The distance between sorted slices, each at its place.
-double even_distance(const fs::path& path, const std::vector<Slice>& slices) {
+/// Heights of an even stack, first + k distance, mm.
+struct EvenSteps {
+    double first = 0.0, distance = 0.0;
+};
+
+/// The even stack nearest to the slices by least squares, and how far the farthest of them lies off it, mm.
+std::pair<EvenSteps, double> fitted_steps(const std::vector<Slice>& slices) {
+    const auto count = static_cast<Eigen::Index>(slices.size());
+    Eigen::ArrayXd heights(count);
+    for (Eigen::Index k = 0; k < count; ++k) heights[k] = slices[static_cast<std::size_t>(k)].height;
+    const Eigen::ArrayXd from_middle =
+        Eigen::ArrayXd::LinSpaced(count, 0.0, double(count - 1)) - 0.5 * double(count - 1);
+    const double distance = (from_middle * heights).sum() / from_middle.square().sum();
+    const Eigen::ArrayXd even = heights.mean() + distance * from_middle;
+    return {{even[0], distance}, (heights - even).abs().maxCoeff()};
+}
+
+/// Steps between sorted slices, each at its place.
+EvenSteps even_steps(const fs::path& path, const std::vector<Slice>& slices, std::vector<std::string>& notes) {
+    constexpr double same_place = 1e-3;
+    if (slices.front().file == slices.back().file && slices.back().height - slices.front().height < same_place)
+        throw unusable_series(path, "its " + std::to_string(slices.size()) +
+                                        " frames lie at one position, since none has a position of its own (as in "
+                                        "nuclear medicine) or they are one slice again and again; export them as a "
+                                        "volume with a position for each slice");
+    const auto [fitted, off] = fitted_steps(slices);
     std::vector<double> distances;
     for (std::size_t i = 1; i < slices.size(); ++i) distances.push_back(slices[i].height - slices[i - 1].height);
     std::vector<double> sorted = distances;
@@ -167,18 +191,27 @@ double even_distance(const fs::path& path, const std::vector<Slice>& slices) {
     const double usual = sorted[sorted.size() / 2];
     // Positions are printed with few digits: 2 % of a slice or 0.01 mm is rounding, more is a gap.
     const double tolerance = std::max(0.02 * usual, 0.01);
+    // Some programs round them to 0.1 mm, which no distance between two shows, and the whole stack does.
+    const bool rounded = off <= std::min(0.08, 0.12 * fitted.distance);
+    bool noted = false;
     for (std::size_t i = 0; i < distances.size(); ++i) {
-        if (distances[i] < 1e-3)
+        if (distances[i] < same_place)
             throw unusable_series(path, "two slices lie at the same position (" + slices[i].name() + ", " +
                                             slices[i + 1].name() +
                                             "); keep one of each (echoes, time points and b-values are volumes of "
                                             "their own)");
-        if (std::abs(distances[i] - usual) > tolerance)
+        if (std::abs(distances[i] - usual) <= tolerance) continue;
+        if (!rounded)
             throw unusable_series(path, "slices are missing or uneven: " + in_mm(distances[i]) + " between " +
                                             slices[i].name() + " and " + slices[i + 1].name() + ", " + in_mm(usual) +
                                             " elsewhere; export the whole series, or resample it to even slices");
+        noted = true;
     }
-    return (slices.back().height - slices.front().height) / static_cast<double>(distances.size());
+    const double first = slices.front().height, last = slices.back().height;
+    if (!noted) return {first, (last - first) / static_cast<double>(distances.size())};
+    notes.push_back("slices lie up to " + in_mm(off) + " off even steps of " + in_mm(fitted.distance) +
+                    ", as rounded positions do; the even steps are taken");
+    return fitted;
 }
 
 /// A grid from its first slice.
@@ -230,13 +263,15 @@ void for_each_frame(const std::vector<DicomFile>& files, const std::vector<Slice
     }
 }
 
-Volume read_image(const fs::path& path, const std::vector<DicomFile>& files, std::vector<Slice> slices) {
+Volume read_image(const fs::path& path, const std::vector<DicomFile>& files, std::vector<Slice> slices,
+                  std::vector<std::string>& notes) {
     if (slices.size() < 2) throw unusable_series(path, "it holds one slice; give the folder of the whole series");
     require_alike(path, slices);
     sort_by_height(slices);
-    const double distance = even_distance(path, slices);
+    const EvenSteps steps = even_steps(path, slices, notes);
     require_upright(path, slices.front(), slices.back());
-    const Geometry grid = grid_of(slices.front(), static_cast<int>(slices.size()), distance);
+    Geometry grid = grid_of(slices.front(), static_cast<int>(slices.size()), steps.distance);
+    grid.origin += (steps.first - slices.front().height) * grid.direction.col(2);
     require_valid(grid, path.c_str());
     int depth = depth_of(slices);
     Volume volume;
@@ -348,7 +383,7 @@ ReadResult read_dicom(const fs::path& path) {
     });
     if (segmentation) return read_segmentation(path, files, std::move(slices));
     ReadResult result;
-    result.volume = read_image(path, files, std::move(slices));
+    result.volume = read_image(path, files, std::move(slices), result.notes);
     return result;
 }
 

@@ -27,18 +27,19 @@ constexpr DicomTag pixel_data = 0x7fe00010;
 /// Attributes of frames: in their own functional groups, in the shared ones, or, in files of one frame, in the file.
 class FrameAttributes {
 public:
-    explicit FrameAttributes(const DicomSet& file)
-        : file_(file), own_(file.items(0x52009230)), shared_(file.items(0x52009229)) {}
+    FrameAttributes(const fs::path& path, const DicomSet& file)
+        : path_(path), file_(file), own_(file.items(0x52009230)), shared_(file.items(0x52009229)) {}
 
     DicomFrame frame(std::size_t index) {
         DicomFrame frame;
-        if (const auto p = numbers(0x00209113, 0x00200032, index, 3))
+        if (const auto p = stated({0x00209113, 0x00200032, index, "Image Position (Patient)"}, 3))
             frame.position = Eigen::Vector3d((*p)[0], (*p)[1], (*p)[2]);
-        if (const auto a = numbers(0x00209116, 0x00200037, index, 6))
+        if (const auto a = stated({0x00209116, 0x00200037, index, "Image Orientation (Patient)"}, 6))
             frame.axes = Eigen::Map<const Eigen::Matrix<double, 3, 2>>(a->data()).colwise().normalized();
         constexpr DicomTag measures = 0x00289110, transformation = 0x00289145;
         // The distance between rows, that along j, comes first.
-        if (const auto s = numbers(measures, 0x00280030, index, 2)) frame.spacing = {(*s)[1], (*s)[0]};
+        if (const auto s = stated({measures, 0x00280030, index, "Pixel Spacing"}, 2))
+            frame.spacing = {(*s)[1], (*s)[0]};
         frame.slice_spacing = number(measures, 0x00180088, index);
         if (!frame.slice_spacing) frame.slice_spacing = number(measures, 0x00180050, index);
         frame.intercept = number(transformation, 0x00281052, index).value_or(0.0);
@@ -49,6 +50,7 @@ public:
     }
 
 private:
+    const fs::path& path_;
     const DicomSet& file_;
     std::vector<DicomSet> own_, shared_;
 
@@ -65,6 +67,21 @@ private:
         if (const auto set = group(sequence, index))
             if (auto found = set->numbers(tag, count)) return found;
         return file_.numbers(tag, count);
+    }
+    struct Attribute {
+        DicomTag sequence, tag;
+        std::size_t index;
+        const char* name;
+    };
+    /// What places a frame: nothing where it is absent, and an error where it is there and is no numbers.
+    std::optional<std::vector<double>> stated(const Attribute& attribute, std::size_t count) {
+        auto found = numbers(attribute.sequence, attribute.tag, attribute.index, count);
+        if (found) return found;
+        const auto set = group(attribute.sequence, attribute.index);
+        const std::string text = (set && set->contains(attribute.tag) ? *set : file_).text(attribute.tag);
+        if (text.empty()) return std::nullopt;
+        throw unusable(path_, std::string(attribute.name) + " is '" + text + "' where " + std::to_string(count) +
+                                  " numbers with decimal points belong, separated by backslashes; correct it");
     }
     std::optional<double> number(DicomTag sequence, DicomTag tag, std::size_t index) {
         const auto found = numbers(sequence, tag, index, 1);
@@ -275,7 +292,7 @@ DicomFile description_of(const fs::path& path, const DicomSet& set) {
     std::error_code unknown;
     if (frames > 8.0 * static_cast<double>(fs::file_size(path, unknown)))
         throw unreadable(path, "it promises " + text_of({frames}) + " frames, more than it can hold; it is damaged");
-    FrameAttributes attributes(set);
+    FrameAttributes attributes(path, set);
     for (std::size_t i = 0; i < static_cast<std::size_t>(frames); ++i) file.frames.push_back(attributes.frame(i));
     if (file.modality == "RTDOSE") place_dose_planes(set, file.frames);
     read_segments(set, file);
@@ -310,6 +327,10 @@ cv::Mat read_dicom_pixels(const DicomFile& file) {
     const DicomBytes read(file.path);
     if (read.big_endian && bits < 16)
         throw unusable(file.path, "its small pixels are stored big endian; convert it to explicit little endian");
+    constexpr DicomTag float_pixels = 0x7fe00008, double_pixels = 0x7fe00009;
+    const bool fractions = read.set.contains(float_pixels) || read.set.contains(double_pixels);
+    if (!read.set.contains(pixel_data) && !fractions)
+        throw unusable(file.path, "it holds no pixels (Pixel Data); copy or export it again");
     if (!read.set.contains(pixel_data))
         throw unusable(file.path, "it holds no whole numbers as pixels (Pixel Data); convert it to 16 bits");
     const std::optional<std::string> bytes = within_file(file.path, [&] { return plain_bytes(file, read); });

@@ -18,7 +18,8 @@ enum class Format { Nifti, Nrrd, MetaImage };
 struct ImageHeader {
     Geometry geometry;  ///< LPS mm
     StoredVoxels voxels;
-    Eigen::Matrix3d vector_axes = Eigen::Matrix3d::Identity();  ///< components as stored to LPS
+    Eigen::Matrix3d vector_axes = Eigen::Matrix3d::Identity();  ///< components as stored to LPS mm
+    bool converted = false;         ///< lengths, and those of vectors with them, were in another unit than mm
     bool positions = false;         ///< vectors are the places (LPS after `vector_axes`) that voxels go to
     std::vector<Segment> segments;  ///< of a segmentation of 3D Slicer
     std::vector<std::string> notes;

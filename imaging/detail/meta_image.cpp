@@ -70,6 +70,10 @@ void read_geometry(const fs::path& path, const TextHeader& header, std::size_t d
     const auto offset = numbers_of(path, header, {"offset", "position", "origin"}, dimensions);
     const auto axes = numbers_of(path, header, {"transformmatrix", "rotation", "orientation"}, dimensions * dimensions);
     if (!spacing) image.notes.emplace_back("the header states no ElementSpacing: voxels of 1 mm are taken");
+    if (!offset) image.notes.emplace_back("the header states no Offset: (0, 0, 0) is taken");
+    if (!axes) image.notes.emplace_back("the header states no TransformMatrix: its axes are taken as LPS");
+    image.converted = unit != 1.0;
+    image.vector_axes *= unit;
     for (std::size_t axis = 0; axis < 3; ++axis) {
         const auto a = static_cast<Eigen::Index>(axis);
         if (spacing) {

@@ -74,6 +74,10 @@ Geometry chosen_form(const fs::path& path, const NiftiHeader& header, const std:
         return unknown;
     }
     if (!has_qform) return sform_alone(path, sform, voxel_size(header));
+    if (voxel_size(header).minCoeff() < 0.0)
+        throw unusable(path, "its pixdim states voxels of " + text_of(voxel_size(header)) +
+                                 ", and a qform needs positive ones; write the true voxel size, and turn the qform "
+                                 "where an axis is reversed");
     if (!has_sform) return qform;
     const bool rigid = at_right_angles(sform) && has_voxel_size(sform, voxel_size(header));
     const bool took_sform = header.sform_code == 1 && rigid;
@@ -97,6 +101,8 @@ void read_geometry(const fs::path& path, const NiftiHeader& header, ImageHeader&
     const double millimetres = header.space_unit == 1 ? 1e3 : 1e-3;
     image.geometry.spacing *= millimetres;
     image.geometry.origin *= millimetres;
+    image.vector_axes *= millimetres;
+    image.converted = true;
     image.notes.push_back(std::string("lengths are given in ") + (header.space_unit == 1 ? "metres" : "micrometres") +
                           " and were converted to mm");
 }
@@ -107,6 +113,8 @@ Scalar type_of(const fs::path& path, int code) {
                                                 {512, Scalar::UInt16}, {768, Scalar::UInt32}, {1024, Scalar::Int64},
                                                 {1280, Scalar::UInt64}};
     const auto found = types.find(code);
+    if (code == 0) throw unusable(path, "NIfTI data type 0 (unknown); write the type that its voxels have");
+    if (code == 1) throw unusable(path, "NIfTI data type 1 (single bits); convert it to uint8");
     if (found == types.end())
         throw unusable(path, "NIfTI data type " + std::to_string(code) +
                                  " (colour, complex or long double); convert it to int16 or float32");
@@ -124,9 +132,18 @@ void read_sizes(const fs::path& path, const NiftiHeader& header, StoredVoxels& v
         sizes.push_back(static_cast<double>(header.dim[axis]));
     values_of(path, sizes);
     require_three_dimensions(path, sizes);
-    if (sizes.size() > 3 && sizes[3] > 1)
-        throw unusable(path, "it holds " + std::to_string(header.dim[4]) + " time points; extract one of them");
-    const double components = sizes.size() > 4 ? sizes[4] : 1.0;
+    if (header.intent_code >= 2006 && header.intent_code <= 2018)
+        throw unusable(path, "it is a warp of FSL (intent " + std::to_string(header.intent_code) +
+                                 "), in a frame of FSL's own; convert it to displacements in LPS mm");
+    sizes.resize(std::max<std::size_t>(sizes.size(), 5), 1.0);
+    const bool vectors = header.intent_code == nifti_intent_vector || header.intent_code == nifti_intent_displacement;
+    if (vectors && sizes[3] == 3.0 && sizes[4] == 1.0) std::swap(sizes[3], sizes[4]);  // 4-D, as some programs write
+    if (sizes[3] > 1)
+        throw unusable(path, "it holds " + std::to_string(header.dim[4]) +
+                                 (sizes[3] == 3.0 ? " time points, or vectors without NIfTI's intent 1007; extract one "
+                                                    "of them, or write the intent"
+                                                  : " time points; extract one of them"));
+    const double components = sizes[4];
     const bool more = sizes.size() > 5 && std::any_of(sizes.begin() + 5, sizes.end(), [](double s) { return s > 1.0; });
     if ((components != 1.0 && components != 3.0) || more)
         throw unusable(path, "its size " + detail::text_of(sizes) +
@@ -208,18 +225,15 @@ void read_intent(const fs::path& path, const NiftiHeader& header, ImageHeader& i
         if (!positions && header.intent_parameter != 1.0)
             throw unusable(path, "it is a transform of NiftyReg of kind " + std::to_string(header.intent_parameter) +
                                      " (velocities or splines); convert it with reg_transform -def or -disp");
-        image.vector_axes = turned;
+        image.vector_axes *= turned;
         image.positions = positions;
         image.notes.push_back(std::string("a field of ") + (positions ? "positions" : "displacements") +
                               " of NiftyReg: turned from RAS to " + (positions ? "displacements in " : "") + "LPS");
     } else if (header.intent_code == nifti_intent_displacement) {
-        image.vector_axes = turned;
+        image.vector_axes *= turned;
         image.notes.emplace_back(
             "NIfTI intent 1006 (displacement): components are taken as RAS and turned to LPS, as ITK 5.3 and later do; "
             "a file whose components are LPS already must carry intent 1007");
-    } else if (header.intent_code >= 2006 && header.intent_code <= 2018) {
-        throw unusable(path, "it is a warp of FSL (intent " + std::to_string(header.intent_code) +
-                                 "), in a frame of FSL's own; convert it to displacements in LPS mm");
     } else if (header.intent_code != nifti_intent_vector) {
         image.notes.push_back("vectors of NIfTI intent " + std::to_string(header.intent_code) + " are taken as LPS mm");
     }

@@ -184,6 +184,7 @@ private:
     std::vector<std::string> kinds_;
     std::vector<std::optional<Eigen::Vector3d>> directions_;
     Axes axes_;
+    bool vectors_turned_ = false;
 
     std::vector<std::string> words(const char* key) const { return words_of(header_.value(key)); }
     void require_per_axis(const char* key, std::size_t count) const {
@@ -265,11 +266,8 @@ private:
         const Eigen::Matrix3d to_lps = world_to_lps(path_, header_.value("space"), image_.notes);
         Eigen::Matrix3d columns = Eigen::Matrix3d::Identity();
         Eigen::Vector3d origin = Eigen::Vector3d::Zero();
-        if (!directions_.empty()) {
-            read_world_geometry(columns, origin);
-        } else {
-            read_axis_geometry(columns, origin);
-        }
+        const Eigen::Vector3d millimetres =
+            directions_.empty() ? read_axis_geometry(columns, origin) : read_world_geometry(columns, origin);
         columns = to_lps * columns;
         Geometry& grid = image_.geometry;
         for (int i = 0; i < 3; ++i) {
@@ -279,10 +277,10 @@ private:
             grid.direction.col(i) = columns.col(i) / length;
         }
         grid.origin = to_lps * origin;
-        read_vector_axes(to_lps);
+        read_vector_axes(to_lps, millimetres);
     }
-    /// "space directions" and "space origin": every world axis may have a unit of its own.
-    void read_world_geometry(Eigen::Matrix3d& columns, Eigen::Vector3d& origin) {
+    /// "space directions" and "space origin": every world axis may have a unit of its own, whose millimetres return.
+    Eigen::Vector3d read_world_geometry(Eigen::Matrix3d& columns, Eigen::Vector3d& origin) {
         for (int i = 0; i < 3; ++i) columns.col(i) = *directions_[axes_.spatial[static_cast<std::size_t>(i)]];
         const auto origins = vectors_of(path_, header_.value("space origin"));
         if (!origins.empty() && origins[0])
@@ -298,34 +296,57 @@ private:
         }
         columns = factors.asDiagonal() * columns;
         origin = factors.cwiseProduct(origin);
+        return factors;
     }
-    /// "spacings" and "axis mins" along the axes themselves, whose units are "units".
-    void read_axis_geometry(Eigen::Matrix3d& columns, Eigen::Vector3d& origin) {
-        const std::vector<double> spacings = numbers_in(header_.value("spacings"));
-        const std::vector<double> mins = numbers_in(header_.value("axis mins") + header_.value("axismins"));
+    /// "axis mins" or "axis maxs", whose older names have no blank.
+    std::vector<double> axis_ends(const std::string& which) const {
+        const std::vector<double> ends = numbers_in(header_.value("axis " + which) + header_.value("axis" + which));
+        require_per_axis(("axis " + which).c_str(), ends.size());
+        return ends;
+    }
+    /// Samples are centred on nodes, or in cells where the header does not say.
+    bool is_node_centred(std::size_t axis) const {
         const std::vector<std::string> centers = words("centers").empty() ? words("centerings") : words("centers");
-        require_per_axis("spacings", spacings.size());
-        require_per_axis("axis mins", mins.size());
+        return axis < centers.size() && lower_case(centers[axis]) == "node";
+    }
+    /// Along each axis of the file, NaN where the header does not say: "spacings", or what lies between "axis mins" and
+    /// "axis maxs", the edges of cells or the places of nodes.
+    std::vector<double> spacings(const std::vector<double>& mins) const {
+        std::vector<double> result = numbers_in(header_.value("spacings"));
+        require_per_axis("spacings", result.size());
+        result.resize(sizes_.size(), NAN);
+        const std::vector<double> maxs = axis_ends("maxs");
+        for (std::size_t axis = 0; axis < sizes_.size() && !mins.empty() && !maxs.empty(); ++axis)
+            if (std::isnan(result[axis]))
+                result[axis] = (maxs[axis] - mins[axis]) / (sizes_[axis] - (is_node_centred(axis) ? 1.0 : 0.0));
+        return result;
+    }
+    /// "spacings", "axis mins" and "axis maxs" along the axes themselves, whose units are "units".
+    Eigen::Vector3d read_axis_geometry(Eigen::Matrix3d& columns, Eigen::Vector3d& origin) {
+        const std::vector<double> mins = axis_ends("mins"), stated = spacings(mins);
         const Eigen::Vector3d factors = units("units", axes_.spatial);
-        if (spacings.empty()) image_.notes.emplace_back("the NRRD header states no spacing: voxels of 1 mm are taken");
+        bool guessed = false;
         for (int i = 0; i < 3; ++i) {
             const std::size_t axis = axes_.spatial[static_cast<std::size_t>(i)];
-            const double spacing = spacings.empty() || std::isnan(spacings[axis]) ? 1.0 : spacings[axis];
+            const double spacing = std::isnan(stated[axis]) ? 1.0 : stated[axis];
+            guessed = guessed || std::isnan(stated[axis]);
             require_spacing(path_, spacing, axis);
             columns(i, i) = factors[i] * spacing;
             if (mins.empty() || std::isnan(mins[axis])) continue;
-            // The least place of an axis is the edge of a cell unless samples are centred on nodes.
-            const bool nodes = axis < centers.size() && lower_case(centers[axis]) == "node";
-            origin[i] = factors[i] * (mins[axis] + (nodes ? 0.0 : 0.5 * spacing));
+            origin[i] = factors[i] * (mins[axis] + (is_node_centred(axis) ? 0.0 : 0.5 * spacing));
         }
+        if (guessed) image_.notes.emplace_back("the NRRD header states no spacing: voxels of 1 mm are taken");
+        return factors;
     }
     /// Components are in the measurement frame, or in the world where there is none.
-    void read_vector_axes(const Eigen::Matrix3d& to_lps) {
+    void read_vector_axes(const Eigen::Matrix3d& to_lps, const Eigen::Vector3d& millimetres) {
         Eigen::Matrix3d to_world = Eigen::Matrix3d::Identity();
         const auto frame = vectors_of(path_, header_.value("measurement frame"));
         if (frame.size() == 3 && frame[0] && frame[1] && frame[2])
             for (int i = 0; i < 3; ++i) to_world.col(i) = *frame[static_cast<std::size_t>(i)];
-        image_.vector_axes = to_lps * to_world;
+        vectors_turned_ = !(to_lps * to_world).isIdentity(1e-6);
+        image_.vector_axes = to_lps * millimetres.asDiagonal() * to_world;
+        image_.converted = millimetres != Eigen::Vector3d::Ones();
     }
 
     /// What the values of a voxel are: one, a vector, layers of a segmentation.
@@ -341,7 +362,7 @@ private:
         if (!segmented && (count != 3.0 || is_domain(axis)))
             throw unusable(path_, "its voxels hold " + text_of({count}) + " values ('" + kind +
                                       "'); give one grey value or a vector of three, or extract one volume");
-        if (!segmented && !image_.vector_axes.isIdentity(1e-6))
+        if (!segmented && vectors_turned_)
             image_.notes.push_back("vectors were turned to LPS from the frame that the header names ('" +
                                    header_.value("space") + "')");
         if (!segmented && kind != "vector" && kind != "3-vector" && kind != "covariant-vector")

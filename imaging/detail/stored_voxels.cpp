@@ -76,6 +76,10 @@ private:
     void require_count(const Piece& piece, std::uint64_t found) const {
         if (found == bytes_ || (found > bytes_ && stored_.surplus == Surplus::Allowed)) return;
         const std::string which = piece.file == path_ ? "" : " ('" + piece.file.string() + "')";
+        if (found < bytes_ && stored_.packing == Packing::Raw && looks_packed(piece))
+            throw IoError("cannot read '" + path_.string() + "'" + which +
+                          ": its voxels are packed (gzip or zlib), and its header says that they are not; correct it "
+                          "('encoding: gzip' of NRRD, 'CompressedData = True' of MetaImage)");
         if (found < bytes_)
             throw IoError("'" + path_.string() + "'" + which + " is cut short: its header promises " +
                           std::to_string(bytes_) + " bytes of voxels, " + std::to_string(found) +
@@ -84,6 +88,12 @@ private:
                       std::to_string(bytes_) +
                       " bytes of voxels that it promises; correct size, type or length of header, or copy the file "
                       "again");
+    }
+    /// The first two bytes are those of gzip, or a multiple of 31 as those of zlib.
+    [[nodiscard]] bool looks_packed(const Piece& piece) const {
+        std::ifstream file = open(piece);
+        const int first = file.get(), second = file.get();
+        return (first == 0x1f && second == 0x8b) || (first == 0x78 && (256 * first + second) % 31 == 0);
     }
     void read_piece(const Piece& piece, char* target) const {
         switch (stored_.packing) {

@@ -114,6 +114,13 @@ std::string TextHeader::value(const std::string& key) const {
     return found == fields.end() ? "" : found->second;
 }
 
+void TextHeader::set(const std::filesystem::path& path, const std::string& key, const std::string& value) {
+    const auto [field, added] = fields.try_emplace(key, value);
+    if (!added && field->second != value && key != "comment")
+        throw unreadable(path, "its header states '" + key + "' twice, '" + field->second + "' and '" + value +
+                                   "'; leave the true one");
+}
+
 TextHeader read_nrrd_header(const std::filesystem::path& path) {
     HeadLines lines(path);
     if (lines.text().compare(0, 4, "NRRD") != 0)
@@ -130,7 +137,7 @@ TextHeader read_nrrd_header(const std::filesystem::path& path) {
         std::string key = lower_case(trimmed(line.substr(0, colon)));
         const std::string value = trimmed(line.substr(colon + 1));
         if (key == "datafile") key = "data file";
-        header.fields[key] = value;
+        header.set(path, key, value);
         if (key == "data file" && is_list(value)) header.listed_files = lines.rest();
     }
     header.bytes = lines.taken();
@@ -144,7 +151,7 @@ TextHeader read_meta_header(const std::filesystem::path& path) {
         const std::size_t equals = line.find('=');
         if (equals == std::string::npos) break;
         const std::string key = lower_case(trimmed(line.substr(0, equals)));
-        header.fields[key] = trimmed(line.substr(equals + 1));
+        header.set(path, key, trimmed(line.substr(equals + 1)));
         if (key != "elementdatafile") continue;
         header.bytes = lines.taken();
         if (is_list(header.fields[key])) header.listed_files = lines.rest();

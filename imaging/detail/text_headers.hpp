@@ -14,6 +14,8 @@ struct TextHeader {
     std::vector<std::string> listed_files;        ///< lines behind "LIST"
     std::size_t bytes = 0;                        ///< length of the header, where attached data begin
 
+    /// Takes a field. Throws IoError where the header has its key with another value.
+    void set(const std::filesystem::path& path, const std::string& key, const std::string& value);
     /// The value of a key, or "" when it is absent.
     [[nodiscard]] std::string value(const std::string& key) const;
 };

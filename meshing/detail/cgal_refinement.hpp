@@ -171,6 +171,7 @@ TetMesh refine_with(const RefinementInput& input, Observer& observer) {
     const double shortest = *std::min_element(input.edge_length.begin() + 1, input.edge_length.end());
     const FacetCriteria<Tr> facets(options.facet_angle, size, input.facet_distance, smallest_facet * shortest);
     const Criteria<Tr> criteria(facets, typename Criteria<Tr>::Cell_criteria(options.radius_edge_ratio, size));
+    CGAL::set_warning_handler([](const char*, const char*, const char*, int, const char*) {});  // labels too thin
     Complex<Concurrency> complex;
     insert_seeds(input, domain, complex);
     observer.checkpoint("refining the mesh", 0.1);

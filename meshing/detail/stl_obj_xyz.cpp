@@ -77,13 +77,17 @@ RawSurface read_ascii_stl(FileReader& file) {
 
 RawSurface read_stl(FileReader& file) {
     // Binary files may begin with "solid" too: their size decides.
-    if (file.text().size() >= 84) {
+    std::string found;
+    if (const std::size_t bytes = file.text().size(); bytes >= 84) {
         file.seek(80);
         const std::uint32_t count = file.binary<std::uint32_t>();
-        if (file.text().size() == 84 + 50 * std::size_t{count}) return read_binary_stl(file, count);
+        const std::size_t expected = 84 + 50 * std::size_t{count};
+        if (bytes == expected) return read_binary_stl(file, count);
+        found = ": it has " + std::to_string(bytes) + " bytes, and the " + std::to_string(count) +
+                " triangles that it states take " + std::to_string(expected);
         file.seek(0);
     }
-    if (!file.text().starts_with("solid")) file.fail("is neither an ascii STL file nor a complete binary one");
+    if (!file.text().starts_with("solid")) file.fail("is neither an ascii STL file nor a complete binary one" + found);
     return read_ascii_stl(file);
 }
 

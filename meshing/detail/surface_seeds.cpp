@@ -98,7 +98,8 @@ std::vector<std::vector<Face>> faces_of_pieces(const LabelGrid& grid, const std:
 }  // namespace
 
 std::vector<SurfaceSeed> surface_seeds(const LabelGrid& grid, const LabelField& field,
-                                       const std::vector<double>& edge_length, const std::vector<char>& thin) {
+                                       const std::vector<double>& edge_length, const std::vector<char>& thin,
+                                       Observer& observer) {
     const Components components = connected_components(grid, field.classes());
     const auto faces = faces_of_pieces(grid, field.classes(), components);
     std::vector<std::int64_t> largest(grid.values.size(), 0);
@@ -114,6 +115,7 @@ std::vector<SurfaceSeed> surface_seeds(const LabelGrid& grid, const LabelField& 
     });
     Sampler sampler(grid, components);
     for (std::int32_t piece : order) {
+        if (observer.cancel_requested()) throw Cancelled();
         const auto c = static_cast<std::size_t>(piece);
         const double edge = edge_length[components.class_of[c]];
         const double volume = static_cast<double>(components.voxels[c]) * grid.spacing.prod();

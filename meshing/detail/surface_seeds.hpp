@@ -1,6 +1,7 @@
 #pragma once
 /// Where to look first: pairs of points on either side of every connected piece's surface, so that none is missed.
 
+#include "core/observer.hpp"
 #include "meshing/detail/label_field.hpp"
 
 namespace tissuewarp::meshing::detail {
@@ -15,7 +16,9 @@ struct SurfaceSeed {
 /// would force tiny elements.
 /// Pieces of the classes marked in `thin` get a dense cluster at one place besides: refinement looks for an interface
 /// where the two ends of a Voronoi edge differ, and long edges pass through a membrane from outside to outside.
+/// Takes a time with the square of the number of pieces: throws Cancelled between two of them.
 std::vector<SurfaceSeed> surface_seeds(const LabelGrid& grid, const LabelField& field,
-                                       const std::vector<double>& edge_length, const std::vector<char>& thin);
+                                       const std::vector<double>& edge_length, const std::vector<char>& thin,
+                                       Observer& observer = silent_observer());
 
 }  // namespace tissuewarp::meshing::detail

@@ -2,6 +2,7 @@
 
 #include "meshing/detail/surface_formats.hpp"
 
+#include <cctype>
 #include <map>
 
 namespace tissuewarp::meshing::detail {
@@ -15,10 +16,10 @@ public:
     RawSurface read() {
         if (!file_.line().starts_with("# vtk DataFile")) file_.fail("is no VTK legacy file");
         surface_.space = space_in(file_.line());  // the title, as 3D Slicer writes it
-        const std::string_view encoding = file_.token();
+        const std::string encoding = keyword();
         if (encoding != "ASCII" && encoding != "BINARY") file_.fail("is neither ASCII nor BINARY");
         binary_ = encoding == "BINARY";
-        if (file_.token() != "DATASET" || file_.token() != "POLYDATA")
+        if (keyword() != "DATASET" || keyword() != "POLYDATA")
             file_.fail("holds no POLYDATA; write the surface as polydata");
         while (section()) {
         }
@@ -26,38 +27,45 @@ public:
     }
 
 private:
+    /// The next word in capitals: files may be written in either.
+    std::string keyword() {
+        std::string word(file_.token());
+        for (char& c : word) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+        return word;
+    }
+
     bool section() {
-        const std::string_view keyword = file_.token();
-        if (keyword.empty()) return false;
-        if (keyword == "POINTS") {
+        const std::string name = keyword();
+        if (name.empty()) return false;
+        if (name == "POINTS") {
             const long long count = file_.integer();
             read_vectors(count, surface_.nodes);
-        } else if (keyword == "POLYGONS") {
+        } else if (name == "POLYGONS") {
             for (const auto& polygon : read_cells()) surface_.add_polygon(polygon);
-        } else if (keyword == "LINES") {
+        } else if (name == "LINES") {
             surface_.lines = read_cells();
-        } else if (keyword == "VERTICES") {
+        } else if (name == "VERTICES") {
             read_cells();
-        } else if (keyword == "TRIANGLE_STRIPS") {
+        } else if (name == "TRIANGLE_STRIPS") {
             file_.fail("has triangle strips; write triangles");
-        } else if (keyword == "METADATA") {
+        } else if (name == "METADATA") {
             skip_metadata();
-        } else if (keyword == "FIELD") {
+        } else if (name == "FIELD") {
             read_field();
-        } else if (keyword == "POINT_DATA") {
+        } else if (name == "POINT_DATA") {
             file_.integer();
             const std::size_t start = file_.position();
-            if (file_.token() != "NORMALS") {
+            if (keyword() != "NORMALS") {
                 file_.seek(start);
                 return false;  // other attributes are of no use here
             }
             file_.token();  // name
             read_vectors(static_cast<long long>(surface_.nodes.size()), surface_.normals);
             return false;
-        } else if (keyword == "CELL_DATA") {
+        } else if (name == "CELL_DATA") {
             return false;
         } else {
-            file_.fail("has the section '" + std::string(keyword.substr(0, 40)) +
+            file_.fail("has the section '" + name.substr(0, 40) +
                        "'; points, polygons, lines, fields and data of points are read");
         }
         return true;
@@ -154,7 +162,7 @@ private:
         const long long first = file_.integer(), second = file_.integer();
         file_.line();
         const std::size_t start = file_.position();
-        if (file_.token() == "OFFSETS") return read_offset_cells(first, second);
+        if (keyword() == "OFFSETS") return read_offset_cells(first, second);
         file_.seek(start);
         std::vector<std::vector<long long>> cells(file_.checked_count(first, "cells", binary_ ? 4 : 2));
         for (auto& cell : cells) cell = read_indices(index("int"), "int");
@@ -165,7 +173,7 @@ private:
         std::string type(file_.token());
         file_.line();
         const auto offsets = read_indices(offset_count, type);
-        if (file_.token() != "CONNECTIVITY") file_.fail("has OFFSETS without CONNECTIVITY");
+        if (keyword() != "CONNECTIVITY") file_.fail("has OFFSETS without CONNECTIVITY");
         type = file_.token();
         file_.line();
         const auto indices = read_indices(index_count, type);

@@ -29,14 +29,25 @@ inline double typical_extent(const Eigen::Matrix3Xd& points) {
 }
 
 /// Throws InvalidInput where points are less than 3 mm or more than 2 m across; `what` names them, with its verb.
-inline void require_millimetres(const Eigen::Matrix3Xd& points, const std::string& what) {
-    constexpr double least_extent_mm = 3, most_extent_mm = 2000;
+inline void require_millimetres(const Eigen::Matrix3Xd& points, const std::string& what, double least_extent_mm = 3) {
+    constexpr double most_extent_mm = 2000;
     const double extent = typical_extent(points);
     if (extent >= least_extent_mm && extent <= most_extent_mm) return;
     std::ostringstream text;
     text << what << " about " << extent << " mm across; coordinates in mm are needed, are these in "
          << (extent < least_extent_mm ? "metres?" : "micrometres?");
     throw InvalidInput(text.str());
+}
+
+/// As above for points of any number: of few, which may lie side by side, only what tissue in metres measures at most
+/// is refused.
+inline void require_millimetres_of_points(const Eigen::Matrix3Xd& points, const std::string& what) {
+    constexpr double largest_organ_in_m = 0.5;
+    constexpr Eigen::Index few = 10;
+    if (points.cols() >= few)
+        require_millimetres(points, what);
+    else if (points.cols() > 1 && typical_extent(points) > 0)
+        require_millimetres(points, what, largest_organ_in_m);
 }
 
 }  // namespace tissuewarp::registration::detail

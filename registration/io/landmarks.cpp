@@ -2,6 +2,7 @@
 #include "core/text_table.hpp"
 #include "meshing/point_table.hpp"
 #include "registration/evaluation.hpp"
+#include "registration/io/extent.hpp"
 #include "registration/io/slicer_markups.hpp"
 
 #include <algorithm>
@@ -62,12 +63,22 @@ Eigen::Matrix3Xd read_elastix_points(const std::filesystem::path& path) {
     return as_matrix(points);
 }
 
-Markups read_points_of_any_kind(const std::filesystem::path& path, Observer& observer) {
-    if (is_slicer_markups(path)) return read_slicer_markups(path, observer);
-    if (!is_table(path)) return {read_elastix_points(path), {}, {}};
+struct PointList : Markups {
+    int blank_line = 0;  ///< between the points of a table, where one may be missing; or 0
+};
+
+PointList read_points_as_they_are(const std::filesystem::path& path, Observer& observer) {
+    if (is_slicer_markups(path)) return {read_slicer_markups(path, observer)};
+    if (!is_table(path)) return {{read_elastix_points(path), {}, {}}};
     meshing::PointTable table = meshing::read_point_table(path);
     for (const std::string& note : table.notes) observer.note(note);
-    return {std::move(table.points), std::move(table.names), {}};
+    return {{std::move(table.points), std::move(table.names), {}}, table.blank_line};
+}
+
+PointList read_points_of_any_kind(const std::filesystem::path& path, Observer& observer) {
+    PointList list = read_points_as_they_are(path, observer);
+    detail::require_millimetres_of_points(list.points, path.string() + ": the points are");
+    return list;
 }
 
 bool has_names(const Markups& markups) {
@@ -94,6 +105,14 @@ std::string listed(const std::vector<std::string>& names) {
     std::string text;
     for (std::size_t i = 0; i < std::min(names.size(), most); ++i) text += (i > 0 ? ", " : "") + names[i];
     return text + (names.size() > most ? ", …" : "");
+}
+
+/// A point that is missing would shift the partners of all behind it.
+void require_no_gap(const PointList& list, const std::filesystem::path& path) {
+    if (list.blank_line > 0)
+        throw InvalidInput(path.string() + ":" + std::to_string(list.blank_line) +
+                           ": the line is empty, and points are pairs by their order; a point may be missing: name the "
+                           "points in both files, or take the line out");
 }
 
 Landmarks paired_by_name(const Markups& from, const Markups& to, const std::filesystem::path& moving,
@@ -161,12 +180,17 @@ Landmarks read_landmarks(const std::filesystem::path& path, Observer& observer) 
             observer.note(note_of(table.path(), "the columns " + columns.name[0] + ", " + columns.name[1] + ", " +
                                                     columns.name[2] + " were turned to LPS"));
     if (table.has_decimal_commas()) observer.note(note_of(table.path(), "its numbers have decimal commas"));
-    return {as_matrix(from), as_matrix(to)};
+    Landmarks landmarks{as_matrix(from), as_matrix(to)};
+    for (const Eigen::Matrix3Xd* points : {&landmarks.moving, &landmarks.fixed})
+        detail::require_millimetres_of_points(*points, path.string() + ": the landmarks are");
+    return landmarks;
 }
 
 Landmarks read_landmarks(const std::filesystem::path& moving, const std::filesystem::path& fixed, Observer& observer) {
-    Markups from = read_points_of_any_kind(moving, observer), to = read_points_of_any_kind(fixed, observer);
+    PointList from = read_points_of_any_kind(moving, observer), to = read_points_of_any_kind(fixed, observer);
     if (has_names(from) && has_names(to)) return paired_by_name(from, to, moving, fixed, observer);
+    require_no_gap(from, moving);
+    require_no_gap(to, fixed);
     if (from.points.cols() != to.points.cols())
         throw InvalidInput(moving.string() + " has " + std::to_string(from.points.cols()) + " points and " +
                            fixed.string() + " has " + std::to_string(to.points.cols()) +

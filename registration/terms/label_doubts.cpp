@@ -84,6 +84,44 @@ void doubt_vanished(const Counts& moving, const Counts& fixed, std::vector<Doubt
                   "segment it in both, or leave it out; check the label tables");
 }
 
+/// The moving labels under the rigid motion that brings all of them together, whatever their numbers, to the fixed.
+Volume where_all_labels_together_fit(const Volume& moving, const Volume& fixed, const imaging::Geometry& grid) {
+    const Alignment found = align_labels(imaging::mask_of_all(moving), imaging::mask_of_all(fixed));
+    Volume placed = moving;
+    placed.geometry.origin = found.placement * moving.geometry.origin;
+    placed.geometry.direction = found.placement.linear() * moving.geometry.direction;
+    return imaging::resample(placed, grid, imaging::Interpolation::Nearest);
+}
+
+/// Which label of the fixed map a label lies on, of those that lie on another than their own; both on one grid.
+std::map<int, int> exchanged_labels(const Volume& shown, const Volume& fixed) {
+    std::map<std::pair<int, int>, double> common;
+    for (std::int64_t n = 0; n < fixed.geometry.voxel_count(); ++n) {
+        const int a = shown.data<std::int32_t>()[n], b = fixed.data<std::int32_t>()[n];
+        if (a != 0 && b != 0) common[{a, b}] += 2;
+    }
+    const Counts in_shown = voxels_of(shown), in_fixed = voxels_of(fixed);
+    std::map<int, int> pairs;
+    for (auto& [pair, dice] : common) {
+        const auto [a, b] = pair;
+        const double own = common.contains({a, a}) ? common.at({a, a}) : 0;
+        const double all = double(in_shown.at(a) + in_fixed.at(b));
+        if (a != b && dice > limits.least_dice * all && dice > own) pairs[a] = b;
+    }
+    return pairs;
+}
+
+/// Empty where there are none.
+std::string text_of_exchange(const std::map<int, int>& pairs) {
+    std::string text;
+    for (const auto& [moving, fixed] : pairs)
+        text += (text.empty() ? "labels seem to be exchanged: " : ", ") + std::to_string(moving) +
+                " of the moving map lies where " + std::to_string(fixed) + " of the fixed one does";
+    return text;
+}
+
+constexpr const char* exchange_remedy = "give the same tissue the same number in both maps";
+
 /// How well the model's own labels fit.
 class LabelFits {
 public:
@@ -109,8 +147,9 @@ public:
 
     /// Which label of the fixed map a label of the model lies on, of those that lie on another than their own.
     [[nodiscard]] std::map<int, int> exchanged() const {
-        std::map<int, int> pairs = exchanged_on(shown_);
-        return pairs.empty() ? exchanged_on(where_all_labels_together_fit()) : pairs;
+        std::map<int, int> pairs = exchanged_labels(shown_, coarse_);
+        if (!pairs.empty()) return pairs;
+        return exchanged_labels(where_all_labels_together_fit(moving_, fixed_, coarse_.geometry), coarse_);
     }
 
     [[nodiscard]] const Volume& moving() const { return moving_; }
@@ -188,43 +227,12 @@ private:
                               " of its surface): what lies at the cut and beyond is where mechanics alone put it",
                           "do not trust tissue there; give labels of all of the organ, or cut both maps alike"});
     }
-
-    /// The moving labels under the rigid motion that brings all of them together, whatever their numbers, to the fixed.
-    [[nodiscard]] Volume where_all_labels_together_fit() const {
-        const Alignment found = align_labels(imaging::mask_of_all(moving_), imaging::mask_of_all(fixed_));
-        Volume placed = moving_;
-        placed.geometry.origin = found.placement * moving_.geometry.origin;
-        placed.geometry.direction = found.placement.linear() * moving_.geometry.direction;
-        return imaging::resample(placed, coarse_.geometry, imaging::Interpolation::Nearest);
-    }
-
-    [[nodiscard]] std::map<int, int> exchanged_on(const Volume& shown) const {
-        std::map<std::pair<int, int>, double> common;
-        for (std::int64_t n = 0; n < coarse_.geometry.voxel_count(); ++n) {
-            const int a = shown.data<std::int32_t>()[n], b = coarse_.data<std::int32_t>()[n];
-            if (a != 0 && b != 0) common[{a, b}] += 2;
-        }
-        const Counts in_shown = voxels_of(shown), in_coarse = voxels_of(coarse_);
-        std::map<int, int> pairs;
-        for (auto& [pair, dice] : common) {
-            const auto [a, b] = pair;
-            const double own = common.contains({a, a}) ? common.at({a, a}) : 0;
-            const double all = double(in_shown.at(a) + in_coarse.at(b));
-            if (a != b && dice > limits.least_dice * all && dice > own) pairs[a] = b;
-        }
-        return pairs;
-    }
 };
 
 std::optional<Doubt> doubt_of_pairing(const LabelFits& fits) {
     const std::map<int, int> pairs = fits.exchanged();
     if (pairs.empty()) return std::nullopt;
-    std::string text = "labels seem to be exchanged:";
-    for (const auto& [moving, fixed] : pairs)
-        text += (text.back() == ':' ? " " : ", ") + std::to_string(moving) + " of the moving map lies where " +
-                std::to_string(fixed) + " of the fixed one does";
-    return Doubt{"labels.exchanged", double(pairs.size()), 0, text,
-                 "give the same tissue the same number in both maps"};
+    return Doubt{"labels.exchanged", double(pairs.size()), 0, text_of_exchange(pairs), exchange_remedy};
 }
 
 std::optional<Doubt> doubt_of_pose(const LabelFits& fits, const UpdateOptions& options, const UpdateResult& result) {
@@ -252,6 +260,13 @@ bool is_misplaced(const std::vector<Doubt>& doubts) {
 }
 
 }  // namespace
+
+std::string why_nothing_matches(const Volume& moving, const Volume& fixed) {
+    const Volume from = moving.as(CV_32S), to = coarsened(fixed.as(CV_32S), limits.grid_mm);
+    const std::string exchange =
+        text_of_exchange(exchanged_labels(where_all_labels_together_fit(from, fixed.as(CV_32S), to.geometry), to));
+    return exchange.empty() ? "check that the images show the same organ" : exchange + "; " + exchange_remedy;
+}
 
 std::vector<Doubt> doubts_of_labels(const PreparedModel& prepared, const Volume& fixed, const UpdateOptions& options,
                                     const UpdateResult& result) {

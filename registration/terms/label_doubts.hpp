@@ -6,6 +6,7 @@
 #include "registration/prepare.hpp"
 #include "registration/result.hpp"
 
+#include <string>
 #include <vector>
 
 namespace tissuewarp::registration::detail {
@@ -38,5 +39,8 @@ inline constexpr LabelPoseLimits label_pose_limits{};
 /// alignment and deformation.
 std::vector<Doubt> doubts_of_labels(const PreparedModel& prepared, const imaging::Volume& fixed,
                                     const UpdateOptions& options, const UpdateResult& result);
+
+/// The likely cause and remedy where labels have no boundary in common: numbers that are exchanged, if any.
+std::string why_nothing_matches(const imaging::Volume& moving, const imaging::Volume& fixed);
 
 }  // namespace tissuewarp::registration::detail

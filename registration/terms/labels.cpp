@@ -60,7 +60,7 @@ Contribution LabelTerm::linearise(const RoundPlan& plan, const State& state, Obs
     }
     if (last_.matched == 0)
         throw InvalidInput("no boundary of the model was found in the fixed labels within " + to_text(plan.range_mm) +
-                           " mm; check that the images show the same organ");
+                           " mm; " + why_nothing_matches(prepared_.labels, labels_));
     Contribution result = last_;
     result.springs = pulled_by(label_kind(prepared_.labels.geometry, labels_.geometry),
                                matched_springs(interfaces, matches, normals, state.displacement, prepared_.options));

@@ -230,6 +230,9 @@ TEST(DicomFrames, GapsTwoStacksAndMissingPositionsAreRefused) {
     frames.insert(frames.end(), frames.begin(), frames.end());
     write_frames(folder / "mf.dcm", ct_volume(), frames);
     EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(folder / "mf.dcm"); }), HasSubstr("same position"));
+    write_frames(folder / "mf.dcm", ct_volume(), std::vector<Frame>(6));
+    EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(folder / "mf.dcm"); }),
+                HasSubstr("its 6 frames lie at one position"));
     frames = in_order(6);
     frames[3].placed = false;
     write_frames(folder / "mf.dcm", ct_volume(), frames);

@@ -25,6 +25,8 @@ struct SliceOptions {
     double thickness = 0.0;                           ///< mm, that of the grid when 0
     bool placed = true;                               ///< states position and orientation
     std::string image_type = "ORIGINAL\\PRIMARY";
+    std::string pixel_spacing = "";  ///< that of the grid when empty
+    bool has_pixels = true;
 };
 
 /// Slice k of an int16 volume as a CT image.
@@ -53,7 +55,9 @@ void write_slice(const std::filesystem::path& path, const Volume& volume, int k,
     data.short_value(0x28, 0x10, grid.size[1]);
     data.short_value(0x28, 0x11, grid.size[0]);
     // Row spacing first: the distance between rows is the spacing along j.
-    data.text(0x28, 0x30, "DS", decimals(Eigen::Vector2d(grid.spacing[1], grid.spacing[0])));
+    data.text(0x28, 0x30, "DS",
+              options.pixel_spacing.empty() ? decimals(Eigen::Vector2d(grid.spacing[1], grid.spacing[0]))
+                                            : options.pixel_spacing);
     data.short_value(0x28, 0x100, 16);
     data.short_value(0x28, 0x101, 16);
     data.short_value(0x28, 0x102, 15);
@@ -61,7 +65,7 @@ void write_slice(const std::filesystem::path& path, const Volume& volume, int k,
     data.text(0x28, 0x1052, "DS", decimals(Eigen::VectorXd::Constant(1, options.intercept)));
     data.text(0x28, 0x1053, "DS", decimals(Eigen::VectorXd::Constant(1, options.slope)));
     const std::int16_t* first = volume.data<short>() + volume.offset(0, 0, k);
-    data.words(0x7fe0, 0x10, {first, first + grid.size[0] * grid.size[1]});
+    if (options.has_pixels) data.words(0x7fe0, 0x10, {first, first + grid.size[0] * grid.size[1]});
 
     test::write_dicom(path, image_class, instance, data);
 }
@@ -112,6 +116,37 @@ TEST(DicomSeries, AMissingSliceIsRefused) {
     const std::string message = message_of<InvalidInput>([&] { read_volume(folder.path()); });
     EXPECT_THAT(message, HasSubstr("slices are missing or uneven: 5 mm"));
     EXPECT_THAT(message, HasSubstr(folder.path().string()));
+}
+
+// 2.5 mm between slices: two roundings to 0.1 mm differ by up to 4 % of it.
+TEST(DicomSeries, PositionsRoundedToATenthOfAMillimetreAreAnEvenStackAndAGapIsNone) {
+    constexpr std::array rounding{0.04, -0.05, 0.05, -0.04, 0.05, -0.05};
+    const TemporaryFolder folder;
+    const Volume volume = ct_volume();
+    for (int k = 0; k < 6; ++k)
+        write_slice(folder / reversed_name(k, 6), volume, k,
+                    {.shift = rounding[static_cast<std::size_t>(k)] * volume.geometry.direction.col(2)});
+    const ReadResult read = read_volume_with_notes(folder.path());
+    EXPECT_TRUE(test::same_voxels(read.volume.voxels, volume.voxels));
+    EXPECT_LT(grid_distance(volume.geometry, read.volume.geometry), 0.02);
+    EXPECT_THAT(read.notes, testing::ElementsAre(HasSubstr("off even steps of 2.4")));
+    for (const int missing : {1, 3}) {
+        const TemporaryFolder gap;
+        for (int k = 0; k < 6; ++k)
+            if (k != missing) std::filesystem::copy_file(folder / reversed_name(k, 6), gap / reversed_name(k, 6));
+        EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(gap.path()); }), HasSubstr("missing or uneven"));
+    }
+}
+
+TEST(DicomSeries, NumbersThatAreNoneAndSlicesWithoutPixelsAreNamed) {
+    const TemporaryFolder folder;
+    for (int k = 0; k < 6; ++k)
+        write_slice(folder / reversed_name(k, 6), ct_volume(), k, {.pixel_spacing = "0,75\\0,75"});
+    EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(folder.path()); }),
+                HasSubstr("Pixel Spacing is '0,75\\0,75' where 2 numbers with decimal points belong"));
+    for (int k = 0; k < 6; ++k) write_slice(folder / reversed_name(k, 6), ct_volume(), k, {.has_pixels = k != 4});
+    EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(folder.path()); }),
+                testing::AllOf(HasSubstr(reversed_name(4, 6)), HasSubstr("holds no pixels")));
 }
 
 TEST(DicomSeries, TwoSeriesInOneFolderAreRefused) {

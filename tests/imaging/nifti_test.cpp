@@ -46,7 +46,8 @@ std::string nifti_bytes(const TemporaryFolder& folder) {
     return bytes_of(folder / "plain.nii");
 }
 
-constexpr std::size_t pixdim = 76, units = 123, qform_code = 252, sform_code = 254, qoffset = 268, srow = 280;
+constexpr std::size_t dim_field = 40, intent_code = 68, datatype = 70, pixdim = 76, units = 123, qform_code = 252,
+                      sform_code = 254, qoffset = 268, srow = 280;
 
 /// Lengths of the header times a factor.
 std::string scaled(std::string bytes, float factor, char unit) {
@@ -217,9 +218,67 @@ TEST(Nifti, WarpsOfFslAreRefused) {
     const TemporaryFolder folder;
     write_volume(Volume(test::plain_grid({3, 3, 3}, {2, 2, 2}), CV_32FC3), folder / "field.nii");
     std::string bytes = bytes_of(folder / "field.nii");
-    put(bytes, 68, std::int16_t{2006});
+    for (const short dimensions : {short{5}, short{4}}) {
+        put(bytes, intent_code, std::int16_t{2006});
+        put(bytes, dim_field, dimensions);
+        put<short>(bytes, dim_field + 8, dimensions == 4 ? 3 : 1);
+        write(folder / "field.nii", bytes);
+        EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(folder / "field.nii"); }),
+                    HasSubstr("FSL (intent 2006)"));
+    }
+}
+
+Volume some_field() {
+    Volume field(test::plain_grid({3, 3, 3}, {2, 2, 2}), CV_32FC3);
+    field.voxels.setTo(cv::Scalar(1, 2, 3));
+    return field;
+}
+
+TEST(Nifti, VectorsAreInTheUnitOfTheHeader) {
+    const TemporaryFolder folder;
+    write_volume(some_field(), folder / "field.nii");
+    for (const short intent : {short{1006}, short{1007}}) {
+        std::string bytes = scaled(bytes_of(folder / "field.nii"), 0.001F, 1);
+        put(bytes, intent_code, intent);
+        write(folder / "metres.nii", bytes);
+        const ReadResult read = read_volume_with_notes(folder / "metres.nii");
+        const float sign = intent == 1006 ? -1 : 1;
+        EXPECT_EQ(read.volume.voxels.at<cv::Vec3f>(1, 1, 1), cv::Vec3f(sign * 1000, sign * 2000, 3000));
+        EXPECT_THAT(read.notes, testing::Contains(HasSubstr("its vectors are taken in the unit that the header")));
+    }
+}
+
+TEST(Nifti, VectorsAlongTheFourthAxisAreKnownByTheirIntent) {
+    const TemporaryFolder folder;
+    write_volume(some_field(), folder / "field.nii");
+    std::string bytes = bytes_of(folder / "field.nii");
+    put<short>(bytes, dim_field, 4);
+    put<short>(bytes, dim_field + 8, 3);
     write(folder / "field.nii", bytes);
-    EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(folder / "field.nii"); }), HasSubstr("FSL (intent 2006)"));
+    EXPECT_TRUE(test::same_voxels(read_volume(folder / "field.nii").voxels, some_field().voxels));
+    put<short>(bytes, intent_code, 0);
+    write(folder / "field.nii", bytes);
+    EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(folder / "field.nii"); }),
+                HasSubstr("3 time points, or vectors without NIfTI's intent 1007"));
+}
+
+TEST(Nifti, AQformOfNegativeVoxelsIsRefused) {
+    const TemporaryFolder folder;
+    std::string bytes = nifti_bytes(folder);
+    put(bytes, pixdim + 4, -2.0F);
+    write(folder / "a.nii", bytes);
+    EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(folder / "a.nii"); }),
+                HasSubstr("its pixdim states voxels of -2 x 2 x 2, and a qform needs positive ones"));
+}
+
+TEST(Nifti, TypesThatAreNoneAreNamed) {
+    const TemporaryFolder folder;
+    std::string bytes = nifti_bytes(folder);
+    for (const auto& [type, text] : {std::pair{short{0}, "type 0 (unknown)"}, {short{1}, "type 1 (single bits)"}}) {
+        put(bytes, datatype, type);
+        write(folder / "a.nii", bytes);
+        EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(folder / "a.nii"); }), HasSubstr(text));
+    }
 }
 
 }  // namespace

@@ -192,6 +192,50 @@ TEST(MetaImage, UnitsAreConvertedAndUnknownOnesRefused) {
     EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(folder / "a.mha"); }), HasSubstr("'furlong'"));
 }
 
+std::string without_line(std::string text, const std::string& key) {
+    const std::size_t at = text.find(key);
+    return text.erase(at, text.find('\n', at) + 1 - at);
+}
+
+TEST(MetaImage, WhatTheHeaderDoesNotStateIsNoted) {
+    const TemporaryFolder folder;
+    for (const std::string key : {"Offset", "TransformMatrix", "ElementSpacing"}) {
+        write(folder / "a.mha", without_line(meta(), key) + "LOCAL\n" + counted_bytes());
+        EXPECT_THAT(read_volume_with_notes(folder / "a.mha").notes,
+                    ElementsAre(HasSubstr("the header states no " + key)));
+    }
+}
+
+TEST(MetaImage, VectorsAreInTheUnitOfTheHeader) {
+    const TemporaryFolder folder;
+    std::string data;
+    for (int i = 0; i < 60; ++i) data += std::string("\1\0\2\0\3\0", 6);
+    write(folder / "a.mha", meta("DistanceUnits = cm\nElementNumberOfChannels = 3\n", "MET_SHORT") + "LOCAL\n" + data);
+    const ReadResult read = read_volume_with_notes(folder / "a.mha");
+    EXPECT_EQ(read.volume.voxels.at<cv::Vec3f>(1, 1, 1), cv::Vec3f(10, 20, 30));
+    EXPECT_THAT(read.notes, ElementsAre(HasSubstr("given in cm"), HasSubstr("its vectors are taken in the unit")));
+}
+
+TEST(MetaImage, HeadersThatStateAKeyTwiceAreRefusedWhereTheyDiffer) {
+    const TemporaryFolder folder;
+    const auto with = [&](const std::string& more) {
+        write(folder / "a.mha", meta(more) + "LOCAL\n" + counted_bytes());
+        return folder / "a.mha";
+    };
+    EXPECT_THAT(message_of<IoError>([&] { read_volume(with("ElementSpacing = 1 1 1\n")); }),
+                HasSubstr("states 'elementspacing' twice, '1 1 1' and '2 3 4'"));
+    expect_counted(read_volume(with("ElementSpacing = 2 3 4\nComment = a\nComment = b\n")));
+}
+
+TEST(MetaImage, PackedVoxelsThatTheHeaderDoesNotSayAreNamed) {
+    const TemporaryFolder folder;
+    const std::string zeros(60, '\0');
+    for (const int window : {MAX_WBITS, MAX_WBITS + 16}) {
+        write(folder / "a.mha", meta("CompressedData = False\n") + "LOCAL\n" + packed(zeros, window));
+        EXPECT_THAT(message_of<IoError>([&] { read_volume(folder / "a.mha"); }), HasSubstr("CompressedData = True"));
+    }
+}
+
 /// An NRRD header of 3 x 4 x 5 bytes; `more` ends in the data, or in the line of their file.
 std::string nrrd(const std::string& space, const std::string& directions, const std::string& more) {
     return "NRRD0005\ntype: uint8\ndimension: 3\n" + space + "sizes: 3 4 5\nspace directions: " + directions +
@@ -281,6 +325,12 @@ TEST(Nrrd, SpacingsAlongAxesHaveUnitsAndOriginsOfTheirOwn) {
     write(folder / "a.nrrd", header + "\n" + counted_bytes());
     EXPECT_THAT(read_volume_with_notes(folder / "a.nrrd").notes,
                 ElementsAre(HasSubstr("names no space"), HasSubstr("states no spacing")));
+    write(folder / "a.nrrd",
+          header + "axis mins: 10 20 30\naxis maxs: 14 32 50\ncenters: node cell cell\n\n" + counted_bytes());
+    const ReadResult ends = read_volume_with_notes(folder / "a.nrrd");
+    EXPECT_TRUE(ends.volume.geometry.spacing.isApprox(Eigen::Vector3d(2, 3, 4)));
+    EXPECT_TRUE(ends.volume.geometry.origin.isApprox(Eigen::Vector3d(10, 21.5, 32)));
+    EXPECT_THAT(ends.notes, ElementsAre(HasSubstr("names no space")));
 }
 
 TEST(Nrrd, DetachedDataInListsPatternsAndBehindHeadersAreRead) {
@@ -361,6 +411,10 @@ TEST(Nrrd, VectorsAreTurnedFromTheHeadersSpace) {
     EXPECT_THAT(notes, ElementsAre(HasSubstr("vectors were turned to LPS")));
     EXPECT_EQ(read("space: left-posterior-superior\nmeasurement frame: (0,1,0) (-1,0,0) (0,0,1)\n"),
               cv::Vec3f(-2, 1, 3));
+    EXPECT_EQ(read("space: left-posterior-superior\nspace units: \"cm\" \"cm\" \"mm\"\n"), cv::Vec3f(10, 20, 3));
+    EXPECT_THAT(notes, ElementsAre(HasSubstr("given in cm"), HasSubstr("its vectors are taken in the unit")));
+    EXPECT_THAT(message_of<IoError>([&] { read("space: LPS\nspace: RAS\n"); }),
+                HasSubstr("states 'space' twice, 'LPS' and 'RAS'"));
 }
 
 /// A segmentation of 3D Slicer with layers in front, 2 x 2 x 2 voxels.

@@ -116,6 +116,10 @@ TEST(SurfaceSeeds, StandOnEveryPieceAndKeepTheirDistance) {
         for (std::size_t b = 0; b < a; ++b)
             EXPECT_GE(0.5 * (seeds[a].inside + seeds[a].outside - seeds[b].inside - seeds[b].outside).matrix().norm(),
                       0.25 * 4.0);
+    struct Impatient : Observer {
+        bool cancel_requested() override { return true; }
+    } impatient;
+    EXPECT_THROW((void)surface_seeds(grid, field, edge, {0, 0, 0}, impatient), Cancelled);
 }
 
 }  // namespace

@@ -243,11 +243,25 @@ TEST(Mesher, StopsWhenAsked) {
     }
 }
 
+struct Listener : Observer {
+    void note(std::string_view message) override { notes.emplace_back(message); }
+    std::vector<std::string> notes;
+};
+
+TEST(Mesher, LabelsThatAreMostlyLostAreNotedOrRefused) {
+    const auto plane = [](const Eigen::Vector3d& p) { return std::abs(p[2] - 22.0) < 0.6 ? 1 : 0; };
+    const auto on_a_block = [&](const Eigen::Vector3d& p) { return p[2] < 15.0 ? 2 : plane(p); };
+    testing::internal::CaptureStderr();
+    EXPECT_THROW(mesh_labels(paint(grid(45), plane), with_edge(12.0)), InvalidInput);
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "");  // CGAL has its own words
+    Listener listener;
+    mesh_labels(paint(grid(45), on_a_block), with_edge(12.0), listener);
+    EXPECT_THAT(listener.notes, testing::Contains(testing::AllOf(testing::HasSubstr("of label 1 "),
+                                                                 testing::HasSubstr("give it an edge length below"))));
+}
+
 TEST(Mesher, LabelsInThousandsOfPiecesAreNoted) {
-    struct Listener : Observer {
-        void note(std::string_view message) override { notes.emplace_back(message); }
-        std::vector<std::string> notes;
-    } listener;
+    Listener listener;
     Volume labels(grid(45), CV_32S);
     for (int k = 0; k < 45; ++k)
         for (int j = 0; j < 45; ++j)

@@ -103,7 +103,14 @@ TEST_F(PointTables, WhatCannotBeToldIsRefusedWithItsLine) {
     EXPECT_THAT(refused("1 2 3\n\n1 2 3 4\n"), HasSubstr("a.csv:3: 4 fields; the first row has 3"));
     EXPECT_THAT(refused("x,y,z\n-5,77,49,03,12,00\n"), HasSubstr("a.csv:2: 6 fields; the header names 3; separate "
                                                                  "columns with decimal commas by semicolons"));
-    EXPECT_THAT(refused("-5,77,49,03,12,00\n"), HasSubstr("a.csv:1: columns 4 to 6"));
+    EXPECT_THAT(refused("-5,77,49,03,12,00\n"), HasSubstr("a.csv:1: commas stand between columns and for decimal"));
+    EXPECT_THAT(refused("My points\nx,y,z\n1,2,3\n"), HasSubstr("a.csv:1: this line stands before the names"));
+    EXPECT_THAT(refused("//X Y Z\n3\n1 2 3\n4 5 6\n"),
+                HasSubstr("a.csv:2: '3' looks like the number of points, and 2"));
+    EXPECT_THAT(refused("2\nmolecule\nC 1 2 3\nH 4 5 6\n"), HasSubstr("a.csv:1: '2' looks like the number of points"));
+    EXPECT_THAT(refused("x,y,z\n1,2,3\n,,\n4,5,6\n"), HasSubstr("a.csv:3: the row is empty and others follow"));
+    EXPECT_THAT(refused("x\ty\tz\n1\t2\t3\n\t\t\n4\t5\t6\n"), HasSubstr("a.csv:3: the row is empty"));
+    EXPECT_THAT(refused("x,y,z\n,,\n4,5,6\n"), HasSubstr("a.csv:2: the row is empty"));
     EXPECT_THAT(refused("x,y,z\n1,nan,3\n"), HasSubstr("a.csv:2: y is nan"));
     EXPECT_THAT(refused("nan,2,3\n"), HasSubstr("a.csv:1: x is nan"));
     EXPECT_THAT(refused("x,y,z\n1,2,1e7\n"), HasSubstr("a.csv:2: z is 1e7; a finite coordinate"));
@@ -118,6 +125,23 @@ TEST_F(PointTables, WhatCannotBeToldIsRefusedWithItsLine) {
     EXPECT_THAT(refused(std::string("x,y,z\n1,2,\0\n", 13)), HasSubstr("is no text"));
     EXPECT_THAT(refused("\xFF\xFEx"), HasSubstr("UTF-16"));
     EXPECT_THROW((void)read_point_table(file("absent.csv")), IoError);
+}
+
+TEST_F(PointTables, FirstRowsThatAreNoPointsAreTold) {
+    EXPECT_EQ(read("0,1,2\n4,5,6\n").points, Eigen::Vector3d(4, 5, 6));
+    EXPECT_THAT(noted("0,1,2\n4,5,6\n"), HasSubstr("line 1 numbers the columns and is no point"));
+    EXPECT_EQ(read("0,1,2\n").points, Eigen::Vector3d(0, 1, 2));
+    EXPECT_EQ(read("2\n1,2,3\n4,5,6\n").points.col(1), Eigen::Vector3d(4, 5, 6));
+    EXPECT_EQ(read("#z y x\n1\n1 2 3\n").points, Eigen::Vector3d(3, 2, 1));
+    EXPECT_THAT(noted("1\n1 2 3\n"), HasSubstr("its first row, 1, is the number of points that follow"));
+}
+
+TEST_F(PointTables, AnEmptyLineBetweenPointsWithoutNamesIsNoted) {
+    EXPECT_THAT(noted("x,y,z\n1,2,3\n\n4,5,6\n"), HasSubstr("line 3 is empty and others follow"));
+    EXPECT_THAT(noted("x,y,z\n1,2,3\n4,5,6\n\n\n7,8,9\n"), HasSubstr("line 4 is empty"));
+    EXPECT_EQ(noted("x,y,z,name\n1,2,3,a\n\n4,5,6,b\n"), "");
+    EXPECT_EQ(noted("x,y,z\n\n1,2,3\n4,5,6\n\n"), "");
+    EXPECT_EQ(noted("x,y,z\r\r\n1,2,3\r\r\n4,5,6\r\r\n7,8,9\r\r\n"), "");
 }
 
 struct Notes : Observer {
@@ -156,6 +180,13 @@ TEST_F(PointTables, SurfacesAreTurnedFromTheFrameThatTheyName) {
         "endfacet\nendsolid\n";
     EXPECT_EQ(read_surface(file("a.stl", "solid 3D Slicer output. SPACE=RAS\n" + solid)).mesh.nodes.col(1),
               Eigen::Vector3d(-1, -2, 3));
+    const std::string binary = std::string(80, 'x') + std::string("\1\0\0\0", 4) + std::string(50 + 50, '\0');
+    try {
+        (void)read_surface(file("long.stl", binary));
+        ADD_FAILURE() << "accepted";
+    } catch (const Error& error) {
+        EXPECT_THAT(error.what(), HasSubstr("it has 184 bytes, and the 1 triangles that it states take 134"));
+    }
     EXPECT_EQ(read_surface(file("b.stl", "solid color space=sRGB\n" + solid)).mesh.nodes.col(1),
               Eigen::Vector3d(1, 2, 3));
 }
@@ -177,6 +208,10 @@ TEST_F(PointTables, FieldsOfVtkFilesStandAnywhere) {
                                std::string(8, '\0') + "\nSPACE 1 1 string\n\xC3RAS\n";
     const Surface surface = read_surface(file("c.vtk", binary + "POINTS 1 float\n" + std::string(12, '\0') + "\n"));
     EXPECT_EQ(surface.mesh.node_count(), 1);
+    const std::string small =
+        "# vtk DataFile Version 3.0\nx\nascii\ndataset polydata\npoints 3 float\n0 0 0 1 2 3 0 1 0\n"
+        "polygons 1 4\n3 0 1 2\npoint_data 3\nnormals n float\n0 0 1 0 0 1 0 0 1\n";
+    EXPECT_EQ(read_surface(file("small.vtk", small)).normals.cols(), 3);
     EXPECT_THROW(read_surface(file("d.vtk", head + points + "POLYGONES 1 4\n3 0 1 2\n")), IoError);
     EXPECT_THROW(read_surface(file("e.vtk", head + "FIELD f 1\na 1000000000 9 double\n" + points)), IoError);
 }

@@ -363,6 +363,32 @@ TEST_F(LandmarkFile, TablesOfPointsArePairsToo) {
     EXPECT_FALSE(is_table_of_pairs(fixed));
 }
 
+// Of a list that lacks a point, all behind it would be paired with their neighbours.
+TEST_F(LandmarkFile, PairsByOrderHaveNoGap) {
+    const auto whole = write("m.csv", "x,y,z\n1,2,3\n4,5,6\n");
+    const auto refused = [&](const std::string& text) {
+        return refusal([&] { read_landmarks(whole, write("f.csv", text)); });
+    };
+    EXPECT_THAT(refused("x,y,z\n1,2,3\n\n4,5,6\n"), HasSubstr("f.csv:3: the line is empty, and points are pairs"));
+    EXPECT_THAT(refused("x,y,z\n1,2,3\n,,\n4,5,6\n"), HasSubstr("f.csv:3: the row is empty"));
+    const auto named = write("n.csv", "x,y,z,name\n1,2,3,a\n\n4,5,6,b\n");
+    EXPECT_EQ(read_landmarks(named, named).fixed.cols(), 2);
+}
+
+TEST_F(LandmarkFile, PointsInMetresAreRefusedAsSurfacesAre) {
+    const std::string rows = "0.02 -0.04 -0.003\n-0.03 0.03 0.005\n0.04 0.1 0.02\n";
+    const auto metres = write("m.csv", rows), elastix = write("m.txt", "point\n3\n" + rows);
+    const auto pairs = write("pairs.csv",
+                             "pre_x,pre_y,pre_z,intra_x,intra_y,intra_z\n20,-40,-3,0.02,-0.04,-0.003\n"
+                             "-30,30,5,-0.03,0.03,0.005\n");
+    const auto slicer = write("good.mrk.json", slicer_points);
+    EXPECT_THAT(refusal([&] { (void)read_points(metres); }), HasSubstr("m.csv: the points are about 0.1"));
+    EXPECT_THAT(refusal([&] { (void)read_points(elastix); }), HasSubstr("are these in metres?"));
+    EXPECT_THAT(refusal([&] { read_landmarks(slicer, metres); }), HasSubstr("m.csv: the points are"));
+    EXPECT_THAT(refusal([&] { read_landmarks(pairs); }), HasSubstr("pairs.csv: the landmarks are"));
+    EXPECT_EQ(read_points(write("near.csv", "1 2 3\n1.5 2 3\n1 2.5 3\n")).cols(), 3);
+}
+
 TEST_F(LandmarkFile, RefusesPointListsOfSlicerThatDoNotSayEnough) {
     const auto good = write("good.mrk.json", slicer_points);
     const auto refused = [&](const std::string& name, const std::string& text) {

@@ -126,6 +126,16 @@ TEST(LabelDoubts, ExchangedNumbersAreNamed) {
     EXPECT_NE(result.doubts.front().text.find("2 of the moving map lies where 3"), std::string::npos);
 }
 
+TEST(LabelDoubts, NumbersExchangedInACycleAreNamed) {
+    const Volume moving = map_of(as_it_is),
+                 fixed = renumbered(moving, [](int label) { return label ? label % 3 + 1 : 0; });
+    const std::string cause = detail::why_nothing_matches(moving, fixed);
+    for (const char* part : {"1 of the moving map lies where 2", "2 of the moving map lies where 3",
+                             "3 of the moving map lies where 1", "give the same tissue the same number"})
+        EXPECT_THAT(cause, testing::HasSubstr(part));
+    EXPECT_THAT(detail::why_nothing_matches(moving, moving), testing::HasSubstr("check that the images show"));
+}
+
 TEST(LabelDoubts, LabelsOfOneMapAloneAreNamed) {
     const auto gone = renumbered(map_of(as_it_is), [](int label) { return label == 3 ? 1 : label; });
     EXPECT_THAT(doubts_of(gone), Contains("label.vanished"));
