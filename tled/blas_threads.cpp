@@ -23,6 +23,16 @@ int threads() {
     return get ? get() : 1;
 }
 
+int active_levels() {
+    static const auto get = reinterpret_cast<int (*)()>(dlsym(RTLD_DEFAULT, "omp_get_max_active_levels"));
+    return get ? get() : 1;
+}
+
+void set_active_levels(int levels) {
+    static const auto set = reinterpret_cast<void (*)(int)>(dlsym(RTLD_DEFAULT, "omp_set_max_active_levels"));
+    if (set) set(levels);
+}
+
 }  // namespace
 
 void let_solves_take_one_blas_thread(bool allowed) {
@@ -43,6 +53,14 @@ SingleBlasThread::~SingleBlasThread() {
     if (!counts_) return;
     const std::lock_guard lock(guard);
     if (--alive == 0) set_threads(threads_before);
+}
+
+SerialOpenMp::SerialOpenMp() : levels_before_(active_levels()) {
+    set_active_levels(0);
+}
+
+SerialOpenMp::~SerialOpenMp() {
+    set_active_levels(levels_before_);
 }
 
 }  // namespace detail

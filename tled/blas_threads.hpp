@@ -1,5 +1,5 @@
 #pragma once
-/// Threads of the BLAS under factors and triangular solves.
+/// Threads of the BLAS and of OpenMP under factors and triangular solves.
 
 namespace tissuewarp::tled {
 
@@ -22,6 +22,20 @@ public:
 
 private:
     bool counts_;
+};
+
+/// Parallel regions of OpenMP that this thread comes to have one thread while this lives. CHOLMOD asks for four
+/// whatever the process may use, and they wait for each other by spinning: of eight processes on sixteen cores each
+/// took eight times as long. No effect without OpenMP.
+class SerialOpenMp {
+public:
+    SerialOpenMp();
+    ~SerialOpenMp();
+    SerialOpenMp(const SerialOpenMp&) = delete;
+    SerialOpenMp& operator=(const SerialOpenMp&) = delete;
+
+private:
+    int levels_before_;
 };
 
 }  // namespace detail

@@ -5,7 +5,11 @@
 #include <dlfcn.h>
 #include <gtest/gtest.h>
 
+#include <oneapi/tbb/global_control.h>
+
 #include <atomic>
+#include <filesystem>
+#include <iterator>
 #include <set>
 #include <thread>
 
@@ -58,6 +62,24 @@ TEST_F(BlasThreads, AreOneWhileSolvingWhereTheHostAllowsIt) {
     let_solves_take_one_blas_thread(true);
     EXPECT_TRUE(seen_while_solving().contains(1));
     EXPECT_EQ(count(), 2);
+}
+
+/// CHOLMOD has three threads of OpenMP made, which spin, whatever --threads says.
+TEST_F(BlasThreads, NoneOfOpenMpAreMade) {
+    const auto threads = [] {
+        return std::distance(std::filesystem::directory_iterator("/proc/self/task"),
+                             std::filesystem::directory_iterator());
+    };
+    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+    const SeedCube cube(Element::T4, 12);
+    const auto levels = reinterpret_cast<int (*)()>(dlsym(RTLD_DEFAULT, "omp_get_max_active_levels"));
+    const int levels_before = levels ? levels() : 0;
+    const RestStiffness stiffness(cube.rest, cube.conditions);
+    const auto threads_before = threads();
+    stiffness.factorise();
+    static_cast<void>(stiffness.solve(cube.rest.position));
+    EXPECT_EQ(threads(), threads_before);
+    EXPECT_EQ(levels ? levels() : 0, levels_before) << "OpenMP is left as it was";
 }
 
 }  // namespace

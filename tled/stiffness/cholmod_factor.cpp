@@ -96,6 +96,7 @@ struct CholmodFactor::Impl {
     [[nodiscard]] Eigen::MatrixXd solved(const Eigen::MatrixXd& b) const {
         cholmod_dense right = view(b);
         const SingleBlasThread single;  // a triangular solve is bound by memory
+        const SerialOpenMp serial;
         cholmod_solve2(CHOLMOD_A, L, &right, nullptr, &x, nullptr, &y, &e, &common);
         require_success("solve with");
         return Eigen::Map<const Eigen::MatrixXd>(static_cast<const double*>(x->x), b.rows(), b.cols());
@@ -169,6 +170,7 @@ bool CholmodFactor::factorize(const Eigen::SparseMatrix<double>& lower) {
     impl_->common.status = CHOLMOD_OK;
     impl_->L = cholmod_copy_factor(impl_->symbolic, &impl_->common);
     impl_->require_success("copy the analysis of");
+    const SerialOpenMp serial;
     std::optional<SingleBlasThread> single;
     if (impl_->small) single.emplace();
     cholmod_factorize(&matrix, impl_->L, &impl_->common);
