@@ -90,7 +90,12 @@ private:
         for (int part = 0, done = 0; part < parts; ++part) {
             const int next = static_cast<int>(std::int64_t{steps} * (part + 1) / parts);
             apply(result_.state.time + next * result_.step);
-            if (part + 1 == parts) first_total_ = total_energy(engine_.observe()).total;
+            if (part + 1 == parts) {
+                // A body that has moved puts nodes onto its surface in the first step: that is work, not growth.
+                engine_.run(1, coefficients());
+                first_total_ = total_energy(engine_.observe()).total;
+                ++done;
+            }
             engine_.run(next - done, coefficients());
             done = next;
         }
