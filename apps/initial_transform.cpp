@@ -56,6 +56,12 @@ void take_initial_transform(RegistrationInputs& inputs, const RegisterOptions& o
     if (options.initial_transform.empty()) return;
     const std::string path = options.initial_transform.string();
     const registration::PointMap map = registration::read_point_map(options.initial_transform);
+    if (map.type == imaging::FieldType::Modeling)
+        throw InvalidInput(
+            fmt::format("'{0}' says that its field maps moving points to fixed ones ('displacement field "
+                        "type:=modeling'); turn it: "
+                        "tissuewarp convert '{0}' transform.h5 --reference FIXED_IMAGE",
+                        path));
     try {
         inputs.start = registration::start_pose(map, inputs.moving_labels);
     } catch (const InvalidInput& problem) {

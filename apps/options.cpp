@@ -2,16 +2,20 @@
 
 #include "apps/options.hpp"
 
+#include "apps/bids.hpp"
 #include "apps/config_file.hpp"
 #include "apps/option_values.hpp"
+#include "apps/output_names.hpp"
 #include "apps/verb.hpp"
 #include "apps/versions.hpp"
 #include "core/errors.hpp"
+#include "imaging/dicom_origin.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <deque>
+#include <tuple>
 
 namespace tissuewarp::apps {
 
@@ -28,6 +32,7 @@ struct Parser {
     RegisterOptions registration;
     MeshOptions mesh;
     WarpOptions warp;
+    ConvertOptions convert;
     EvaluateOptions evaluate;
     InfoOptions info;
     BenchOptions bench;
@@ -46,6 +51,7 @@ struct Parser {
         declare_register(verbs.emplace_back(app, "register", "Register a segmented volume to another, or to points"));
         declare_mesh(verbs.emplace_back(app, "mesh", "Turn a label map into tetrahedra"));
         declare_warp(verbs.emplace_back(app, "warp", "Carry an image, labels, points or a surface along"));
+        declare_convert(verbs.emplace_back(app, "convert", "Turn a transform or field into another program's"));
         declare_evaluate(verbs.emplace_back(app, "evaluate", "Score label maps, landmarks, curves and fields"));
         declare_info(verbs.emplace_back(app, "info", "Print what a file holds, or the devices of this machine"));
         declare_bench(verbs.emplace_back(app, "bench", "Time the solver's engines on this machine"));
@@ -152,6 +158,16 @@ struct Parser {
         verb.text("--device", o.device.name, "auto, cpu, gpu or gpu:<index>")
             ->check(CLI::Validator(check_device, "", "device"));
         verb.common(o.common);
+        verb.list(
+                "--write", o.write, "NAME",
+                "Files beside the usual ones: displacement_magnitude (mm), jacobian, organ (its surface with errors), "
+                "markups (carried points for 3D Slicer), inverse_transform, dicom (registration, contours and maps for "
+                "--fixed in DICOM), or all")
+            ->delimiter(',')
+            ->check(CLI::IsMember(words_of_write()).description(""));
+        verb.text("--bids", o.bids,
+                  "Subject (01): --output is a derivative dataset of BIDS, and results get its folders, names and "
+                  "sidecars");
         verb.path("--save-parameters", o.save_parameters, "Write the parameters in use to a TOML file");
         verb.flag("--dry-run", o.dry_run, "Read and check the inputs, say what would be done, write nothing");
         verb.app().add_option("--config", "Read parameters from a TOML file; the command line wins")->type_name("FILE");
@@ -194,6 +210,29 @@ struct Parser {
         verb.flag("--labels", o.labels, "The image is a label map: nearest neighbour");
         verb.number("--outside", o.outside, "VALUE", -1e9, 1e9, "Value of voxels that come from outside the image");
         verb.number("--fade", o.fade, "MM", 1.0, 1e4, "Distance from the organ where the field has become rigid (mm)");
+        verb.common(o.common);
+    }
+
+    void declare_convert(Verb& verb) {
+        ConvertOptions& o = convert;
+        verb.app().footer(
+            "Example:\n  tissuewarp convert out/transform.h5 warp.nii.gz\n"
+            "  tissuewarp convert out/displacement_moving_to_fixed.nii.gz points.nrrd --from modeling");
+        verb.path(
+                "input", o.input,
+                "Transform of ITK (.h5, .tfm, .txt, .mat), four rows of four numbers, or displacement field (mm, LPS)")
+            ->required();
+        verb.path("output", o.output,
+                  "File to write: .h5, .tfm, .txt (linear), or a displacement field .nii.gz, .nrrd, .mha (mm, LPS)")
+            ->required();
+        for (const auto& [name, target, what] :
+             {std::tuple{"--from", &o.from,
+                         "What the input maps: resampling (fixed to moving points, as ITK's "
+                         "transforms) or modeling (moving to fixed); default: what it says"},
+              {"--to", &o.to, "What the output shall map; default: resampling, in .nrrd as the input"}})
+            verb.text(name, *target, what)->check(CLI::IsMember({"modeling", "resampling"}).description(""));
+        verb.path("--reference", o.reference, "Image whose grid a displacement field gets");
+        verb.flag("--matrix", o.matrix, "In .txt four rows of four numbers, not ITK's text");
         verb.common(o.common);
     }
 
@@ -358,6 +397,8 @@ struct Parser {
                         : "matching the fixed image takes the moving one; give --moving");
             require_organ(registration);
             require_pairs(registration);
+            require_what_is_written(registration);
+            enter_bids_folder(registration);
             if (!registration.match_image && !(registration.moving_mask.empty() && registration.fixed_mask.empty()))
                 throw InvalidInput(
                     "--moving-mask and --fixed-mask say what of the images is matched, and they are not; add "
@@ -370,6 +411,7 @@ struct Parser {
             return mesh;
         }
         if (verb == "warp") return warp;
+        if (verb == "convert") return convert;
         if (verb == "evaluate") return evaluate;
         if (verb == "bench") return bench;
         if (verb == "simulate") return simulate;
@@ -399,6 +441,25 @@ struct Parser {
                 1 + o.moving_contrasts.size(), 1 + o.fixed_contrasts.size()));
         if (!o.match_image)
             throw InvalidInput("further contrasts are there to be matched, and images are not; add --match-image");
+    }
+
+    static void enter_bids_folder(RegisterOptions& o) {
+        if (o.bids.empty()) return;
+        o.output = o.output / bids_subject(o.bids) / "anat";
+        if (!o.moving.empty()) bids_suffix(o.moving);
+    }
+
+    static void require_what_is_written(const RegisterOptions& o) {
+        const auto names = [&](const char* word) {
+            return std::find(o.write.begin(), o.write.end(), word) != o.write.end();
+        };
+        if (names("dicom") && !imaging::is_dicom(o.fixed))
+            throw InvalidInput(
+                "--write dicom writes objects that belong to the study of the fixed series; give --fixed as DICOM");
+        if (names("markups") && !o.landmarks.given() && o.points.empty())
+            throw InvalidInput(
+                "--write markups writes points that are carried along, and there are none; give "
+                "--landmarks or --points");
     }
 
     /// Something must say where the organ is, and what the numbers of other options mean.
@@ -444,7 +505,8 @@ struct Parser {
     }
 
     static std::vector<std::string> verb_names() {
-        return {"register", "mesh", "warp", "evaluate", "info", "bench", "simulate", "explain", "calibrate", "study"};
+        return {"register", "mesh",     "warp",    "convert",   "evaluate", "info",
+                "bench",    "simulate", "explain", "calibrate", "study"};
     }
 };
 
@@ -464,11 +526,10 @@ Command parse_command_line(std::vector<std::string> arguments) {
         throw HelpRequest{parser.app.version() + "\n"};
     } catch (const CLI::ParseError& error) {
         const bool no_verb = parser.app.get_subcommands().empty();
-        throw InvalidInput(
-            no_verb
-                ? "give a verb: register, mesh, warp, evaluate, info, bench, simulate, explain, calibrate or study; "
-                  "see --help"
-                : std::string(error.what()) + "; see --help");
+        throw InvalidInput(no_verb ? "give a verb: register, mesh, warp, convert, evaluate, info, bench, simulate, "
+                                     "explain, calibrate or study; "
+                                     "see --help"
+                                   : std::string(error.what()) + "; see --help");
     }
     return parser.result();
 }

@@ -75,6 +75,8 @@ struct RegisterOptions {
     bool strict = false;  ///< a result that is doubted ends with exit code 4
     bool dry_run = false;
     DeviceChoice device;
+    std::string bids;                ///< subject: results in BIDS' folders under its names; `output` is the innermost
+    std::vector<std::string> write;  ///< words of output_names.hpp: files beside the usual ones
     std::filesystem::path save_parameters;
     std::vector<Parameter> parameters;  ///< all of the above as written to files
 };
@@ -96,6 +98,13 @@ struct WarpOptions {
     bool labels = false;   ///< nearest neighbour
     double outside = 0.0;  ///< value of voxels whose tissue lay outside the moving image
     double fade = 60.0;    ///< mm, with --record
+};
+
+struct ConvertOptions {
+    CommonOptions common;
+    std::filesystem::path input, output, reference;
+    std::string from, to;  ///< "modeling", "resampling", or empty: as the files say
+    bool matrix = false;   ///< four rows of four numbers, not ITK's text
 };
 
 struct EvaluateOptions {
@@ -165,8 +174,8 @@ struct StudyOptions {
     DeviceChoice device;
 };
 
-using Command = std::variant<RegisterOptions, MeshOptions, WarpOptions, EvaluateOptions, InfoOptions, BenchOptions,
-                             SimulateOptions, ExplainOptions, CalibrateOptions, StudyOptions>;
+using Command = std::variant<RegisterOptions, MeshOptions, WarpOptions, ConvertOptions, EvaluateOptions, InfoOptions,
+                             BenchOptions, SimulateOptions, ExplainOptions, CalibrateOptions, StudyOptions>;
 
 /// The text that --help or --version asked for; not an error.
 struct HelpRequest {

@@ -1,7 +1,9 @@
 // tissuewarp register: read → prepare → update → fields → warp → score and write.
 
+#include "apps/bids.hpp"
 #include "apps/dial.hpp"
 #include "apps/output_folder.hpp"
+#include "apps/output_names.hpp"
 #include "apps/progress.hpp"
 #include "apps/register_outputs.hpp"
 #include "apps/report_json.hpp"
@@ -287,6 +289,7 @@ void run_register(const RegisterOptions& options) {
     const nlohmann::json report = report_json(run, clock.total());
     write_reports(run, report, *output);
     output->commit();
+    if (!options.bids.empty()) write_bids_dataset(options);
     if (!options.save_parameters.empty()) save_parameters(options.parameters, options.save_parameters);
     run.times.push_back(clock.lap("report"));
     progress.clear();

@@ -1,11 +1,18 @@
 #include "apps/register_outputs.hpp"
 
-#include "apps/file_kind.hpp"
+#include "apps/bids.hpp"
+#include "apps/output_names.hpp"
 #include "apps/point_files.hpp"
 #include "apps/progress.hpp"
+#include "apps/register_dicom.hpp"
+#include "apps/register_maps.hpp"
 #include "apps/report_json.hpp"
 #include "apps/versions.hpp"
+#include "core/atomic_file.hpp"
 #include "meshing/mesh_io.hpp"
+#include "registration/field.hpp"
+#include "registration/io/point_map_field.hpp"
+#include "registration/io/transform_file.hpp"
 #include "registration/record.hpp"
 #include "report/page.hpp"
 
@@ -22,6 +29,8 @@ namespace tissuewarp::apps {
 namespace {
 
 using registration::Deformation;
+using registration::with_linear_part;
+using registration::write_itk_transform;
 
 /// The smallest integer type that holds the labels, as other programs write them.
 imaging::Volume compact(const imaging::Volume& labels) {
@@ -92,10 +101,6 @@ registration::RecordInfo record_info(const RegistrationRun& run) {
     return info;
 }
 
-std::string surface_name(const RegisterOptions& options) {
-    return "warped_surface" + options.surface.extension().string();
-}
-
 std::string summary_row(const std::string& name, const registration::Summary& s) {
     return fmt::format("  {:<22}{:>6}{:>8.2f}{:>8.2f}{:>8.2f}{:>8.2f}\n", name, s.count, s.mean, s.median,
                        s.percentile_95, s.maximum);
@@ -115,46 +120,60 @@ std::string estimate_text(const registration::UncertaintySummary& s) {
                       100 * s.unknown_share);
 }
 
+/// What --write names; `start(name, write)` starts a task.
+template <class Start>
+void start_optional(const RegistrationRun& run, const Start& start) {
+    using registration::jacobian_determinant;
+    const Products& products = run.products;
+    const Eigen::Isometry3d& placement = run.result.deformation.placement;
+    for (const OptionalOutput& output : optional_outputs) {
+        if (!writes(run.options, output)) continue;
+        const std::string word = output.word, file = output.file;
+        if (word == "displacement_magnitude")
+            start(file, [&](auto& path) { write_volume(magnitude(products.fixed_to_moving), path); });
+        else if (word == "jacobian")
+            start(file, [&](auto& path) { write_volume(jacobian_determinant(products.moving_to_fixed), path); });
+        else if (word == "organ")
+            start(file, [&](auto& path) { write_organ(run, path); });
+        else if (word == "inverse_transform")
+            start(file, [&](auto& path) {
+                write_itk_transform(with_linear_part(products.moving_to_fixed, placement), path);
+            });
+        else if (word == "dicom")
+            start(file, [&run, file](auto& path) { write_dicom_result(run, file, path); });
+        else if (file.starts_with("warped_landmarks"))
+            start(file, [&](auto& path) { write_landmark_markups(run, path); });
+        else
+            start(file, [&](auto& path) { write_point_markups(run, path); });
+    }
+}
+
 }  // namespace
-
-std::vector<std::string> output_names(const RegisterOptions& options) {
-    std::vector<std::string> names;
-    if (!options.moving.empty()) names.push_back("warped.nii.gz");
-    for (const char* name : {"warped_labels.nii.gz", "displacement_moving_to_fixed.nii.gz",
-                             "displacement_fixed_to_moving.nii.gz", "mesh.vtu", "record.h5"})
-        names.emplace_back(name);
-    if (!options.no_error_estimate)
-        for (const char* name : {"uncertainty.nii.gz", "uncertainty_trust.nii.gz"}) names.emplace_back(name);
-    if (options.landmarks.given()) names.push_back("warped_landmarks.csv");
-    if (!options.points.empty()) names.push_back("warped_points.csv");
-    if (!options.surface.empty()) names.push_back(surface_name(options));
-    for (const char* name : {"report.json", "preview.png", "report.html"}) names.emplace_back(name);
-    return names;
-}
-
-bool is_register_output(const std::string& name) {
-    RegisterOptions all;
-    all.moving = all.landmarks.csv = all.points = all.surface = "given";
-    const std::vector<std::string> names = output_names(all);
-    const std::filesystem::path path(name);
-    return std::find(names.begin(), names.end(), name) != names.end() ||
-           (path.stem() == "warped_surface" && file_kind(path) == FileKind::Surface);
-}
 
 void start_writing(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks) {
     const auto start = [&](const std::string& name, auto write) {
-        tasks.run([=, &output, path = output.path(name)] {
+        const std::string in_folder = bids_name(run.options, name);
+        tasks.run([=, &run, &output, path = output.path(in_folder)] {
             if (interrupted()) throw Cancelled();
             try {
                 write(path);
+                if (in_folder != name) write_file(sidecar(run.options, name), output.path(sidecar_name(in_folder)));
             } catch (const IoError& error) {
                 throw IoError(output.in_words(error.what()));
             }
         });
     };
     const Products& products = run.products;
-    start("displacement_moving_to_fixed.nii.gz", [&](auto& path) { write_volume(products.moving_to_fixed, path); });
-    start("displacement_fixed_to_moving.nii.gz", [&](auto& path) { write_volume(products.fixed_to_moving, path); });
+    const Eigen::Isometry3d& placement = run.result.deformation.placement;
+    start(transform_name, [&](auto& path) {  // the longest of all
+        registration::write_itk_transform(registration::with_linear_part(products.fixed_to_moving, placement.inverse()),
+                                          path);
+    });
+    start(moving_to_fixed_name,
+          [&](auto& path) { write_displacement_field(products.moving_to_fixed, path, imaging::FieldType::Modeling); });
+    start(fixed_to_moving_name, [&](auto& path) {
+        write_displacement_field(products.fixed_to_moving, path, imaging::FieldType::Resampling);
+    });
     if (products.uncertainty) {
         start("uncertainty.nii.gz", [&](auto& path) { write_volume(products.uncertainty_volumes.deviation, path); });
         start("uncertainty_trust.nii.gz", [&](auto& path) { write_volume(products.uncertainty_volumes.trust, path); });
@@ -168,6 +187,7 @@ void start_writing(const RegistrationRun& run, const OutputFolder& output, tbb::
     if (run.inputs.points) start("warped_points.csv", [&](auto& path) { write_points(run, path); });
     if (products.surface)
         start(surface_name(run.options), [&](auto& path) { meshing::write_surface(*products.surface, path); });
+    start_optional(run, start);
 }
 
 void write_reports(const RegistrationRun& run, const nlohmann::json& report, const OutputFolder& output) {

@@ -8,15 +8,8 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include <string>
-#include <vector>
 
 namespace tissuewarp::apps {
-
-/// Names of the files in the output folder.
-std::vector<std::string> output_names(const RegisterOptions& options);
-
-/// Of any options, and of versions before this one.
-bool is_register_output(const std::string& name);
 
 /// Starts one task per file for images, fields, mesh, points and record; `run` and `output` must outlive `tasks`.
 /// wait() on the tasks rethrows the first IoError, or Cancelled.

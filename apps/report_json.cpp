@@ -1,5 +1,6 @@
 #include "apps/report_json.hpp"
 
+#include "apps/output_names.hpp"
 #include "apps/register_outputs.hpp"
 #include "apps/versions.hpp"
 #include "core/atomic_file.hpp"

@@ -7,6 +7,7 @@
 #include "imaging/detail/image_header.hpp"
 #include "imaging/detail/itk_image_io.hpp"
 #include "imaging/detail/structure_set.hpp"
+#include "imaging/detail/text_headers.hpp"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -179,11 +180,12 @@ void require_no_grey_image(const Volume& labels, const fs::path& path) {
 
 /// Writes one file through ITK and makes sure that all of it arrived: ITK does not notice a full disk, and knows its
 /// formats by small letters only.
-void write_whole(const Volume& volume, const fs::path& temporary, detail::Format format, const fs::path& path) {
+void write_whole(const Volume& volume, const fs::path& temporary, detail::Format format, const fs::path& path,
+                 std::optional<FieldType> type = {}) {
     fs::path small_letters = temporary;
     small_letters.replace_extension(lower_case_name(temporary.extension()));
     const AtomicFile file(small_letters);
-    detail::write_through_itk(volume, file.path(), format);
+    detail::write_through_itk(volume, file.path(), format, type);
     try {
         detail::require_whole(file.path(), detail::read_image_header(file.path(), format).voxels);
     } catch (const Error&) {
@@ -200,6 +202,32 @@ void write_compressed_nifti(const Volume& volume, const fs::path& path, const fs
     write_whole(volume, plain.path(), detail::Format::Nifti, path);
     const bool integers = volume.voxels.depth() < CV_32F;
     detail::gzip_file(plain.path(), temporary, integers ? 4 : 1);
+}
+
+void write_checked(const Volume& volume, const fs::path& path, std::optional<FieldType> type) {
+    const detail::Format format = format_of(path, "write");
+    const std::string name = lower_case_name(path);
+    for (const char* pair : {".nhdr", ".mhd", ".hdr", ".hdr.gz", ".img", ".img.gz"})
+        if (name.ends_with(pair))
+            throw InvalidInput("cannot write '" + path.string() +
+                               "': this format makes two files; use .nii.gz, .nrrd or .mha");
+    if (volume.empty() || (volume.channels() != 1 && volume.channels() != 3))
+        throw InvalidInput("cannot write '" + path.string() + "': a volume of " + std::to_string(volume.channels()) +
+                           " components; one or three are written");
+    require_valid(volume.geometry, path.c_str());
+    if (const auto& size = volume.geometry.size; *std::min_element(size.begin(), size.end()) < 2)
+        throw InvalidInput(
+            "cannot write '" + path.string() +
+            "': the volume is one voxel thick, which formats store as two-dimensional; keep two or more");
+    if (!path.parent_path().empty() && !fs::is_directory(path.parent_path()))
+        throw IoError("cannot write '" + path.string() + "': the folder does not exist; create it first");
+    AtomicFile file(path);
+    if (name.ends_with(".nii.gz")) {
+        write_compressed_nifti(volume, path, file.path());
+    } else {
+        write_whole(volume, file.path(), format, path, type);
+    }
+    file.commit();
 }
 
 }  // namespace
@@ -288,29 +316,38 @@ ReadResult as_labels(ReadResult read, const fs::path& path) {
 }
 
 void write_volume(const Volume& volume, const fs::path& path) {
-    const detail::Format format = format_of(path, "write");
-    const std::string name = lower_case_name(path);
-    for (const char* pair : {".nhdr", ".mhd", ".hdr", ".hdr.gz", ".img", ".img.gz"})
-        if (name.ends_with(pair))
-            throw InvalidInput("cannot write '" + path.string() +
-                               "': this format makes two files; use .nii.gz, .nrrd or .mha");
-    if (volume.empty() || (volume.channels() != 1 && volume.channels() != 3))
-        throw InvalidInput("cannot write '" + path.string() + "': a volume of " + std::to_string(volume.channels()) +
-                           " components; one or three are written");
-    require_valid(volume.geometry, path.c_str());
-    if (const auto& size = volume.geometry.size; *std::min_element(size.begin(), size.end()) < 2)
-        throw InvalidInput(
-            "cannot write '" + path.string() +
-            "': the volume is one voxel thick, which formats store as two-dimensional; keep two or more");
-    if (!path.parent_path().empty() && !fs::is_directory(path.parent_path()))
-        throw IoError("cannot write '" + path.string() + "': the folder does not exist; create it first");
-    AtomicFile file(path);
-    if (name.ends_with(".nii.gz")) {
-        write_compressed_nifti(volume, path, file.path());
-    } else {
-        write_whole(volume, file.path(), format, path);
-    }
-    file.commit();
+    write_checked(volume, path, {});
+}
+
+Volume rounded(const Volume& field, double step) {
+    Volume result(field.geometry, field.voxels.type());
+    const auto channels = static_cast<std::size_t>(field.channels());
+    const auto per_slice = static_cast<std::size_t>(field.geometry.size[0] * field.geometry.size[1]) * channels;
+    tbb::parallel_for(0, field.geometry.size[2], [&](int k) {
+        const auto* source = field.voxels.ptr<float>(k);
+        auto* target = result.voxels.ptr<float>(k);
+        for (std::size_t i = 0; i < per_slice; ++i)
+            target[i] = static_cast<float>(std::nearbyint(source[i] / step) * step);
+    });
+    return result;
+}
+
+void write_displacement_field(const Volume& field, const fs::path& path, FieldType type) {
+    if (field.voxels.type() != CV_32FC3)
+        throw InvalidInput("cannot write '" + path.string() + "': a displacement field has three float32 components");
+    write_checked(rounded(field, displacement_step_mm), path, type);
+}
+
+std::optional<FieldType> stated_field_type(const fs::path& path) {
+    if (format_named(lower_case_name(path)) != detail::Format::Nrrd || fs::is_directory(path)) return std::nullopt;
+    const detail::TextHeader header = naming(path, [&] { return detail::read_nrrd_header(path); });
+    const auto stated = header.comments.find(detail::field_type_key);
+    if (stated == header.comments.end()) return std::nullopt;
+    const std::string word = detail::lower_case(detail::trimmed(stated->second));
+    for (const FieldType type : {FieldType::Resampling, FieldType::Modeling})
+        if (word == name_of(type)) return type;
+    throw InvalidInput("'" + path.string() + "' says '" + detail::field_type_key + ":=" + word.substr(0, 40) +
+                       "'; correct it to resampling or modeling");
 }
 
 }  // namespace tissuewarp::imaging

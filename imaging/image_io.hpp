@@ -3,10 +3,12 @@
 /// .nhdr, segmentations of 3D Slicer), MetaImage (.mha, .mhd), a folder that holds one DICOM series, one DICOM file of
 /// many frames, and DICOM contours.
 
+#include "imaging/field_type.hpp"
 #include "imaging/label_names.hpp"
 #include "imaging/volume.hpp"
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -59,5 +61,21 @@ ReadResult as_labels(ReadResult image, const std::filesystem::path& path);
 /// volumes become displacement fields: NIfTI intent 1007, LPS mm, 5-D as ANTs writes; NRRD `kinds: vector`. Compressed
 /// except for .nii. Throws IoError (a full disk too); nothing half-written is left behind.
 void write_volume(const Volume& volume, const std::filesystem::path& path);
+
+/// Steps that the components of written displacements take: a whole power of two, which leaves bits of float32 zero and
+/// halves the files, and an error of half a micrometre at most.
+inline constexpr double displacement_step_mm = 1.0 / 1024;
+
+/// The nearest whole steps. `field` has float32 voxels.
+Volume rounded(const Volume& field, double step);
+
+/// As write_volume(), the components rounded to displacement_step_mm; NRRD also gets the key `displacement field type`,
+/// by which 3D Slicer (from September 2025 on) takes the direction. Other formats have no place for it: programs take
+/// them for resampling. Throws InvalidInput unless there are three components of float32.
+void write_displacement_field(const Volume& field, const std::filesystem::path& path, FieldType type);
+
+/// What an NRRD file says of its field's direction; nothing where it says nothing, and of other formats. Throws IoError
+/// on a damaged header and InvalidInput on another word than the two.
+std::optional<FieldType> stated_field_type(const std::filesystem::path& path);
 
 }  // namespace tissuewarp::imaging

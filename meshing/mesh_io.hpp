@@ -60,10 +60,16 @@ struct Polylines {
     std::vector<std::vector<int>> lines;
 };
 
-/// Reads the lines of VTK polydata, legacy (.vtk) or XML (.vtp), turned as surfaces are. Throws IoError or InvalidInput.
+/// Reads the lines of VTK polydata, legacy (.vtk) or XML (.vtp), turned as surfaces are. Throws IoError or
+/// InvalidInput.
 Polylines read_polylines(const std::filesystem::path& path, Observer& observer = silent_observer());
 
 /// Writes .ply (binary), .stl, .obj, .vtk or .vtp by extension. Complete or absent. Throws IoError.
 void write_surface(const SurfaceMesh& surface, const std::filesystem::path& path);
+
+/// Writes .vtp with arrays on the nodes; programs show the first one as colours. Complete or absent. Throws IoError,
+/// and InvalidInput for arrays of another length.
+void write_vtp(const SurfaceMesh& surface, const std::filesystem::path& path,
+               const std::vector<MeshArray>& point_arrays);
 
 }  // namespace tissuewarp::meshing

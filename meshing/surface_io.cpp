@@ -158,7 +158,7 @@ std::string vtk_document(const SurfaceMesh& surface) {
     return bytes + "\n";
 }
 
-std::string vtp_document(const SurfaceMesh& surface) {
+std::string vtp_document(const SurfaceMesh& surface, const std::vector<MeshArray>& point_arrays = {}) {
     const auto count = static_cast<std::size_t>(surface.triangle_count());
     std::vector<std::int64_t> offsets(count);
     for (std::size_t t = 0; t < count; ++t) offsets[t] = 3 * static_cast<std::int64_t>(t + 1);
@@ -172,7 +172,10 @@ std::string vtp_document(const SurfaceMesh& surface) {
         "76 80 83 0</Array>\n</FieldData>\n<Piece NumberOfPoints=\"" +  // LPS
         std::to_string(surface.node_count()) +
         "\" NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"" + std::to_string(count) +
-        "\">\n<Points>\n";
+        "\">\n<PointData" +
+        (point_arrays.empty() ? "" : " Scalars=\"" + detail::xml_escaped(point_arrays.front().name) + "\"") + ">\n";
+    xml += detail::float_arrays(data, point_arrays, surface.nodes.cols(), "nodes");
+    xml += "</PointData>\n<Points>\n";
     xml += data.array("Float64", "Points", 3, std::vector<double>(nodes.begin(), nodes.end()));
     xml += "</Points>\n<Polys>\n";
     xml += data.array("Int64", "connectivity", 1, std::vector<std::int64_t>(corners.begin(), corners.end()));
@@ -237,6 +240,11 @@ Polylines read_polylines(const std::filesystem::path& path, Observer& observer) 
 
 void write_surface(const SurfaceMesh& surface, const std::filesystem::path& path) {
     write_file(document(surface, path), path);
+}
+
+void write_vtp(const SurfaceMesh& surface, const std::filesystem::path& path,
+               const std::vector<MeshArray>& point_arrays) {
+    write_file(vtp_document(surface, point_arrays), path);
 }
 
 }  // namespace tissuewarp::meshing

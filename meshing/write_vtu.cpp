@@ -14,19 +14,6 @@ namespace {
 
 using detail::VtkAppended;
 
-std::string arrays(VtkAppended& data, const std::vector<MeshArray>& list, Eigen::Index count, const char* what) {
-    std::string elements;
-    for (const MeshArray& array : list) {
-        if (array.values.cols() != count || array.values.rows() == 0)
-            throw InvalidInput("write_vtu: array '" + array.name + "' has " + std::to_string(array.values.cols()) +
-                               " columns for " + std::to_string(count) + " " + what + "; give one column each");
-        const Eigen::MatrixXf values = array.values.cast<float>();
-        elements += data.array("Float32", array.name, values.rows(),
-                               std::vector<float>(values.data(), values.data() + values.size()));
-    }
-    return elements;
-}
-
 std::string document(const TetMesh& mesh, const std::vector<MeshArray>& points, const std::vector<MeshArray>& cells) {
     constexpr std::uint8_t vtk_tetra = 10;
     const auto count = static_cast<std::size_t>(mesh.tet_count());
@@ -39,10 +26,10 @@ std::string document(const TetMesh& mesh, const std::vector<MeshArray>& points, 
         "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"
         "<UnstructuredGrid>\n<Piece NumberOfPoints=\"" +
         std::to_string(mesh.node_count()) + "\" NumberOfCells=\"" + std::to_string(count) + "\">\n<PointData>\n";
-    xml += arrays(data, points, mesh.nodes.cols(), "nodes");
+    xml += detail::float_arrays(data, points, mesh.nodes.cols(), "nodes");
     xml += "</PointData>\n<CellData>\n";
     xml += data.array("Int32", "label", 1, std::vector<std::int32_t>(mesh.labels.begin(), mesh.labels.end()));
-    xml += arrays(data, cells, mesh.tets.cols(), "cells");
+    xml += detail::float_arrays(data, cells, mesh.tets.cols(), "cells");
     xml += "</CellData>\n<Points>\n";
     xml += data.array("Float64", "Points", 3,
                       std::vector<double>(mesh.nodes.data(), mesh.nodes.data() + mesh.nodes.size()));

@@ -15,6 +15,9 @@ namespace tissuewarp::imaging::detail {
 
 enum class Format { Nifti, Nrrd, MetaImage };
 
+/// NRRD's free pair that says what a displacement field carries, as 3D Slicer writes it.
+inline constexpr const char* field_type_key = "displacement field type";
+
 struct ImageHeader {
     Geometry geometry;  ///< LPS mm
     StoredVoxels voxels;

@@ -2,6 +2,7 @@
 
 #include "core/errors.hpp"
 
+#include <itkMetaDataObject.h>
 #include <itkMetaImageIO.h>
 #include <itkNiftiImageIO.h>
 #include <itkNrrdImageIO.h>
@@ -64,7 +65,8 @@ std::string one_line(const itk::ExceptionObject& error) {
 
 }  // namespace
 
-void write_through_itk(const Volume& volume, const std::filesystem::path& path, Format format) {
+void write_through_itk(const Volume& volume, const std::filesystem::path& path, Format format,
+                       std::optional<FieldType> type) {
     try {
         const ImageIo io = make_image_io(format);
         const Geometry& grid = volume.geometry;
@@ -85,6 +87,8 @@ void write_through_itk(const Volume& volume, const std::filesystem::path& path, 
                                                 : itk::ImageIOBase::IOPixelType::VECTOR);
         io->SetUseCompression(format != Format::Nifti);
         io->SetCompressionLevel(1);
+        if (type && format == Format::Nrrd)
+            itk::EncapsulateMetaData<std::string>(io->GetMetaDataDictionary(), field_type_key, name_of(*type));
         io->SetFileName(path.string());
         io->Write(volume.voxels.data);
     } catch (const itk::ExceptionObject& error) {

@@ -1,5 +1,7 @@
 #include "meshing/detail/vtk_appended.hpp"
 
+#include "core/errors.hpp"
+
 namespace tissuewarp::meshing::detail {
 
 std::string xml_escaped(const std::string& text) {
@@ -23,6 +25,20 @@ std::string xml_escaped(const std::string& text) {
         }
     }
     return result;
+}
+
+std::string float_arrays(VtkAppended& data, const std::vector<MeshArray>& arrays, Eigen::Index count,
+                         const char* what) {
+    std::string elements;
+    for (const MeshArray& array : arrays) {
+        if (array.values.cols() != count || array.values.rows() == 0)
+            throw InvalidInput("array '" + array.name + "' of a VTK file has " + std::to_string(array.values.cols()) +
+                               " columns for " + std::to_string(count) + " " + what + "; give one column each");
+        const Eigen::MatrixXf values = array.values.cast<float>();
+        elements += data.array("Float32", array.name, values.rows(),
+                               std::vector<float>(values.data(), values.data() + values.size()));
+    }
+    return elements;
 }
 
 }  // namespace tissuewarp::meshing::detail

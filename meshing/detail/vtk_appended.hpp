@@ -1,6 +1,8 @@
 #pragma once
 /// Arrays of a VTK XML file as raw appended data, with lengths of 64 bits.
 
+#include "meshing/mesh_io.hpp"
+
 #include <bit>
 #include <cstdint>
 #include <string>
@@ -35,5 +37,9 @@ private:
 
     std::string bytes_;
 };
+
+/// The elements of arrays as float32. Throws InvalidInput unless each has a column for each of `count` nodes or cells,
+/// which `what` names.
+std::string float_arrays(VtkAppended& data, const std::vector<MeshArray>& arrays, Eigen::Index count, const char* what);
 
 }  // namespace tissuewarp::meshing::detail

@@ -116,6 +116,7 @@ PointMap displacement_image(const std::filesystem::path& path) {
                            " component; a displacement field has three");
     PointMap map;
     map.field = field.as(CV_32F);
+    map.type = imaging::stated_field_type(path).value_or(imaging::FieldType::Resampling);
     return map;
 }
 

@@ -27,4 +27,13 @@ bool is_slicer_markups(const std::filesystem::path& path);
 /// there is one, also for units other than mm and for files without a point.
 Markups read_slicer_markups(const std::filesystem::path& path, Observer& observer = silent_observer());
 
+/// A point of a list that is written.
+struct MarkupPoint {
+    std::string label, description;
+    Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< LPS mm
+};
+
+/// Writes a .mrk.json file with one list of points, LPS mm. Complete or absent. Throws IoError.
+void write_slicer_markups(const std::vector<MarkupPoint>& points, const std::filesystem::path& path);
+
 }  // namespace tissuewarp::registration

@@ -12,7 +12,7 @@ from phantom import (CENTRE_LPS, FIXED_AXES, MOVING_AFFINE, MOVING_AXES, SHIFT_L
 
 INPUT = 2
 OUTPUTS = ["displacement_fixed_to_moving.nii.gz", "displacement_moving_to_fixed.nii.gz", "mesh.vtu", "preview.png",
-           "record.h5", "report.html", "report.json", "uncertainty.nii.gz", "uncertainty_trust.nii.gz", "warped.nii.gz", "warped_labels.nii.gz"]
+           "record.h5", "report.html", "report.json", "transform.h5", "uncertainty.nii.gz", "uncertainty_trust.nii.gz", "warped.nii.gz", "warped_labels.nii.gz"]
 
 
 def sphere(count):

@@ -248,6 +248,39 @@ TEST(ImageIo, CompressedNiftiIsOneGzipMember) {
     inflateEnd(&stream);
 }
 
+TEST(ImageIo, WrittenDisplacementsAreWholeStepsLessThanAMicrometreAway) {
+    const TemporaryFolder folder;
+    Volume field(test::oblique_grid({20, 19, 18}), CV_32FC3);
+    cv::RNG random(3);
+    random.fill(test::flat(field.voxels), cv::RNG::UNIFORM, -40, 40);
+    for (const char* name : {"field.nii.gz", "field.nrrd", "field.mha"}) {
+        write_displacement_field(field, folder / name, FieldType::Resampling);
+        const Volume read = read_volume(folder / name);
+        EXPECT_LE(test::largest_difference(field.voxels, read.voxels), 0.5 * displacement_step_mm + 1e-9) << name;
+        EXPECT_EQ(test::largest_difference(rounded(field, displacement_step_mm).voxels, read.voxels), 0) << name;
+    }
+    write_volume(field, folder / "exact.nii.gz");
+    EXPECT_LT(std::filesystem::file_size(folder / "field.nii.gz"), 0.7 * std::filesystem::file_size(folder / "exact.nii.gz"));
+}
+
+TEST(ImageIo, NrrdSaysWhichPointsAFieldCarries) {
+    const TemporaryFolder folder;
+    const Volume field(test::plain_grid({4, 4, 4}), CV_32FC3);
+    for (const FieldType type : {FieldType::Modeling, FieldType::Resampling}) {
+        write_displacement_field(field, folder / "field.nrrd", type);
+        EXPECT_EQ(stated_field_type(folder / "field.nrrd"), type);
+        std::ifstream file(folder / "field.nrrd", std::ios::binary);
+        std::stringstream text;
+        text << file.rdbuf();
+        EXPECT_THAT(text.str(), testing::HasSubstr(std::string("displacement field type:=") + name_of(type) + "\n"));
+    }
+    write_displacement_field(field, folder / "field.nii.gz", FieldType::Modeling);
+    EXPECT_EQ(stated_field_type(folder / "field.nii.gz"), std::nullopt);
+    write_volume(field, folder / "silent.nrrd");
+    EXPECT_EQ(stated_field_type(folder / "silent.nrrd"), std::nullopt);
+    EXPECT_THROW(write_displacement_field(field.as(CV_64F), folder / "wide.nrrd", FieldType::Modeling), InvalidInput);
+}
+
 TEST(ImageIo, UnknownExtensionsAndMissingFoldersAreRefused) {
     const TemporaryFolder folder;
     const Volume volume(test::plain_grid({2, 2, 2}), CV_8U);
