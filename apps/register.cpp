@@ -5,6 +5,7 @@
 #include "apps/output_folder.hpp"
 #include "apps/output_names.hpp"
 #include "apps/progress.hpp"
+#include "apps/register_dicom.hpp"
 #include "apps/register_outputs.hpp"
 #include "apps/report_json.hpp"
 #include "apps/silenced_stderr.hpp"
@@ -235,6 +236,7 @@ void run_register(const RegisterOptions& options) {
     run.inputs = read_inputs(options, progress);
     require_inputs_stay(run.inputs, options.output);
     validate(run.inputs, options);
+    require_dicom_origins(options);
     run.times.push_back(clock.lap("read"));
     if (options.dry_run) {
         progress.clear();

@@ -1,8 +1,11 @@
 #include "apps/register_dicom.hpp"
 
+#include "apps/output_names.hpp"
 #include "imaging/dicom_results.hpp"
 #include "registration/field.hpp"
 #include "registration/io/point_map_field.hpp"
+
+#include <algorithm>
 
 namespace tissuewarp::apps {
 
@@ -18,6 +21,15 @@ void write_registration(const RegistrationRun& run, const std::filesystem::path&
 }
 
 }  // namespace
+
+void require_dicom_origins(const RegisterOptions& options) {
+    const bool asked = std::any_of(optional_outputs.begin(), optional_outputs.end(), [&](const OptionalOutput& output) {
+        return output.word == std::string("dicom") && writes(options, output);
+    });
+    if (!asked) return;
+    for (const std::filesystem::path& path : {options.fixed, options.moving})
+        if (imaging::is_dicom(path)) read_dicom_origin(path);
+}
 
 void write_dicom_result(const RegistrationRun& run, const std::string& file, const std::filesystem::path& path) {
     if (file == "registration.dcm") return write_registration(run, path);

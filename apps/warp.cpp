@@ -26,9 +26,20 @@ namespace {
 
 using imaging::Volume;
 
+/// The field that was given, unless its file says that it carries the points of the other image.
+Volume displacement(const WarpOptions& options, imaging::FieldType needed, Observer& observer) {
+    const auto stated = imaging::stated_field_type(options.displacement);
+    if (stated && *stated != needed)
+        throw InvalidInput(fmt::format(
+            "'{}' says 'displacement field type:={}', and '{}' takes {}; give the other field, or turn this one with "
+            "tissuewarp convert --to {} --reference IMAGE",
+            options.displacement.string(), name_of(*stated), options.input.string(), name_of(needed), name_of(needed)));
+    return read_displacement(options.displacement, observer);
+}
+
 /// The pulling field: the one that was given, or the record's on the reference grid.
 Volume fixed_to_moving(const WarpOptions& options, const Volume& image, Observer& observer) {
-    if (!options.displacement.empty()) return read_displacement(options.displacement, observer);
+    if (!options.displacement.empty()) return displacement(options, imaging::FieldType::Resampling, observer);
     const registration::Record record = registration::read_record(options.record);
     const imaging::Geometry grid =
         options.reference.empty() ? image.geometry : read_noted_volume(options.reference, observer).geometry;
@@ -62,7 +73,8 @@ void require_near(const Eigen::Matrix3Xd& points, const meshing::TetMesh& mesh, 
 }
 
 Eigen::Matrix3Xd map_points(const WarpOptions& options, const Eigen::Matrix3Xd& points, Observer& observer) {
-    if (!options.displacement.empty()) return displaced(points, read_displacement(options.displacement, observer));
+    if (!options.displacement.empty())
+        return displaced(points, displacement(options, imaging::FieldType::Modeling, observer));
     const registration::Record record = registration::read_record(options.record);
     require_near(points, record.deformation.mesh, options.input);
     return registration::PointTransform(record.deformation, {options.fade})(points);

@@ -10,6 +10,7 @@
 #include <array>
 #include <cstdio>
 #include <ctime>
+#include <sstream>
 
 namespace tissuewarp::imaging::detail {
 
@@ -157,14 +158,13 @@ std::string new_uid() {
 }
 
 void write_dicom(const DicomObject& object, const std::filesystem::path& path) {
-    AtomicFile file(path);
+    std::ostringstream stream;  // GDCM does not notice a full disk
     gdcm::Writer writer;
-    writer.SetFileName(file.path().c_str());
+    writer.SetStream(stream);
     writer.GetFile().SetDataSet(object.set());
     writer.GetFile().GetHeader().SetDataSetTransferSyntax(gdcm::TransferSyntax::ExplicitVRLittleEndian);
-    if (!writer.Write())
-        throw IoError("cannot write '" + path.string() + "'; check the folder, the permission and the space");
-    file.commit();
+    if (!writer.Write()) throw IoError("cannot put together '" + path.string() + "': GDCM refuses the object");
+    write_file(stream.view(), path);
 }
 
 }  // namespace tissuewarp::imaging::detail

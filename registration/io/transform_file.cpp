@@ -2,7 +2,6 @@
 
 #include "core/atomic_file.hpp"
 #include "core/detail/hdf5.hpp"
-#include "core/detail/hdf5_seal.hpp"
 #include "core/errors.hpp"
 #include "imaging/image_io.hpp"
 
@@ -13,9 +12,19 @@
 #include <itkTransformFileWriter.h>
 #include <itkTxtTransformIO.h>
 
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <sstream>
 #include <string>
 
 namespace tissuewarp::registration {
@@ -58,9 +67,10 @@ Field::Pointer displacement_field(const imaging::Volume& volume) {
     image->SetSpacing(spacing);
     image->SetDirection(direction);
     image->Allocate();
-    const imaging::Volume even = imaging::rounded(volume, imaging::displacement_step_mm);
-    const auto count = static_cast<std::size_t>(3 * grid.voxel_count());
-    std::copy_n(even.data<float>(), count, image->GetBufferPointer()->GetDataPointer());
+    constexpr double step = imaging::displacement_step_mm;
+    const auto* components = volume.data<float>();
+    std::transform(components, components + 3 * grid.voxel_count(), image->GetBufferPointer()->GetDataPointer(),
+                   [](float v) { return std::nearbyint(v / step) * step; });
     const auto result = Field::New();
     result->SetDisplacementField(image);
     return result;
@@ -85,6 +95,40 @@ void write(const PointMap& map, itk::TransformIOBaseTemplate<double>& format, co
     writer->Update();
 }
 
+/// A file in memory. HDF5 cannot recover from a disk that fills while it writes, and ends the process later; here it
+/// never meets one.
+class MemoryFile {
+public:
+    MemoryFile() : descriptor_(::memfd_create("transform", MFD_CLOEXEC)) {
+        if (descriptor_ < 0) throw IoError(std::string("no file in memory: ") + std::strerror(errno));
+    }
+    ~MemoryFile() { ::close(descriptor_); }
+    MemoryFile(const MemoryFile&) = delete;
+    MemoryFile& operator=(const MemoryFile&) = delete;
+
+    [[nodiscard]] std::string path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
+    [[nodiscard]] std::string bytes() const {
+        std::ifstream stream(path(), std::ios::binary);
+        std::ostringstream all;
+        all << stream.rdbuf();
+        return std::move(all).str();
+    }
+
+private:
+    int descriptor_;
+};
+
+/// Limits on the size of files hold in memory too: room for the parameters as they are, unpacked.
+void require_room(const PointMap& map) {
+    constexpr std::uint64_t rest = 1 << 20;  // of the file
+    const std::uint64_t bytes =
+        rest + (map.field ? 24 * static_cast<std::uint64_t>(map.field->geometry.voxel_count()) : 0);
+    rlimit limit{};
+    if (::getrlimit(RLIMIT_FSIZE, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY && limit.rlim_cur < bytes)
+        throw IoError("files are limited to " + std::to_string(limit.rlim_cur) +
+                      " bytes (ulimit -f), and it may take " + std::to_string(bytes));
+}
+
 }  // namespace
 
 void write_itk_transform(const PointMap& map, const std::filesystem::path& path) {
@@ -97,17 +141,21 @@ void write_itk_transform(const PointMap& map, const std::filesystem::path& path)
         throw InvalidInput("cannot write '" + path.string() +
                            "': text holds linear transforms only, and this one has a displacement field; use .h5");
     const Hdf5Quiet quiet;
-    AtomicFile file(path);
+    std::string bytes;
     try {
+        require_room(map);
+        const MemoryFile file;
         if (text)
             write(map, *itk::TxtTransformIOTemplate<double>::New(), file.path());
         else
             write(map, *itk::HDF5TransformIOTemplate<double>::New(), file.path());
-        if (!text) require_unbroken_hdf5(file.path());
-    } catch (const std::exception&) {  // ITK's own, HDF5's or ours: what they say does not help
-        throw IoError("cannot write '" + path.string() + "'; check the folder, the permission and the space");
+        bytes = file.bytes();
+    } catch (const itk::ExceptionObject& error) {
+        throw IoError("cannot write '" + path.string() + "': " + error.GetDescription());
+    } catch (const IoError& error) {
+        throw IoError("cannot write '" + path.string() + "': " + error.what());
     }
-    file.commit();
+    write_file(bytes, path);
 }
 
 void write_matrix(const Eigen::Affine3d& map, const std::filesystem::path& path) {

@@ -154,6 +154,17 @@ class Convert(Registered):
         self.assertEqual(result.returncode, INPUT)
         self.assertIn("contradicts", result.stderr)
 
+    def test_warp_refuses_a_field_that_says_the_other_direction(self):
+        typed = self.convert(self.output / "displacement_moving_to_fixed.nii.gz", self.file("forward.nrrd"), "--from",
+                             "modeling")
+        points = run("warp", self.file("points.csv"), "-o", self.file("carried.csv"), "--displacement", typed)
+        self.assertEqual(points.returncode, 0, points.stderr)
+        self.assert_close(columns(table(self.file("carried.csv")), ""), self.carried, 0.05)
+        image = run("warp", self.phantom.moving, "-o", self.file("no.nii.gz"), "--displacement", typed)
+        self.assertEqual(image.returncode, INPUT)
+        self.assertIn("displacement field type:=modeling", image.stderr)
+        self.assertFalse(self.file("no.nii.gz").exists())
+
     def test_the_wrong_field_is_not_taken_silently(self):
         result = run("convert", self.output / "displacement_moving_to_fixed.nii.gz", self.file("wrong.h5"))
         self.assertEqual(result.returncode, INPUT)
@@ -217,6 +228,7 @@ class Maps(Registered):
         back = through_itk(self.output / "transform.h5", nodes)
         numpy.testing.assert_allclose(values["displacement_mm"], numpy.linalg.norm(nodes - back, axis=1), atol=0.15)
         self.assertEqual(tree.find("PolyData/FieldData/Array").get("Name"), "SPACE")
+        self.assertEqual(run("info", self.output / "organ.vtp").returncode, 0)
 
     def test_markups_hold_the_carried_points_and_their_errors(self):
         for name, prefix, start in (("warped_landmarks", "warped_", "mm from its place; estimated error"),
@@ -233,6 +245,11 @@ class Maps(Registered):
                 self.assertIn(start, point["description"])
                 self.assertIn(f"estimated error {deviation:.2f} mm (1 sigma)", point["description"])
                 self.assertEqual(point["positionStatus"], "defined")
+            back = self.file(f"{name}_back.csv")
+            result = run("warp", self.output / f"{name}.mrk.json", "-o", back, "--displacement",
+                         self.output / "displacement_fixed_to_moving.nii.gz")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assert_close(columns(table(back), ""), self.moving_points, 0.05)
 
     def test_the_report_names_every_file(self):
         report = json.loads((self.output / "report.json").read_text())

@@ -260,7 +260,9 @@ TEST(ImageIo, WrittenDisplacementsAreWholeStepsLessThanAMicrometreAway) {
         EXPECT_EQ(test::largest_difference(rounded(field, displacement_step_mm).voxels, read.voxels), 0) << name;
     }
     write_volume(field, folder / "exact.nii.gz");
-    EXPECT_LT(std::filesystem::file_size(folder / "field.nii.gz"), 0.7 * std::filesystem::file_size(folder / "exact.nii.gz"));
+    // Noise, the hardest to pack.
+    EXPECT_LT(std::filesystem::file_size(folder / "field.nii.gz"),
+              0.85 * std::filesystem::file_size(folder / "exact.nii.gz"));
 }
 
 TEST(ImageIo, NrrdSaysWhichPointsAFieldCarries) {

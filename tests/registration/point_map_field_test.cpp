@@ -9,9 +9,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <sys/resource.h>
 #include <cmath>
-#include <fstream>
-#include <random>
+#include <csignal>
 
 namespace tissuewarp::registration {
 namespace {
@@ -100,7 +100,9 @@ TEST(PointMapField, AFieldOnItsOwnGridIsTheMap) {
 
 TEST(PointMapField, InversesUndoTheMap) {
     const Geometry grid = oblique_grid();
-    const PointMap map = with_linear_part(field_of(grid, wave), some_affine());
+    PointMap map;
+    map.field = field_of(grid, wave);
+    map.after = some_affine();
     Geometry target = grid;  // where the map leads to
     target.origin = some_affine() * grid.origin;
     target.direction = Eigen::AngleAxisd(0.4, Vector3d(3, -1, 2).normalized()).toRotationMatrix() * grid.direction;
@@ -170,6 +172,23 @@ TEST(TransformFile, WhatAFileCannotHoldIsRefusedAndLeavesNothing) {
     EXPECT_THAT(message_of([&] { write_itk_transform(field, folder / "a.xfm"); }), HasSubstr("names no transform"));
     EXPECT_THROW(write_itk_transform(field, folder / "none" / "a.h5"), IoError);
     EXPECT_TRUE(folder.is_empty());
+}
+
+TEST(TransformFile, ALimitOnFilesIsToldAndLeavesNothing) {
+    const tissuewarp::test::TemporaryFolder folder;
+    const PointMap map = with_linear_part(field_of(oblique_grid(60), wave), some_affine());
+    std::signal(SIGXFSZ, SIG_IGN);
+    rlimit before{};
+    ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+    rlimit small = before;
+    small.rlim_cur = 1 << 16;
+    ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+    const std::string message = message_of([&] { write_itk_transform(map, folder / "a.h5"); });
+    ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
+    EXPECT_THAT(message, HasSubstr("ulimit -f"));
+    EXPECT_TRUE(folder.is_empty());
+    write_itk_transform(map, folder / "a.h5");
+    EXPECT_FALSE(folder.is_empty());
 }
 
 }  // namespace
