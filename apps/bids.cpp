@@ -29,7 +29,7 @@ constexpr std::array<BidsName, 6> names{{
     {"warped.nii.gz", "space-intraop_desc-warped_{}.nii.gz", "intraop"},
     {"warped_labels.nii.gz", "space-intraop_dseg.nii.gz", "intraop"},
     {transform_name, "from-preop_to-intraop_mode-image_xfm.h5", "intraop"},
-    {"inverse_transform.h5", "from-intraop_to-preop_mode-image_xfm.h5", "preop"},
+    {inverse_transform.file, "from-intraop_to-preop_mode-image_xfm.h5", "preop"},
     {fixed_to_moving_name, "from-preop_to-intraop_mode-image_desc-field_xfm.nii.gz", "intraop"},
     {moving_to_fixed_name, "from-preop_to-intraop_mode-points_desc-field_xfm.nii.gz", "preop"},
 }};

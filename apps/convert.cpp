@@ -122,10 +122,9 @@ imaging::Volume field(const PointMap& map, const std::optional<Geometry>& refere
 
 void write(const PointMap& map, FieldType type, const ConvertOptions& options,
            const std::optional<Geometry>& reference) {
-    const Target target = target_of(options);
-    if (target == Target::Field) {
+    const SilencedStandardError silenced;
+    if (target_of(options) == Target::Field) {
         const imaging::Volume displacement = field(map, reference);
-        const SilencedStandardError silenced;
         write_displacement_field(displacement, options.output, type);
     } else if (options.matrix) {
         registration::write_matrix(map.after * map.before, options.output);

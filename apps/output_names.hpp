@@ -18,13 +18,14 @@ struct OptionalOutput {
     const char* word;  ///< for --write
     const char* file;
 };
+inline constexpr OptionalOutput inverse_transform{"inverse_transform", "inverse_transform.h5"};
 inline constexpr std::array<OptionalOutput, 10> optional_outputs{{
     {"displacement_magnitude", "displacement_magnitude.nii.gz"},
     {"jacobian", "jacobian.nii.gz"},
     {"organ", "organ.vtp"},
     {"markups", "warped_landmarks.mrk.json"},
     {"markups", "warped_points.mrk.json"},
-    {"inverse_transform", "inverse_transform.h5"},
+    inverse_transform,
     {"dicom", "registration.dcm"},
     {"dicom", "structures.dcm"},
     {"dicom", "uncertainty.dcm"},

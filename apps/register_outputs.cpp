@@ -120,74 +120,110 @@ std::string estimate_text(const registration::UncertaintySummary& s) {
                       100 * s.unknown_share);
 }
 
-/// What --write names; `start(name, write)` starts a task.
-template <class Start>
-void start_optional(const RegistrationRun& run, const Start& start) {
-    using registration::jacobian_determinant;
+/// Puts files into the output folder, under the names that they have there. Copies write for the same run.
+class Writer {
+public:
+    Writer(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks)
+        : run_(&run), output_(&output), tasks_(&tasks) {}
+
+    [[nodiscard]] const RegistrationRun& run() const { return *run_; }
+
+    template <class Write>
+    void now(const std::string& name, const Write& write) const {
+        if (interrupted()) throw Cancelled();
+        const std::string in_folder = bids_name(run_->options, name);
+        const std::filesystem::path path = output_->path(in_folder);
+        try {
+            write(path);
+            if (in_folder != name) write_file(sidecar(run_->options, name), output_->path(sidecar_name(in_folder)));
+        } catch (const IoError& error) {
+            throw IoError(output_->in_words(error.what()));
+        }
+    }
+    /// In a task of its own.
+    template <class Write>
+    void start(const std::string& name, const Write& write) const {
+        tasks_->run([writer = *this, name, write] { writer.now(name, write); });
+    }
+
+private:
+    const RegistrationRun* run_;
+    const OutputFolder* output_;
+    tbb::task_group* tasks_;
+};
+
+/// Before other files, which could fill the disk meanwhile (transform_file.cpp).
+void write_transforms(const Writer& writer) {
+    const Products& products = writer.run().products;
+    const Eigen::Isometry3d& placement = writer.run().result.deformation.placement;
+    writer.now(transform_name, [&](auto& path) {
+        write_itk_transform(with_linear_part(products.fixed_to_moving, placement.inverse()), path);
+    });
+    if (writes(writer.run().options, inverse_transform))
+        writer.now(inverse_transform.file, [&](auto& path) {
+            write_itk_transform(with_linear_part(products.moving_to_fixed, placement), path);
+        });
+}
+
+/// What else --write names.
+void start_optional(const Writer& writer) {
+    const RegistrationRun& run = writer.run();
     const Products& products = run.products;
-    const Eigen::Isometry3d& placement = run.result.deformation.placement;
     for (const OptionalOutput& output : optional_outputs) {
         if (!writes(run.options, output)) continue;
         const std::string word = output.word, file = output.file;
         if (word == "displacement_magnitude")
-            start(file, [&](auto& path) { write_volume(magnitude(products.fixed_to_moving), path); });
+            writer.start(file, [&](auto& path) { write_volume(magnitude(products.fixed_to_moving), path); });
         else if (word == "jacobian")
-            start(file, [&](auto& path) { write_volume(jacobian_determinant(products.moving_to_fixed), path); });
-        else if (word == "organ")
-            start(file, [&](auto& path) { write_organ(run, path); });
-        else if (word == "inverse_transform")
-            start(file, [&](auto& path) {
-                write_itk_transform(with_linear_part(products.moving_to_fixed, placement), path);
+            writer.start(file, [&](auto& path) {
+                write_volume(registration::jacobian_determinant(products.moving_to_fixed), path);
             });
+        else if (word == "organ")
+            writer.start(file, [&](auto& path) { write_organ(run, path); });
         else if (word == "dicom")
-            start(file, [&run, file](auto& path) { write_dicom_result(run, file, path); });
+            writer.start(file, [&run, file](auto& path) { write_dicom_result(run, file, path); });
         else if (file.starts_with("warped_landmarks"))
-            start(file, [&](auto& path) { write_landmark_markups(run, path); });
-        else
-            start(file, [&](auto& path) { write_point_markups(run, path); });
+            writer.start(file, [&](auto& path) { write_landmark_markups(run, path); });
+        else if (file.starts_with("warped_points"))
+            writer.start(file, [&](auto& path) { write_point_markups(run, path); });
     }
+}
+
+void start_usual(const Writer& writer) {
+    const RegistrationRun& run = writer.run();
+    const Products& products = run.products;
+    writer.start(moving_to_fixed_name, [&](auto& path) {
+        write_displacement_field(products.moving_to_fixed, path, imaging::FieldType::Modeling);
+    });
+    writer.start(fixed_to_moving_name, [&](auto& path) {
+        write_displacement_field(products.fixed_to_moving, path, imaging::FieldType::Resampling);
+    });
+    if (products.uncertainty) {
+        const registration::UncertaintyVolumes& volumes = products.uncertainty_volumes;
+        writer.start("uncertainty.nii.gz", [&](auto& path) { write_volume(volumes.deviation, path); });
+        writer.start("uncertainty_trust.nii.gz", [&](auto& path) { write_volume(volumes.trust, path); });
+    }
+    if (!products.warped.empty())
+        writer.start("warped.nii.gz", [&](auto& path) { write_volume(products.warped, path); });
+    writer.start("warped_labels.nii.gz", [&](auto& path) { write_volume(compact(products.warped_labels), path); });
+    writer.start("mesh.vtu", [&](auto& path) { write_mesh(run.result.deformation, path); });
+    writer.start("record.h5",
+                 [&](auto& path) { registration::write_record(*run.prepared, run.result, record_info(run), path); });
+    if (run.inputs.landmarks) writer.start("warped_landmarks.csv", [&](auto& path) { write_landmarks(run, path); });
+    if (run.inputs.points) writer.start("warped_points.csv", [&](auto& path) { write_points(run, path); });
+    if (products.surface)
+        writer.start(surface_name(run.options), [&](auto& path) { meshing::write_surface(*products.surface, path); });
 }
 
 }  // namespace
 
 void start_writing(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks) {
-    const auto start = [&](const std::string& name, auto write) {
-        const std::string in_folder = bids_name(run.options, name);
-        tasks.run([=, &run, &output, path = output.path(in_folder)] {
-            if (interrupted()) throw Cancelled();
-            try {
-                write(path);
-                if (in_folder != name) write_file(sidecar(run.options, name), output.path(sidecar_name(in_folder)));
-            } catch (const IoError& error) {
-                throw IoError(output.in_words(error.what()));
-            }
-        });
-    };
-    const Products& products = run.products;
-    const Eigen::Isometry3d& placement = run.result.deformation.placement;
-    start(transform_name, [&](auto& path) {  // the longest of all
-        registration::write_itk_transform(registration::with_linear_part(products.fixed_to_moving, placement.inverse()),
-                                          path);
+    const Writer writer(run, output, tasks);
+    tasks.run([writer] {
+        write_transforms(writer);
+        start_usual(writer);
+        start_optional(writer);
     });
-    start(moving_to_fixed_name,
-          [&](auto& path) { write_displacement_field(products.moving_to_fixed, path, imaging::FieldType::Modeling); });
-    start(fixed_to_moving_name, [&](auto& path) {
-        write_displacement_field(products.fixed_to_moving, path, imaging::FieldType::Resampling);
-    });
-    if (products.uncertainty) {
-        start("uncertainty.nii.gz", [&](auto& path) { write_volume(products.uncertainty_volumes.deviation, path); });
-        start("uncertainty_trust.nii.gz", [&](auto& path) { write_volume(products.uncertainty_volumes.trust, path); });
-    }
-    if (!products.warped.empty()) start("warped.nii.gz", [&](auto& path) { write_volume(products.warped, path); });
-    start("warped_labels.nii.gz", [&](auto& path) { write_volume(compact(products.warped_labels), path); });
-    start("mesh.vtu", [&](auto& path) { write_mesh(run.result.deformation, path); });
-    start("record.h5",
-          [&](auto& path) { registration::write_record(*run.prepared, run.result, record_info(run), path); });
-    if (run.inputs.landmarks) start("warped_landmarks.csv", [&](auto& path) { write_landmarks(run, path); });
-    if (run.inputs.points) start("warped_points.csv", [&](auto& path) { write_points(run, path); });
-    if (products.surface)
-        start(surface_name(run.options), [&](auto& path) { meshing::write_surface(*products.surface, path); });
-    start_optional(run, start);
 }
 
 void write_reports(const RegistrationRun& run, const nlohmann::json& report, const OutputFolder& output) {

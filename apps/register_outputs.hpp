@@ -11,8 +11,8 @@
 
 namespace tissuewarp::apps {
 
-/// Starts one task per file for images, fields, mesh, points and record; `run` and `output` must outlive `tasks`.
-/// wait() on the tasks rethrows the first IoError, or Cancelled.
+/// Starts a task that writes the transforms and then one per file for images, fields, mesh, points and record; `run`
+/// and `output` must outlive `tasks`. wait() on the tasks rethrows the first IoError, or Cancelled.
 void start_writing(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks);
 
 /// report.json, preview.png and report.html.

@@ -12,8 +12,7 @@
 #include <itkTransformFileWriter.h>
 #include <itkTxtTransformIO.h>
 
-#include <sys/mman.h>
-#include <sys/resource.h>
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -23,8 +22,6 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <fstream>
-#include <sstream>
 #include <string>
 
 namespace tissuewarp::registration {
@@ -95,38 +92,19 @@ void write(const PointMap& map, itk::TransformIOBaseTemplate<double>& format, co
     writer->Update();
 }
 
-/// A file in memory. HDF5 cannot recover from a disk that fills while it writes, and ends the process later; here it
-/// never meets one.
-class MemoryFile {
-public:
-    MemoryFile() : descriptor_(::memfd_create("transform", MFD_CLOEXEC)) {
-        if (descriptor_ < 0) throw IoError(std::string("no file in memory: ") + std::strerror(errno));
-    }
-    ~MemoryFile() { ::close(descriptor_); }
-    MemoryFile(const MemoryFile&) = delete;
-    MemoryFile& operator=(const MemoryFile&) = delete;
-
-    [[nodiscard]] std::string path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
-    [[nodiscard]] std::string bytes() const {
-        std::ifstream stream(path(), std::ios::binary);
-        std::ostringstream all;
-        all << stream.rdbuf();
-        return std::move(all).str();
-    }
-
-private:
-    int descriptor_;
-};
-
-/// Limits on the size of files hold in memory too: room for the parameters as they are, unpacked.
-void require_room(const PointMap& map) {
-    constexpr std::uint64_t rest = 1 << 20;  // of the file
-    const std::uint64_t bytes =
-        rest + (map.field ? 24 * static_cast<std::uint64_t>(map.field->geometry.voxel_count()) : 0);
-    rlimit limit{};
-    if (::getrlimit(RLIMIT_FSIZE, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY && limit.rlim_cur < bytes)
-        throw IoError("files are limited to " + std::to_string(limit.rlim_cur) +
-                      " bytes (ulimit -f), and it may take " + std::to_string(bytes));
+/// HDF5 cannot recover from a disk that fills while it writes, and ends the process later: room for the parameters as
+/// they are, unpacked, must be there before. What others write meanwhile is not foreseen.
+void require_room(const PointMap& map, const std::filesystem::path& path) {
+    constexpr std::int64_t rest = 1 << 20;  // of the file
+    const std::int64_t bytes = rest + (map.field ? 24 * map.field->geometry.voxel_count() : 0);
+    const int file = ::open(path.c_str(), O_CREAT | O_WRONLY | O_TRUNC | O_CLOEXEC, 0666);
+    if (file < 0) throw IoError(std::strerror(errno));
+    const int failure = ::posix_fallocate(file, 0, bytes);
+    ::close(file);
+    std::filesystem::remove(path);
+    if (failure != 0)
+        throw IoError(std::string(std::strerror(failure)) + "; it takes up to " + std::to_string(bytes >> 20) +
+                      " MiB while it is written");
 }
 
 }  // namespace
@@ -141,21 +119,19 @@ void write_itk_transform(const PointMap& map, const std::filesystem::path& path)
         throw InvalidInput("cannot write '" + path.string() +
                            "': text holds linear transforms only, and this one has a displacement field; use .h5");
     const Hdf5Quiet quiet;
-    std::string bytes;
+    AtomicFile file(path);
     try {
-        require_room(map);
-        const MemoryFile file;
+        require_room(map, file.path());
         if (text)
             write(map, *itk::TxtTransformIOTemplate<double>::New(), file.path());
         else
             write(map, *itk::HDF5TransformIOTemplate<double>::New(), file.path());
-        bytes = file.bytes();
     } catch (const itk::ExceptionObject& error) {
         throw IoError("cannot write '" + path.string() + "': " + error.GetDescription());
     } catch (const IoError& error) {
         throw IoError("cannot write '" + path.string() + "': " + error.what());
     }
-    write_file(bytes, path);
+    file.commit();
 }
 
 void write_matrix(const Eigen::Affine3d& map, const std::filesystem::path& path) {
