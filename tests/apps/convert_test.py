@@ -2,6 +2,7 @@
 
 import json
 import os
+import pathlib
 import re
 import subprocess
 import unittest
@@ -251,9 +252,15 @@ class Maps(Registered):
             self.assertEqual(result.returncode, 0, result.stderr)
             self.assert_close(columns(table(back), ""), self.moving_points, 0.05)
 
-    def test_the_report_names_every_file(self):
+    def test_the_report_names_every_file_and_so_does_the_manual(self):
         report = json.loads((self.output / "report.json").read_text())
         self.assertEqual(sorted(report["outputs"]), sorted(path.name for path in self.output.iterdir()))
+        page = (pathlib.Path(__file__).parents[2] / "docs" / "manual" / "register.md").read_text()
+        for name in report["outputs"]:
+            self.assertIn(f"`{name}`", page)
+        for word in ("displacement_magnitude", "jacobian", "organ", "markups", "inverse_transform", "dicom", "all"):
+            self.assertIn(f"`{word}`", page)
+            self.assertIn(word, run("register", "--help").stdout)
 
 
 class Bids(PhantomTest):
