@@ -68,6 +68,12 @@ void DicomObject::us(std::uint32_t tag, const std::vector<std::uint16_t>& values
     bytes(tag, "US", values.data(), values.size() * sizeof values[0]);
 }
 
+void DicomObject::at(std::uint32_t tag, std::uint32_t pointer) {
+    const std::array<std::uint16_t, 2> words{static_cast<std::uint16_t>(pointer >> 16U),
+                                             static_cast<std::uint16_t>(pointer)};
+    bytes(tag, "AT", words.data(), sizeof words);
+}
+
 void DicomObject::ul(std::uint32_t tag, const std::vector<std::uint32_t>& values) {
     bytes(tag, "UL", values.data(), values.size() * sizeof values[0]);
 }
@@ -131,9 +137,30 @@ DicomObject derived_object(const DicomOrigin& origin, const char* sop_class, con
     object.whole(0x00200013, {1});
     object.text(0x00200052, "UI", origin.frame_of_reference);
     object.text(0x00201040, "LO", "");
-    for (const std::uint32_t date : {0x00080012U, 0x00080023U}) object.text(date, "DA", today());
-    for (const std::uint32_t time : {0x00080013U, 0x00080033U}) object.text(time, "TM", time_of_day());
+    object.text(0x00080012, "DA", today());
+    object.text(0x00080013, "TM", time_of_day());
     return object;
+}
+
+void add_content(DicomObject& object, const char* label, const std::string& description) {
+    object.text(0x00080023, "DA", today());
+    object.text(0x00080033, "TM", time_of_day());
+    object.text(0x00700080, "CS", label);
+    object.text(0x00700081, "LO", description);
+    object.text(0x00700084, "PN", "");
+}
+
+DicomObject reference_to(const DicomInstance& instance) {
+    DicomObject item;
+    item.text(0x00081150, "UI", instance.sop_class);
+    item.text(0x00081155, "UI", instance.sop_instance);
+    return item;
+}
+
+std::vector<DicomObject> references_to(const std::vector<DicomInstance>& instances) {
+    std::vector<DicomObject> items;
+    for (const DicomInstance& instance : instances) items.push_back(reference_to(instance));
+    return items;
 }
 
 DicomObject code(const char* value, const char* scheme, const char* meaning) {

@@ -22,6 +22,7 @@ public:
     void decimals(std::uint32_t tag, const std::vector<double>& values);
     void whole(std::uint32_t tag, const std::vector<int>& values);  ///< IS
     void us(std::uint32_t tag, const std::vector<std::uint16_t>& values);
+    void at(std::uint32_t tag, std::uint32_t pointer);
     void ul(std::uint32_t tag, const std::vector<std::uint32_t>& values);
     void fd(std::uint32_t tag, const std::vector<double>& values);
     void fl(std::uint32_t tag, float value);
@@ -39,6 +40,13 @@ private:
 /// An object of this class and modality in a series of its own, in the study and frame of reference of `origin`.
 DicomObject derived_object(const DicomOrigin& origin, const char* sop_class, const char* modality,
                            const std::string& series_description);
+
+/// Date, label and description of what was made.
+void add_content(DicomObject& object, const char* label, const std::string& description);
+
+/// Items that name instances.
+DicomObject reference_to(const DicomInstance& instance);
+std::vector<DicomObject> references_to(const std::vector<DicomInstance>& instances);
 
 /// A code as a sequence of one item holds it.
 DicomObject code(const char* value, const char* scheme, const char* meaning);

@@ -18,14 +18,17 @@ constexpr float padding = -1;  ///< where nothing is said
 
 void add_shared_groups(DicomObject& shared, const Geometry& grid, const MapQuantity& quantity, float least,
                        float most) {
-    DicomObject measures, orientation, voi, kind, mapping, definition;
+    DicomObject measures, orientation, voi, kind, mapping, definition, identity;
     measures.decimals(0x00280030, {grid.spacing[1], grid.spacing[0]});  // along j comes first
     measures.decimals(0x00180050, {grid.spacing[2]});
     measures.decimals(0x00180088, {grid.spacing[2]});
     orientation.decimals(0x00200037, {grid.direction.data(), grid.direction.data() + 6});
     voi.decimals(0x00281050, {0.5 * (double(least) + most)});
     voi.decimals(0x00281051, {std::max(1e-3, double(most) - least)});
-    kind.text(0x00089007, "CS", "DERIVED\\PRIMARY\\QUANTITY\\NONE");
+    identity.decimals(0x00281052, {0});
+    identity.decimals(0x00281053, {1});
+    identity.text(0x00281054, "LO", "US");  // unspecified
+    kind.text(0x00089007, "CS", "DERIVED\\PRIMARY\\VOLUME\\QUANTITY");
     definition.text(0x0040a040, "CS", "CODE");
     definition.sequence(0x0040a043, {code("246205007", "SCT", "Quantity")});
     definition.sequence(0x0040a168,
@@ -41,6 +44,7 @@ void add_shared_groups(DicomObject& shared, const Geometry& grid, const MapQuant
     shared.sequence(0x00289110, {measures});
     shared.sequence(0x00209116, {orientation});
     shared.sequence(0x00289132, {voi});
+    shared.sequence(0x00289145, {identity});
     shared.sequence(0x00409092, {kind});
     shared.sequence(0x00409096, {mapping});
 }
@@ -51,7 +55,7 @@ std::vector<DicomObject> frame_groups(const Geometry& grid) {
         const auto slice = static_cast<std::uint32_t>(k + 1);
         const Eigen::Vector3d corner = grid.point({0, 0, double(k)});
         DicomObject frame, content, position;
-        content.ul(0x00209157, {slice});
+        content.ul(0x00209157, {1, slice});
         content.text(0x00209056, "SH", "1");
         content.ul(0x00209057, {slice});
         position.decimals(0x00200032, {corner.data(), corner.data() + 3});
@@ -62,10 +66,22 @@ std::vector<DicomObject> frame_groups(const Geometry& grid) {
     return frames;
 }
 
-DicomObject dimensions() {
-    DicomObject item;
-    item.text(0x00209164, "UI", detail::new_uid());
-    return item;
+/// Frames are counted by stack, of which there is one, and by their place in it.
+void add_dimensions(DicomObject& object) {
+    constexpr std::uint32_t frame_content = 0x00209111;
+    const std::string uid = detail::new_uid();
+    DicomObject organization;
+    organization.text(0x00209164, "UI", uid);
+    std::vector<DicomObject> indices;
+    for (const std::uint32_t counted : {0x00209056U, 0x00209057U}) {
+        DicomObject index;
+        index.text(0x00209164, "UI", uid);
+        index.at(0x00209165, counted);
+        index.at(0x00209167, frame_content);
+        indices.push_back(std::move(index));
+    }
+    object.sequence(0x00209221, {organization});
+    object.sequence(0x00209222, indices);
 }
 
 void add_pixels(DicomObject& object, const Volume& map) {
@@ -78,7 +94,7 @@ void add_pixels(DicomObject& object, const Volume& map) {
     object.us(0x00280100, {32});
     object.text(0x00280301, "CS", "NO");
     object.text(0x00282110, "CS", "00");
-    object.fl(0x00280122, padding);
+    for (const std::uint32_t value_and_limit : {0x00280122U, 0x00280124U}) object.fl(value_and_limit, padding);
     std::vector<float> values(map.data<float>(), map.data<float>() + grid.voxel_count());
     std::replace_if(
         values.begin(), values.end(), [](float v) { return std::isnan(v); }, padding);
@@ -97,14 +113,16 @@ void write_parametric_map(const Volume& given, const MapQuantity& quantity, cons
         if (value > most) most = value;
     }
     DicomObject object = detail::derived_object(origin, "1.2.840.10008.5.1.4.1.1.30", "OT", quantity.description);
-    object.text(0x00080008, "CS", "DERIVED\\PRIMARY\\QUANTITY\\NONE");
-    object.text(0x00700080, "CS", "MAP");
-    object.text(0x00700081, "LO", quantity.description);
-    object.text(0x00700084, "PN", "");
+    object.text(0x00080008, "CS", "DERIVED\\PRIMARY\\VOLUME\\QUANTITY");
+    detail::add_content(object, "MAP", quantity.description);
+    object.text(0x00189004, "CS", "RESEARCH");
+    object.text(0x00200060, "CS", "");
+    object.text(0x00280302, "CS", "NO");  // no face is to be recognised
+    object.sequence(0x00400555, {});
     object.text(0x20500020, "CS", "IDENTITY");
     DicomObject shared;
     add_shared_groups(shared, map.geometry, quantity, least, most);
-    object.sequence(0x00209221, {dimensions()});
+    add_dimensions(object);
     object.sequence(0x52009229, {shared});
     object.sequence(0x52009230, frame_groups(map.geometry));
     add_pixels(object, map);

@@ -32,17 +32,19 @@ DicomObject grid_item(const Volume& field) {
 }
 
 DicomObject series_reference(const DicomOrigin& origin) {
-    std::vector<DicomObject> instances;
-    for (const DicomInstance& instance : origin.instances) {
-        DicomObject item;
-        item.text(0x00081150, "UI", instance.sop_class);
-        item.text(0x00081155, "UI", instance.sop_instance);
-        instances.push_back(std::move(item));
-    }
     DicomObject series;
     series.text(0x0020000e, "UI", origin.series);
-    series.sequence(0x0008114a, instances);
+    series.sequence(0x0008114a, detail::references_to(origin.instances));
     return series;
+}
+
+/// Of images in a frame of reference.
+DicomObject registration_item(const DicomOrigin& origin) {
+    DicomObject item;
+    item.text(0x00640003, "UI", origin.frame_of_reference);
+    item.sequence(0x00081140, detail::references_to(origin.instances));
+    item.sequence(0x0070030d, {});
+    return item;
 }
 
 /// Images of the object's own study, and those of others (PS3.3, C.12.2).
@@ -61,16 +63,13 @@ void add_references(DicomObject& object, const DicomOrigin& fixed, const DicomOr
 void write_deformable_registration(const Volume& displacement, const Eigen::Isometry3d& after, const DicomOrigin& fixed,
                                    const DicomOrigin& moving, const std::filesystem::path& path) {
     DicomObject object = detail::derived_object(fixed, "1.2.840.10008.5.1.4.1.1.66.3", "REG", "Registration");
-    object.text(0x00700080, "CS", "REGISTRATION");
-    object.text(0x00700081, "LO", "moving series to fixed series");
-    object.text(0x00700084, "PN", "");
-    DicomObject item;
-    item.text(0x00640003, "UI", moving.frame_of_reference);
+    detail::add_content(object, "REGISTRATION", "moving series to fixed series");
+    object.text(0x00200060, "CS", "");
+    DicomObject item = registration_item(moving);
     item.sequence(0x00640005, {grid_item(detail::right_handed(displacement))});
     item.sequence(0x0064000f, {matrix_item(Eigen::Isometry3d::Identity())});
     item.sequence(0x00640010, {matrix_item(after)});
-    item.sequence(0x0070030d, {});
-    object.sequence(0x00640002, {item});
+    object.sequence(0x00640002, {item, registration_item(fixed)});
     add_references(object, fixed, moving);
     detail::write_dicom(object, path);
 }

@@ -14,20 +14,11 @@ namespace {
 
 using detail::DicomObject;
 
-DicomObject reference_to(const DicomInstance& instance) {
-    DicomObject item;
-    item.text(0x00081150, "UI", instance.sop_class);
-    item.text(0x00081155, "UI", instance.sop_instance);
-    return item;
-}
-
 /// The frame of reference, and the images that lie in it.
 DicomObject frame_reference(const DicomOrigin& origin) {
-    std::vector<DicomObject> images;
-    for (const DicomInstance& instance : origin.instances) images.push_back(reference_to(instance));
     DicomObject series, study, frame;
     series.text(0x0020000e, "UI", origin.series);
-    series.sequence(0x30060016, images);
+    series.sequence(0x30060016, detail::references_to(origin.instances));
     study.text(0x00081150, "UI", "1.2.840.10008.3.1.2.3.1");  // a study, retired but for this use
     study.text(0x00081155, "UI", origin.study);
     study.sequence(0x30060014, {series});
@@ -51,7 +42,7 @@ std::vector<DicomObject> contours(const Volume& labels, int label, const DicomOr
         const DicomInstance* image = image_at(origin, labels.geometry, k);
         for (const Eigen::Matrix3Xd& contour : detail::slice_contours(labels, label, k)) {
             DicomObject item;
-            if (image) item.sequence(0x30060016, {reference_to(*image)});
+            if (image) item.sequence(0x30060016, {detail::reference_to(*image)});
             item.text(0x30060042, "CS", "CLOSED_PLANAR");
             item.whole(0x30060046, {static_cast<int>(contour.cols())});
             item.decimals(0x30060050, {contour.data(), contour.data() + contour.size()});
@@ -94,6 +85,7 @@ void write_structure_set(const Volume& labels, const LabelNames& names, const Di
     if (regions.empty()) throw InvalidInput("cannot write '" + path.string() + "': the label map is empty");
     DicomObject object =
         detail::derived_object(origin, "1.2.840.10008.5.1.4.1.1.481.3", "RTSTRUCT", "Registered structures");
+    object.text(0x00081070, "PN", "");
     object.text(0x30060002, "SH", "registered");
     object.text(0x30060008, "DA", detail::today());
     object.text(0x30060009, "TM", detail::time_of_day());

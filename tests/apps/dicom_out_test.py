@@ -1,4 +1,4 @@
-"""Results as DICOM objects, read by pydicom and plastimatch and compared with the files that are tested elsewhere."""
+"""Results as DICOM objects, read by pydicom, plastimatch and dciodvfy, and compared with the files that are tested elsewhere."""
 
 import json
 import os
@@ -77,10 +77,18 @@ class DicomOut(unittest.TestCase):
         self.assertLessEqual({"registration.dcm", "structures.dcm", "uncertainty.dcm", "jacobian.dcm"},
                              set(report["outputs"]))
 
+    def test_they_keep_to_the_standard(self):
+        for name in ("registration.dcm", "structures.dcm", "uncertainty.dcm", "jacobian.dcm"):
+            result = subprocess.run(["dciodvfy", self.output / name], capture_output=True, text=True)
+            self.assertNotIn("Error", result.stdout + result.stderr, name)
+
     def test_registration_maps_points_as_the_standard_says(self):
         object_ = self.read("registration.dcm", self.fixed_frame, "1.2.840.10008.5.1.4.1.1.66.3")
         self.assertEqual((object_.Modality, object_.StudyInstanceUID), ("REG", self.study))
-        (item,) = object_.DeformableRegistrationSequence
+        item, registered = object_.DeformableRegistrationSequence
+        self.assertEqual(registered.SourceFrameOfReferenceUID, self.fixed_frame)
+        self.assertNotIn("DeformableRegistrationGridSequence", registered)
+        self.assertEqual((len(item.ReferencedImageSequence), len(registered.ReferencedImageSequence)), (SIZE, SIZE))
         self.assertEqual(item.SourceFrameOfReferenceUID, self.moving_frame)
         (grid,) = item.DeformableRegistrationGridSequence
         before, after = (numpy.array(sequence[0].FrameOfReferenceTransformationMatrix, float).reshape(4, 4) for sequence
