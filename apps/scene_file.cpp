@@ -65,8 +65,7 @@ void read_probes(TomlReader& file, Scene& scene) {
     }
 }
 
-Scene read_checked(const std::filesystem::path& path, Observer& observer) {
-    const toml::table table = parse_toml_file(path);
+Scene read_checked(const toml::table& table, const std::filesystem::path& path, Observer& observer) {
     const std::filesystem::path folder = path.parent_path();
     TomlReader file(table, path, "");
     Scene scene;
@@ -90,7 +89,12 @@ Scene read_checked(const std::filesystem::path& path, Observer& observer) {
 }  // namespace
 
 Scene read_scene(const std::filesystem::path& path, Observer& observer) {
-    return naming(path, [&] { return read_checked(path, observer); });
+    return naming(path, [&] { return read_checked(parse_toml_file(path), path, observer); });
+}
+
+Scene scene_of_text(std::string_view text, const std::filesystem::path& folder, Observer& observer) {
+    const std::filesystem::path path = folder / "scene";
+    return naming(path, [&] { return read_checked(parse_toml(text, path), path, observer); });
 }
 
 }  // namespace tissuewarp::apps

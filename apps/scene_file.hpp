@@ -5,6 +5,7 @@
 #include "simulation/scene.hpp"
 
 #include <filesystem>
+#include <string_view>
 
 namespace tissuewarp::apps {
 
@@ -12,5 +13,9 @@ namespace tissuewarp::apps {
 /// file and line for unknown keys, values of the wrong kind or out of range, sets and labels that do not exist; and for
 /// what simulation::require_valid() refuses. Notes to the observer: what the readers of images had to decide.
 simulation::Scene read_scene(const std::filesystem::path& path, Observer& observer = silent_observer());
+
+/// The same of a text whose files lie in `folder`; messages call it "scene" there.
+simulation::Scene scene_of_text(std::string_view text, const std::filesystem::path& folder,
+                                Observer& observer = silent_observer());
 
 }  // namespace tissuewarp::apps

@@ -7,6 +7,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 namespace tissuewarp::apps {
 
@@ -15,16 +16,26 @@ inline std::string toml_place(const std::filesystem::path& path, const toml::nod
     return "'" + path.string() + "', line " + std::to_string(node.source().begin.line);
 }
 
-inline toml::table parse_toml_file(const std::filesystem::path& path) {
-    std::error_code failure;
-    if (!std::filesystem::is_regular_file(path, failure))
-        throw IoError("cannot read '" + path.string() + "': no such file");
+/// What `parse()` returns; `path` stands for it in messages.
+template <class Parse>
+toml::table parsed_toml(const std::filesystem::path& path, const Parse& parse) {
     try {
-        return toml::parse_file(path.string());
+        return parse();
     } catch (const toml::parse_error& error) {
         throw InvalidInput("'" + path.string() + "', line " + std::to_string(error.source().begin.line) + ": " +
                            std::string(error.description()));
     }
+}
+
+inline toml::table parse_toml_file(const std::filesystem::path& path) {
+    std::error_code failure;
+    if (!std::filesystem::is_regular_file(path, failure))
+        throw IoError("cannot read '" + path.string() + "': no such file");
+    return parsed_toml(path, [&] { return toml::parse_file(path.string()); });
+}
+
+inline toml::table parse_toml(std::string_view text, const std::filesystem::path& path) {
+    return parsed_toml(path, [&] { return toml::parse(text); });
 }
 
 }  // namespace tissuewarp::apps

@@ -3,6 +3,7 @@
 
 #include "registration/evaluation.hpp"
 #include "registration/field.hpp"
+#include "registration/field/inverse_transform.hpp"
 #include "registration/gpu_warp.hpp"
 #include "registration/matching/image_mask.hpp"
 #include "registration/prepared_io.hpp"

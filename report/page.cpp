@@ -1,13 +1,12 @@
 #include "report/page.hpp"
 
+#include "report/detail/encoding.hpp"
 #include "report/detail/picture.hpp"
 #include "report/detail/slice_stack.hpp"
 #include "report/detail/template.hpp"
 #include "report/detail/view.hpp"
 
 #include "core/atomic_file.hpp"
-
-#include <opencv2/imgcodecs.hpp>
 
 #include <cmath>
 #include <cstdio>
@@ -56,8 +55,7 @@ nlohmann::json page_values(const ReportInput& input, const detail::Preview& prev
 
 void write_report(const ReportInput& input, const std::filesystem::path& folder) {
     const detail::Preview preview = detail::draw_preview(input);
-    std::vector<unsigned char> png;
-    cv::imencode(".png", preview.picture, png, {cv::IMWRITE_PNG_COMPRESSION, 9});
+    const std::vector<unsigned char> png = detail::png(preview.picture);
     write_file({reinterpret_cast<const char*>(png.data()), png.size()}, folder / "preview.png");
     write_file(detail::fill(detail::page_template(), page_values(input, preview, png)), folder / "report.html");
 }

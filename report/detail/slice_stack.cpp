@@ -2,8 +2,7 @@
 
 #include "report/detail/display.hpp"
 #include "report/detail/drawing.hpp"
-
-#include <opencv2/imgcodecs.hpp>
+#include "report/detail/encoding.hpp"
 
 #include <cstdio>
 
@@ -40,9 +39,7 @@ nlohmann::json slice_stack(const ReportInput& input, int count) {
         const auto encoded = [&](const imaging::Volume& image, const Window& window) {
             cv::Mat picture = grey_to_colour(grey_slice(image, window, plane));
             outlines(picture, outline, cv::Scalar(90, 210, 70), 1, sigma);
-            std::vector<unsigned char> bytes;
-            cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, 75});
-            return base64(bytes);
+            return base64(jpeg(picture, 75));
         };
         char mm[32];
         std::snprintf(mm, sizeof mm, "%.1f", point[2]);

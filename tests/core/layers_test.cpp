@@ -28,6 +28,7 @@ const std::map<std::string, std::set<std::string>> may_include{
     {"study", {"core", "imaging", "meshing", "shaders", "tled", "registration", "report", "study"}},
     {"apps",
      {"core", "imaging", "meshing", "shaders", "tled", "simulation", "registration", "report", "study", "apps"}},
+    {"python", {"core", "imaging", "meshing", "tled", "simulation", "registration", "apps", "python"}},  // scene files
 };
 
 /// The rooms of tled, and into which of the others each may look. All see the headers that lie directly in tled/.

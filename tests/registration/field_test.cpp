@@ -4,6 +4,7 @@
 #include "imaging/image_io.hpp"
 #include "meshing/point_location.hpp"
 #include "registration/evaluation.hpp"
+#include "registration/field/inverse_transform.hpp"
 #include "shapes.hpp"
 
 #include <gtest/gtest.h>
@@ -365,6 +366,29 @@ TEST(PointTransform, KnowsWhichPointsLieInTheMesh) {
     Eigen::Matrix3Xd points(3, 3);
     points << 5, 11, 55, 5, 5, 5, 5, 5, 5;
     EXPECT_EQ(transform.inside(points), (std::vector<bool>{true, false, false}));
+}
+
+TEST(InversePointTransform, LeadsBackInsideAndOutside) {
+    for (const double height : {9.0, -9.0}) {
+        Deformation deformation =
+            test::deformed_by(test::ball({0, 0, 0}, 40.0, 10), [&](const auto& X) { return bump(X, height); });
+        deformation.placement = test::motion(-7.0, {0.5, 0, 1}, {2, 2, -3});
+        const Geometry grid = test::oblique_grid({10, 0, 0}, {13, 12, 11}, {9.1, 9.3, 9.7});
+        const Volume places(grid, CV_8UC1);
+        Eigen::Matrix3Xd X(3, grid.voxel_count());
+        for_each_voxel(places, [&](const Eigen::Vector3d& index, std::int64_t n) { X.col(n) = grid.point(index); });
+        const Eigen::Matrix3Xd y = PointTransform(deformation)(X);
+        const Eigen::Matrix3Xd back = InversePointTransform(deformation)(y);
+        EXPECT_LT((back - X).colwise().norm().maxCoeff(), 1e-4) << height;
+        EXPECT_LT((PointTransform(deformation)(back) - y).colwise().norm().maxCoeff(), 2e-5) << height;
+    }
+}
+
+TEST(InversePointTransform, RefusesPointsThatAreNone) {
+    const InversePointTransform inverse(test::deformed_by(test::box_at({0, 0, 0}, {10, 10, 10}, {2, 2, 2}),
+                                                          [](const auto&) { return Eigen::Vector3d(50, 0, 0); }));
+    EXPECT_THROW((void)inverse(Eigen::Vector3d(0, std::nan(""), 0)), InvalidInput);
+    EXPECT_LT((inverse(Eigen::Vector3d(55, 5, 5)).col(0) - Eigen::Vector3d(5, 5, 5)).norm(), 1e-9);
 }
 
 TEST(JacobianDeterminant, OfAnAffineFieldIsItsDeterminant) {

@@ -1,0 +1,15 @@
+# Debian's Python and pybind11; the module is built where both are there.
+find_program(TISSUEWARP_PYTHON3 NAMES python3 PATHS /usr/bin NO_DEFAULT_PATH)  # the one that Debian's numpy belongs to
+mark_as_advanced(TISSUEWARP_PYTHON3)
+if(TISSUEWARP_PYTHON3)
+  set(Python_EXECUTABLE ${TISSUEWARP_PYTHON3})
+  set(PYBIND11_FINDPYTHON ON)
+  find_package(Python QUIET COMPONENTS Interpreter Development.Module)
+  if(Python_FOUND)
+    find_package(pybind11 2.10 QUIET)
+  endif()
+endif()
+option(TISSUEWARP_PYTHON "Build the Python module" ${pybind11_FOUND})
+if(TISSUEWARP_PYTHON AND NOT pybind11_FOUND)
+  message(FATAL_ERROR "TISSUEWARP_PYTHON needs Debian's python3-dev and pybind11-dev (scripts/setup installs them)")
+endif()

@@ -1,0 +1,17 @@
+#pragma once
+/// Pictures as the bytes of a file.
+
+#include <opencv2/core.hpp>
+
+#include <vector>
+
+namespace tissuewarp::report::detail {
+
+/// A PNG of a picture of three bytes a pixel (blue, green, red). Throws InvalidInput for any other type, IoError where
+/// libpng gives up.
+std::vector<unsigned char> png(const cv::Mat& picture);
+
+/// The same as a JPEG; `quality` from 1 to 100.
+std::vector<unsigned char> jpeg(const cv::Mat& picture, int quality);
+
+}  // namespace tissuewarp::report::detail
