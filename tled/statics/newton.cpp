@@ -1,6 +1,6 @@
 // Newton's method (Nocedal and Wright, Numerical Optimization (2006), algorithms 3.2 and 3.3) with the exact tangent of
-// the tissue where it is, in float64: slow, and what decides whether there is an equilibrium. A factor is kept while
-// corrections shrink fast enough under it.
+// the tissue where it is, in float64: slow, and what decides whether there is an equilibrium. The factor of one state
+// prepares conjugate gradients at the next ones (Dembo, Eisenstat, Steihaug, SIAM J. Numer. Anal. 19 (1982) 400).
 
 #include "tled/statics/equilibrium_search.hpp"
 #include "tled/statics/line_search.hpp"
@@ -14,7 +14,6 @@ using Eigen::Matrix3Xd;
 
 namespace {
 
-constexpr double contraction_kept = 0.2;  // of corrections, above which the tangent is taken anew
 constexpr int most_iterations = 60;
 constexpr int most_idle = 15;  // iterations without the correction falling by a tenth
 
@@ -33,23 +32,22 @@ EquilibriumResult newton(EquilibriumSearch& search, const Matrix3Xd* start) {
     Matrix3Xd u = first_state(search, start);
     if (!search.admissible(u)) search.fail_stalled();
     Matrix3Xd r = search.residual();
-    double before = 0, least = 0;
-    bool renew = true;
+    double least = 0;
+    bool last = false;
     for (int iteration = 0, idle = 0; iteration < most_iterations; ++iteration, ++idle) {
-        if (renew && !tangent.factorise(u)) search.fail_stalled();
-        const Matrix3Xd d = tangent.solve(r);
+        std::optional<Matrix3Xd> by_other_factor;
+        if (iteration > 0 && !last) by_other_factor = tangent.solve_at(u, r);
+        if (!by_other_factor && !tangent.factorise(u)) search.fail_stalled();
+        const Matrix3Xd d = by_other_factor ? *std::move(by_other_factor) : tangent.solve(r);
         const double correction = largest_norm(d);
-        const double contraction = renew || !(before > 0) ? 0 : correction / before;
-        if (!renew && contraction > contraction_kept) {
-            renew = true;
-            continue;
-        }
         search.keep(u, correction);
-        if (correction <= search.options.tolerance_mm && tangent.shift() == 0) {
-            if (renew) return search.finish();
-            renew = true;  // accepted by the tangent where the tissue is alone
+        const bool near = correction <= search.options.tolerance_mm;
+        if (near && !by_other_factor && tangent.shift() == 0) return search.finish_with(d);
+        if (near && by_other_factor) {
+            last = true;  // accepted by the factor where the tissue is alone, which also tells whether it is stable
             continue;
         }
+        last = false;
         if (iteration == 0 || correction < 0.9 * least) {
             least = correction;
             idle = 0;
@@ -59,8 +57,6 @@ EquilibriumResult newton(EquilibriumSearch& search, const Matrix3Xd* start) {
         if (!step) search.fail_stalled();
         u += step->length * d;
         r = std::move(step->residual);
-        renew = step->length != 1 || tangent.shift() > 0;
-        before = correction;
     }
     search.fail_stalled();
 }

@@ -1,17 +1,25 @@
 #pragma once
-/// The tangent stiffness at a state and its factor, for Newton's method.
+/// The tangent stiffness at a state, and systems of it solved, for Newton's method.
 
 #include "tled/conditions.hpp"
 #include "tled/rest_state.hpp"
 #include "tled/stiffness/cholmod_factor.hpp"
 #include "tled/stiffness/free_degrees.hpp"
+#include "tled/stiffness/product.hpp"
+#include "tled/stiffness/stiffness.hpp"
 
 #include <memory>
+#include <optional>
 
 namespace tissuewarp::tled::detail {
 
-/// ∂²E/∂u² of the tissue and its springs, membranes and sliding pairs as at rest; pressures, fluid and contact are not
-/// in it.
+/// ∂²E/∂u² at a displacement (3 × N, mm) of the tissue and its springs, membranes and sliding pairs as at rest;
+/// pressures, fluid and contact are not in it. Throws SolverFailure where det F ≤ 0.
+Stiffness tangent_at(const RestState& rest, const NodalConditions& conditions, const Eigen::Matrix3Xd& displacement);
+/// Its products on the free degrees of freedom, 0 on the others.
+Product tangent_product(const RestState& rest, const NodalConditions& conditions, const Eigen::Matrix3Xd& displacement);
+
+/// The same factorised.
 class TangentFactor {
 public:
     /// Tissue and conditions outlive this.
@@ -26,6 +34,11 @@ public:
 
     /// K⁻¹ f on the free degrees of freedom, 0 on the others (3 × N; mN, mm). Precondition: factorise() was true.
     [[nodiscard]] Eigen::Matrix3Xd solve(const Eigen::Matrix3Xd& force) const;
+    /// The same of the tangent at another displacement, to a few percent: by conjugate gradients, which the factor of
+    /// the last one prepares. None where these would take longer than a factor, or the tangent is not positive along
+    /// them. Throws SolverFailure where det F ≤ 0.
+    [[nodiscard]] std::optional<Eigen::Matrix3Xd> solve_at(const Eigen::Matrix3Xd& displacement,
+                                                           const Eigen::Matrix3Xd& force) const;
 
 private:
     const RestState& rest_;
