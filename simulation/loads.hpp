@@ -29,7 +29,7 @@ private:
     const Stage& stage_;
     std::vector<Eigen::Index> pressure_faces_;  ///< of each pressure in this stage
     tled::NodalConditions conditions_;
-    Eigen::Matrix3Xd image_load_;  ///< mN, what the image's own weight and lift take off
+    Eigen::Matrix3Xd image_load_;                   ///< mN, what the image's own weight and lift take off
     std::vector<Eigen::Matrix3Xd> traction_loads_;  ///< mN, of each traction where its curve is 1
     std::vector<double> traction_parts_;            ///< of the conditions
     Eigen::Vector3d gravity_;                       ///< mm/s², likewise

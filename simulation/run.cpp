@@ -137,7 +137,8 @@ private:
         double angle = 0;
         const auto part = [&](const Curve& curve, double time) { return value_at(curve, time, solve_.duration); };
         for (const Motion& each : built_.scene.motions)
-            angle = std::max(angle, std::abs(part(each.curve, end) - part(each.curve, begin)) * each.motion.turn.norm());
+            angle =
+                std::max(angle, std::abs(part(each.curve, end) - part(each.curve, begin)) * each.motion.turn.norm());
         const int steps = std::max(1, static_cast<int>(std::ceil(angle / most - 1e-9)));
         std::vector<double> times;
         for (int step = 1; step < steps; ++step) times.push_back(begin + (end - begin) * step / steps);

@@ -79,9 +79,8 @@ EquilibriumResult by_newton(Engine& engine, const RestStiffness& stiffness, cons
 EquilibriumResult refined(const EquilibriumResult& found, Engine& engine, const RestStiffness& stiffness,
                           const NodalConditions& conditions, const EquilibriumOptions& options, Observer& observer) {
     EquilibriumResult result =
-        precisely(engine, stiffness, conditions, options, observer, [&](detail::EquilibriumSearch& search) {
-            return detail::refinement(search, found.displacement);
-        });
+        precisely(engine, stiffness, conditions, options, observer,
+                  [&](detail::EquilibriumSearch& search) { return detail::refinement(search, found.displacement); });
     result.force_evaluations += found.force_evaluations;
     result.lifted_residuals += found.lifted_residuals;
     result.highest = found.highest;
@@ -90,9 +89,11 @@ EquilibriumResult refined(const EquilibriumResult& found, Engine& engine, const 
     return result;
 }
 
-/// On a GPU K₀ is not factorised.
+/// On a GPU K₀ is not factorised; loads that follow the surface are not in the tangent.
 bool judged_by_tangent(const Engine& engine, const NodalConditions& conditions, const EquilibriumOptions& options) {
-    return options.rest != nullptr && !conditions.effects.contact && engine.processor() == Processor::Cpu;
+    const NodalEffects& effects = conditions.effects;
+    return options.rest != nullptr && engine.processor() == Processor::Cpu && !effects.contact && !effects.fluid &&
+           effects.surface.pressure_faces.cols() == 0;
 }
 
 EquilibriumResult solve(EquilibriumMethod method, Engine& engine, const RestStiffness& stiffness,

@@ -18,7 +18,8 @@ Scene with_everything() {
     scene.sets["tool"].box = Box{{30, 30, 99}, {70, 70, 101}};
     scene.sets["front"].side = Side{1, false, 0.0};
     scene.sets["corner"].ball = Ball{{100, 100, 100}, 60};
-    scene.motions.push_back({"tool", {true, false, true}, {{2, 0, -5}, {0, 0.2, 0.1}, {50, 50, 90}}, Curve{{{0.1, 0}, {0.7, 1}}}});
+    scene.motions.push_back(
+        {"tool", {true, false, true}, {{2, 0, -5}, {0, 0.2, 0.1}, {50, 50, 90}}, Curve{{{0.1, 0}, {0.7, 1}}}});
     scene.springs.push_back({"front", 0.3, 0.0, Springs::Along::Normal});
     scene.gravity = Gravity{Vector3d(0, 0, -1), Vector3d(0, -1, -1).normalized(), 9810.0, {}};
     scene.fluid = FluidLevel{1.1e-6, 90, 30, Curve{{{0, 0}, {0.5, 1}}}};

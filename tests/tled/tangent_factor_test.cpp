@@ -33,7 +33,7 @@ Column column(Element element) {
     for (int n = 0; n < model.mesh.node_count(); ++n) {
         const Vector3d X = model.mesh.nodes.col(n);
         if (X.z() < 1e-9) conditions.prescribed.push_back({n, {true, true, true}, Vector3d::Zero()});
-        if (X.x() < 1e-9 && X.z() > 50) conditions.springs.push_back({n, 1e-3 * Eigen::Matrix3d::Identity(), {}});
+        if (X.x() < 1e-9 && X.z() > 50) conditions.springs.push_back({n, 1e-3 * Eigen::Matrix3d::Identity(), Vector3d::Zero()});
         if (X.z() > 100 - 1e-9) made.aside(0, n) = 1;
     }
     made.conditions = nodal_conditions(conditions, made.rest);
@@ -49,7 +49,7 @@ Matrix3Xd stretched(const RestState& rest, double stretch) {
 TEST(TangentFactor, OfOneStatePreparesAnother) {
     for (const Element element : {Element::T4, Element::AveragedPressureT4}) {
         const Column made = column(element);
-        const Matrix3Xd there = stretched(made.rest, 1.15);
+        const Matrix3Xd there = stretched(made.rest, 1.01);
         detail::TangentFactor at_rest(made.rest, made.conditions), own(made.rest, made.conditions);
         ASSERT_TRUE(at_rest.factorise(stretched(made.rest, 1.0)));
         ASSERT_TRUE(own.factorise(there));
@@ -57,7 +57,7 @@ TEST(TangentFactor, OfOneStatePreparesAnother) {
         ASSERT_TRUE(found);
         const Matrix3Xd expected = own.solve(made.aside);
         EXPECT_LT((*found - expected).norm(), 0.05 * expected.norm());
-        EXPECT_GT((at_rest.solve(made.aside) - expected).norm(), 0.2 * expected.norm()) << "its own answer is another";
+        EXPECT_GT((at_rest.solve(made.aside) - expected).norm(), 0.02 * expected.norm()) << "its own answer is another";
     }
 }
 
@@ -67,10 +67,10 @@ TEST(TangentFactor, LeavesTissueThatBucklesToAFactorOfItsOwn) {
     detail::TangentFactor tangent(made.rest, made.conditions);
     EXPECT_FALSE(tangent.solve_at(there, made.aside)) << "nothing is factorised";
     ASSERT_TRUE(tangent.factorise(stretched(made.rest, 1.0)));
-    EXPECT_EQ(tangent.shift(), 0);
+    EXPECT_TRUE(tangent.stable());
     EXPECT_FALSE(tangent.solve_at(there, made.aside));
     ASSERT_TRUE(tangent.factorise(there));
-    EXPECT_GT(tangent.shift(), 0);
+    EXPECT_FALSE(tangent.stable());
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 // Newton's method with conjugate gradients that K₀ prepares (Dembo, Eisenstat, Steihaug, SIAM J. Numer. Anal. 19 (1982)
-// 400), for a state that is nearly there: the other methods judge by K₀, which knows tissue only as it lay, and by float32
-// forces.
+// 400), for a state that is nearly there: the other methods judge by K₀, which knows tissue only as it lay, and by
+// float32 forces.
 
 #include "tled/statics/equilibrium_search.hpp"
 #include "tled/stiffness/conjugate_gradients.hpp"

@@ -12,19 +12,25 @@ namespace {
 
 constexpr int most_iterations = 20;  // of conjugate gradients, each a solve with the factor
 constexpr double relative_tolerance = 0.05;
-constexpr double first_shift = 1e-6, shift_growth = 10, last_shift = 1e3;  // of the diagonal
 
 }  // namespace
 
 TangentFactor::TangentFactor(const RestState& rest, const NodalConditions& conditions)
     : rest_(rest), conditions_(conditions), free_(conditions.constrained) {}
 
-Stiffness tangent_at(const RestState& rest, const NodalConditions& conditions, const Matrix3Xd& displacement) {
-    Stiffness tangent = stiffness(rest, displacement);
-    add_effects(conditions.effects.surface, rest.position, tangent);
+namespace {
+
+Stiffness with_effects(Stiffness tissue, const RestState& rest, const NodalConditions& conditions) {
+    add_effects(conditions.effects.surface, rest.position, tissue);
     for (std::size_t s = 0; s < conditions.spring_node.size(); ++s)
-        tangent.elements.diagonal(conditions.spring_node[s]) += spring_matrix(conditions, static_cast<int>(s));
-    return tangent;
+        tissue.elements.diagonal(conditions.spring_node[s]) += spring_matrix(conditions, static_cast<int>(s));
+    return tissue;
+}
+
+}  // namespace
+
+Stiffness tangent_at(const RestState& rest, const NodalConditions& conditions, const Matrix3Xd& displacement) {
+    return with_effects(stiffness(rest, displacement), rest, conditions);
 }
 
 Product tangent_product(const RestState& rest, const NodalConditions& conditions, const Matrix3Xd& displacement) {
@@ -33,17 +39,14 @@ Product tangent_product(const RestState& rest, const NodalConditions& conditions
 }
 
 bool TangentFactor::factorise(const Matrix3Xd& displacement) {
-    const BlockRows rows = assembled(tangent_at(rest_, conditions_, displacement), Triangle::Lower);
-    Eigen::SparseMatrix<double> lower = scalar_matrix(rows, free_.index(), Triangle::Lower);
+    stable_ = factorised(tangent_at(rest_, conditions_, displacement));
+    return stable_ || factorised(with_effects(positive_stiffness(rest_, displacement), rest_, conditions_));
+}
+
+bool TangentFactor::factorised(const Stiffness& stiffness) {
+    const auto lower = scalar_matrix(assembled(stiffness, Triangle::Lower), free_.index(), Triangle::Lower);
     if (!factor_) factor_ = std::make_unique<CholmodFactor>(lower, free_.nodes());
-    const Eigen::VectorXd diagonal = lower.diagonal();
-    shift_ = 0;
-    while (!factor_->factorize(lower)) {
-        shift_ = shift_ > 0 ? shift_growth * shift_ : first_shift;
-        if (shift_ > last_shift) return false;
-        lower.diagonal() = diagonal + shift_ * diagonal.cwiseAbs();
-    }
-    return true;
+    return factor_->factorize(lower);
 }
 
 std::optional<Matrix3Xd> TangentFactor::solve_at(const Matrix3Xd& displacement, const Matrix3Xd& force) const {
