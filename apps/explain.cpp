@@ -25,8 +25,8 @@ std::string work_text(const simulation::Work& work) {
 
 std::string absent_effects(const std::vector<simulation::PlannedEffect>& present) {
     std::string text;
-    for (const char* name : {"fixed", "motion", "springs", "gravity", "viscosity", "fluid", "pressure", "membrane",
-                             "sliding", "parting", "contact"})
+    for (const char* name : {"fixed", "motion", "springs", "gravity", "viscosity", "fluid", "pressure", "traction",
+                             "membrane", "sliding", "parting", "contact"})
         if (std::none_of(present.begin(), present.end(), [&](const auto& effect) { return effect.name == name; }))
             text += (text.empty() ? "" : ", ") + std::string(name);
     return text;

@@ -150,7 +150,9 @@ void read_loads(TomlReader& file, Scene& scene, NameUses& uses) {
         Motion motion;
         motion.set = set_of(reader, uses);
         motion.axes = axes_of(reader);
-        motion.displacement = reader.required_vector("displacement_mm", any_length);
+        if (!reader.has("displacement_mm") && !reader.has("rotation"))
+            throw InvalidInput(reader.place() + ": a motion needs 'displacement_mm', a 'rotation' or both");
+        motion.motion = read_rigid_motion(reader);
         motion.curve = reader.curve();
         reader.finish();
         scene.motions.push_back(motion);
@@ -165,6 +167,14 @@ void read_loads(TomlReader& file, Scene& scene, NameUses& uses) {
         pressure.curve = reader.curve();
         reader.finish();
         scene.pressures.push_back(pressure);
+    }
+    for (TomlReader& reader : file.tables("traction")) {
+        Traction traction;
+        traction.set = set_of(reader, uses);
+        traction.traction = reader.required_vector("traction_kpa", {-1e4, 1e4, "kPa"});
+        traction.curve = reader.curve();
+        reader.finish();
+        scene.tractions.push_back(traction);
     }
     for (TomlReader& reader : file.tables("membrane")) {
         MembraneOn membrane;

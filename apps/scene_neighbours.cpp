@@ -49,7 +49,9 @@ void read_sides(TomlReader& reader, Sliding& sliding, NameUses& uses) {
     for (const int label : labels) uses.tissue_labels.push_back({label, reader.place("labels"), "slides"});
 }
 
-RigidMotion rigid_motion(TomlReader& reader) {
+}  // namespace
+
+RigidMotion read_rigid_motion(TomlReader& reader) {
     RigidMotion motion;
     motion.displacement = reader.vector("displacement_mm", any_length).value_or(Eigen::Vector3d::Zero());
     auto rotation = reader.table("rotation");
@@ -65,8 +67,6 @@ RigidMotion rigid_motion(TomlReader& reader) {
     return motion;
 }
 
-}  // namespace
-
 void read_neighbours(TomlReader& file, const std::filesystem::path& folder, Scene& scene, NameUses& uses,
                      Observer& observer) {
     for (TomlReader& reader : file.tables("contact")) {
@@ -75,7 +75,7 @@ void read_neighbours(TomlReader& file, const std::filesystem::path& folder, Scen
         if (!contact.set.empty()) uses.sets.push_back({contact.set, reader.place("set")});
         contact.gap = reader.number("gap_mm", {0.0, 1000.0, "mm"}).value_or(0.0);
         contact.friction = reader.number("friction", {0.0, 10.0}).value_or(0.0);
-        contact.motion = rigid_motion(reader);
+        contact.motion = read_rigid_motion(reader);
         contact.curve = reader.curve();
         contact.body = body_of(reader, folder, uses, observer);
         reader.finish();

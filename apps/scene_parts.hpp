@@ -46,6 +46,8 @@ void read_neighbours(TomlReader& file, const std::filesystem::path& folder, simu
                      Observer& observer);
 void read_solve(TomlReader& file, simulation::Scene& scene);
 
+/// `displacement_mm` and `rotation`, neither of them required.
+simulation::RigidMotion read_rigid_motion(TomlReader& reader);
 simulation::Box read_box(TomlReader reader);
 simulation::Ball read_ball(TomlReader reader);
 simulation::HalfSpace read_half_space(TomlReader reader);

@@ -119,6 +119,7 @@ std::vector<Removable> removable(const Scene& scene) {
                        }});
     if (scene.fluid) all.push_back({"fluid", [](Scene& without) { without.fluid.reset(); }});
     add_each(all, scene, &Scene::pressures, on("pressure on"));
+    add_each(all, scene, &Scene::tractions, on("traction on"));
     add_each(all, scene, &Scene::membranes, on("membrane on"));
     add_each(all, scene, &Scene::contacts, [](const Contact& contact, std::size_t i) {
         return "contact " + std::to_string(i + 1) + (contact.set.empty() ? "" : " of '" + contact.set + "'");

@@ -245,6 +245,7 @@ BuiltScene build(const Scene& scene, const meshing::TetMesh& mesh, Observer& obs
     const RegionFinder finder(tissue, scene.sets);
     built.held = held_nodes(scene, finder);
     for (const Springs& springs : scene.springs) add_springs(springs, tissue.mesh, finder, built.springs);
+    for (const Traction& each : scene.tractions) built.traction_faces.push_back(finder.faces(each.set));
     built.effects = effects_of(scene, tissue.mesh, finder, std::move(interfaces), observer);
     built.probes = located(scene.probes, tissue.mesh);
     built.mesh = tissue.mesh;

@@ -39,6 +39,7 @@ struct BuiltScene {
     std::vector<Stage> stages;   ///< one at least, in the order of time
     std::vector<HeldNode> held;  ///< by node
     std::vector<tled::Spring> springs;
+    std::vector<Eigen::Matrix3Xi> traction_faces;  ///< of each traction, 3 × F
     tled::Effects effects;  ///< pressures and levels where their curves are 1, obstacles where they are at time 0
     std::vector<meshing::Location> probes;  ///< of Scene::probes, in that mesh
 };

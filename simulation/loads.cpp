@@ -31,7 +31,8 @@ Vector3d displacement_of(const HeldNode& held, const BuiltScene& built, double t
         const int motion = held.motion[static_cast<std::size_t>(axis)];
         if (motion < 0) continue;
         const Motion& each = built.scene.motions[static_cast<std::size_t>(motion)];
-        displacement[axis] = part(each.curve, built, time) * each.displacement[axis];
+        displacement[axis] =
+            displacement_at(each.motion, part(each.curve, built, time), built.mesh.nodes.col(held.node))[axis];
     }
     return displacement;
 }
@@ -91,6 +92,26 @@ Eigen::Matrix3Xi remaining_faces(const Eigen::Matrix3Xi& faces, const Stage& sta
     Eigen::Matrix3Xi matrix(3, static_cast<Eigen::Index>(kept.size()));
     for (std::size_t f = 0; f < kept.size(); ++f) matrix.col(static_cast<Eigen::Index>(f)) = kept[f];
     return matrix;
+}
+
+/// What each traction pulls at the nodes where its curve is 1, mN.
+std::vector<Matrix3Xd> traction_loads(const BuiltScene& built, const Stage& stage) {
+    std::vector<Matrix3Xd> loads;
+    for (std::size_t t = 0; t < built.traction_faces.size(); ++t) {
+        const Eigen::VectorXd area = nodal_areas(stage.model.mesh, remaining_faces(built.traction_faces[t], stage));
+        loads.emplace_back(built.scene.tractions[t].traction * area.transpose());
+    }
+    return loads;
+}
+
+std::vector<double> traction_parts(const BuiltScene& built, double time) {
+    std::vector<double> parts;
+    for (const Traction& each : built.scene.tractions) parts.push_back(part(each.curve, built, time));
+    return parts;
+}
+
+void add_tractions(const std::vector<Matrix3Xd>& loads, const std::vector<double>& parts, Matrix3Xd& force) {
+    for (std::size_t t = 0; t < loads.size(); ++t) force += parts[t] * loads[t];
 }
 
 /// The effects of the scene on what the stage still has, at rest.
@@ -170,24 +191,32 @@ tled::Conditions conditions_at(const BuiltScene& built, const Stage& stage, doub
         if (spring.node >= 0) conditions.springs.push_back(spring);
     }
     conditions.external_force = weight_at(built, stage, image_load(built, stage), time);
+    add_tractions(traction_loads(built, stage), traction_parts(built, time), conditions.external_force);
     conditions.effects = remaining_effects(built, stage);
     move_effects(built, stage, time, conditions.effects);
     return conditions;
 }
 
 LoadsInTime::LoadsInTime(const BuiltScene& built, const Stage& stage, double time)
-    : built_(built), stage_(stage), image_load_(image_load(built, stage)) {
+    : built_(built),
+      stage_(stage),
+      image_load_(image_load(built, stage)),
+      traction_loads_(traction_loads(built, stage)),
+      traction_parts_(traction_parts(built, time)) {
     const tled::Conditions conditions = conditions_at(built, stage, time);
     for (const tled::SurfacePressure& each : conditions.effects.pressures) pressure_faces_.push_back(each.faces.cols());
     conditions_ = tled::nodal_conditions(conditions, stage.rest);
     gravity_ = gravity_of(built, time);
 }
 
-void LoadsInTime::turn_gravity(double time) {
+void LoadsInTime::change_dead_loads(double time) {
     const Vector3d gravity = gravity_of(built_, time);
-    if (gravity == gravity_) return;
+    std::vector<double> parts = traction_parts(built_, time);
+    if (gravity == gravity_ && parts == traction_parts_) return;
     gravity_ = gravity;
+    traction_parts_ = std::move(parts);
     conditions_.external_force = weight_at(built_, stage_, image_load_, time);
+    add_tractions(traction_loads_, traction_parts_, conditions_.external_force);
     if (!conditions_.effects.fluid) return;
     tled::Effects fluid;
     fluid.fluid = fluid_of(built_, level_at(*built_.scene.fluid, built_, time), gravity);
@@ -199,7 +228,7 @@ const tled::NodalConditions& LoadsInTime::at(double time) {
         const int node = stage_.place[static_cast<std::size_t>(held.node)];
         if (node >= 0) conditions_.imposed.col(node) = displacement_of(held, built_, time);
     }
-    turn_gravity(time);
+    change_dead_loads(time);
     tled::NodalEffects& effects = conditions_.effects;
     if (effects.fluid) effects.fluid->level = level_at(*built_.scene.fluid, built_, time);
     if (effects.contact) move_bodies(built_, time, effects.contact->obstacles);
@@ -227,8 +256,13 @@ double hold_interval(const BuiltScene& built, const Stage& stage) {
     const auto limit = [&](double most, double speed) {
         if (speed > 0) interval = std::min({interval, most / speed, duration / fewest});
     };
-    for (const Motion& motion : scene.motions)
-        limit(small * shortest, motion.displacement.norm() * steepest(motion.curve, duration));
+    for (const HeldNode& held : built.held)
+        for (const int m : held.motion) {
+            if (m < 0) continue;
+            const Motion& each = scene.motions[static_cast<std::size_t>(m)];
+            const double reach = distance_from_axis(each.motion, built.mesh.nodes.col(held.node));
+            limit(small * shortest, longest_way(each.motion, reach) * steepest(each.curve, duration));
+        }
     for (std::size_t c = 0; c < scene.contacts.size(); ++c) {
         const RigidMotion& motion = scene.contacts[c].motion;
         const double reach = surface_reach(*built.effects.contact->obstacles[c].surface, motion);
@@ -236,6 +270,7 @@ double hold_interval(const BuiltScene& built, const Stage& stage) {
     }
     if (!stage.growth.empty()) limit(small, 1 / duration);
     for (const Pressure& pressure : scene.pressures) limit(small, steepest(pressure.curve, duration));
+    for (const Traction& traction : scene.tractions) limit(small, steepest(traction.curve, duration));
     if (scene.gravity && scene.gravity->from != scene.gravity->to)
         limit(small, steepest(scene.gravity->curve, duration));
     if (scene.fluid && scene.fluid->from != scene.fluid->to) limit(small, steepest(scene.fluid->curve, duration));

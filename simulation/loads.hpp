@@ -22,15 +22,17 @@ public:
     const tled::NodalConditions& at(double time);
 
 private:
-    /// Weight, lift and what tissue left out does, which stay as they are while gravity stands.
-    void turn_gravity(double time);
+    /// Weight, tractions, lift and what tissue left out does, which stay as they are while gravity and tractions stand.
+    void change_dead_loads(double time);
 
     const BuiltScene& built_;
     const Stage& stage_;
     std::vector<Eigen::Index> pressure_faces_;  ///< of each pressure in this stage
     tled::NodalConditions conditions_;
-    Eigen::Matrix3Xd image_load_;  ///< mN, what the image's own weight and lift take off
-    Eigen::Vector3d gravity_;      ///< mm/s², of the conditions
+    Eigen::Matrix3Xd image_load_;                   ///< mN, what the image's own weight and lift take off
+    std::vector<Eigen::Matrix3Xd> traction_loads_;  ///< mN, of each traction where its curve is 1
+    std::vector<double> traction_parts_;            ///< of the conditions
+    Eigen::Vector3d gravity_;                       ///< mm/s², likewise
 };
 
 /// For how long (s) loads may be held so that no motion in one go, of a node or of any point of a body's surface,

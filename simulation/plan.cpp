@@ -48,6 +48,8 @@ void add_loads(const BuiltScene& built, std::vector<PlannedEffect>& all) {
                        times(static_cast<double>(nodes.size()), {36 + 4, 18})});
     if (scene.gravity)
         all.push_back({"gravity", scene.gravity->from ? "turns, from the image's direction" : "grows", {}});
+    for (const Eigen::Matrix3Xi& faces : built.traction_faces)
+        all.push_back({"traction", count(faces.cols(), "faces"), {}});
     for (const auto& [label, tissue] : scene.tissues)
         if (!tissue.viscosity.terms.empty() && scene.solve.kind == Solve::Kind::Dynamics) {
             const auto tets = static_cast<double>((built.stages.front().model.mesh.labels.array() == label).count());

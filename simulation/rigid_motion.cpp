@@ -6,12 +6,28 @@ namespace tissuewarp::simulation {
 
 using Eigen::Vector3d;
 
+namespace {
+
+/// Precondition: the motion turns.
+Eigen::Matrix3d rotation_at(const RigidMotion& motion, double part) {
+    const double angle = motion.turn.norm();
+    return Eigen::AngleAxisd(part * angle, motion.turn / angle).toRotationMatrix();
+}
+
+}  // namespace
+
+Vector3d displacement_at(const RigidMotion& motion, double part, const Vector3d& X) {
+    const Vector3d shift = part * motion.displacement;
+    if (!(motion.turn.norm() > 0)) return shift;
+    const Vector3d arm = X - motion.point;
+    return shift + rotation_at(motion, part) * arm - arm;
+}
+
 tled::RigidPlacement placement_at(const RigidMotion& motion, double part) {
     tled::RigidPlacement placement;
     placement.shift = part * motion.displacement;
-    const double angle = motion.turn.norm();
-    if (!(angle > 0)) return placement;
-    placement.rotation = Eigen::AngleAxisd(part * angle, motion.turn / angle).toRotationMatrix();
+    if (!(motion.turn.norm() > 0)) return placement;
+    placement.rotation = rotation_at(motion, part);
     placement.shift += motion.point - placement.rotation * motion.point;
     return placement;
 }

@@ -15,6 +15,9 @@ struct RigidMotion {
     Eigen::Vector3d point = Eigen::Vector3d::Zero();         ///< mm, on the axis at rest
 };
 
+/// How far the body's point X (mm, at rest) is from there at a part of the way, mm.
+Eigen::Vector3d displacement_at(const RigidMotion& motion, double part, const Eigen::Vector3d& X);
+
 /// Where the body is at a part of the way.
 tled::RigidPlacement placement_at(const RigidMotion& motion, double part);
 

@@ -14,7 +14,9 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <string>
+#include <vector>
 
 namespace tissuewarp::simulation {
 namespace {
@@ -122,9 +124,26 @@ private:
         summary_.engine = engine->description();
         for (; shown_ <= solve_.frames && (last || time_of(shown_) < end);) {
             const double time = time_of(shown_);
-            equilibrium_at(*engine, stiffness, stage, loads.at(time), time);
+            for (const double then : times_of_turning(time_of(shown_ - 1), time))
+                equilibrium_at(*engine, stiffness, stage, loads.at(then), then);
             show(shown_, time, s, state_.displacement);
         }
+    }
+
+    /// Equilibria are found along straight ways, which what is turned does not go: `end`, and before it as many times
+    /// as leave no more than 10° between two.
+    [[nodiscard]] std::vector<double> times_of_turning(double begin, double end) const {
+        constexpr double most = 10 * std::numbers::pi / 180;
+        double angle = 0;
+        const auto part = [&](const Curve& curve, double time) { return value_at(curve, time, solve_.duration); };
+        for (const Motion& each : built_.scene.motions)
+            angle =
+                std::max(angle, std::abs(part(each.curve, end) - part(each.curve, begin)) * each.motion.turn.norm());
+        const int steps = std::max(1, static_cast<int>(std::ceil(angle / most - 1e-9)));
+        std::vector<double> times;
+        for (int step = 1; step < steps; ++step) times.push_back(begin + (end - begin) * step / steps);
+        times.push_back(end);
+        return times;
     }
 
     void equilibrium_at(tled::Engine& engine, const tled::RestStiffness& stiffness, const Stage& stage,
@@ -134,7 +153,7 @@ private:
         options.rest = &stage.rest;
         options.method = solve_.method;
         // The first comes from rest, along its load where that is too much at once.
-        const Matrix3Xd* start = shown_ == 1 ? nullptr : &state_.displacement;
+        const Matrix3Xd* start = from_rest_ ? nullptr : &state_.displacement;
         Part part(observer_, time / solve_.duration, time / solve_.duration);
         const bool unilateral = conditions.effects.contact || !conditions.effects.surface.parting.empty();
         try {
@@ -146,6 +165,7 @@ private:
                                  engine, stiffness, conditions,
                                  {.equilibrium = options, .first_parts = solve_.load_steps}, start, part);
             state_.displacement = found.displacement;
+            from_rest_ = false;
             summary_.steps += found.force_evaluations;
             summary_.estimated_error_mm = std::max(summary_.estimated_error_mm, found.estimated_error_mm);
             summary_.min_jacobian = std::min(summary_.min_jacobian, found.min_jacobian);
@@ -195,6 +215,7 @@ private:
     const std::function<void(const Frame&)>& on_frame_;
     Observer& observer_;
     tled::DynamicsState state_;
+    bool from_rest_ = true;  // no equilibrium has been found yet
     int shown_ = 0;
     double seconds_of_caller_ = 0;
     RunSummary summary_;

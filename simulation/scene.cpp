@@ -49,6 +49,7 @@ std::vector<std::pair<std::string, std::string>> named_sets(const Scene& scene) 
     for (const Motion& each : scene.motions) names.emplace_back("a motion", each.set);
     for (const Springs& each : scene.springs) names.emplace_back("springs", each.set);
     for (const Pressure& each : scene.pressures) names.emplace_back("a pressure", each.set);
+    for (const Traction& each : scene.tractions) names.emplace_back("a traction", each.set);
     for (const MembraneOn& each : scene.membranes) names.emplace_back("a membrane", each.set);
     for (const Resection& each : scene.resections) names.emplace_back("a resection", each.set);
     for (const Contact& each : scene.contacts)
@@ -61,9 +62,14 @@ std::vector<std::pair<std::string, std::string>> named_sets(const Scene& scene) 
     return names;
 }
 
+void require_finite(const RigidMotion& motion, const std::string& what) {
+    require(motion.displacement.allFinite() && motion.turn.allFinite() && motion.point.allFinite(),
+            what + " has a displacement or a rotation that is not finite");
+}
+
 void require_loads(const Scene& scene) {
     for (const Motion& motion : scene.motions) {
-        require(motion.displacement.allFinite(), "the displacement of a motion of '" + motion.set + "' is not finite");
+        require_finite(motion.motion, "a motion of '" + motion.set + "'");
         require_valid(motion.curve, "the curve of a motion");
     }
     for (const Springs& springs : scene.springs)
@@ -72,6 +78,10 @@ void require_loads(const Scene& scene) {
     for (const Pressure& pressure : scene.pressures) {
         require(std::isfinite(pressure.pressure), "the pressure on '" + pressure.set + "' is not finite");
         require_valid(pressure.curve, "the curve of a pressure");
+    }
+    for (const Traction& traction : scene.tractions) {
+        require(traction.traction.allFinite(), "the traction on '" + traction.set + "' is not finite");
+        require_valid(traction.curve, "the curve of a traction");
     }
     for (const MembraneOn& membrane : scene.membranes) {
         require_positive(membrane.shear_modulus, "the shear modulus (kPa) of the membrane on '" + membrane.set + "'");
@@ -94,10 +104,8 @@ void require_loads(const Scene& scene) {
 void require_neighbours(const Scene& scene) {
     for (const Contact& contact : scene.contacts) {
         require(contact.friction >= 0 && std::isfinite(contact.friction), "the friction of a contact is below 0");
-        const RigidMotion& motion = contact.motion;
-        require(std::isfinite(contact.gap) && motion.displacement.allFinite() && motion.turn.allFinite() &&
-                    motion.point.allFinite(),
-                "a contact has a number that is not finite");
+        require(std::isfinite(contact.gap), "the gap (mm) of a contact is not finite");
+        require_finite(contact.motion, "a contact");
         require_valid(contact.curve, "the curve of a contact");
         if (const auto* plane = std::get_if<HalfSpace>(&contact.body))
             require_unit(plane->normal, "the normal of a plane in contact");

@@ -65,11 +65,11 @@ struct Fixed {
     std::array<bool, 3> axes{true, true, true};
 };
 
-/// Displacement components that follow a curve.
+/// Displacement components that are those of a rigid body, which moves along a curve.
 struct Motion {
     std::string set;
     std::array<bool, 3> axes{true, true, true};
-    Eigen::Vector3d displacement = Eigen::Vector3d::Zero();  ///< mm, where the curve is 1
+    RigidMotion motion{};  ///< all of it where the curve is 1
     Curve curve{};
 };
 
@@ -104,6 +104,13 @@ struct FluidLevel {
 struct Pressure {
     std::string set;
     double pressure = 0.0;  ///< kPa, inwards
+    Curve curve{};
+};
+
+/// Pulls in one direction whatever becomes of the surface: a dead load.
+struct Traction {
+    std::string set;
+    Eigen::Vector3d traction = Eigen::Vector3d::Zero();  ///< kPa, for each mm² at rest
     Curve curve{};
 };
 
@@ -186,6 +193,7 @@ struct Scene {
     std::optional<Gravity> gravity;
     std::optional<FluidLevel> fluid;
     std::vector<Pressure> pressures;
+    std::vector<Traction> tractions;
     std::vector<MembraneOn> membranes;
     std::vector<Contact> contacts;
     std::vector<Sliding> sliding;

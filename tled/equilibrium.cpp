@@ -56,15 +56,44 @@ std::vector<EquilibriumMethod> escalation(EquilibriumMethod first, const NodalCo
     return methods;
 }
 
-EquilibriumResult by_newton(Engine& engine, const RestStiffness& stiffness, const NodalConditions& conditions,
-                            const EquilibriumOptions& options, const Eigen::Matrix3Xd* start, Observer& observer) {
-    if (options.rest == nullptr) throw InvalidInput("equilibrium: Newton's method takes the rest state");
+/// `search` with forces in float64; the engine is left where its answer is.
+template <class Search>
+EquilibriumResult precisely(Engine& engine, const RestStiffness& stiffness, const NodalConditions& conditions,
+                            const EquilibriumOptions& options, Observer& observer, const Search& search) {
     const auto precise = make_cpu_engine(*options.rest, Scalar::Float64);
-    detail::EquilibriumSearch search(*precise, stiffness, conditions, options, observer);
-    EquilibriumResult result = detail::newton(search, start);
+    detail::EquilibriumSearch with_float64(*precise, stiffness, conditions, options, observer);
+    EquilibriumResult result = search(with_float64);
     engine.set_conditions(conditions);
     engine.set_state(result.displacement, Eigen::Matrix3Xd::Zero(3, result.displacement.cols()));
     return result;
+}
+
+EquilibriumResult by_newton(Engine& engine, const RestStiffness& stiffness, const NodalConditions& conditions,
+                            const EquilibriumOptions& options, const Eigen::Matrix3Xd* start, Observer& observer) {
+    if (options.rest == nullptr) throw InvalidInput("equilibrium: Newton's method takes the rest state");
+    return precisely(engine, stiffness, conditions, options, observer,
+                     [&](detail::EquilibriumSearch& search) { return detail::newton(search, start); });
+}
+
+/// What another method accepted, judged and corrected by the tangent.
+EquilibriumResult refined(const EquilibriumResult& found, Engine& engine, const RestStiffness& stiffness,
+                          const NodalConditions& conditions, const EquilibriumOptions& options, Observer& observer) {
+    EquilibriumResult result =
+        precisely(engine, stiffness, conditions, options, observer,
+                  [&](detail::EquilibriumSearch& search) { return detail::refinement(search, found.displacement); });
+    result.force_evaluations += found.force_evaluations;
+    result.lifted_residuals += found.lifted_residuals;
+    result.highest = found.highest;
+    result.method = found.method;
+    result.reason = found.reason;
+    return result;
+}
+
+/// On a GPU K₀ is not factorised; loads that follow the surface are not in the tangent.
+bool judged_by_tangent(const Engine& engine, const NodalConditions& conditions, const EquilibriumOptions& options) {
+    const NodalEffects& effects = conditions.effects;
+    return options.rest != nullptr && engine.processor() == Processor::Cpu && !effects.contact && !effects.fluid &&
+           effects.surface.pressure_faces.cols() == 0;
 }
 
 EquilibriumResult solve(EquilibriumMethod method, Engine& engine, const RestStiffness& stiffness,
@@ -112,15 +141,23 @@ EquilibriumResult equilibrium(Engine& engine, const RestStiffness& stiffness, co
     };
     if (!automatic) return run(choice.method);
     const std::vector<EquilibriumMethod> methods = escalation(choice.method, conditions, options);
+    Eigen::Matrix3Xd accepted;  // by K₀, where the tangent does not agree
+    const auto run_and_judge = [&](EquilibriumMethod method) {
+        EquilibriumResult found = run(method);
+        if (method == EquilibriumMethod::Newton || !judged_by_tangent(engine, conditions, options)) return found;
+        accepted = found.displacement;
+        start = &accepted;
+        return refined(found, engine, stiffness, conditions, options, observer);
+    };
     for (std::size_t n = 0; n + 1 < methods.size(); ++n) {
         try {
-            return run(methods[n]);
+            return run_and_judge(methods[n]);
         } catch (const SolverFailure& failure) {
             choice.reason = std::string(name_of(methods[n])) + " failed (" + failure.what() + ")";
             observer.note(std::string("equilibrium by ") + name_of(methods[n + 1]) + ": " + choice.reason);
         }
     }
-    return run(methods.back());
+    return run_and_judge(methods.back());
 }
 
 }  // namespace tissuewarp::tled

@@ -1,10 +1,12 @@
 #include "tled/load_path.hpp"
 
 #include "tled/damped_motion.hpp"
+#include "tled/statics/finite_rotations.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -89,11 +91,17 @@ private:
         return now_.load > 0 ? 1 : *moderate_part_;
     }
 
-    /// On the line through the last two equilibria; from the first only with the imposed displacements moved.
-    [[nodiscard]] Matrix3Xd predicted(double load, const NodalConditions& partial) const {
-        Matrix3Xd u = now_.displacement;
-        if (before_) u += (load - now_.load) / (now_.load - before_->load) * (u - before_->displacement);
-        return partial.constrained.select(partial.imposed, u);
+    /// On through the last two equilibria, turned by finite angles; from the first only with the imposed displacements
+    /// moved.
+    [[nodiscard]] Matrix3Xd predicted(double load, const NodalConditions& partial) {
+        Matrix3Xd step = Matrix3Xd::Zero(3, now_.displacement.cols());
+        if (before_)
+            step = (load - now_.load) / (now_.load - before_->load) * (now_.displacement - before_->displacement);
+        step = partial.constrained.select(partial.imposed - now_.displacement, step);
+        const RestState* rest = options_.equilibrium.rest;
+        if (!before_ || rest == nullptr) return now_.displacement + step;
+        if (!rotations_) rotations_ = std::make_unique<detail::FiniteRotations>(*rest, conditions_);
+        return rotations_->moved(now_.displacement, step);
     }
 
     bool advance(double load) {
@@ -187,6 +195,7 @@ private:
     Point now_;
     std::optional<Point> before_;
     std::optional<double> moderate_part_;
+    std::unique_ptr<detail::FiniteRotations> rotations_;  // made where a step is predicted
     std::string cause_;
     EquilibriumResult result_;
 };

@@ -12,6 +12,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <numbers>
 
 namespace tissuewarp::apps {
 namespace {
@@ -83,6 +84,10 @@ axes = "xz"
 set = "top"
 displacement_mm = [0, 0, -2]
 curve = [[0, 0], [0.5, 1]]
+[[motion]]
+set = "base"
+axes = "y"
+rotation = { point_mm = [1, 2, 3], axis = [0, 0, 2], degrees = 90 }
 [[springs]]
 set = "top"
 stiffness_kpa_per_mm = 0.5
@@ -97,6 +102,9 @@ density_kg_m3 = 1010
 [[pressure]]
 set = "top"
 pressure_kpa = 1.5
+[[traction]]
+set = "top"
+traction_kpa = [0.1, 0, -0.2]
 [[membrane]]
 set = "top"
 shear_modulus_kpa = 100
@@ -121,8 +129,11 @@ name = "middle"
 at_mm = [5, 10, 15]
 )");
     EXPECT_EQ(scene.fixed.at(0).axes, (std::array{true, false, true}));
-    EXPECT_EQ(scene.motions.at(0).displacement.z(), -2);
+    EXPECT_EQ(scene.motions.at(0).motion.displacement.z(), -2);
     EXPECT_EQ(scene.motions.at(0).curve.points.size(), 2u);
+    EXPECT_NEAR(scene.motions.at(1).motion.turn.z(), std::numbers::pi / 2, 1e-12);
+    EXPECT_EQ(scene.motions.at(1).motion.point, Eigen::Vector3d(1, 2, 3));
+    EXPECT_EQ(scene.tractions.at(0).traction, Eigen::Vector3d(0.1, 0, -0.2));
     EXPECT_EQ(scene.springs.at(0).per_area, 0.5);
     EXPECT_EQ(scene.springs.at(0).along, simulation::Springs::Along::Normal);
     EXPECT_EQ(*scene.gravity->from, Eigen::Vector3d(0, 0, -1)) << "a direction of length 1";

@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace tissuewarp::simulation {
 namespace {
 
@@ -16,12 +18,15 @@ Scene with_everything() {
     scene.sets["tool"].box = Box{{30, 30, 99}, {70, 70, 101}};
     scene.sets["front"].side = Side{1, false, 0.0};
     scene.sets["corner"].ball = Ball{{100, 100, 100}, 60};
-    scene.motions.push_back({"tool", {true, false, true}, {2, 0, -5}, Curve{{{0.1, 0}, {0.7, 1}}}});
+    scene.motions.push_back(
+        {"tool", {true, false, true}, {{2, 0, -5}, {0, 0.2, 0.1}, {50, 50, 90}}, Curve{{{0.1, 0}, {0.7, 1}}}});
     scene.springs.push_back({"front", 0.3, 0.0, Springs::Along::Normal});
     scene.gravity = Gravity{Vector3d(0, 0, -1), Vector3d(0, -1, -1).normalized(), 9810.0, {}};
     scene.fluid = FluidLevel{1.1e-6, 90, 30, Curve{{{0, 0}, {0.5, 1}}}};
     scene.pressures.push_back({"front", 0.4, {}});
     scene.pressures.push_back({"above", -0.2, Curve{{{0, 1}, {1, 0}}}});
+    scene.tractions.push_back({"above", {0.1, 0, 0.2}, Curve{{{0.05, 0}, {0.6, 1}}}});
+    scene.tractions.push_back({"front", {0, 0.3, 0}, {}});
     scene.membranes.push_back({"front", 20.0, 0.5});
     Contact table;
     table.body = HalfSpace{{0, 0, -1}, {0, 0, 1}};
@@ -66,6 +71,7 @@ TEST(LoadsInTime, AreTheConditionsOfThatTime) {
 TEST(LoadsInTime, AreThoseOfTheImageAtTheBeginning) {
     Scene scene = with_everything();
     scene.pressures.clear();
+    scene.tractions.clear();
     const BuiltScene built = build(scene);
     const Stage& stage = built.stages.front();
     const tled::NodalConditions rest = LoadsInTime(built, stage, 0.0).at(0.0);
@@ -81,13 +87,20 @@ TEST(LoadsInTime, AreThoseOfTheImageAtTheBeginning) {
 
 TEST(LoadsInTime, AreHeldForLessThanAHundredthOfALoadOrOfAnEdge) {
     Scene scene = test::cube();
-    scene.motions.push_back({"above", {false, false, true}, {0, 0, -20}, {}});
+    scene.motions.push_back({"above", {false, false, true}, {{0, 0, -20}}, {}});
     const BuiltScene built = build(scene);
     EXPECT_NEAR(hold_interval(built, built.stages[0]), 0.01 * 25 / 20, 1e-12) << "cells of 25 mm, 20 mm/s";
     scene.motions.clear();
     EXPECT_EQ(hold_interval(build(scene), built.stages[0]), scene.solve.duration) << "nothing changes";
     scene.gravity = Gravity{std::nullopt, {0, 0, -1}, 9810.0, Curve{{{0, 0}, {0.1, 1}}}};
     EXPECT_NEAR(hold_interval(build(scene), built.stages[0]), 1e-3, 1e-12);
+    scene.gravity.reset();
+    scene.tractions.push_back({"above", {0.1, 0, 0}, Curve{{{0, 0}, {0.2, 1}}}});
+    EXPECT_NEAR(hold_interval(build(scene), built.stages[0]), 2e-3, 1e-12);
+    scene.tractions.clear();
+    scene.motions.push_back({"above", {true, true, true}, {{0, 0, 0}, {0, 0, 0.5}, {0, 0, 0}}, {}});
+    EXPECT_NEAR(hold_interval(build(scene), built.stages[0]), 0.01 * 25 / (0.5 * std::hypot(100, 100)), 1e-12)
+        << "the corner across from the axis";
 }
 
 // The furthest point of a body that turns about a point far off goes far.

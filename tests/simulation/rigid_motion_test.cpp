@@ -28,6 +28,13 @@ TEST(RigidMotion, TurnsAboutThePointAtRestAndIsThenDisplaced) {
     EXPECT_EQ(placement_at(motion, 0), tled::RigidPlacement{});
 }
 
+TEST(RigidMotion, MovesAPointToWhereItsBodyIs) {
+    const RigidMotion motion{{5, 3, -1}, {0.4, -0.8, 2.0}, {10, 0, 40}};
+    const Vector3d X(-70, 20, 30);
+    EXPECT_LT((X + displacement_at(motion, 0.6, X) - place_of(placement_at(motion, 0.6), X)).norm(), 1e-12);
+    EXPECT_EQ(displacement_at({{0.1, -0.7, 3}, {0, 0, 0}, {0, 0, 0}}, 0.3, X), 0.3 * Vector3d(0.1, -0.7, 3));
+}
+
 TEST(RigidMotion, WithoutATurnIsTheDisplacementBitByBit) {
     const RigidMotion motion{{0.1, -0.7, 3}, {0, 0, 0}, {500, 20, -30}};
     EXPECT_EQ(placement_at(motion, 0.3).shift, 0.3 * motion.displacement);

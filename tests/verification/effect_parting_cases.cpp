@@ -81,7 +81,7 @@ double measured_pressed_shift(const MakeEngine& make) {
 double measured_distance_from_apart(const MakeEngine& make) {
     Scene scene = two_blocks({20, 20, 20}, {4, 4, 4}, press_stiffness);
     scene.fixed.push_back({"base", {true, true, true}});
-    scene.motions.push_back({"top", {true, true, true}, {1, 0, 3}, Curve{{{0, 0}, {0.5, -0.667}, {1, 1}}}});
+    scene.motions.push_back({"top", {true, true, true}, {{1, 0, 3}}, Curve{{{0, 0}, {0.5, -0.667}, {1, 1}}}});
     scene.solve.frames = 2;
     const BuiltScene built = simulation::build(scene);
     const Matrix3Xd u = end_of(built, make);

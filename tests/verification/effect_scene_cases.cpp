@@ -76,7 +76,7 @@ double measured_shift_of_free_end(const MakeEngine& make) {
     const double a = travel_time();
     Scene scene = column_scene(100);
     scene.motions.push_back(
-        {"base", {false, false, true}, {0, 0, stroke}, Curve{{{0, 0}, {a, 1}, {2 * a, 1}, {3 * a, 0}}}});
+        {"base", {false, false, true}, {{0, 0, stroke}}, Curve{{{0, 0}, {a, 1}, {2 * a, 1}, {3 * a, 0}}}});
     scene.solve.kind = simulation::Solve::Kind::Dynamics;
     scene.solve.duration = 4.5 * a;
     scene.solve.damping = 0;

@@ -100,6 +100,11 @@ EquilibriumResult EquilibriumSearch::finish() {
     return std::move(result_);
 }
 
+EquilibriumResult EquilibriumSearch::finish_with(const Matrix3Xd& missing) {
+    if (const Matrix3Xd u = good_ + missing; admissible(u)) keep(u, good_error_mm_);
+    return finish();
+}
+
 void EquilibriumSearch::fail(const std::string& cause, const std::string& remedy) const {
     std::string last = "; no good state";
     if (good_.size() > 0)

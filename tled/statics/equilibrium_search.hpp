@@ -36,6 +36,9 @@ public:
 
     /// The last good state, checked once more.
     EquilibriumResult finish();
+    /// The last good state plus what the tangent says is missing, where tissue admits it: better than the estimate of
+    /// the state without it, which is kept.
+    EquilibriumResult finish_with(const Eigen::Matrix3Xd& missing);
     [[noreturn]] void fail(const std::string& cause, const std::string& remedy) const;
     /// fail() with the engine's precision or the method as cause.
     [[noreturn]] void fail_stalled() const;
@@ -62,6 +65,9 @@ constexpr double least_starting_jacobian = 0.1;
 EquilibriumResult lbfgs(EquilibriumSearch& search, const Eigen::Matrix3Xd* start);
 EquilibriumResult dynamic_relaxation(EquilibriumSearch& search, const Eigen::Matrix3Xd* start);
 EquilibriumResult newton(EquilibriumSearch& search, const Eigen::Matrix3Xd* start);  // options.rest is there
+/// A state that is nearly an equilibrium brought there and judged by the tangent; options.rest is there. Throws
+/// SolverFailure where K₀ does not prepare that, or the tangent is not positive.
+EquilibriumResult refinement(EquilibriumSearch& search, const Eigen::Matrix3Xd& start);
 EquilibriumResult self_checked_relaxation(EquilibriumSearch& search, const Eigen::Matrix3Xd* start);
 
 }  // namespace tissuewarp::tled::detail

@@ -1,12 +1,14 @@
 // Newton's method (Nocedal and Wright, Numerical Optimization (2006), algorithms 3.2 and 3.3) with the exact tangent of
-// the tissue where it is, in float64: slow, and what decides whether there is an equilibrium. A factor is kept while
-// corrections shrink fast enough under it.
+// the tissue where it is, in float64: slow, and what decides whether there is an equilibrium. The factor of one state
+// prepares conjugate gradients at the next ones (Dembo, Eisenstat, Steihaug, SIAM J. Numer. Anal. 19 (1982) 400).
 
 #include "tled/statics/equilibrium_search.hpp"
+#include "tled/statics/finite_rotations.hpp"
 #include "tled/statics/line_search.hpp"
 #include "tled/stiffness/tangent_factor.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace tissuewarp::tled::detail {
 
@@ -14,53 +16,82 @@ using Eigen::Matrix3Xd;
 
 namespace {
 
-constexpr double contraction_kept = 0.2;  // of corrections, above which the tangent is taken anew
 constexpr int most_iterations = 60;
+constexpr const char* of_several =
+    "on the way to it the tissue was not stable: where it buckles or snaps through there are several equilibria, of "
+    "which this is a stable one";
 constexpr int most_idle = 15;  // iterations without the correction falling by a tenth
 
-/// The start as it is, with the imposed displacements in place; from rest the linear-elastic solution as far as no
-/// tetrahedron is turned inside out.
-Matrix3Xd first_state(EquilibriumSearch& search, const Matrix3Xd* start) {
-    if (start == nullptr) return search.begin(nullptr);
+/// The start as it is, with the imposed displacements in place; from rest the linear-elastic solution turned by finite
+/// angles, or as far as no tetrahedron is turned inside out.
+Matrix3Xd first_state(EquilibriumSearch& search, const FiniteRotations& rotations, const Matrix3Xd* start) {
+    if (start == nullptr) {
+        const Matrix3Xd linear = search.stiffness.linear_solution(search.conditions);
+        Matrix3Xd turned = rotations.moved(Matrix3Xd::Zero(3, linear.cols()), linear);
+        return search.admissible(turned) ? turned : search.begin(nullptr);
+    }
     Matrix3Xd u = search.conditions.constrained.select(search.conditions.imposed, *start);
     return search.admissible(u) ? u : search.begin(start);
+}
+
+double dot(const Matrix3Xd& a, const Matrix3Xd& b) {
+    return a.cwiseProduct(b).sum();
+}
+
+/// Whether going from `u`, with its residual `r`, to `next` led downhill and not too far; the residual is then that
+/// there.
+bool taken(EquilibriumSearch& search, const Matrix3Xd& u, const Matrix3Xd& next, Matrix3Xd& r) {
+    constexpr double slope_kept = 0.9;
+    const double start = dot(r, next - u);
+    if (!(start > 0) || !search.admissible(next)) return false;
+    Matrix3Xd there = search.residual();
+    if (std::abs(dot(there, next - u)) > slope_kept * start) return false;
+    r = std::move(there);
+    return true;
 }
 
 }  // namespace
 
 EquilibriumResult newton(EquilibriumSearch& search, const Matrix3Xd* start) {
     TangentFactor tangent(*search.options.rest, search.conditions);
-    Matrix3Xd u = first_state(search, start);
+    const FiniteRotations rotations(*search.options.rest, search.conditions);
+    Matrix3Xd u = first_state(search, rotations, start);
     if (!search.admissible(u)) search.fail_stalled();
     Matrix3Xd r = search.residual();
-    double before = 0, least = 0;
-    bool renew = true;
+    double least = 0;
+    bool was_unstable = false;
+    bool last = false;
     for (int iteration = 0, idle = 0; iteration < most_iterations; ++iteration, ++idle) {
-        if (renew && !tangent.factorise(u)) search.fail_stalled();
-        const Matrix3Xd d = tangent.solve(r);
+        std::optional<Matrix3Xd> by_other_factor;
+        if (iteration > 0 && !last) by_other_factor = tangent.solve_at(u, r);
+        if (!by_other_factor && !tangent.factorise(u)) search.fail_stalled();
+        was_unstable |= !by_other_factor && !tangent.stable();
+        const Matrix3Xd d = by_other_factor ? *std::move(by_other_factor) : tangent.solve(r);
         const double correction = largest_norm(d);
-        const double contraction = renew || !(before > 0) ? 0 : correction / before;
-        if (!renew && contraction > contraction_kept) {
-            renew = true;
-            continue;
-        }
         search.keep(u, correction);
-        if (correction <= search.options.tolerance_mm && tangent.shift() == 0) {
-            if (renew) return search.finish();
-            renew = true;  // accepted by the tangent where the tissue is alone
+        const bool near = correction <= search.options.tolerance_mm;
+        if (near && !by_other_factor && tangent.stable()) {
+            if (start == nullptr && was_unstable) search.observer.note(of_several);
+            return search.finish_with(d);
+        }
+        if (near && by_other_factor) {
+            last = true;  // accepted by the factor where the tissue is alone, which also tells whether it is stable
             continue;
         }
+        last = false;
         if (iteration == 0 || correction < 0.9 * least) {
             least = correction;
             idle = 0;
         }
         if (idle > most_idle) search.fail_stalled();
+        if (Matrix3Xd next = rotations.moved(u, d); taken(search, u, next, r)) {
+            u = std::move(next);
+            continue;
+        }
         std::optional<LineStep> step = line_search(search, u, r, d);
         if (!step) search.fail_stalled();
         u += step->length * d;
         r = std::move(step->residual);
-        renew = step->length != 1 || tangent.shift() > 0;
-        before = correction;
     }
     search.fail_stalled();
 }

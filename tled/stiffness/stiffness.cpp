@@ -1,6 +1,7 @@
 #include "tled/stiffness/stiffness.hpp"
 #include "tled/parallel/parallel.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
 #include <oneapi/tbb/enumerable_thread_specific.h>
@@ -183,7 +184,22 @@ const Matrix3d& BlockRows::diagonal(int i) const {
     return const_cast<BlockRows*>(this)->diagonal(i);
 }
 
-Stiffness stiffness(const RestState& rest, const Matrix3Xd& displacement) {
+namespace {
+
+using Matrix9 = Eigen::Matrix<double, 9, 9>;
+
+void keep(Matrix9&) {}
+
+/// Its negative eigenvalues become zero.
+void make_positive(Matrix9& symmetric) {
+    const Eigen::SelfAdjointEigenSolver<Matrix9> modes(symmetric);
+    if (modes.eigenvalues()[0] >= 0) return;
+    symmetric =
+        modes.eigenvectors() * modes.eigenvalues().cwiseMax(0.0).asDiagonal() * modes.eigenvectors().transpose();
+}
+
+template <class Treat>
+Stiffness stiffness_of(const RestState& rest, const Matrix3Xd& displacement, const Treat& treat) {
     const VectorXd jacobian = element_jacobians(rest, displacement);
     require_positive(rest, jacobian);
     const std::vector<VolumetricFunction> nodal = nodal_volumetric(rest, jacobian);
@@ -195,6 +211,7 @@ Stiffness stiffness(const RestState& rest, const Matrix3Xd& displacement) {
         Tangent tangent = shear_tangent(material, deformation_gradient(rest, displacement, e));
         add_volumetric_tangent(tangent, element_pressure(rest, e, material, jacobian[e], nodal),
                                rest.volumetric_modulus[e] * volumetric_function(material, jacobian[e]).second);
+        treat(tangent.derivative);
         const Matrix34 gradient = shape_gradients(rest, e);
         terms[e] = {rest.volume[e] * tangent.derivative, gradient, cofactor(tangent.F) * gradient};
     });
@@ -203,6 +220,18 @@ Stiffness stiffness(const RestState& rest, const Matrix3Xd& displacement) {
     result.elements = element_rows(rest, terms);
     result.products = pressure_rows(rest, terms, nodal);
     return result;
+}
+
+}  // namespace
+
+Stiffness stiffness(const RestState& rest, const Matrix3Xd& displacement) {
+    return stiffness_of(rest, displacement, keep);
+}
+
+Stiffness positive_stiffness(const RestState& rest, const Matrix3Xd& displacement) {
+    Stiffness positive = stiffness_of(rest, displacement, make_positive);
+    positive.products.stiffness = positive.products.stiffness.cwiseMax(0.0);
+    return positive;
 }
 
 namespace {

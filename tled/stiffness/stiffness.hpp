@@ -49,6 +49,10 @@ struct Stiffness {
 /// ∂²E/∂u² at a displacement (3 × N mm). Throws SolverFailure where det F ≤ 0.
 Stiffness stiffness(const RestState& rest, const Eigen::Matrix3Xd& displacement);
 
+/// The same without what is negative in it, tetrahedron by tetrahedron: positive semidefinite, near K, and downhill
+/// where K is not (Teran, Sifakis, Irving, Fedkiw, ACM SCA 2005).
+Stiffness positive_stiffness(const RestState& rest, const Eigen::Matrix3Xd& displacement);
+
 enum class Triangle { Lower, Full };
 
 /// K with the products multiplied out: the block columns of node i hold the rows j ≥ i (Lower) or all (Full).

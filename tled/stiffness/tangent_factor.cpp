@@ -1,8 +1,8 @@
 #include "tled/stiffness/tangent_factor.hpp"
 
 #include "tled/model/springs.hpp"
+#include "tled/stiffness/conjugate_gradients.hpp"
 #include "tled/stiffness/effect_stiffness.hpp"
-#include "tled/stiffness/stiffness.hpp"
 
 namespace tissuewarp::tled::detail {
 
@@ -10,29 +10,52 @@ using Eigen::Matrix3Xd;
 
 namespace {
 
-constexpr double first_shift = 1e-6, shift_growth = 10, last_shift = 1e3;  // of the diagonal
+constexpr int most_iterations = 20;  // of conjugate gradients, each a solve with the factor
+constexpr double relative_tolerance = 0.05;
 
 }  // namespace
 
 TangentFactor::TangentFactor(const RestState& rest, const NodalConditions& conditions)
     : rest_(rest), conditions_(conditions), free_(conditions.constrained) {}
 
+namespace {
+
+Stiffness with_effects(Stiffness tissue, const RestState& rest, const NodalConditions& conditions) {
+    add_effects(conditions.effects.surface, rest.position, tissue);
+    for (std::size_t s = 0; s < conditions.spring_node.size(); ++s)
+        tissue.elements.diagonal(conditions.spring_node[s]) += spring_matrix(conditions, static_cast<int>(s));
+    return tissue;
+}
+
+}  // namespace
+
+Stiffness tangent_at(const RestState& rest, const NodalConditions& conditions, const Matrix3Xd& displacement) {
+    return with_effects(stiffness(rest, displacement), rest, conditions);
+}
+
+Product tangent_product(const RestState& rest, const NodalConditions& conditions, const Matrix3Xd& displacement) {
+    return [&conditions, tangent = std::make_shared<Stiffness>(tangent_at(rest, conditions, displacement))](
+               const Matrix3Xd& x) -> Matrix3Xd { return conditions.constrained.select(0.0, tangent->multiply(x)); };
+}
+
 bool TangentFactor::factorise(const Matrix3Xd& displacement) {
-    Stiffness tangent = stiffness(rest_, displacement);
-    add_effects(conditions_.effects.surface, rest_.position, tangent);
-    BlockRows rows = assembled(tangent, Triangle::Lower);
-    for (std::size_t s = 0; s < conditions_.spring_node.size(); ++s)
-        rows.diagonal(conditions_.spring_node[s]) += spring_matrix(conditions_, static_cast<int>(s));
-    Eigen::SparseMatrix<double> lower = scalar_matrix(rows, free_.index(), Triangle::Lower);
+    stable_ = factorised(tangent_at(rest_, conditions_, displacement));
+    return stable_ || factorised(with_effects(positive_stiffness(rest_, displacement), rest_, conditions_));
+}
+
+bool TangentFactor::factorised(const Stiffness& stiffness) {
+    const auto lower = scalar_matrix(assembled(stiffness, Triangle::Lower), free_.index(), Triangle::Lower);
     if (!factor_) factor_ = std::make_unique<CholmodFactor>(lower, free_.nodes());
-    const Eigen::VectorXd diagonal = lower.diagonal();
-    shift_ = 0;
-    while (!factor_->factorize(lower)) {
-        shift_ = shift_ > 0 ? shift_growth * shift_ : first_shift;
-        if (shift_ > last_shift) return false;
-        lower.diagonal() = diagonal + shift_ * diagonal.cwiseAbs();
-    }
-    return true;
+    return factor_->factorize(lower);
+}
+
+std::optional<Matrix3Xd> TangentFactor::solve_at(const Matrix3Xd& displacement, const Matrix3Xd& force) const {
+    if (!factor_) return std::nullopt;
+    ConjugateGradients found = conjugate_gradients_within(
+        most_iterations, tangent_product(rest_, conditions_, displacement),
+        [&](const Matrix3Xd& f) { return solve(f); }, conditions_.constrained.select(0.0, force), relative_tolerance);
+    if (!found.positive || found.relative_residual > relative_tolerance) return std::nullopt;
+    return std::move(found.x);
 }
 
 Matrix3Xd TangentFactor::solve(const Matrix3Xd& force) const {

@@ -1,38 +1,53 @@
 #pragma once
-/// The tangent stiffness at a state and its factor, for Newton's method.
+/// The tangent stiffness at a state, and systems of it solved, for Newton's method.
 
 #include "tled/conditions.hpp"
 #include "tled/rest_state.hpp"
 #include "tled/stiffness/cholmod_factor.hpp"
 #include "tled/stiffness/free_degrees.hpp"
+#include "tled/stiffness/product.hpp"
+#include "tled/stiffness/stiffness.hpp"
 
 #include <memory>
+#include <optional>
 
 namespace tissuewarp::tled::detail {
 
-/// ∂²E/∂u² of the tissue and its springs, membranes and sliding pairs as at rest; pressures, fluid and contact are not
-/// in it.
+/// ∂²E/∂u² at a displacement (3 × N, mm) of the tissue and its springs, membranes and sliding pairs as at rest;
+/// pressures, fluid and contact are not in it. Throws SolverFailure where det F ≤ 0.
+Stiffness tangent_at(const RestState& rest, const NodalConditions& conditions, const Eigen::Matrix3Xd& displacement);
+/// Products with it on the free degrees of freedom, 0 on the others.
+Product tangent_product(const RestState& rest, const NodalConditions& conditions, const Eigen::Matrix3Xd& displacement);
+
+/// The same factorised.
 class TangentFactor {
 public:
     /// Tissue and conditions outlive this.
     TangentFactor(const RestState& rest, const NodalConditions& conditions);
 
-    /// Factorises the tangent at a displacement (3 × N, mm), where it is indefinite with the smallest of a series of
-    /// multiples of its diagonal that makes it positive definite: it then leads downhill. False where none does. Throws
-    /// SolverFailure where det F ≤ 0.
+    /// Factorises the tangent at a displacement (3 × N, mm), where it is indefinite without what is negative in its
+    /// tetrahedra: it then leads downhill. False where that is not positive definite either. Throws SolverFailure where
+    /// det F ≤ 0.
     [[nodiscard]] bool factorise(const Eigen::Matrix3Xd& displacement);
-    /// Of the last factorise(): 0 where the tangent was positive definite.
-    [[nodiscard]] double shift() const { return shift_; }
+    /// Whether the tangent of the last factorise() was positive definite.
+    [[nodiscard]] bool stable() const { return stable_; }
 
     /// K⁻¹ f on the free degrees of freedom, 0 on the others (3 × N; mN, mm). Precondition: factorise() was true.
     [[nodiscard]] Eigen::Matrix3Xd solve(const Eigen::Matrix3Xd& force) const;
+    /// The same of the tangent at another displacement, to a few percent: by conjugate gradients, which the factor of
+    /// the last one prepares. None where these would take longer than a factor, or the tangent is not positive along
+    /// them. Throws SolverFailure where det F ≤ 0.
+    [[nodiscard]] std::optional<Eigen::Matrix3Xd> solve_at(const Eigen::Matrix3Xd& displacement,
+                                                           const Eigen::Matrix3Xd& force) const;
 
 private:
+    [[nodiscard]] bool factorised(const Stiffness& stiffness);
+
     const RestState& rest_;
     const NodalConditions& conditions_;
     FreeDegrees free_;
     std::unique_ptr<CholmodFactor> factor_;
-    double shift_ = 0;
+    bool stable_ = false;
 };
 
 }  // namespace tissuewarp::tled::detail
