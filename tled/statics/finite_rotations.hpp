@@ -16,8 +16,8 @@ namespace tissuewarp::tled::detail {
 
 /// A linear increment stretches what it turns: a rod that hangs grows longer by 1 − cos⁻¹ of its slope, and Newton's
 /// method then spends its steps on taking that back. Here each tetrahedron turns by the angle of the increment, and the
-/// nodes go where they fit all tetrahedra best (rotation–strain coordinates: Huang, Tong, Zhou, Bao, Desbrun, ACM SCA
-/// 2011).
+/// nodes go where they fit all tetrahedra best (rotation–strain coordinates: Huang, Tong, Zhou, Bao, Desbrun, IEEE
+/// Trans. Vis. Comput. Graph. 17 (2011) 983).
 class FiniteRotations {
 public:
     /// Factorises three scalar Laplacians, one for each axis. Tissue outlives this.
