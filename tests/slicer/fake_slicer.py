@@ -99,8 +99,10 @@ def install():
     scripted.ScriptedLoadableModuleWidget = type("ScriptedLoadableModuleWidget", (), {
         "setup": lambda self: setattr(self, "layout", mock.MagicMock())})
     slicer.ScriptedLoadableModule = scripted
+    qt = mock.MagicMock()
+    qt.QPushButton = lambda *_: mock.MagicMock()  # a mock called twice returns one object
     vtk = mock.MagicMock()
     vtk.vtkStringArray = StringArray
-    sys.modules.update({"slicer": slicer, "slicer.ScriptedLoadableModule": scripted, "vtk": vtk,
-                        "qt": mock.MagicMock(), "ctk": mock.MagicMock()})
+    sys.modules.update({"slicer": slicer, "slicer.ScriptedLoadableModule": scripted, "vtk": vtk, "qt": qt,
+                        "ctk": mock.MagicMock()})
     return slicer
