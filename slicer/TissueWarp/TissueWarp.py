@@ -67,6 +67,7 @@ class TissueWarpWidget(ScriptedLoadableModuleWidget):
         for option, label, kinds in choices:
             selector = slicer.qMRMLNodeComboBox()
             selector.nodeTypes = kinds
+            selector.showChildNodeTypes = False  # a label map is a kind of volume
             selector.noneEnabled = True
             selector.addEnabled = False
             selector.removeEnabled = False
@@ -181,15 +182,15 @@ class TissueWarpLogic(ScriptedLoadableModuleLogic):
 
     def write(self, nodes, folder):
         """{option: file} of the nodes, transforms applied."""
+        files = {option: folder / (option + FILE_ENDINGS[option]) for option in nodes}
         labels = self.labelMaps(nodes)
-        files = {}
-        for option, node in nodes.items():
-            files[option] = folder / (option + FILE_ENDINGS[option])
-            node = labels.get(option, node)
-            if not slicer.util.exportNode(node, str(files[option]), world=True):
-                raise RunError(f"'{node.GetName()}' cannot be written to '{files[option]}'; is the disk full?")
-        for node in labels.values():
-            slicer.mrmlScene.RemoveNode(node)
+        try:
+            for option, node in {**nodes, **labels}.items():
+                if not slicer.util.exportNode(node, str(files[option]), world=True):
+                    raise RunError(f"'{node.GetName()}' cannot be written to '{files[option]}'; is the disk full?")
+        finally:
+            for node in labels.values():
+                slicer.mrmlScene.RemoveNode(node)
         return files
 
     def labelMaps(self, nodes):

@@ -133,6 +133,23 @@ class ExecutionModel(PhantomTest):
         self.assertTrue(mesh.is_file())
         self.assertRegex(returned.read_text(), r"^tetrahedra = [1-9]\d+\n$")
 
+    def test_warp_takes_what_slicer_writes(self):
+        self.assertEqual(self.phantom.register("--edge-length", 8, "--rounds", 1, "--no-error-estimate").returncode, 0)
+        warped = self.phantom.folder / "warped.nrrd"
+        result = self.as_slicer_runs("warp", "--output", warped, "--displacement",
+                                     self.phantom.output / "displacement_fixed_to_moving.nii.gz", self.phantom.moving)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertTrue(warped.is_file())
+        self.assertIn("<filter-name>warping</filter-name>", result.stdout)
+
+    def test_simulate(self):
+        scene, frames = self.phantom.folder / "cube.toml", self.phantom.folder / "frames"
+        self.assertEqual(run("simulate", "--init", "cube", scene).returncode, 0)
+        result = self.as_slicer_runs("simulate", "--output", frames, scene)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertTrue((frames / "summary.json").is_file())
+        self.assertIn("<filter-name>simulating</filter-name>", result.stdout)
+
     def test_people_see_no_tags(self):
         result = run("mesh", self.phantom.moving_labels, "-o", self.phantom.folder / "mesh.vtu", "--edge-length", 8)
         self.assertEqual(result.returncode, 0, result.stderr)

@@ -99,6 +99,11 @@ class Segmentations(unittest.TestCase):
         with self.assertRaisesRegex(RunError, "choose two of a kind"):
             self.logic.labelMaps({"moving-labels": self.moving, "fixed-labels": labels})
 
+    def test_label_maps_leave_the_scene_whatever_happens(self):
+        with self.assertRaisesRegex(RunError, "cannot be written"):
+            self.logic.write({"moving-labels": self.moving}, pathlib.Path("run"))
+        self.assertEqual(slicer.mrmlScene.removed[-1].kind, "vtkMRMLLabelMapVolumeNode")
+
     def test_a_node_that_cannot_be_written_is_named(self):
         nodes = {"moving": Node("vtkMRMLScalarVolumeNode")}
         with self.assertRaisesRegex(RunError, "'vtkMRMLScalarVolumeNode' cannot be written"):
