@@ -238,7 +238,7 @@ void require_correct(const BenchResults& results) {
 }  // namespace
 
 void run_bench(const BenchOptions& options) {
-    ProgressLine progress(options.common.quiet);
+    ProgressLine progress(options.common);
     if (options.study == "all" && !options.elements.empty())
         throw InvalidInput("--elements with --study all fits no study; name one: cube, brain or scaling");
     std::optional<OutputFolder> output;

@@ -58,7 +58,7 @@ void print(const Fronts& fronts) {
 void run_calibrate(const CalibrateOptions& options) {
     const std::filesystem::path path = destination(options);
     require_writable_folder(std::filesystem::absolute(path).parent_path());
-    ProgressLine progress(options.common.quiet);
+    ProgressLine progress(options.common);
     study::FrontsPlan plan;
     plan.update = on_device(options.device);
     plan.seeds = seeds_of(options, plan.seeds);

@@ -140,7 +140,7 @@ const char* direction_text(FieldType type) {
 }  // namespace
 
 void run_convert(const ConvertOptions& options) {
-    ProgressLine progress(options.common.quiet);
+    ProgressLine progress(options.common);
     target_of(options);
     require_could_write_file(options.output);
     progress.begin("converting", 0.0, 1.0);

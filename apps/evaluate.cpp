@@ -180,7 +180,7 @@ void require_something(const EvaluateOptions& options) {
 }  // namespace
 
 void run_evaluate(const EvaluateOptions& options) {
-    ProgressLine progress(options.common.quiet);
+    ProgressLine progress(options.common);
     require_something(options);
     if (!options.json.empty()) require_could_write_file(options.json);
     progress.begin("evaluating", 0.0, 1.0);

@@ -65,7 +65,7 @@ void print_passes(const simulation::BuiltScene& built, Observer& observer) {
 }  // namespace
 
 void run_explain(const ExplainOptions& options) {
-    ProgressLine progress(options.common.quiet);
+    ProgressLine progress(options.common);
     progress.begin("reading", 0.0, 0.05);
     const simulation::Scene scene = read_scene(options.scene, progress);
     progress.begin("building", 0.05, 1.0);

@@ -105,7 +105,7 @@ void print_mesh_file(const fs::path& path) {
 }
 
 void print_surface(const fs::path& path) {
-    ProgressLine notes(true);
+    ProgressLine notes({.quiet = true});
     meshing::Surface surface;
     if (registration::is_slicer_markups(path))
         surface.mesh.nodes = registration::read_slicer_markups(path, notes).points;

@@ -1,5 +1,6 @@
 // tissuewarp mesh: label map → tetrahedra, with the quality and the fidelity of what was made.
 
+#include "apps/module_description.hpp"
 #include "apps/noted_images.hpp"
 #include "apps/output_folder.hpp"
 #include "apps/progress.hpp"
@@ -41,7 +42,7 @@ void print_report(const meshing::TetMesh& mesh, const meshing::QualityReport& qu
 }  // namespace
 
 void run_mesh(const MeshOptions& options) {
-    ProgressLine progress(options.common.quiet);
+    ProgressLine progress(options.common);
     if (options.output.extension() != ".vtu")
         throw InvalidInput("'" + options.output.string() + "' is not a .vtu file; give a name that ends in .vtu");
     require_could_write_file(options.output);
@@ -73,6 +74,7 @@ void run_mesh(const MeshOptions& options) {
         write_json(report, options.json);
     }
     file.commit();
+    write_return_parameters(options.common.return_parameters, {{"tetrahedra", std::to_string(mesh.tet_count())}});
     progress.clear();
     if (options.common.quiet) return;
     print_report(mesh, quality, fidelity);

@@ -125,16 +125,16 @@ struct Parser {
                   "Choose mesh and rounds for this time, preparation and writing apart, for instance 2s");
         verb.number("--edge-length", o.edge_length, "MM", 0.0, 100.0,
                     "Target edge of the tetrahedra (mm); 0: about 50 000 of them with fixed labels, 15 000 without");
-        verb.list("--label-edge-length", register_lengths, "LABEL=MM", "Target edge in one label (mm); repeatable");
+        verb.list("--label-edge-length", register_lengths, "LABEL=MM", "Target edge in one label (mm); repeatable")
+            ->delimiter(',');
         verb.path("--materials", o.materials,
                   "Material table (TOML): [label.1] youngs_modulus_kpa, poissons_ratio, law, name");
         verb.number("--default-youngs-modulus", o.default_youngs_modulus, "KPA", 1e-3, 1e6,
                     "Young's modulus without a table (kPa)");
         verb.number("--default-poissons-ratio", o.default_poissons_ratio, "RATIO", 0.0, 0.4999,
                     "Poisson's ratio without a table");
-        verb.text("--element", o.element,
-                  "auto, t4 or averaged-pressure; auto: the latter from a Poisson's ratio of 0.45")
-            ->check(CLI::IsMember({"auto", "t4", "averaged-pressure"}).description(""));
+        verb.choice("--element", o.element, {"auto", "t4", "averaged-pressure"},
+                    "auto, t4 or averaged-pressure; auto: the latter from a Poisson's ratio of 0.45");
         verb.list("--anchor", anchors, "LABEL", "Labels of tissue that stays where the rigid placement has it")
             ->delimiter(',');
         verb.list("--rigid-neighbour", rigid_neighbours, "LABEL",
@@ -158,6 +158,7 @@ struct Parser {
         verb.text("--device", o.device.name, "auto, cpu, gpu or gpu:<index>")
             ->check(CLI::Validator(check_device, "", "device"));
         verb.common(o.common);
+        verb.module(o.common);
         verb.list(
                 "--write", o.write, "NAME",
                 "Files beside the usual ones: displacement_magnitude (mm), jacobian, organ (its surface with errors), "
@@ -178,19 +179,18 @@ struct Parser {
         verb.path("labels", o.labels, "Label map")->required();
         verb.path("-o,--output", o.output, "Mesh to write: .vtu (mm, LPS)")->required();
         verb.number("--edge-length", o.edge_length, "MM", 0.1, 100.0, "Target edge of the tetrahedra (mm)");
-        verb.list("--label-edge-length", mesh_lengths, "LABEL=MM", "Target edge in one label (mm); repeatable");
+        verb.list("--label-edge-length", mesh_lengths, "LABEL=MM", "Target edge in one label (mm); repeatable")
+            ->delimiter(',');
         verb.number("--facet-distance", o.facet_distance, "MM", 0.0, 100.0,
                     "Largest distance of facets to the interface (mm); 0: 0.12 edges, at least a quarter voxel");
         verb.number("--smoothing", o.smoothing, "VOXELS", 0.0, 10.0, "Gaussian that rounds the voxel steps (voxels)");
-        verb.app()
-            .add_option("--only", o.only, "Labels to mesh; default: all but 0")
-            ->type_name("LABEL")
-            ->delimiter(',');
-        verb.text("--refinement", o.refinement,
-                  "deterministic (one thread, the same mesh every time) or parallel (faster, another mesh every time)")
-            ->check(CLI::IsMember({"deterministic", "parallel"}).description(""));
+        verb.list("--only", o.only, "LABEL", "Labels to mesh; default: all but 0")->delimiter(',')->allow_extra_args();
+        verb.choice(
+            "--refinement", o.refinement, {"deterministic", "parallel"},
+            "deterministic (one thread, the same mesh every time) or parallel (faster, another mesh every time)");
         verb.path("--json", o.json, "Also write the quality report as JSON");
         verb.common(o.common);
+        verb.module(o.common);
     }
 
     void declare_warp(Verb& verb) {
@@ -211,6 +211,7 @@ struct Parser {
         verb.number("--outside", o.outside, "VALUE", -1e9, 1e9, "Value of voxels that come from outside the image");
         verb.number("--fade", o.fade, "MM", 1.0, 1e4, "Distance from the organ where the field has become rigid (mm)");
         verb.common(o.common);
+        verb.module(o.common);
     }
 
     void declare_convert(Verb& verb) {
@@ -230,7 +231,7 @@ struct Parser {
                          "What the input maps: resampling (fixed to moving points, as ITK's "
                          "transforms) or modeling (moving to fixed); default: what it says"},
               {"--to", &o.to, "What the output shall map; default: resampling, in .nrrd as the input"}})
-            verb.text(name, *target, what)->check(CLI::IsMember({"modeling", "resampling"}).description(""));
+            verb.choice(name, *target, {"modeling", "resampling"}, what);
         verb.path("--reference", o.reference, "Image whose grid a displacement field gets");
         verb.flag("--matrix", o.matrix, "In .txt four rows of four numbers, not ITK's text");
         verb.common(o.common);
@@ -296,8 +297,8 @@ struct Parser {
 
     void declare_bench(Verb& verb) {
         BenchOptions& o = bench;
-        verb.text("--study", o.study, "cube (stretched, 100 mm), brain (indented by 10 mm), scaling (cubes) or all")
-            ->check(CLI::IsMember({"cube", "brain", "scaling", "all"}).description(""));
+        verb.choice("--study", o.study, {"cube", "brain", "scaling", "all"},
+                    "cube (stretched, 100 mm), brain (indented by 10 mm), scaling (cubes) or all");
         verb.path("--labels", o.labels,
                   "Label map of the brain; default: data/brainshift/preop_labels.nii.gz if there");
         verb.app()
@@ -334,6 +335,7 @@ struct Parser {
         verb.text("--device", o.device.name, "auto, cpu, gpu or gpu:<index>; auto: what the scene says")
             ->check(CLI::Validator(check_device, "", "device"));
         verb.common(o.common);
+        verb.module(o.common);
     }
 
     void declare_explain(Verb& verb) {
@@ -504,6 +506,14 @@ struct Parser {
         throw InvalidInput(message + (nearest.empty() ? "; see --help" : "; did you mean '" + nearest + "'?"));
     }
 
+    /// The verb that the arguments name, where it is a command-line module; or null.
+    [[nodiscard]] const Verb* module(const std::vector<std::string>& arguments) const {
+        const auto named = std::find_if(verbs.begin(), verbs.end(), [&](const Verb& verb) {
+            return !arguments.empty() && verb.name() == arguments.front() && verb.is_module();
+        });
+        return named == verbs.end() ? nullptr : &*named;
+    }
+
     static std::vector<std::string> verb_names() {
         return {"register", "mesh",     "warp",    "convert",   "evaluate", "info",
                 "bench",    "simulate", "explain", "calibrate", "study"};
@@ -514,9 +524,13 @@ struct Parser {
 
 Command parse_command_line(std::vector<std::string> arguments) {
     Parser parser;
+    const Verb* module = parser.module(arguments);
+    if (module) arguments = with_hyphens(std::move(arguments));
     if (!arguments.empty() && arguments.front() == "register")
         arguments = with_config(arguments, parser.verbs.front().known());
     parser.refuse_unknown(arguments);
+    if (module && std::find(arguments.begin(), arguments.end(), "--xml") != arguments.end())
+        throw HelpRequest{module->description()};
     std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them last first
     try {
         parser.app.parse(arguments);

@@ -14,8 +14,12 @@ namespace tissuewarp::apps {
 
 /// What every verb understands.
 struct CommonOptions {
-    int threads = 0;     ///< 0: all cores
-    bool quiet = false;  ///< errors only
+    int threads = 0;                               ///< 0: all cores
+    bool quiet = false;                            ///< errors only
+    std::filesystem::path return_parameters = {};  ///< what 3D Slicer reads back; or empty
+    std::string process_information = {};          ///< where 3D Slicer keeps progress, in its own memory; or empty
+    /// 3D Slicer runs this verb and reads progress on standard output.
+    [[nodiscard]] bool tells_progress() const { return !(return_parameters.empty() && process_information.empty()); }
 };
 
 /// Where the time steps run.

@@ -50,8 +50,9 @@ bool interrupted() {
     return stop_requested;
 }
 
-ProgressLine::ProgressLine(bool quiet) {
-    if (quiet || isatty(STDERR_FILENO) != 1) return;
+ProgressLine::ProgressLine(const CommonOptions& options) {
+    if (options.tells_progress()) tags_.emplace();
+    if (options.quiet || isatty(STDERR_FILENO) != 1) return;
     const int own = dup(STDERR_FILENO);
     if (own >= 0) terminal_ = fdopen(own, "w");
 }
@@ -68,6 +69,7 @@ void ProgressLine::begin(const std::string& stage, double from, double to) {
         to_ = to;
         done_ = std::max(done_, from);
         last_ = {};
+        if (tags_) tags_->begin(stage);
         draw();
     }
     if (interrupted()) throw Cancelled();
@@ -85,6 +87,7 @@ void ProgressLine::note(std::string_view message) {
 }
 
 void ProgressLine::draw() {
+    if (tags_) tags_->progress(done_);
     const auto now = Clock::now();
     if (!terminal_ || now - last_ < std::chrono::milliseconds(100)) return;
     last_ = now;

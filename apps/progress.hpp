@@ -1,10 +1,13 @@
 #pragma once
-/// Progress for people: one line on a terminal, nothing in a pipe; and the interrupt key.
+/// Progress for people: one line on a terminal, nothing in a pipe; for 3D Slicer, tags. And the interrupt key.
 
+#include "apps/filter_tags.hpp"
+#include "apps/options.hpp"
 #include "core/observer.hpp"
 
 #include <chrono>
 #include <cstdio>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,7 +28,7 @@ struct Interrupted : Error {
 /// Keeps notes, and draws "stage  percent  time left" on standard error when that is a terminal.
 class ProgressLine final : public Observer {
 public:
-    explicit ProgressLine(bool quiet);
+    explicit ProgressLine(const CommonOptions& options);
     ~ProgressLine() override;
     ProgressLine(const ProgressLine&) = delete;
     ProgressLine& operator=(const ProgressLine&) = delete;
@@ -49,6 +52,7 @@ private:
     using Clock = std::chrono::steady_clock;
     std::FILE* terminal_ = nullptr;  // standard error of its own, which SilencedStandardError leaves alone; or null
     bool dirty_ = false;
+    std::optional<FilterTags> tags_;  // on standard output, where 3D Slicer asks for them
     std::string stage_;
     double from_ = 0, to_ = 0, done_ = 0;
     Clock::time_point start_ = Clock::now(), last_{};

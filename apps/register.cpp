@@ -2,6 +2,7 @@
 
 #include "apps/bids.hpp"
 #include "apps/dial.hpp"
+#include "apps/module_description.hpp"
 #include "apps/output_folder.hpp"
 #include "apps/output_names.hpp"
 #include "apps/progress.hpp"
@@ -220,11 +221,18 @@ Scores score(const RegistrationRun& run) {
     return scores;
 }
 
+/// The codes of doubts in one line; "none" where there are none.
+std::string codes(const std::vector<Doubt>& doubts) {
+    std::vector<std::string> result;
+    for (const Doubt& doubt : doubts) result.push_back(doubt.code);
+    return result.empty() ? "none" : fmt::format("{}", fmt::join(result, ", "));
+}
+
 }  // namespace
 
 void run_register(const RegisterOptions& options) {
     StageClock clock;
-    ProgressLine progress(options.common.quiet);
+    ProgressLine progress(options.common);
     RegistrationRun run(options, utc_now());
 
     if (options.dry_run) require_could_write(options.output, is_register_output);
@@ -294,6 +302,7 @@ void run_register(const RegisterOptions& options) {
     if (!options.bids.empty()) write_bids_dataset(options);
     if (!options.save_parameters.empty()) save_parameters(options.parameters, options.save_parameters);
     run.times.push_back(clock.lap("report"));
+    write_return_parameters(options.common.return_parameters, {{"doubts", codes(run.result.doubts)}});
     progress.clear();
     if (!options.common.quiet) fmt::print("{}", summary_text(run, clock.total()));
     if (options.strict) require_no_doubts(run);

@@ -1,6 +1,7 @@
 // tissuewarp simulate: what a scene file says, from its mesh to its frames.
 
 #include "apps/ablate.hpp"
+#include "apps/module_description.hpp"
 #include "apps/output_folder.hpp"
 #include "apps/progress.hpp"
 #include "apps/report_json.hpp"
@@ -92,7 +93,7 @@ void write_template(const SimulateOptions& options) {
 }
 
 void run_ablation(const SimulateOptions& options) {
-    ProgressLine progress(options.common.quiet);
+    ProgressLine progress(options.common);
     progress.begin("reading", 0.0, 0.02);
     simulation::Scene scene = read_scene(options.scene, progress);
     apply_device(options.device, scene.solve);
@@ -110,7 +111,7 @@ void run_simulate(const SimulateOptions& options) {
     if (!options.init.empty()) return write_template(options);
     if (options.scene.empty()) throw InvalidInput("give a scene file, or --init to write one");
     if (options.ablate) return run_ablation(options);
-    ProgressLine progress(options.common.quiet);
+    ProgressLine progress(options.common);
     if (options.output.empty()) throw InvalidInput("give --output, the folder for the frames");
     require_could_write(options.output, is_simulate_output);
     progress.begin("reading", 0.0, 0.02);
@@ -130,6 +131,7 @@ void run_simulate(const SimulateOptions& options) {
     series.finish();
     write_json(summary_json(options, built, run, progress.notes(), building), folder.path("summary.json"));
     folder.commit();
+    write_return_parameters(options.common.return_parameters, {});
     progress.clear();
     if (options.common.quiet) return;
     for (const std::string& note : progress.notes()) fmt::print("note: {}\n", note);

@@ -133,7 +133,7 @@ void print_problem(const study::ProblemSummary& problem, const study::Store& sto
 
 void run_accuracy_time_study(const StudyOptions& options) {
     if (options.output.empty()) throw InvalidInput("give --output, the folder for measurements and page");
-    ProgressLine progress(options.common.quiet);
+    ProgressLine progress(options.common);
     const std::vector<study::NamedProblem> problems = problems_of(options);
     const std::optional<BenchDevice> device = bench_device(options.device.name);
     study::AccuracyTimeOptions study_options;

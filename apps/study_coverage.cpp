@@ -74,7 +74,7 @@ std::vector<study::CoverageRow> measured(const StudyOptions& options, const stud
 
 void run_coverage_study(const StudyOptions& options) {
     if (options.output.empty()) throw InvalidInput("give --output, the folder that keeps each phantom's measurements");
-    ProgressLine progress(options.common.quiet);
+    ProgressLine progress(options.common);
     const study::CoverageOptions plan = plan_of(options, progress);
     progress.begin("registering phantoms", 0.0, 1.0);
     const auto coverage = study::coverage_of(measured(options, plan, progress));

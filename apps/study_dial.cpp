@@ -67,7 +67,7 @@ void run_dial_study(const StudyOptions& options) {
     std::tie(plan.first_seed, plan.last_seed) = phantom_seeds(options.problems, {plan.first_seed, plan.last_seed});
     if (options.quick) plan.last_seed = std::min(plan.last_seed, plan.first_seed + 1);
     if (options.output.empty()) throw InvalidInput("give --output, the folder that keeps each phantom's trials");
-    ProgressLine progress(options.common.quiet);
+    ProgressLine progress(options.common);
     progress.begin("registering phantoms", 0.0, 1.0);
     const std::vector<DialTrial> trials = measured(options, plan, progress);
     progress.clear();

@@ -2,29 +2,35 @@
 /// One verb of the command line. For options.cpp alone, the one translation unit that includes CLI11.
 
 #include "apps/config_file.hpp"
+#include "apps/module_description.hpp"
 #include "apps/options.hpp"
 
+#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
+#include <type_traits>
 
 namespace tissuewarp::apps {
 
 /// Declares the options of one verb and remembers of which kind each is.
 class Verb {
     using Kind = Parameter::Kind;
+    using Type = DeclaredOption::Type;
 
 public:
     Verb(CLI::App& parent, const char* name, const char* what) : app_(*parent.add_subcommand(name, what)) {
         app_.set_help_flag("-h,--help", "Print this text and exit");
     }
     CLI::App& app() { return app_; }
+    [[nodiscard]] std::string name() const { return app_.get_name(); }
 
     CLI::Option* path(const std::string& names, std::filesystem::path& target, const char* what) {
-        return keep(Kind::Text, app_.add_option_function<std::string>(
-                                        names, [&target](const std::string& value) { target = value; }, what)
-                                    ->type_name("FILE")
-                                    ->take_last());
+        return keep(Kind::Text, Type::File,
+                    app_.add_option_function<std::string>(
+                            names, [&target](const std::string& value) { target = value; }, what)
+                        ->type_name("FILE")
+                        ->take_last());
     }
     /// A file, and more of them where the option is repeated.
     CLI::Option* paths(const std::string& names, std::filesystem::path& first, std::vector<std::filesystem::path>& rest,
@@ -33,32 +39,63 @@ public:
             first = values.front();
             rest.assign(values.begin() + 1, values.end());
         };
-        return keep(Kind::Text, app_.add_option_function<std::vector<std::string>>(names, take, what)
-                                    ->type_name("FILE")
-                                    ->allow_extra_args(false)
-                                    ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll));
+        return keep(Kind::Text, Type::File,
+                    app_.add_option_function<std::vector<std::string>>(names, take, what)
+                        ->type_name("FILE")
+                        ->allow_extra_args(false)
+                        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll));
     }
     CLI::Option* text(const std::string& names, std::string& target, const char* what) {
-        return keep(Kind::Text, app_.add_option(names, target, what)->capture_default_str()->take_last());
+        return keep(Kind::Text, Type::Text, app_.add_option(names, target, what)->capture_default_str()->take_last());
+    }
+    /// One of the words in `choices`.
+    CLI::Option* choice(const std::string& names, std::string& target, const std::vector<std::string>& choices,
+                        const char* what) {
+        CLI::Option* option = text(names, target, what)->check(CLI::IsMember(choices).description(""));
+        options_.back().facts.type = Type::Choice;
+        options_.back().facts.choices = choices;
+        return option;
     }
     /// A number within [least, most], of the unit that `unit` names.
     template <class T>
     CLI::Option* number(const std::string& names, T& target, const char* unit, T least, T most, const char* what) {
-        return keep(Kind::Number, app_.add_option(names, target, what)
-                                      ->type_name(unit)
-                                      ->check(CLI::Range(least, most).description(""))
-                                      ->capture_default_str()
-                                      ->take_last());
+        CLI::Option* option = keep(Kind::Number, std::is_integral_v<T> ? Type::Integer : Type::Real,
+                                   app_.add_option(names, target, what)
+                                       ->type_name(unit)
+                                       ->check(CLI::Range(least, most).description(""))
+                                       ->capture_default_str()
+                                       ->take_last());
+        options_.back().facts.least = fmt::format("{}", least);
+        options_.back().facts.most = fmt::format("{}", most);
+        return option;
     }
     CLI::Option* flag(const std::string& names, bool& target, const char* what) {
-        return keep(Kind::Switch, app_.add_flag(names, target, what)->take_last());
+        return keep(Kind::Switch, Type::Switch, app_.add_flag(names, target, what)->take_last());
     }
-    CLI::Option* list(const std::string& names, std::vector<std::string>& target, const char* unit, const char* what) {
-        return keep(Kind::TextList, app_.add_option(names, target, what)->type_name(unit)->allow_extra_args(false));
+    template <class T>
+    CLI::Option* list(const std::string& names, std::vector<T>& target, const char* unit, const char* what) {
+        return keep(Kind::TextList, Type::List,
+                    app_.add_option(names, target, what)->type_name(unit)->allow_extra_args(false));
     }
     void common(CommonOptions& target) {
         number("--threads", target.threads, "COUNT", 0, 4096, "Cores to use; 0: all");
         flag("--quiet", target.quiet, "Print errors only");
+    }
+    /// A verb that 3D Slicer can run as a command-line module. Hidden: its execution model says these, not people.
+    void module(CommonOptions& target) {
+        app_.add_flag("--xml")->description("Print the description of this command-line module")->group("");
+        app_.add_option_function<std::string>(
+                "--returnparameterfile", [&target](const std::string& value) { target.return_parameters = value; },
+                "File for what 3D Slicer reads back")
+            ->take_last()
+            ->group("");
+        app_.add_option("--processinformationaddress", target.process_information, "Accepted; not written to")
+            ->take_last()
+            ->group("");
+    }
+    [[nodiscard]] bool is_module() const { return app_.get_option_no_throw("--xml") != nullptr; }
+    [[nodiscard]] std::string description() const {
+        return module_description(app_.get_name(), app_.get_description(), declared());
     }
     void landmarks(LandmarkFiles& target) {
         CLI::Option* csv =
@@ -73,7 +110,7 @@ public:
 
     [[nodiscard]] KnownOptions known() const {
         KnownOptions result;
-        for (const auto& [option, kind] : options_) {
+        for (const auto& [option, kind, facts] : options_) {
             result.names.push_back(name_of(option));
             if (kind == Kind::Switch) result.switches.push_back(name_of(option));
         }
@@ -82,7 +119,7 @@ public:
     /// Present values, defaults included; options without a value are left out.
     [[nodiscard]] std::vector<Parameter> parameters(const std::vector<std::string>& except) const {
         std::vector<Parameter> result;
-        for (const auto& [option, kind] : options_) {
+        for (const auto& [option, kind, facts] : options_) {
             Parameter parameter{name_of(option), kind, {}};
             if (std::find(except.begin(), except.end(), parameter.name) != except.end()) continue;
             if (option->count() > 0)
@@ -101,14 +138,32 @@ public:
     }
 
 private:
-    CLI::Option* keep(Kind kind, CLI::Option* option) {
-        options_.emplace_back(option, kind);
+    struct Declared {
+        CLI::Option* option;
+        Kind kind;
+        DeclaredOption facts;  // type, choices and limits; declared() adds the rest
+    };
+    CLI::Option* keep(Kind kind, Type type, CLI::Option* option) {
+        options_.push_back({option, kind, {}});
+        options_.back().facts.type = type;
         return option;
+    }
+    [[nodiscard]] std::vector<DeclaredOption> declared() const {
+        std::vector<DeclaredOption> result;
+        for (const auto& [option, kind, facts] : options_) {
+            DeclaredOption& entry = result.emplace_back(facts);
+            entry.positional = option->get_positional();
+            entry.name = entry.positional ? option->get_name(true) : name_of(option);
+            if (!option->get_snames().empty()) entry.short_name = option->get_snames().front();
+            entry.description = option->get_description();
+            entry.default_text = option->get_default_str();
+        }
+        return result;
     }
     static std::string name_of(const CLI::Option* option) { return option->get_lnames().front(); }
 
     CLI::App& app_;
-    std::vector<std::pair<CLI::Option*, Kind>> options_;
+    std::vector<Declared> options_;
 };
 
 }  // namespace tissuewarp::apps

@@ -4,6 +4,7 @@
 
 #include "apps/displacement_field.hpp"
 #include "apps/file_kind.hpp"
+#include "apps/module_description.hpp"
 #include "apps/noted_images.hpp"
 #include "apps/output_folder.hpp"
 #include "apps/point_files.hpp"
@@ -83,7 +84,7 @@ Eigen::Matrix3Xd map_points(const WarpOptions& options, const Eigen::Matrix3Xd& 
 }  // namespace
 
 void run_warp(const WarpOptions& options) {
-    ProgressLine progress(options.common.quiet);
+    ProgressLine progress(options.common);
     if (options.record.empty() && options.displacement.empty())
         throw InvalidInput("nothing to warp with; give --record record.h5 or --displacement FIELD");
     const FileKind kind = file_kind(options.input);
@@ -109,6 +110,7 @@ void run_warp(const WarpOptions& options) {
                            "or a surface (.ply, .stl, "
                            ".obj, .vtk, .vtp)");
     }
+    write_return_parameters(options.common.return_parameters, {});
     progress.clear();
     if (options.common.quiet) return;
     for (const std::string& note : progress.notes()) fmt::print("note: {}\n", note);

@@ -15,6 +15,14 @@ install(FILES ${packaging}/copyright ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_S
   ${PROJECT_SOURCE_DIR}/data/SOURCES.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs/manual ${PROJECT_SOURCE_DIR}/examples DESTINATION ${CMAKE_INSTALL_DOCDIR})
 
+# 3D Slicer: the scripted module, and a program for each verb that is a command-line module.
+set(slicer ${CMAKE_INSTALL_DATADIR}/tissuewarp/slicer)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/slicer/TissueWarp DESTINATION ${slicer} PATTERN __pycache__ EXCLUDE)
+foreach(verb register mesh warp simulate)
+  install(PROGRAMS ${PROJECT_SOURCE_DIR}/slicer/cli-modules/tissuewarp-module DESTINATION ${slicer}/cli-modules
+    RENAME tissuewarp-${verb})
+endforeach()
+
 # Man pages and shell completion say what --help says.
 if(TISSUEWARP_PYTHON3)
   install(CODE "execute_process(COMMAND ${TISSUEWARP_PYTHON3} ${packaging}/from_help.py $<TARGET_FILE:tissuewarp_app>
