@@ -1,8 +1,8 @@
 /// NRRD (.nrrd, .nhdr), after "Definition of NRRD File Format" of the Teem library.
 
+#include "core/length_units.hpp"
 #include "imaging/detail/header_checks.hpp"
 #include "imaging/detail/image_header.hpp"
-#include "imaging/detail/length_units.hpp"
 #include "imaging/detail/text_headers.hpp"
 
 #include <Eigen/LU>
