@@ -115,12 +115,11 @@ std::string frame_in_remarks(const TextTable& table) {
     std::string frame;
     for (const TextTable::Remark& remark : table.remarks()) {
         for (const std::string& named : frames_in(remark.text)) {
-            if (!frame.empty() && frame != named)
-                table.refuse(remark.line, "the remarks name both " + frame + " and " + named +
-                                              "; leave the one in which the points are");
             if (named != "RAS" && named != "LPS")
                 table.refuse(remark.line,
                              "says that its points are in the frame " + named + "; write them as LPS or RAS");
+            if (!frame.empty() && frame != named)
+                table.refuse(remark.line, "the remarks name both RAS and LPS; leave the one in which the points are");
             frame = named;
         }
     }
