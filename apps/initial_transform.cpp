@@ -56,6 +56,7 @@ void take_initial_transform(RegistrationInputs& inputs, const RegisterOptions& o
     if (options.initial_transform.empty()) return;
     const std::string path = options.initial_transform.string();
     const registration::PointMap map = registration::read_point_map(options.initial_transform);
+    for (const std::string& note : map.notes) inputs.notes.push_back(fmt::format("'{}': {}", path, note));
     try {
         inputs.start = registration::start_pose(map, inputs.moving_labels);
     } catch (const InvalidInput& problem) {

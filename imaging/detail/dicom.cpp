@@ -263,8 +263,16 @@ void for_each_frame(const std::vector<DicomFile>& files, const std::vector<Slice
     }
 }
 
+void require_linear_values(const std::vector<DicomFile>& files) {
+    for (const DicomFile& file : files)
+        if (file.value_table)
+            throw unusable(file.path, "its values are entries of a table (Modality LUT Sequence, 0028,3000), which is "
+                                      "not read; export it with Rescale Slope and Rescale Intercept");
+}
+
 Volume read_image(const fs::path& path, const std::vector<DicomFile>& files, std::vector<Slice> slices,
                   std::vector<std::string>& notes) {
+    require_linear_values(files);
     if (slices.size() < 2) throw unusable_series(path, "it holds one slice; give the folder of the whole series");
     require_alike(path, slices);
     sort_by_height(slices);

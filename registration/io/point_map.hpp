@@ -7,6 +7,8 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
+#include <vector>
 
 namespace tissuewarp::registration {
 
@@ -16,6 +18,7 @@ struct PointMap {
     Eigen::Affine3d before = Eigen::Affine3d::Identity();
     std::optional<imaging::Volume> field;  ///< displacements, three channels float32, LPS mm
     Eigen::Affine3d after = Eigen::Affine3d::Identity();
+    std::vector<std::string> notes{};  ///< what the reader of the field had to decide
 };
 
 /// Reads transforms of ITK as ANTs and 3D Slicer write them: text (.tfm, .txt), HDF5 (.h5) and Matlab (.mat)
