@@ -56,7 +56,7 @@ bool names_three_axes(const std::string& letters) {
 }
 
 bool speaks_of_frames(const std::vector<Word>& words) {
-    static const std::set<std::string> keys{"space",  "coordinate",       "coordinates", "system", "coordinatesystem",
+    static const std::set<std::string> keys{"space", "coordinate",      "coordinates", "system", "coordinatesystem",
                                             "frame", "coordinateframe", "orientation"};
     return std::any_of(words.begin(), words.end(),
                        [](const Word& word) { return keys.contains(lower_case(word.text)); });
@@ -64,7 +64,7 @@ bool speaks_of_frames(const std::vector<Word>& words) {
 
 /// "right", "anterior", "superior" from here on as "RAS"; empty where there are not three of them.
 std::string directions_from(const std::vector<Word>& words, std::size_t first) {
-    static const std::map<std::string, char> letters{{"left", 'L'},     {"right", 'R'},    {"anterior", 'A'},
+    static const std::map<std::string, char> letters{{"left", 'L'},      {"right", 'R'},    {"anterior", 'A'},
                                                      {"posterior", 'P'}, {"superior", 'S'}, {"inferior", 'I'}};
     std::string found;
     for (std::size_t w = first; w < std::min(first + 3, words.size()); ++w)

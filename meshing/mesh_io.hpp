@@ -61,7 +61,8 @@ struct Polylines {
     std::vector<std::vector<int>> lines;
 };
 
-/// Reads the lines of VTK polydata, legacy (.vtk) or XML (.vtp), turned as surfaces are. Throws IoError or InvalidInput.
+/// Reads the lines of VTK polydata, legacy (.vtk) or XML (.vtp), turned as surfaces are. Throws IoError or
+/// InvalidInput.
 Polylines read_polylines(const std::filesystem::path& path, Observer& observer = silent_observer());
 
 /// Writes .ply (binary), .stl, .obj, .vtk or .vtp by extension. Complete or absent. Throws IoError.

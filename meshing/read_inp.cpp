@@ -39,15 +39,15 @@ struct ElementSet {
         long long first, last, step;
     };
     std::string name;
-    bool internal = false;      ///< of a program's own, such as the faces of a load
-    std::string other_sets{};   ///< a name where a number is expected: the set is made of others
+    bool internal = false;     ///< of a program's own, such as the faces of a load
+    std::string other_sets{};  ///< a name where a number is expected: the set is made of others
     std::unordered_set<long long> elements{};
     std::vector<Range> ranges{};  ///< of GENERATE
 
     [[nodiscard]] bool holds(long long element) const {
         return elements.contains(element) || std::any_of(ranges.begin(), ranges.end(), [&](const Range& range) {
-            return element >= range.first && element <= range.last && (element - range.first) % range.step == 0;
-        });
+                   return element >= range.first && element <= range.last && (element - range.first) % range.step == 0;
+               });
     }
 };
 

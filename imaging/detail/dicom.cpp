@@ -266,8 +266,9 @@ void for_each_frame(const std::vector<DicomFile>& files, const std::vector<Slice
 void require_linear_values(const std::vector<DicomFile>& files) {
     for (const DicomFile& file : files)
         if (file.value_table)
-            throw unusable(file.path, "its values are entries of a table (Modality LUT Sequence, 0028,3000), which is "
-                                      "not read; export it with Rescale Slope and Rescale Intercept");
+            throw unusable(file.path,
+                           "its values are entries of a table (Modality LUT Sequence, 0028,3000), which is "
+                           "not read; export it with Rescale Slope and Rescale Intercept");
 }
 
 Volume read_image(const fs::path& path, const std::vector<DicomFile>& files, std::vector<Slice> slices,
@@ -353,11 +354,10 @@ std::map<int, std::string> segment_names(const fs::path& path, const std::vector
         for (const auto& [number, name] : file.segment_names) {
             const DicomFile& first = *file_of.try_emplace(number, &file).first->second;
             if (first.segment_names.at(number) != name)
-                throw unusable_series(path, "segment " + std::to_string(number) + " is '" +
-                                                first.segment_names.at(number) + "' in " +
-                                                first.path.filename().string() + " and '" + name + "' in " +
-                                                file.path.filename().string() +
-                                                "; give one file, or number the segments anew");
+                throw unusable_series(
+                    path, "segment " + std::to_string(number) + " is '" + first.segment_names.at(number) + "' in " +
+                              first.path.filename().string() + " and '" + name + "' in " +
+                              file.path.filename().string() + "; give one file, or number the segments anew");
         }
     std::map<int, std::string> names;
     for (const auto& [number, file] : file_of) names[number] = file->segment_names.at(number);

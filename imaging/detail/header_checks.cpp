@@ -2,9 +2,9 @@
 
 #include "core/file_message.hpp"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
-#include <algorithm>
 #include <cmath>
 #include <sstream>
 

@@ -38,7 +38,8 @@ cv::Mat whole_numbers(const Volume& layers, const std::filesystem::path& path) {
     for (std::size_t i = 0; i < count; ++i) {
         const double value = doubles.ptr<double>()[i];
         if (value < 0.0 || value != std::floor(value) || value > std::numeric_limits<int>::max()) {
-            throw unusable(path, "a layer holds the value " + all_digits(value) + "; labels are whole numbers from 0 on");
+            throw unusable(path,
+                           "a layer holds the value " + all_digits(value) + "; labels are whole numbers from 0 on");
         }
     }
     return values;

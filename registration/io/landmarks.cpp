@@ -164,8 +164,8 @@ void turn_pairs_by_remarks(const TextTable& table, const std::array<AxisColumns*
         const bool by_remark = meshing::turn_by_remarks(table, *columns);
         const std::string names = columns->name[0] + ", " + columns->name[1] + ", " + columns->name[2];
         if (by_remark)
-            observer.note(note_of(table.path(), "says that its points are RAS; the columns " + names +
-                                                    " were turned to LPS"));
+            observer.note(
+                note_of(table.path(), "says that its points are RAS; the columns " + names + " were turned to LPS"));
         else if (columns->signs != Eigen::Vector3d(1, 1, 1))
             observer.note(note_of(table.path(), "the columns " + names + " were turned to LPS"));
     }
