@@ -28,7 +28,10 @@ using imaging::Volume;
 void evaluate_labels(const EvaluateOptions& options, Observer& observer, ScoreSheet& sheet) {
     const imaging::ReadResult labels = imaging::read_labels_with_notes(options.labels);
     for (const std::string& note : notes_of(labels, options.labels)) observer.note(note);
-    Volume reference = read_noted_labels(options.reference_labels, observer);
+    const imaging::ReadResult references = imaging::read_labels_with_notes(options.reference_labels);
+    for (const std::string& note : notes_of(references, options.reference_labels)) observer.note(note);
+    require_same_numbers(labels.label_names, options.labels, references.label_names, options.reference_labels);
+    Volume reference = references.volume;
     require_same_grid(reference.geometry, labels.volume.geometry, options.reference_labels.string(),
                       options.labels.string(), "resample one onto the other");
     reference.geometry = labels.volume.geometry;

@@ -99,9 +99,11 @@ void print_mesh(const meshing::TetMesh& mesh) {
 }
 
 void print_mesh_file(const fs::path& path) {
-    const meshing::TetMesh mesh = meshing::read_vtu(path);
+    ProgressLine notes(true);
+    const meshing::TetMesh mesh = meshing::read_vtu(path, notes);
     fmt::print("{}: ", path.string());
     print_mesh(mesh);
+    for (const std::string& note : notes.notes()) fmt::print("note: {}\n", note);
 }
 
 void print_surface(const fs::path& path) {

@@ -62,6 +62,7 @@ void take_initial_transform(RegistrationInputs& inputs, const RegisterOptions& o
                         "type:=modeling'); turn it: "
                         "tissuewarp convert '{0}' transform.h5 --reference FIXED_IMAGE",
                         path));
+    for (const std::string& note : map.notes) inputs.notes.push_back(fmt::format("'{}': {}", path, note));
     try {
         inputs.start = registration::start_pose(map, inputs.moving_labels);
     } catch (const InvalidInput& problem) {

@@ -48,17 +48,6 @@ void require_common_label(const Volume& moving, const Volume& fixed, const Regis
         organ_file(options).string(), fmt::join(a, ", "), options.fixed_labels.string(), fmt::join(b, ", ")));
 }
 
-/// Segments are matched by number: one name with two numbers would match two tissues.
-void require_same_numbers(const RegistrationInputs& inputs, const RegisterOptions& options) {
-    for (const auto& [label, name] : inputs.moving_label_names)
-        for (const auto& [other, fixed_name] : inputs.fixed_label_names)
-            if (name == fixed_name && label != other)
-                throw InvalidInput(
-                    fmt::format("'{}' calls label {} '{}' and '{}' gives that name to label {}; give the same tissue "
-                                "the same number",
-                                organ_file(options).string(), label, name, options.fixed_labels.string(), other));
-}
-
 /// Corners of the box around the labels, LPS mm.
 std::pair<Eigen::Vector3d, Eigen::Vector3d> label_box(const Volume& labels) {
     Eigen::Vector3d lower = Eigen::Vector3d::Constant(INFINITY), upper = -lower;
@@ -121,11 +110,31 @@ void validate_fixed_labels(RegistrationInputs& inputs, const RegisterOptions& op
     require_millimetres(inputs.fixed_labels.geometry, options.fixed_labels);
     imaging::require_labels(inputs.fixed_labels, {}, options.fixed_labels.string().c_str());
     require_common_label(inputs.moving_labels, inputs.fixed_labels, options);
-    require_same_numbers(inputs, options);
+    require_same_numbers(inputs.moving_label_names, organ_file(options), inputs.fixed_label_names,
+                         options.fixed_labels);
     if (options.no_align) require_organs_meet(inputs);
 }
 
 }  // namespace
+
+void require_same_numbers(const imaging::LabelNames& names, const fs::path& path,
+                          const imaging::LabelNames& other_names, const fs::path& other_path) {
+    for (const auto& [label, name] : names)
+        for (const auto& [other, other_name] : other_names)
+            if (name == other_name && label != other)
+                throw InvalidInput(
+                    fmt::format("'{}' calls label {} '{}' and '{}' gives that name to label {}; give the same tissue "
+                                "the same number",
+                                path.string(), label, name, other_path.string(), other));
+}
+
+void require_labels_of_lengths(const std::map<int, double>& label_edge_length, const Volume& labels,
+                               const fs::path& path) {
+    std::vector<int> named;
+    for (const auto& [label, length] : label_edge_length) named.push_back(label);
+    if (named.empty()) return;
+    imaging::require_labels(labels, named, fmt::format("'{}', --label-edge-length", path.string()).c_str());
+}
 
 void require_millimetres(const Geometry& grid, const fs::path& path) {
     double extent = 0;
@@ -304,6 +313,7 @@ void validate(RegistrationInputs& inputs, const RegisterOptions& options) {
     if (!inputs.fixed_labels.empty()) validate_fixed_labels(inputs, options);
     require_known_surroundings(inputs.moving_labels, options);
     const Volume organ = imaging::without_labels(inputs.moving_labels, options.rigid_neighbours);
+    require_labels_of_lengths(options.label_edge_length, organ, organ_file(options));
     if (!options.materials.empty()) require_materials(inputs.materials, imaging::labels_in(organ), options.materials);
     const auto check_moving = [&](const Eigen::Matrix3Xd& points, const char* what) {
         check_inside(points, inputs.moving_grid(), what, inputs.notes);

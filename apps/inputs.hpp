@@ -67,6 +67,14 @@ void validate(RegistrationInputs& inputs, const RegisterOptions& options);
 void require_same_grid(const imaging::Geometry& image, const imaging::Geometry& labels, const std::string& image_name,
                        const std::string& labels_name, const std::string& remedy);
 
+/// Throws InvalidInput where two maps give one name to two numbers: segments are matched by number.
+void require_same_numbers(const imaging::LabelNames& names, const std::filesystem::path& path,
+                          const imaging::LabelNames& other_names, const std::filesystem::path& other_path);
+
+/// Throws InvalidInput where --label-edge-length names a label that the map lacks.
+void require_labels_of_lengths(const std::map<int, double>& label_edge_length, const imaging::Volume& labels,
+                               const std::filesystem::path& path);
+
 /// Throws InvalidInput where the extent of a grid is no part of a body: other units than millimetres.
 void require_millimetres(const imaging::Geometry& grid, const std::filesystem::path& path);
 

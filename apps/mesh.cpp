@@ -1,5 +1,6 @@
 // tissuewarp mesh: label map → tetrahedra, with the quality and the fidelity of what was made.
 
+#include "apps/inputs.hpp"
 #include "apps/module_description.hpp"
 #include "apps/noted_images.hpp"
 #include "apps/output_folder.hpp"
@@ -50,6 +51,7 @@ void run_mesh(const MeshOptions& options) {
     progress.begin("reading", 0.0, 0.05);
     const imaging::Volume labels = read_noted_labels(options.labels, progress);
     imaging::require_labels(labels, options.only, options.labels.string().c_str());
+    require_labels_of_lengths(options.label_edge_length, labels, options.labels);
 
     progress.begin("meshing", 0.05, 0.9);
     meshing::MeshingOptions meshing_options;

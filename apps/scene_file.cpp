@@ -55,7 +55,7 @@ void require_labels(const Scene& scene, const NameUses& uses) {
     for (const auto& [label, place, role] : uses.volume_labels)
         if (!std::binary_search(present.begin(), present.end(), label))
             throw InvalidInput(place + ": label " + std::to_string(label) + " " + role +
-                               " and the geometry has labels " + list(present) + " only");
+                               " and the geometry has labels " + list(present) + " only" + uses.geometry_notes);
 }
 
 void read_probes(TomlReader& file, Scene& scene) {

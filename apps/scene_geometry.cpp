@@ -57,6 +57,17 @@ void read_fibre_arrays(const std::optional<std::string>& mesh, const std::filesy
     }
 }
 
+/// Keeps what is passed on, for messages that end the run.
+struct NotesOfMesh : Observer {
+    explicit NotesOfMesh(Observer& listening) : next(listening) {}
+    void note(std::string_view message) override {
+        text.append("; ").append(message);
+        next.note(message);
+    }
+    Observer& next;
+    std::string text{};  ///< "; " before each
+};
+
 tled::EquilibriumMethod method_named(const std::string& name) {
     if (name == "relaxation") return tled::EquilibriumMethod::SelfCheckedRelaxation;
     if (name == "lbfgs") return tled::EquilibriumMethod::Lbfgs;
@@ -65,7 +76,7 @@ tled::EquilibriumMethod method_named(const std::string& name) {
 
 }  // namespace
 
-void read_geometry(TomlReader& file, const std::filesystem::path& folder, Scene& scene, const NameUses& uses,
+void read_geometry(TomlReader& file, const std::filesystem::path& folder, Scene& scene, NameUses& uses,
                    Observer& observer) {
     auto geometry = file.table("geometry");
     if (!geometry) throw InvalidInput(file.place() + ": the scene lacks [geometry]");
@@ -74,6 +85,8 @@ void read_geometry(TomlReader& file, const std::filesystem::path& folder, Scene&
     auto shapes = geometry->tables("shape");
     const double edge_length = geometry->number("edge_length_mm", edge).value_or(5.0);
     const auto label_edge_length = geometry->by_label("label_edge_length_mm", edge);
+    for (const auto& [label, length] : label_edge_length)
+        uses.volume_labels.push_back({label, geometry->place("label_edge_length_mm"), "has an edge length"});
     geometry->finish();
     if (int(labels.has_value()) + int(mesh.has_value()) + int(box.has_value()) + int(!shapes.empty()) != 1)
         throw InvalidInput(geometry->place() + ": [geometry] takes one of 'labels', 'mesh', 'box' and 'shape'");
@@ -82,7 +95,9 @@ void read_geometry(TomlReader& file, const std::filesystem::path& folder, Scene&
     } else if (labels) {
         scene.geometry = LabelledVolume{read_noted_labels(folder / *labels, observer), edge_length, label_edge_length};
     } else if (mesh) {
-        scene.geometry = meshing::read_vtu(folder / *mesh);
+        NotesOfMesh notes(observer);
+        scene.geometry = meshing::read_vtu(folder / *mesh, notes);
+        uses.geometry_notes = notes.text;
     } else {
         ShapeGeometry painted;
         for (TomlReader& shape : shapes) painted.shapes.push_back(shape_of(shape));

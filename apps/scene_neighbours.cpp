@@ -1,7 +1,7 @@
 // [[contact]] and [[sliding]]: what the tissue touches.
 
+#include "apps/point_files.hpp"
 #include "apps/scene_parts.hpp"
-#include "meshing/mesh_io.hpp"
 
 #include <numbers>
 
@@ -16,7 +16,7 @@ Body body_of(TomlReader& reader, const std::filesystem::path& folder, NameUses& 
     if (const auto plane = reader.table("plane")) bodies.emplace_back(read_half_space(*plane));
     if (const auto ball = reader.table("ball")) bodies.emplace_back(read_ball(*ball));
     if (const auto surface = reader.text("surface"))
-        bodies.emplace_back(meshing::read_surface(folder / *surface, observer).mesh);
+        bodies.emplace_back(read_tissue_surface(folder / *surface, observer));
     if (const auto label = reader.whole("label", 1, 1000000)) {
         bodies.emplace_back(ObstacleLabel{*label});
         uses.volume_labels.push_back({*label, reader.place("label"), "is a body in contact"});

@@ -29,6 +29,7 @@ struct NameUses {
         std::string array, place;
     };
     std::vector<FibreArray> fibre_arrays;
+    std::string geometry_notes;  ///< what its reader said, "; " before each, for messages about labels
 };
 
 constexpr double largest_length = 1e4;  // mm
@@ -38,8 +39,8 @@ inline const Range positive_length{1e-6, largest_length, "mm"};
 void read_tissues(TomlReader& file, const std::filesystem::path& folder, simulation::Scene& scene, NameUses& uses,
                   Observer& observer);
 /// The fibres that `uses` names too.
-void read_geometry(TomlReader& file, const std::filesystem::path& folder, simulation::Scene& scene,
-                   const NameUses& uses, Observer& observer);
+void read_geometry(TomlReader& file, const std::filesystem::path& folder, simulation::Scene& scene, NameUses& uses,
+                   Observer& observer);
 void read_sets(TomlReader& file, simulation::Scene& scene, NameUses& uses);
 void read_loads(TomlReader& file, simulation::Scene& scene, NameUses& uses);
 void read_neighbours(TomlReader& file, const std::filesystem::path& folder, simulation::Scene& scene, NameUses& uses,

@@ -4,6 +4,7 @@
 #include "core/file_message.hpp"
 #include "imaging/detail/dicom.hpp"
 #include "imaging/detail/gzip.hpp"
+#include "imaging/detail/header_checks.hpp"
 #include "imaging/detail/image_header.hpp"
 #include "imaging/detail/itk_image_io.hpp"
 #include "imaging/detail/structure_set.hpp"
@@ -145,10 +146,10 @@ void copy_labels(const Volume& image, Volume& labels, const fs::path& path) {
     for (std::size_t i = 0; i < count; ++i) {
         const auto value = static_cast<double>(source[i]);
         if (value < 0.0 || value != std::floor(value) || value > std::numeric_limits<int>::max()) {
-            std::ostringstream message;
-            message << "cannot use '" << path.string() << "' as a label map: it holds the value " << value
-                    << "; labels are whole numbers from 0 on, so give a segmentation, resampled with nearest neighbour";
-            throw InvalidInput(message.str());
+            throw InvalidInput("cannot use '" + path.string() + "' as a label map: it holds the value " +
+                               detail::all_digits(value) +
+                               "; labels are whole numbers from 0 on, so give a segmentation, resampled with nearest "
+                               "neighbour");
         }
         target[i] = static_cast<int>(value);
     }

@@ -23,9 +23,10 @@ void write_vtu(const TetMesh& mesh, const std::filesystem::path& path, const std
                const std::vector<MeshArray>& cell_arrays = {});
 
 /// Reads a .vtu of tetrahedra: what write_vtu makes, and the variants that VTK and meshio write, ascii, inline or
-/// appended, uncompressed or compressed by zlib, little-endian and in one piece. A missing `label` array means label 1.
-/// Throws IoError or InvalidInput.
-TetMesh read_vtu(const std::filesystem::path& path);
+/// appended, uncompressed or compressed by zlib, little-endian and in one piece. Labels are the cell array `label`, in
+/// any case, or else meshio's `gmsh:physical`; where there is neither all have label 1, with a note where other arrays
+/// may have been meant. Throws IoError or InvalidInput.
+TetMesh read_vtu(const std::filesystem::path& path, Observer& observer = silent_observer());
 
 /// Tetrahedra made by another program.
 struct MeshFile {

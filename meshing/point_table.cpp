@@ -1,9 +1,11 @@
 #include "meshing/point_table.hpp"
 
 #include "core/errors.hpp"
+#include "core/free_text.hpp"
+#include "core/length_units.hpp"
 
 #include <algorithm>
-#include <cctype>
+#include <charconv>
 #include <cmath>
 #include <map>
 
@@ -18,17 +20,16 @@ constexpr const char* axes_needed = "name the columns x,y,z (LPS mm), or r,a,s";
 /// A column's name without its unit and its frame.
 struct ColumnName {
     std::string axis, unit;
-    bool ras = false;
+    bool says_frame = false, ras = false;
 };
 
 /// Cuts "(mm)", "[mm]", "_mm" or " mm" from a name, of any unit of length, and returns the unit.
 std::string cut_unit(std::string& name) {
-    static const std::array<std::string, 8> units{"mm", "cm", "m", "um", "\xC2\xB5m", "\xCE\xBCm", "nm", "in"};
     const std::size_t cut = name.find_last_of("([_ ");
     if (cut == std::string::npos || cut == 0) return "";
     std::string unit = name.substr(cut + 1);
     while (!unit.empty() && (unit.back() == ')' || unit.back() == ']')) unit.pop_back();
-    if (std::find(units.begin(), units.end(), unit) == units.end()) return "";
+    if (!millimetres_per(unit)) return "";
     name = trimmed(std::string_view(name).substr(0, cut));
     return unit;
 }
@@ -49,6 +50,7 @@ ColumnName column_name(const std::string& text) {
         if (!behind && !before) continue;
         name.axis = behind ? name.axis.substr(0, name.axis.size() - 4) : name.axis.substr(4);
         name.ras = frame == "ras";
+        name.says_frame = true;
     }
     if (const auto word = words.find(name.axis); word != words.end()) name.axis = word->second;
     return name;
@@ -89,6 +91,7 @@ std::optional<AxisColumns> columns_by_letters(const TextTable& table, const std:
             found.column[axis] = c;
             found.name[axis] = header[c];
             found.signs[static_cast<Eigen::Index>(axis)] = name.ras && axis < 2 ? -sign : sign;
+            found.says_frame |= name.says_frame;
             ++count;
         }
         if (count > 1)
@@ -107,21 +110,50 @@ double sign_of_direction(const Axis& axis, const ColumnName& name) {
     return name.axis == std::string(1, axis.against) ? -1 : 0;
 }
 
-/// A remark that says RAS or LPS and not both.
+/// The frame that remarks name; empty where they name none.
 std::string frame_in_remarks(const TextTable& table) {
     std::string frame;
     for (const TextTable::Remark& remark : table.remarks()) {
-        std::string text = remark.text;
-        std::replace_if(
-            text.begin(), text.end(), [](unsigned char c) { return std::isalnum(c) == 0; }, ' ');
-        for (const std::string& word : words_of(text)) {
-            if (word != "RAS" && word != "LPS") continue;
-            if (!frame.empty() && frame != word)
+        for (const std::string& named : frames_in(remark.text)) {
+            if (named != "RAS" && named != "LPS")
+                table.refuse(remark.line,
+                             "says that its points are in the frame " + named + "; write them as LPS or RAS");
+            if (!frame.empty() && frame != named)
                 table.refuse(remark.line, "the remarks name both RAS and LPS; leave the one in which the points are");
-            frame = word;
+            frame = named;
         }
     }
     return frame;
+}
+
+void require_millimetres_in_remarks(const TextTable& table) {
+    for (const TextTable::Remark& remark : table.remarks())
+        if (const std::string unit = foreign_unit_in(remark.text); !unit.empty())
+            table.refuse(remark.line, "says that its unit is " + unit + "; coordinates in mm are needed");
+}
+
+/// A column that names points, where others may number rows.
+bool is_title(const std::string& column) {
+    return column == "label" || column == "name";
+}
+
+/// A number that says whether a point counts; decimal commas are seen through.
+std::optional<double> state_number(std::string word) {
+    std::replace(word.begin(), word.end(), ',', '.');
+    double value = 0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error != std::errc{} || end != word.data() + word.size() || !std::isfinite(value)) return std::nullopt;
+    return value;
+}
+
+/// 0, 1, 2, ... or 1, 2, 3, ... in their order.
+bool count_rows(const std::vector<std::string>& names) {
+    for (const std::size_t first : {0U, 1U}) {
+        std::size_t n = 0;
+        while (n < names.size() && names[n] == std::to_string(n + first)) ++n;
+        if (n == names.size()) return true;
+    }
+    return false;
 }
 
 class PointTableReader {
@@ -149,7 +181,7 @@ private:
     std::optional<AxisColumns> normals_;
     std::vector<Eigen::Vector3d> points_, directions_;
     std::size_t label_ = 0, line_ = 0;
-    std::vector<std::size_t> counts_;
+    std::vector<std::size_t> states_;
     std::vector<std::string> left_out_;
     PointTable result_;
 
@@ -199,8 +231,7 @@ private:
             table_.refuse(table_.header_line(), "the header '" + joined(header_) +
                                                     "' does not say which columns are coordinates; " + axes_needed);
         axes_ = *found;
-        const std::string frame = turn_by_remark();
-        if (axes_.signs != Eigen::Vector3d(1, 1, 1) && frame != "RAS")
+        if (!turn_by_remark() && axes_.signs != Eigen::Vector3d(1, 1, 1))
             note("the columns " + axes_.name[0] + ", " + axes_.name[1] + ", " + axes_.name[2] + " were turned to LPS");
         normals_ = columns_by_letters(table_, header_, "", [](const Axis& axis, const ColumnName& name) {
             return name.axis == std::string("n") + axis.plain ? 1.0 : 0.0;
@@ -208,28 +239,21 @@ private:
     }
 
     /// Where axes are x, y and z and a remark says RAS.
-    std::string turn_by_remark() {
-        if (axes_.signs != Eigen::Vector3d(1, 1, 1) || lower_case(axes_.name[0]).starts_with("l")) return "";
-        const std::string frame = frame_in_remarks(table_);
-        if (frame != "RAS") return frame;
-        axes_.signs = {-1, -1, 1};
-        note("says that its points are RAS; they were turned to LPS");
-        return frame;
+    bool turn_by_remark() {
+        const bool turned = turn_by_remarks(table_, axes_);
+        if (turned) note("says that its points are RAS; they were turned to LPS");
+        return turned;
     }
 
     /// Columns that say more of a point; those that there are not are past the last.
     void find_further_columns() {
-        label_ = find_column(table_, header_, "label");
-        if (label_ == header_.size()) label_ = find_column(table_, header_, "name");
+        label_ = name_column(table_, header_);
         line_ = find_column(table_, header_, "line");
-        for (const char* name : {"defined", "visible"})  // of 3D Slicer: 0 for points that are not placed, or hidden
-            if (const std::size_t c = find_column(table_, header_, name); c < header_.size()) counts_.push_back(c);
+        states_ = state_columns(table_, header_);
     }
 
     void take(const Row& row) {
-        const bool counts =
-            std::none_of(counts_.begin(), counts_.end(), [&](std::size_t column) { return row.fields[column] == "0"; });
-        if (!counts) {
+        if (!row_counts(table_, row, states_)) {
             left_out_.push_back(label_ < header_.size() ? row.fields[label_] : "line " + std::to_string(row.line));
             return;
         }
@@ -273,6 +297,8 @@ private:
         if (!left_out_.empty()) note("points that are not placed or hidden are left out: " + joined(left_out_));
         if (table_.has_decimal_commas()) note("its numbers have decimal commas");
         result_.blank_line = table_.blank_line();
+        result_.names_count_rows =
+            label_ < header_.size() && !is_title(lower_case(header_[label_])) && count_rows(result_.names);
         if (result_.blank_line > 0 && result_.names.empty())
             note("line " + std::to_string(result_.blank_line) +
                  " is empty and others follow; is a point missing there?");
@@ -292,7 +318,43 @@ std::optional<AxisColumns> axis_columns(const TextTable& table, const std::vecto
                                         std::string_view prefix) {
     const std::string before(prefix);
     if (auto plain = columns_by_letters(table, header, before, sign_of_plain)) return plain;
-    return columns_by_letters(table, header, before, sign_of_direction);
+    auto directions = columns_by_letters(table, header, before, sign_of_direction);
+    if (directions) directions->says_frame = true;
+    return directions;
+}
+
+bool turn_by_remarks(const TextTable& table, AxisColumns& columns) {
+    require_millimetres_in_remarks(table);
+    if (columns.says_frame || frame_in_remarks(table) != "RAS") return false;
+    columns.signs = {-1, -1, 1};
+    return true;
+}
+
+std::size_t name_column(const TextTable& table, const std::vector<std::string>& header) {
+    for (const char* name : {"label", "name", "landmark", "point", "id"})
+        if (const std::size_t column = find_column(table, header, name); column < header.size()) return column;
+    return header.size();
+}
+
+std::vector<std::size_t> state_columns(const TextTable& table, const std::vector<std::string>& header,
+                                       const std::string& prefix) {
+    std::vector<std::size_t> columns;
+    for (const char* name : {"defined", "visible"})  // of 3D Slicer: 0 for points that are not placed, or hidden
+        if (const std::size_t c = find_column(table, header, prefix + name); c < header.size()) columns.push_back(c);
+    return columns;
+}
+
+bool row_counts(const TextTable& table, const TextTable::Row& row, const std::vector<std::size_t>& states) {
+    bool counts = true;
+    for (const std::size_t column : states) {
+        const std::string word = lower_case(trimmed(row.fields[column]));
+        const bool yes = word == "true" || word == "yes", no = word == "false" || word == "no";
+        const std::optional<double> number = state_number(word);
+        if (!yes && !no && !number)
+            table.refuse(row.line, "'" + row.fields[column] + "' does not say whether the point counts; write 1 or 0");
+        counts = counts && !no && (yes || *number != 0);
+    }
+    return counts;
 }
 
 PointTable read_point_table(const std::filesystem::path& path) {

@@ -77,7 +77,7 @@ MeshFile read_checked(const std::filesystem::path& path) {
     const std::string extension = detail::extension_of(path);
     FileReader file(path);
     if (extension == ".vtu") {
-        read.mesh = read_vtu(path);
+        read = detail::read_vtu_with_notes(path);
     } else if (extension == ".msh" || extension == ".inp") {
         RawTetrahedra raw = extension == ".msh" ? detail::read_msh(file) : detail::read_inp(file);
         read.mesh = mesh_of(raw, file);
@@ -85,6 +85,7 @@ MeshFile read_checked(const std::filesystem::path& path) {
             return std::find(raw.labels.begin(), raw.labels.end(), entry.first) == raw.labels.end();
         });
         read.label_names = std::move(raw.label_names);
+        read.notes = std::move(raw.notes);
     } else {
         file.fail("has the extension '" + extension + "'; tetrahedra are read from .vtu, .msh and .inp");
     }

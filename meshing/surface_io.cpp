@@ -1,4 +1,5 @@
 #include "core/atomic_file.hpp"
+#include "core/free_text.hpp"
 #include "meshing/detail/surface_formats.hpp"
 #include "meshing/detail/vtk_appended.hpp"
 #include "meshing/mesh_io.hpp"
@@ -38,6 +39,7 @@ bool is_ras(const RawSurface& raw, const FileReader& file, Observer& observer) {
 }
 
 Eigen::Matrix3Xd checked_nodes(const RawSurface& raw, const FileReader& file) {
+    if (!raw.unit.empty()) file.refuse("says that its unit is " + raw.unit + "; write coordinates in mm");
     if (raw.nodes.empty()) file.refuse("has no points; at least one is needed");
     Eigen::Matrix3Xd nodes(3, static_cast<Eigen::Index>(raw.nodes.size()));
     for (Eigen::Index n = 0; n < nodes.cols(); ++n) {
@@ -213,6 +215,13 @@ std::string detail::space_in(std::string_view text) {
         if (whole && axes == 3) return space;
     }
     return "";
+}
+
+void detail::RawSurface::take_free_text(std::string_view text) {
+    if (unit.empty()) unit = foreign_unit_in(text);
+    if (space.empty()) space = space_in(text);
+    const std::set<std::string> frames = frames_stated_in(text);
+    if (space.empty() && !frames.empty()) space = frames.size() == 1 ? *frames.begin() : "RAS and LPS";
 }
 
 Surface read_surface(const std::filesystem::path& path, Observer& observer) {

@@ -263,8 +263,17 @@ void for_each_frame(const std::vector<DicomFile>& files, const std::vector<Slice
     }
 }
 
+void require_linear_values(const std::vector<DicomFile>& files) {
+    for (const DicomFile& file : files)
+        if (file.value_table)
+            throw unusable(file.path,
+                           "its values are entries of a table (Modality LUT Sequence, 0028,3000), which is "
+                           "not read; export it with Rescale Slope and Rescale Intercept");
+}
+
 Volume read_image(const fs::path& path, const std::vector<DicomFile>& files, std::vector<Slice> slices,
                   std::vector<std::string>& notes) {
+    require_linear_values(files);
     if (slices.size() < 2) throw unusable_series(path, "it holds one slice; give the folder of the whole series");
     require_alike(path, slices);
     sort_by_height(slices);
@@ -338,9 +347,26 @@ void read_segment_frame(const Slice& slice, const cv::Mat& pixels, const Paint& 
         if (const int value = values.ptr<int>()[i]; value >= least) paint(i, numbers ? value : slice.frame().segment);
 }
 
+/// Of all files of one segmentation, in which a number is one segment.
+std::map<int, std::string> segment_names(const fs::path& path, const std::vector<DicomFile>& files) {
+    std::map<int, const DicomFile*> file_of;
+    for (const DicomFile& file : files)
+        for (const auto& [number, name] : file.segment_names) {
+            const DicomFile& first = *file_of.try_emplace(number, &file).first->second;
+            if (first.segment_names.at(number) != name)
+                throw unusable_series(
+                    path, "segment " + std::to_string(number) + " is '" + first.segment_names.at(number) + "' in " +
+                              first.path.filename().string() + " and '" + name + "' in " +
+                              file.path.filename().string() + "; give one file, or number the segments anew");
+        }
+    std::map<int, std::string> names;
+    for (const auto& [number, file] : file_of) names[number] = file->segment_names.at(number);
+    return names;
+}
+
 ReadResult read_segmentation(const fs::path& path, const std::vector<DicomFile>& files, std::vector<Slice> slices) {
     ReadResult result;
-    for (const DicomFile& file : files) result.label_names.insert(file.segment_names.begin(), file.segment_names.end());
+    result.label_names = segment_names(path, files);
     for (const Slice& slice : slices)
         if (slice.file->segmentation != DicomFile::Segmentation::LabelMap && slice.frame().segment < 1)
             throw unusable_series(path,

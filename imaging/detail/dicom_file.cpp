@@ -286,6 +286,7 @@ DicomFile description_of(const fs::path& path, const DicomSet& set) {
     file.high_bit = set.whole(0x00280102, file.bits_stored - 1);
     file.is_signed = set.whole(0x00280103, 0) != 0;
     file.palette = set.text(0x00280004) == "PALETTE COLOR";
+    file.value_table = !set.items(0x00283000).empty();
     file.mosaic = set.text(0x00080008).find("MOSAIC") != std::string::npos;
     const double frames = set.number(0x00280008).value_or(1.0);
     values_of(path, {frames, 1.0 * file.rows, 1.0 * file.columns});

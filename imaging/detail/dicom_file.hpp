@@ -36,6 +36,7 @@ struct DicomFile {
     int bits_stored = 0, high_bit = 0;
     bool is_signed = false;
     bool palette = false;            ///< pixels are indices of colours
+    bool value_table = false;        ///< Modality LUT Sequence: values are entries of a table, not slope and intercept
     bool mosaic = false;             ///< Siemens: many slices side by side in one frame
     std::vector<DicomFrame> frames;  ///< in the order of the file
     Segmentation segmentation = Segmentation::None;

@@ -3,6 +3,8 @@
 #include "core/file_message.hpp"
 
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <cmath>
 #include <sstream>
 
@@ -22,6 +24,11 @@ InvalidInput unusable(const fs::path& path, const std::string& cause) {
 
 IoError unreadable(const fs::path& path, const std::string& cause) {
     return IoError(presentable("cannot read '" + path.string() + "': " + cause));
+}
+
+std::string all_digits(double value) {
+    std::array<char, 32> text{};
+    return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
 }
 
 std::string text_of(const std::vector<double>& sizes) {

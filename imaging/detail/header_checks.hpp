@@ -16,6 +16,9 @@ InvalidInput unusable(const std::filesystem::path& path, const std::string& caus
 /// "cannot read 'path': cause", of a file that breaks the rules of its format.
 IoError unreadable(const std::filesystem::path& path, const std::string& cause);
 
+/// As many digits as tell the value from its neighbours.
+std::string all_digits(double value);
+
 /// "4 x 5 x 6".
 std::string text_of(const std::vector<double>& sizes);
 

@@ -1,9 +1,9 @@
 /// MetaImage (.mha, .mhd), after the format's description and MetaIO's reader: offsets and axes are LPS mm, a row of
 /// TransformMatrix is the direction of an axis.
 
+#include "core/length_units.hpp"
 #include "imaging/detail/header_checks.hpp"
 #include "imaging/detail/image_header.hpp"
-#include "imaging/detail/length_units.hpp"
 #include "imaging/detail/text_headers.hpp"
 
 #include <algorithm>

@@ -1,8 +1,8 @@
 /// NRRD (.nrrd, .nhdr), after "Definition of NRRD File Format" of the Teem library.
 
+#include "core/length_units.hpp"
 #include "imaging/detail/header_checks.hpp"
 #include "imaging/detail/image_header.hpp"
-#include "imaging/detail/length_units.hpp"
 #include "imaging/detail/text_headers.hpp"
 
 #include <Eigen/LU>
@@ -14,6 +14,7 @@
 #include <map>
 #include <numeric>
 #include <optional>
+#include <set>
 #include <sstream>
 
 namespace tissuewarp::imaging::detail {
@@ -355,7 +356,7 @@ private:
         const std::size_t axis = *axes_.values;
         const double count = sizes_[axis];
         const std::string kind = kinds_.empty() ? "" : lower_case(kinds_[axis]);
-        const bool segmented = has_segment(0);
+        const bool segmented = !segments().empty();
         if (kind.find("color") != std::string::npos)
             throw unusable(path_,
                            "its voxels are colours ('" + kinds_[axis] + "'); give one grey value or a vector of three");
@@ -469,12 +470,22 @@ private:
                                       "' is no number from 0 on; correct the header");
         return static_cast<int>(values[0]);
     }
-    bool has_segment(int number) const {
-        return !segment_field(number, "ID").empty() || !segment_field(number, "LabelValue").empty();
+    /// Numbers of the segments, ascending; gaps are where one was deleted.
+    std::set<int> segments() const {
+        constexpr std::size_t most_digits = 6;
+        const std::string prefix = "Segment";
+        std::set<int> numbers;
+        for (const auto& [key, value] : header_.comments) {
+            const std::size_t end = key.find_first_not_of("0123456789", prefix.size());
+            if (!key.starts_with(prefix) || end == std::string::npos || end == prefix.size()) continue;
+            const std::string field = key.substr(end), digits = key.substr(prefix.size(), end - prefix.size());
+            if ((field != "_ID" && field != "_LabelValue") || value.empty() || digits.size() > most_digits) continue;
+            numbers.insert(std::stoi(digits));
+        }
+        return numbers;
     }
     void read_segments() {
-        constexpr int most = 10000;
-        for (int i = 0; i < most && has_segment(i); ++i) {
+        for (const int i : segments()) {
             Segment segment;
             segment.name = segment_field(i, "Name").empty() ? segment_field(i, "ID") : segment_field(i, "Name");
             // Versions of 3D Slicer before 4.11 wrote a layer a segment, and neither key.

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 #include <set>
-#include <sstream>
 
 namespace tissuewarp::imaging::detail {
 
@@ -39,9 +38,8 @@ cv::Mat whole_numbers(const Volume& layers, const std::filesystem::path& path) {
     for (std::size_t i = 0; i < count; ++i) {
         const double value = doubles.ptr<double>()[i];
         if (value < 0.0 || value != std::floor(value) || value > std::numeric_limits<int>::max()) {
-            std::ostringstream text;
-            text << value;
-            throw unusable(path, "a layer holds the value " + text.str() + "; labels are whole numbers from 0 on");
+            throw unusable(path,
+                           "a layer holds the value " + all_digits(value) + "; labels are whole numbers from 0 on");
         }
     }
     return values;

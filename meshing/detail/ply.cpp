@@ -127,12 +127,22 @@ void read_element(FileReader& file, const Element& element, Encoding encoding, R
     }
 }
 
+/// Of the header, behind which the cursor stands and stays.
+void take_comments(FileReader& file, RawSurface& surface) {
+    const std::size_t end = file.position();
+    file.seek(0);
+    while (file.position() < end)
+        if (const std::string_view line = file.line(); line.starts_with("comment") || line.starts_with("obj_info"))
+            surface.take_free_text(line);
+    file.seek(end);
+}
+
 }  // namespace
 
 RawSurface read_ply(FileReader& file) {
     RawSurface surface;
     const Header header = read_header(file);
-    surface.space = space_in(file.text().substr(0, file.position()));
+    take_comments(file, surface);
     for (const Element& element : header.elements) read_element(file, element, header.encoding, surface);
     return surface;
 }

@@ -1,5 +1,6 @@
 // The short formats: stereolithography (ascii, binary) and Wavefront OBJ.
 
+#include "core/text_table.hpp"
 #include "meshing/detail/surface_formats.hpp"
 
 #include <map>
@@ -31,7 +32,7 @@ void require_finite(const Eigen::Vector3d& position, const FileReader& file) {
 
 RawSurface read_binary_stl(FileReader& file, std::size_t count) {
     RawSurface surface;
-    surface.space = space_in(file.text().substr(0, 80));
+    surface.take_free_text(file.text().substr(0, 80));
     NodeMerger merger(surface);
     file.seek(84);
     for (std::size_t t = 0; t < count; ++t) {
@@ -51,7 +52,7 @@ RawSurface read_binary_stl(FileReader& file, std::size_t count) {
 
 RawSurface read_ascii_stl(FileReader& file) {
     RawSurface surface;
-    surface.space = space_in(file.line());
+    surface.take_free_text(file.line());
     NodeMerger merger(surface);
     std::vector<long long> corners;
     bool ended = false;
@@ -71,6 +72,14 @@ RawSurface read_ascii_stl(FileReader& file) {
     }
     if (!ended || !corners.empty()) file.fail("ends before its data do");
     return surface;
+}
+
+/// "v x y z w": a fourth number is a weight, by which the others are to be divided; six are a place and a colour.
+void require_weight_of_one(std::string_view vertex, const FileReader& file) {
+    const std::vector<std::string> words = words_of(vertex);
+    if (words.size() == 5 && file.to_number(words[4]) != 1)
+        file.refuse("has a vertex with the weight " + words[4] + " ('" + std::string(vertex.substr(0, 60)) +
+                    "'); divide x, y and z by it and leave it out");
 }
 
 }  // namespace
@@ -96,12 +105,13 @@ RawSurface read_obj(FileReader& file) {
     while (file.remaining() > 0) {
         const std::string_view line = file.line();
         if (line.starts_with('#')) {
-            if (surface.space.empty()) surface.space = space_in(line);
+            surface.take_free_text(line.substr(1));
         } else if (line.starts_with("v ") || line.starts_with("v\t")) {
             const std::size_t next = file.position();
             file.seek(static_cast<std::size_t>(line.data() - file.text().data()) + 1);
             Eigen::Vector3d position;
             for (double& x : position) x = file.number();
+            require_weight_of_one(line, file);
             surface.nodes.push_back(position);
             file.seek(next);
         } else if (line.starts_with("f ") || line.starts_with("f\t")) {

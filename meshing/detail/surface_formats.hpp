@@ -15,6 +15,10 @@ struct RawSurface {
     std::vector<std::array<long long, 3>> triangles;
     std::vector<std::vector<long long>> lines;  ///< of VTK's files alone
     std::string space;                          ///< "LPS", "RAS", ...; empty where the file does not say
+    std::string unit;                           ///< of length, as the file has it, where it says another than mm
+
+    /// What a title, a remark or a comment says of frame and unit; the first counts.
+    void take_free_text(std::string_view text);
 
     /// Cuts a polygon into a fan of triangles.
     void add_polygon(const std::vector<long long>& corners) {

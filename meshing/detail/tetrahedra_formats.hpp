@@ -19,6 +19,7 @@ struct RawTetrahedra {
     std::vector<std::array<long long, 4>> tets;
     std::vector<int> labels;
     std::map<int, std::string> label_names;
+    std::vector<std::string> notes;
 
     void add_node(long long number, const Eigen::Vector3d& place, const FileReader& file) {
         if (!node_of.emplace(number, static_cast<int>(nodes.size())).second)
@@ -29,5 +30,8 @@ struct RawTetrahedra {
 
 RawTetrahedra read_msh(FileReader& file);  ///< Gmsh
 RawTetrahedra read_inp(FileReader& file);  ///< Abaqus
+
+/// As read_vtu, with its notes.
+MeshFile read_vtu_with_notes(const std::filesystem::path& path);
 
 }  // namespace tissuewarp::meshing::detail

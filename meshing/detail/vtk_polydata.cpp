@@ -15,7 +15,7 @@ public:
 
     RawSurface read() {
         if (!file_.line().starts_with("# vtk DataFile")) file_.fail("is no VTK legacy file");
-        surface_.space = space_in(file_.line());  // the title, as 3D Slicer writes it
+        surface_.take_free_text(file_.line());  // the title, as 3D Slicer writes it
         const std::string encoding = keyword();
         if (encoding != "ASCII" && encoding != "BINARY") file_.fail("is neither ASCII nor BINARY");
         binary_ = encoding == "BINARY";

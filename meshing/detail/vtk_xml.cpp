@@ -170,6 +170,13 @@ std::string VtkXml::attribute(const std::string& section, const std::string& key
     return found == sections_.end() ? std::string() : found->second.attribute(key);
 }
 
+bool VtkXml::is_numeric(const std::string& name) const {
+    const auto found = arrays_.find(name);
+    if (found == arrays_.end()) return false;
+    const std::string type = found->second.attribute("type");
+    return type.starts_with("Int") || type.starts_with("UInt") || type.starts_with("Float");
+}
+
 std::string VtkXml::bytes_of(const XmlTag& tag) const {
     VtkEncoded encoded{content_of(tag, file_), true, compressed_, header_bytes_};
     if (tag.attribute("format") == "appended") {

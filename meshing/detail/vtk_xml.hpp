@@ -38,6 +38,8 @@ public:
     /// Of all arrays, "Section/Name", as the file has them; that of the points is "Points/" whatever its name.
     [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
     [[nodiscard]] bool has(const std::string& name) const { return arrays_.contains(name); }
+    /// True for an array of integers or floating-point numbers.
+    [[nodiscard]] bool is_numeric(const std::string& name) const;
 
     /// The values of an array, all components of an entry in a row.
     [[nodiscard]] std::vector<double> values(const std::string& name) const;

@@ -6,6 +6,7 @@
 #include "registration/io/slicer_markups.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <map>
 #include <string>
@@ -64,7 +65,8 @@ Eigen::Matrix3Xd read_elastix_points(const std::filesystem::path& path) {
 }
 
 struct PointList : Markups {
-    int blank_line = 0;  ///< between the points of a table, where one may be missing; or 0
+    int blank_line = 0;             ///< between the points of a table, where one may be missing; or 0
+    bool names_count_rows = false;  ///< as a column `id` may
 };
 
 PointList read_points_as_they_are(const std::filesystem::path& path, Observer& observer) {
@@ -72,7 +74,7 @@ PointList read_points_as_they_are(const std::filesystem::path& path, Observer& o
     if (!is_table(path)) return {{read_elastix_points(path), {}, {}}};
     meshing::PointTable table = meshing::read_point_table(path);
     for (const std::string& note : table.notes) observer.note(note);
-    return {{std::move(table.points), std::move(table.names), {}}, table.blank_line};
+    return {{std::move(table.points), std::move(table.names), {}}, table.blank_line, table.names_count_rows};
 }
 
 PointList read_points_of_any_kind(const std::filesystem::path& path, Observer& observer) {
@@ -83,6 +85,11 @@ PointList read_points_of_any_kind(const std::filesystem::path& path, Observer& o
 
 bool has_names(const Markups& markups) {
     return std::any_of(markups.labels.begin(), markups.labels.end(), [](const auto& name) { return !name.empty(); });
+}
+
+/// Names by which points are pairs. Numbers of rows are such where the other file's are in another order.
+bool are_by_name(const PointList& from, const PointList& to) {
+    return has_names(from) && has_names(to) && !(from.names_count_rows && to.names_count_rows);
 }
 
 /// Place of each name. Throws InvalidInput where one repeats or a point has none.
@@ -151,6 +158,40 @@ AxisColumns columns_of(const TextTable& table, const std::string& prefix) {
     table.refuse(table.header_line(), std::string("the header must name ") + pair_columns);
 }
 
+/// With a note of what was turned.
+void turn_pairs_by_remarks(const TextTable& table, const std::array<AxisColumns*, 2>& sides, Observer& observer) {
+    for (AxisColumns* columns : sides) {
+        const bool by_remark = meshing::turn_by_remarks(table, *columns);
+        const std::string names = columns->name[0] + ", " + columns->name[1] + ", " + columns->name[2];
+        if (by_remark)
+            observer.note(
+                note_of(table.path(), "says that its points are RAS; the columns " + names + " were turned to LPS"));
+        else if (columns->signs != Eigen::Vector3d(1, 1, 1))
+            observer.note(note_of(table.path(), "the columns " + names + " were turned to LPS"));
+    }
+}
+
+struct PairRows {
+    std::vector<const TextTable::Row*> counting;
+    std::vector<std::string> left_out;  ///< by name, or line
+};
+
+/// Rows that no column `defined` or `visible`, of the pair or of one of its points, excludes.
+PairRows rows_that_count(const TextTable& table) {
+    std::vector<std::size_t> states;
+    for (const char* prefix : {"", "pre_", "intra_"})
+        for (const std::size_t column : meshing::state_columns(table, table.header(), prefix)) states.push_back(column);
+    const std::size_t name = meshing::name_column(table, table.header());
+    PairRows rows;
+    for (const TextTable::Row& row : table.rows()) {
+        if (meshing::row_counts(table, row, states))
+            rows.counting.push_back(&row);
+        else
+            rows.left_out.push_back(name < row.fields.size() ? row.fields[name] : "line " + std::to_string(row.line));
+    }
+    return rows;
+}
+
 }  // namespace
 
 bool is_table_of_pairs(const std::filesystem::path& path) {
@@ -168,17 +209,18 @@ Landmarks read_landmarks(const std::filesystem::path& path, Observer& observer) 
         table.refuse(table.rows().front().line,
                      std::string("no header; a first row naming ") + pair_columns + " is needed");
     table.require_even_rows();
-    const AxisColumns moving = columns_of(table, "pre_"), fixed = columns_of(table, "intra_");
+    AxisColumns moving = columns_of(table, "pre_"), fixed = columns_of(table, "intra_");
+    turn_pairs_by_remarks(table, {&moving, &fixed}, observer);
+    const PairRows rows = rows_that_count(table);
     std::vector<Eigen::Vector3d> from, to;
-    for (const TextTable::Row& row : table.rows()) {
-        from.push_back(moving.point(table, row));
-        to.push_back(fixed.point(table, row));
+    for (const TextTable::Row* row : rows.counting) {
+        from.push_back(moving.point(table, *row));
+        to.push_back(fixed.point(table, *row));
     }
     if (from.empty()) table.refuse(table.header_line(), "no landmark follows the header; at least one row is needed");
-    for (const AxisColumns& columns : {moving, fixed})
-        if (columns.signs != Eigen::Vector3d(1, 1, 1))
-            observer.note(note_of(table.path(), "the columns " + columns.name[0] + ", " + columns.name[1] + ", " +
-                                                    columns.name[2] + " were turned to LPS"));
+    if (!rows.left_out.empty())
+        observer.note(
+            note_of(table.path(), "pairs that are not placed or hidden are left out: " + listed(rows.left_out)));
     if (table.has_decimal_commas()) observer.note(note_of(table.path(), "its numbers have decimal commas"));
     Landmarks landmarks{as_matrix(from), as_matrix(to)};
     for (const Eigen::Matrix3Xd* points : {&landmarks.moving, &landmarks.fixed})
@@ -188,14 +230,14 @@ Landmarks read_landmarks(const std::filesystem::path& path, Observer& observer) 
 
 Landmarks read_landmarks(const std::filesystem::path& moving, const std::filesystem::path& fixed, Observer& observer) {
     PointList from = read_points_of_any_kind(moving, observer), to = read_points_of_any_kind(fixed, observer);
-    if (has_names(from) && has_names(to)) return paired_by_name(from, to, moving, fixed, observer);
+    if (are_by_name(from, to)) return paired_by_name(from, to, moving, fixed, observer);
     require_no_gap(from, moving);
     require_no_gap(to, fixed);
     if (from.points.cols() != to.points.cols())
         throw InvalidInput(moving.string() + " has " + std::to_string(from.points.cols()) + " points and " +
                            fixed.string() + " has " + std::to_string(to.points.cols()) +
                            "; corresponding points need equal numbers, or names in both files");
-    if (has_names(from) || has_names(to))
+    if (has_names(from) != has_names(to))
         observer.note(
             note_of(has_names(from) ? fixed : moving, "its points have no names; they are pairs by their order"));
     return {std::move(from.points), std::move(to.points)};

@@ -110,13 +110,15 @@ PointMap matrix(const std::string& text, const std::filesystem::path& path) {
 }
 
 PointMap displacement_image(const std::filesystem::path& path) {
-    const imaging::Volume field = imaging::read_volume(path);
+    const imaging::ReadResult read = imaging::read_volume_with_notes(path);
+    const imaging::Volume& field = read.volume;
     if (field.channels() != 3)
         throw InvalidInput("'" + path.string() + "' has " + std::to_string(field.channels()) +
                            " component; a displacement field has three");
     PointMap map;
     map.field = field.as(CV_32F);
     map.type = imaging::stated_field_type(path).value_or(imaging::FieldType::Resampling);
+    map.notes = read.notes;
     return map;
 }
 

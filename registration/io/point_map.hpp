@@ -8,6 +8,8 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
+#include <vector>
 
 namespace tissuewarp::registration {
 
@@ -19,6 +21,7 @@ struct PointMap {
     Eigen::Affine3d after = Eigen::Affine3d::Identity();
     /// Modeling where the file says that it maps the other way, from moving points to fixed ones.
     imaging::FieldType type = imaging::FieldType::Resampling;
+    std::vector<std::string> notes{};  ///< what the reader of the field had to decide
 };
 
 /// Reads transforms of ITK as ANTs and 3D Slicer write them: text (.tfm, .txt), HDF5 (.h5) and Matlab (.mat)

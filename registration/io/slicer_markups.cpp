@@ -129,12 +129,15 @@ json parsed(const std::filesystem::path& path) {
     }
 }
 
-/// "mm", or a list that begins with it.
+/// "mm", or a list of it; a code of a dictionary counts by its first entry, ["mm", "UCUM", "millimeter"].
 void require_millimetres(const json& list, const std::string& where) {
     const auto units = list.find("coordinateUnits");
     if (units == list.end()) return;
-    const json& first = units->is_array() && !units->empty() ? units->front() : *units;
-    if (first != "mm") throw InvalidInput(where + ": coordinateUnits is " + units->dump() + "; save the points in mm");
+    const bool code = units->is_array() && units->size() > 1 && (*units)[1] == "UCUM";
+    const bool listed = units->is_array() && !units->empty() && !code;
+    const bool all = listed ? std::all_of(units->begin(), units->end(), [](const json& unit) { return unit == "mm"; })
+                            : (code ? units->front() : *units) == "mm";
+    if (!all) throw InvalidInput(where + ": coordinateUnits is " + units->dump() + "; save the points in mm");
 }
 
 std::string system_of(const json& list, const std::string& where) {

@@ -179,6 +179,32 @@ class Kinds(PhantomTest):
         result = phantom.register(moving=None, fixed=None, moving_labels=moving, fixed_labels=fixed)
         self.assert_refused(result, INPUT, "m.seg.nrrd", "f.seg.nrrd", "'shell'", "label 2")
 
+    def test_evaluate_refuses_one_name_with_two_numbers(self):
+        folder, labels = self.phantom.folder, self.phantom.moving_labels_array
+        one = segmentation(folder / "m.seg.nrrd", labels, {1: "shell", 2: "core"})
+        other = segmentation(folder / "f.seg.nrrd", labels, {1: "core", 2: "shell"})
+        self.assert_refused(run("evaluate", "--labels", one, "--reference-labels", other), INPUT, "m.seg.nrrd",
+                            "f.seg.nrrd", "'shell'", "label 2")
+
+    def test_lengths_of_labels_that_a_map_lacks_are_refused(self):
+        labels, folder = self.phantom.moving_labels, self.phantom.folder
+        result = run("mesh", labels, "-o", folder / "a.vtu", "--label-edge-length", "9=3")
+        self.assert_refused(result, INPUT, labels.name, "--label-edge-length", "label 9 is absent", "1, 2")
+        scene = folder / "scene.toml"
+        scene.write_text(SCENE.replace("LABELS", labels.name).replace("edge_length_mm = 8",
+                         "edge_length_mm = 8\nlabel_edge_length_mm = { 9 = 3 }"))
+        result = run("simulate", scene, "-o", folder / "out")
+        self.assert_refused(result, INPUT, "label 9 has an edge length", "labels 1, 2 only")
+
+    def test_a_contact_surface_in_metres_is_refused(self):
+        folder = self.phantom.folder
+        (folder / "wall.obj").write_text("v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n"
+                                         "f 2 3 4\n")
+        scene = folder / "scene.toml"
+        scene.write_text(SCENE.replace("LABELS", self.phantom.moving_labels.name) +
+                         '[[contact]]\nsurface = "wall.obj"\n')
+        self.assert_refused(run("simulate", scene, "-o", folder / "out"), INPUT, "wall.obj", "in metres?")
+
 
 if __name__ == "__main__":
     unittest.main()

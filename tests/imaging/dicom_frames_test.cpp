@@ -270,12 +270,13 @@ Elements segment_description(int number, const std::string& name) {
 
 /// Bits of the frames, joined, or packed by RLE a frame; every frame shows the voxels of its segment.
 void write_segmentation(const std::filesystem::path& path, const Volume& labels, const std::vector<Frame>& frames,
-                        bool packed = false, const std::string& type = "BINARY") {
+                        bool packed = false, const std::string& type = "BINARY",
+                        const std::string& first_name = "liver") {
     const Geometry& grid = labels.geometry;
     const bool bits = type == "BINARY";
     Elements data = described(grid, frames, segmentation, bits ? 1 : 8);
     data.text(0x62, 1, "CS", type);
-    data.sequence(0x62, 2, {segment_description(1, "liver"), segment_description(2, "tumour")});
+    data.sequence(0x62, 2, {segment_description(1, first_name), segment_description(2, "tumour")});
     data.short_value(0x62, 0xe, 200);
     add_groups(data, grid, frames);
     std::string joined;
@@ -323,6 +324,15 @@ TEST(DicomSegmentation, IsReadBySegmentNumberWithNames) {
         EXPECT_EQ(read.label_names, (std::map<int, std::string>{{1, "liver"}, {2, "tumour"}}));
         EXPECT_TRUE(read.notes.empty());
     }
+}
+
+TEST(DicomSegmentation, OneNumberWithTwoNamesIsRefused) {
+    const TemporaryFolder folder;
+    const std::vector<Frame> frames = segment_frames();
+    write_segmentation(folder / "a.dcm", label_volume(), {frames.begin(), frames.begin() + 4});
+    write_segmentation(folder / "b.dcm", label_volume(), {frames.begin() + 4, frames.end()}, false, "BINARY", "spleen");
+    EXPECT_THAT(message_of<InvalidInput>([&] { read_labels(folder.path()); }),
+                HasSubstr("segment 1 is 'liver' in a.dcm and 'spleen' in b.dcm"));
 }
 
 TEST(DicomSegmentation, OverlapsAreRefusedByName) {

@@ -27,6 +27,7 @@ struct SliceOptions {
     std::string image_type = "ORIGINAL\\PRIMARY";
     std::string pixel_spacing = "";  ///< that of the grid when empty
     bool has_pixels = true;
+    bool has_table = false;  ///< of values, Modality LUT Sequence
 };
 
 /// Slice k of an int16 volume as a CT image.
@@ -64,6 +65,9 @@ void write_slice(const std::filesystem::path& path, const Volume& volume, int k,
     data.short_value(0x28, 0x103, 1);
     data.text(0x28, 0x1052, "DS", decimals(Eigen::VectorXd::Constant(1, options.intercept)));
     data.text(0x28, 0x1053, "DS", decimals(Eigen::VectorXd::Constant(1, options.slope)));
+    Elements table;
+    table.text(0x28, 0x3004, "LO", "HU");
+    if (options.has_table) data.sequence(0x28, 0x3000, {table});
     const std::int16_t* first = volume.data<short>() + volume.offset(0, 0, k);
     if (options.has_pixels) data.words(0x7fe0, 0x10, {first, first + grid.size[0] * grid.size[1]});
 
@@ -107,6 +111,12 @@ TEST(DicomSeries, SlopesThatDifferFromSliceToSliceAreEachApplied) {
         const auto at = volume.offset(3, 4, k);
         EXPECT_NEAR(read.data<double>()[at], (1.0 + 0.25 * k) * volume.data<short>()[at], 1e-4);
     }
+}
+
+TEST(DicomSeries, ATableOfValuesIsRefused) {
+    const TemporaryFolder folder;
+    for (int k = 0; k < 6; ++k) write_slice(folder / reversed_name(k, 6), ct_volume(), k, {.has_table = true});
+    EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(folder.path()); }), HasSubstr("Modality LUT Sequence"));
 }
 
 TEST(DicomSeries, AMissingSliceIsRefused) {

@@ -308,6 +308,8 @@ TEST(Nrrd, UnitsAreConvertedAndUnknownOnesRefused) {
     EXPECT_TRUE(read("units: \"cm\" \"cm\" \"cm\"").volume.geometry.origin.isApprox(Eigen::Vector3d(100, 200, 300)));
     EXPECT_TRUE(read("space units: \"mm\" \"mm\" \"mm\"").notes.empty());
     EXPECT_TRUE(read("space units: \"\" \"\" \"\"").notes.empty());
+    EXPECT_TRUE(
+        read("space units: inches inches inch").volume.geometry.origin.isApprox(Eigen::Vector3d(254, 508, 762)));
     EXPECT_THAT(message_of<InvalidInput>([&] { read("space units: \"furlong\" \"mm\" \"mm\""); }),
                 HasSubstr("furlong"));
 }
@@ -442,6 +444,15 @@ TEST(Segmentation, LayersBecomeOneLabelMapWithNames) {
     const ReadResult read = read_labels_with_notes(folder / "a.seg.nrrd");
     EXPECT_EQ(std::vector<int>(read.volume.data<int>(), read.volume.data<int>() + 5),
               (std::vector<int>{1, 1, 0, 2, 2}));
+    EXPECT_EQ(read.label_names, (std::map<int, std::string>{{1, "liver"}, {2, "tumour"}}));
+    EXPECT_TRUE(read.notes.empty());
+}
+
+TEST(Segmentation, NumbersOfSegmentsMayHaveGaps) {
+    const TemporaryFolder folder;
+    const std::string data = layered({{1, 0}, {1, 0}, {0, 0}, {0, 2}, {0, 2}, {0, 0}, {0, 0}, {0, 0}});
+    write(folder / "a.seg.nrrd", segmentation(2, segment(1, "liver", 1, 0) + segment(12, "tumour", 2, 1), data));
+    const ReadResult read = read_labels_with_notes(folder / "a.seg.nrrd");
     EXPECT_EQ(read.label_names, (std::map<int, std::string>{{1, "liver"}, {2, "tumour"}}));
     EXPECT_TRUE(read.notes.empty());
 }

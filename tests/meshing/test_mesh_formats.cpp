@@ -134,6 +134,33 @@ TEST_F(MeshFormats, AbaqusHasElementSetsAsLabels) {
     EXPECT_THAT(read.label_names, ElementsAre(Pair(1, "Liver"), Pair(2, "Tumour")));
 }
 
+TEST_F(MeshFormats, AbaqusHasSetsOfElsetAsLabels) {
+    const std::string one = replaced(replaced(abaqus, ", elset=Liver", ""), "*Element, type=C3D4, elset=Tumour\n", "");
+    const std::string liver = "*Elset, elset=Liver, generate\n 2, 2, 1\n", tumour = "*ELSET, ELSET=Tumour\n3,\n",
+                      both = "*Elset, elset=all\n2, 3\n";
+    const MeshFile read = read_tetrahedra(file("a.inp", one + both + liver + tumour));
+    EXPECT_THAT(read.mesh.labels, ElementsAre(2, 3));
+    EXPECT_THAT(read.label_names, ElementsAre(Pair(2, "Liver"), Pair(3, "Tumour")));
+    EXPECT_THAT(read.notes, ElementsAre(HasSubstr("are its labels: Liver, Tumour")));
+    const std::string again = "*Elset, elset=Held\n2\n", section = "*Solid Section, elset=LIVER, material=M\n1.\n";
+    EXPECT_THAT(refusal(file("b.inp", one + liver + again)), HasSubstr("element 2 in the sets Liver and Held"));
+    EXPECT_THAT(read_tetrahedra(file("c.inp", one + liver + again + section)).mesh.labels, ElementsAre(2, 1));
+    EXPECT_THAT(refusal(file("d.inp", one + "*Elset, elset=E\nLiver, Tumour\n")), HasSubstr("set E made of others"));
+    const MeshFile known = read_tetrahedra(file("e.inp", abaqus + again));
+    EXPECT_THAT(known.mesh.labels, ElementsAre(1, 2));
+    EXPECT_THAT(known.notes, ElementsAre(HasSubstr("passed over: Held")));
+}
+
+TEST_F(MeshFormats, AbaqusFilesWhosePartsLieElsewhereAreRefused) {
+    const std::string instance = std::string(abaqus) + "*Instance, name=a, part=b\n";
+    EXPECT_THAT(refusal(file("a.inp", instance + "6., 0., 0.\n*End Instance\n")), HasSubstr("an *INSTANCE with '6."));
+    EXPECT_EQ(refusal(file("b.inp", instance + "0., 0., 0.\n*End Instance\n")), "");
+    EXPECT_THAT(refusal(file("c.inp", replaced(abaqus, "nset=all", "system=C"))), HasSubstr("'*Node, system=C'"));
+    EXPECT_THAT(refusal(file("d.inp", std::string("*INCLUDE, INPUT=nodes.inp\n") + abaqus)),
+                HasSubstr("'*INCLUDE, INPUT=nodes.inp'"));
+    EXPECT_THAT(refusal(file("e.inp", std::string(abaqus) + "*Ngen\n1, 5, 1\n")), HasSubstr("*Ngen; write them all"));
+}
+
 TEST_F(MeshFormats, MeshesThatAreAllInvertedAreTurned) {
     const std::string inverted = replaced(replaced(abaqus, "1, 2, 3, 4\n", "2, 1, 3, 4\n"), "2, 5, 3, 4", "5, 2, 3, 4");
     const MeshFile read = read_tetrahedra(file("a.inp", inverted));

@@ -127,6 +127,42 @@ TEST_F(PointTables, WhatCannotBeToldIsRefusedWithItsLine) {
     EXPECT_THROW((void)read_point_table(file("absent.csv")), IoError);
 }
 
+TEST_F(PointTables, RemarksSayTheFrameInAnyCaseAndInWords) {
+    const Eigen::Vector3d turned(-1, -2, 3), kept(1, 2, 3);
+    for (const std::string remark : {"coordinate system: ras", "space: right-anterior-superior", "Frame = Ras",
+                                     "CoordinateSystem = RAS+", "Right Anterior Superior"}) {
+        EXPECT_EQ(read("# " + remark + "\nx,y,z\n1,2,3\n").points, turned) << remark;
+        EXPECT_THAT(noted("# " + remark + "\nx,y,z\n1,2,3\n"), HasSubstr("says that its points are RAS")) << remark;
+    }
+    for (const std::string remark : {"of brain_ras.nii.gz", "space: lps", "units: mm", "unit normals in m", "las"})
+        EXPECT_EQ(read("# " + remark + "\nx,y,z\n1,2,3\n").points, kept) << remark;
+    EXPECT_THAT(refused("# space: LAS\nx,y,z\n1,2,3\n"),
+                HasSubstr("a.csv:1: says that its points are in the frame LAS"));
+}
+
+TEST_F(PointTables, RemarksThatSayAnotherUnitAreRefused) {
+    EXPECT_THAT(refused("# units: cm\nx,y,z\n1,2,3\n"), HasSubstr("a.csv:1: says that its unit is cm"));
+    EXPECT_THAT(refused("# Unit of length is \xC2\xB5m\n1,2,3\n"), HasSubstr("its unit is \xC2\xB5m"));
+}
+
+TEST_F(PointTables, NamesStandInSeveralColumns) {
+    for (const std::string column : {"ID", "id", "Point", "landmark", "Name", "LABEL"})
+        EXPECT_EQ(read(column + ",x,y,z\nF-1,1,2,3\n").names, std::vector<std::string>{"F-1"}) << column;
+    EXPECT_EQ(read("id,label,x,y,z\n7,tip,1,2,3\n").names, std::vector<std::string>{"tip"});
+    EXPECT_TRUE(read("id,x,y,z\n1,1,2,3\n2,4,5,6\n").names_count_rows);
+    EXPECT_FALSE(read("id,x,y,z\n2,1,2,3\n1,4,5,6\n").names_count_rows);
+}
+
+TEST_F(PointTables, PointsThatDoNotCountAreSaidInNumbersOrWords) {
+    for (const std::string no : {"0", "0.0", "False", "NO"})
+        for (const std::string yes : {"1", "1.0", "True", "yes"}) {
+            const std::string text = "label,x,y,z,defined\na,1,2,3," + no + "\nb,4,5,6," + yes + "\n";
+            EXPECT_EQ(read(text).points, Eigen::Vector3d(4, 5, 6)) << text;
+            EXPECT_THAT(noted(text), HasSubstr("left out: a")) << text;
+        }
+    EXPECT_THAT(refused("x,y,z,visible\n1,2,3,maybe\n"), HasSubstr("a.csv:2: 'maybe' does not say whether"));
+}
+
 TEST_F(PointTables, FirstRowsThatAreNoPointsAreTold) {
     EXPECT_EQ(read("0,1,2\n4,5,6\n").points, Eigen::Vector3d(4, 5, 6));
     EXPECT_THAT(noted("0,1,2\n4,5,6\n"), HasSubstr("line 1 numbers the columns and is no point"));
@@ -189,6 +225,26 @@ TEST_F(PointTables, SurfacesAreTurnedFromTheFrameThatTheyName) {
     }
     EXPECT_EQ(read_surface(file("b.stl", "solid color space=sRGB\n" + solid)).mesh.nodes.col(1),
               Eigen::Vector3d(1, 2, 3));
+}
+
+TEST_F(PointTables, SurfacesThatSayAnotherUnitOrHaveWeightsAreRefused) {
+    const auto refusal = [&](const std::string& name, const std::string& text) -> std::string {
+        try {
+            (void)read_surface(file(name, text));
+        } catch (const InvalidInput& error) {
+            return error.what();
+        }
+        return "accepted";
+    };
+    const std::string ply =
+        "element vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n";
+    EXPECT_THAT(refusal("a.ply", "ply\nformat ascii 1.0\ncomment units: cm\n" + ply), HasSubstr("its unit is cm"));
+    EXPECT_EQ(refusal("b.ply", "ply\nformat ascii 1.0\ncomment units: mm\n" + ply), "accepted");
+    EXPECT_THAT(refusal("a.obj", "# Units: inches\nv 1 2 3\n"), HasSubstr("its unit is inches"));
+    EXPECT_THAT(refusal("b.obj", "v 1 2 3 2\n"), HasSubstr("the weight 2 ('v 1 2 3 2')"));
+    EXPECT_EQ(refusal("c.obj", "v 1 2 3 1\nv 1 2 3 0.5 0.5 0.5\n"), "accepted");
+    EXPECT_EQ(read_surface(file("d.obj", "# coordinate system: ras\nv 1 2 3\n")).mesh.nodes.col(0),
+              Eigen::Vector3d(-1, -2, 3));
 }
 
 TEST_F(PointTables, FieldsOfVtkFilesStandAnywhere) {

@@ -8,6 +8,8 @@
 #include <array>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
+#include <iterator>
 #include <sstream>
 
 namespace tissuewarp::meshing {
@@ -62,6 +64,23 @@ TEST_F(Vtu, CellArraysAreReadByName) {
     } catch (const InvalidInput& error) {
         EXPECT_THAT(error.what(), ::testing::AllOf(::testing::HasSubstr("'fiber'"), ::testing::HasSubstr("'fibre'")));
     }
+}
+
+TEST_F(Vtu, LabelsMayHaveOtherNamesAndArraysThatAreNoneAreNoted) {
+    const TetMesh mesh = labelled_box();
+    write_vtu(mesh, file("label.vtu"));
+    std::ifstream stream(file("label.vtu"), std::ios::binary);
+    const std::string bytes(std::istreambuf_iterator<char>(stream), {});
+    const auto named = [&](const std::string& name) {
+        return read_tetrahedra(file("named.vtu", replaced(bytes, "Name=\"label\"", "Name=\"" + name + "\"")));
+    };
+    EXPECT_EQ(named("Label").mesh.labels, mesh.labels);
+    EXPECT_TRUE(named("Label").notes.empty());
+    EXPECT_EQ(named("gmsh:physical").mesh.labels, mesh.labels);
+    EXPECT_THAT(named("gmsh:physical").notes, ::testing::Contains(::testing::HasSubstr("'gmsh:physical'")));
+    EXPECT_EQ(named("material").mesh.labels, Eigen::VectorXi::Ones(mesh.tet_count()));
+    EXPECT_THAT(named("material").notes,
+                ::testing::Contains(::testing::HasSubstr("all its tetrahedra have label 1; where 'material' holds")));
 }
 
 TEST_F(Vtu, ReadsAsciiWithoutLabels) {

@@ -363,6 +363,35 @@ TEST_F(LandmarkFile, TablesOfPointsArePairsToo) {
     EXPECT_FALSE(is_table_of_pairs(fixed));
 }
 
+TEST_F(LandmarkFile, ColumnsOfNumbersPairWhereTheyAreNoOrderOfTheirOwn) {
+    const auto moving = write("m.csv", "id,x,y,z\n1,1,2,3\n2,4,5,6\n"),
+               shuffled = write("s.csv", "ID,x,y,z\n2,4,5,6\n1,1,2,3\n"),
+               from_zero = write("z.csv", "id,x,y,z\n0,1,2,3\n1,4,5,6\n"),
+               fewer = write("f.csv", "id,x,y,z\n1,1,2,3\n");
+    EXPECT_EQ(read_landmarks(moving, shuffled).fixed, read_landmarks(moving, moving).moving);
+    EXPECT_EQ(read_landmarks(moving, from_zero).fixed, read_landmarks(moving, moving).moving);
+    EXPECT_THAT(refusal([&] { read_landmarks(moving, fewer); }), HasSubstr("equal numbers"));
+}
+
+TEST_F(LandmarkFile, TablesOfPairsHaveRemarksAndRowsThatDoNotCount) {
+    const std::string header = "pre_x,pre_y,pre_z,intra_x,intra_y,intra_z";
+    Notes notes;
+    const Landmarks turned =
+        read_landmarks(write("p.csv", "# CoordinateSystem = RAS\n" + header + "\n1,2,3,4,5,6\n"), notes);
+    EXPECT_EQ(turned.moving.col(0), Eigen::Vector3d(-1, -2, 3));
+    EXPECT_EQ(turned.fixed.col(0), Eigen::Vector3d(-4, -5, 6));
+    EXPECT_THAT(notes.all, HasSubstr("says that its points are RAS"));
+    notes.all.clear();
+    const Landmarks pairs =
+        read_landmarks(write("d.csv", "label," + header +
+                                          ",defined,intra_visible\na,1,2,3,4,5,6,1,1\nb,0,0,0,0,0,0,0,1\n"
+                                          "c,0,0,0,0,0,0,True,False\n"),
+                       notes);
+    EXPECT_EQ(pairs.moving.cols(), 1);
+    EXPECT_THAT(notes.all, HasSubstr("left out: b, c"));
+    EXPECT_THAT(csv_refusal("# unit: cm\n" + header + "\n1,2,3,4,5,6\n"), HasSubstr("its unit is cm"));
+}
+
 // Of a list that lacks a point, all behind it would be paired with their neighbours.
 TEST_F(LandmarkFile, PairsByOrderHaveNoGap) {
     const auto whole = write("m.csv", "x,y,z\n1,2,3\n4,5,6\n");
@@ -405,6 +434,8 @@ TEST_F(LandmarkFile, RefusesPointListsOfSlicerThatDoNotSayEnough) {
     EXPECT_THAT(changed("coordinateSystem", "system"), HasSubstr("list 1: has no coordinateSystem"));
     EXPECT_THAT(changed("LPS", "IJK"), HasSubstr("the coordinate system is 'IJK'"));
     EXPECT_THAT(changed("\"mm\"", "\"cm\""), HasSubstr("coordinateUnits is \"cm\""));
+    EXPECT_THAT(changed("\"mm\"", R"(["mm", "mm", "cm"])"), HasSubstr(R"(coordinateUnits is ["mm","mm","cm"])"));
+    EXPECT_EQ(changed("\"mm\"", R"(["mm", "UCUM", "millimeter"])"), "accepted");
     EXPECT_THAT(changed("[4, 5, 6]", "[4, 5]"), HasSubstr("point 2: has no position of three numbers"));
     EXPECT_THAT(changed("[4, 5, 6]", "[4, 5, null]"), HasSubstr("point 2: position holds null"));
     EXPECT_THAT(changed("[4, 5, 6]", "[4, 5, 1e300]"), HasSubstr("a finite coordinate"));

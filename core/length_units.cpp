@@ -1,10 +1,11 @@
-#include "imaging/detail/length_units.hpp"
+#include "core/length_units.hpp"
 
 #include <algorithm>
 #include <cctype>
 #include <map>
+#include <string_view>
 
-namespace tissuewarp::imaging::detail {
+namespace tissuewarp {
 
 std::optional<double> millimetres_per(const std::string& unit) {
     // The micro sign in UTF-8 (two code points look alike) and in Latin-1.
@@ -17,11 +18,12 @@ std::optional<double> millimetres_per(const std::string& unit) {
     std::string name;
     for (const char c : unit)
         if (c != '"' && c != ' ') name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    auto found = known.find(name);
-    if (found == known.end() && name.size() > 3 && name.back() == 's')
-        found = known.find(name.substr(0, name.size() - 1));
-    if (found == known.end()) return std::nullopt;
-    return found->second;
+    for (const std::string_view plural : {"", "s", "es"}) {
+        if (!plural.empty() && (name.size() <= 3 || !name.ends_with(plural))) continue;
+        const auto found = known.find(name.substr(0, name.size() - plural.size()));
+        if (found != known.end()) return found->second;
+    }
+    return std::nullopt;
 }
 
-}  // namespace tissuewarp::imaging::detail
+}  // namespace tissuewarp
