@@ -99,7 +99,7 @@ void print_mesh(const meshing::TetMesh& mesh) {
 }
 
 void print_mesh_file(const fs::path& path) {
-    ProgressLine notes(true);
+    ProgressLine notes({.quiet = true});
     const meshing::TetMesh mesh = meshing::read_vtu(path, notes);
     fmt::print("{}: ", path.string());
     print_mesh(mesh);
