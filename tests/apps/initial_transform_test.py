@@ -53,10 +53,10 @@ class InitialTransform(PhantomTest):
                 " ".join(str(p) for p in parameters) + "\nFixedParameters: " + " ".join(str(c) for c in centre) + "\n")
 
     def test_a_field_that_was_turned_says_so(self):
-        header = ("NRRD0004\ntype: float\ndimension: 4\nspace: RAS\nsizes: 3 9 9 9\nkinds: vector domain domain domain\n"
-                  "space directions: none (100,0,0) (0,100,0) (0,0,100)\nspace origin: (-400,-400,-400)\n"
+        header = ("NRRD0004\ntype: float\ndimension: 4\nspace: RAS\nsizes: 3 101 101 101\nkinds: vector domain domain domain\n"
+                  "space directions: none (4,0,0) (0,4,0) (0,0,4)\nspace origin: (-200,-200,-200)\n"
                   "encoding: raw\nendian: little\n\n")
-        vectors = numpy.tile((-FAR * [-1, -1, 1]).astype("<f4"), 9 ** 3)
+        vectors = numpy.tile((-FAR * [-1, -1, 1]).astype("<f4"), 101 ** 3)
         _, output = self.dry_start(self.file("start.nrrd", header.encode() + vectors.tobytes()))
         self.assertIn("start.nrrd': vectors were turned to LPS", output)
 
