@@ -16,8 +16,7 @@ namespace tissuewarp::apps {
 /// Points of a file of points or of a surface, 3 × P, LPS mm. Throws IoError or InvalidInput.
 Eigen::Matrix3Xd read_points(const std::filesystem::path& path, Observer& observer);
 
-/// A surface of tissue, or of a body that touches it. Throws IoError, or InvalidInput where its extent cannot be that
-/// of tissue in mm.
+/// A surface of tissue. Throws IoError, or InvalidInput where its extent cannot be that of tissue in mm.
 meshing::SurfaceMesh read_tissue_surface(const std::filesystem::path& path, Observer& observer);
 
 /// Named columns of numbers, all of one length, as CSV with six decimals. Complete or absent; throws IoError.

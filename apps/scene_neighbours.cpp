@@ -1,7 +1,8 @@
 // [[contact]] and [[sliding]]: what the tissue touches.
 
-#include "apps/point_files.hpp"
 #include "apps/scene_parts.hpp"
+#include "meshing/mesh_io.hpp"
+#include "registration/io/extent.hpp"
 
 #include <numbers>
 
@@ -11,12 +12,17 @@ using namespace simulation;
 
 namespace {
 
+meshing::SurfaceMesh obstacle_surface(const std::filesystem::path& path, Observer& observer) {
+    meshing::SurfaceMesh surface = meshing::read_surface(path, observer).mesh;
+    registration::detail::require_millimetres(surface.nodes, "'" + path.string() + "': the surface is");
+    return surface;
+}
+
 Body body_of(TomlReader& reader, const std::filesystem::path& folder, NameUses& uses, Observer& observer) {
     std::vector<Body> bodies;
     if (const auto plane = reader.table("plane")) bodies.emplace_back(read_half_space(*plane));
     if (const auto ball = reader.table("ball")) bodies.emplace_back(read_ball(*ball));
-    if (const auto surface = reader.text("surface"))
-        bodies.emplace_back(read_tissue_surface(folder / *surface, observer));
+    if (const auto surface = reader.text("surface")) bodies.emplace_back(obstacle_surface(folder / *surface, observer));
     if (const auto label = reader.whole("label", 1, 1000000)) {
         bodies.emplace_back(ObstacleLabel{*label});
         uses.volume_labels.push_back({*label, reader.place("label"), "is a body in contact"});

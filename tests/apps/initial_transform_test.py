@@ -52,6 +52,14 @@ class InitialTransform(PhantomTest):
         return ("#Insight Transform File V1.0\n#Transform 0\nTransform: " + kind + "\nParameters: " +
                 " ".join(str(p) for p in parameters) + "\nFixedParameters: " + " ".join(str(c) for c in centre) + "\n")
 
+    def test_a_field_that_was_turned_says_so(self):
+        header = ("NRRD0004\ntype: float\ndimension: 4\nspace: RAS\nsizes: 3 101 101 101\nkinds: vector domain domain domain\n"
+                  "space directions: none (4,0,0) (0,4,0) (0,0,4)\nspace origin: (-200,-200,-200)\n"
+                  "encoding: raw\nendian: little\n\n")
+        vectors = numpy.tile((-FAR * [-1, -1, 1]).astype("<f4"), 101 ** 3)
+        _, output = self.dry_start(self.file("start.nrrd", header.encode() + vectors.tobytes()))
+        self.assertIn("start.nrrd': vectors were turned to LPS", output)
+
     def test_it_is_where_the_search_of_an_image_begins(self):
         path = self.file("start.tfm", self.affine_text([1, 0, 0, 0, 1, 0, 0, 0, 1, *-FAR]))
         result = self.register(path)

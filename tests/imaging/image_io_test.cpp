@@ -182,7 +182,7 @@ TEST(ImageIo, WholeFloatLabelsAreAcceptedAndFractionsRefused) {
     labels.data<float>()[4] = 1.0000001F;
     write_volume(labels, folder / "labels.nrrd");
     EXPECT_THAT(test::message_of<InvalidInput>([&] { read_labels(folder / "labels.nrrd"); }),
-                testing::HasSubstr("the value 1.00000012"));
+                testing::HasSubstr("the value 1.0000001"));
     labels.data<float>()[4] = -1.0F;
     write_volume(labels, folder / "labels.nrrd");
     EXPECT_THROW(read_labels(folder / "labels.nrrd"), InvalidInput);
