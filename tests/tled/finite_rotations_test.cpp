@@ -68,6 +68,23 @@ TEST(FiniteRotations, LeaveWhatOnlyStretchesAndSmallIncrementsAsTheyAre) {
     EXPECT_LT((rotations.moved(zero, bent) - bent).cwiseAbs().maxCoeff(), 1e-3 * bent.cwiseAbs().maxCoeff());
 }
 
+TEST(FiniteRotations, LeaveAxesAlongWhichNothingIsFree) {
+    const RestState rest = rod();
+    Conditions conditions;
+    for (int n = 0; n < rest.node_count; ++n)
+        conditions.prescribed.push_back({n, {false, true, false}, Vector3d::Zero()});
+    const detail::FiniteRotations rotations(rest, nodal_conditions(conditions, rest));
+    const Matrix3Xd zero = Matrix3Xd::Zero(3, rest.node_count);
+    const Matrix3Xd turned = rotations.moved(zero, spin({0, 0.7, 0}) * rest.position);
+    EXPECT_EQ(turned.row(1), zero.row(1));
+    const Matrix3d expected = Eigen::AngleAxisd(0.7, Vector3d::UnitY()).toRotationMatrix();
+    const Matrix3Xd place = rest.position + turned;
+    EXPECT_LT((place.col(rest.node_count - 1) - place.col(0) -
+               expected * (rest.position.col(rest.node_count - 1) - rest.position.col(0)))
+                  .norm(),
+              1e-3);
+}
+
 // A rod that is bent into a circle by an increment that is linear in the angle keeps its length.
 TEST(FiniteRotations, BendARodWithoutDrawingItOut) {
     const RestState rest = rod();

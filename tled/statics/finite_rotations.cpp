@@ -73,6 +73,7 @@ FiniteRotations::FiniteRotations(const RestState& rest, const NodalConditions& c
         Axis& each = axes_[static_cast<std::size_t>(axis)];
         for (int n = 0; n < rest.node_count; ++n)
             if (!conditions.constrained(axis, n)) each.free.push_back(n);
+        if (each.free.empty()) continue;
         const Eigen::SparseMatrix<double> lower = attached(laplacian_, each.free);
         std::vector<int> numbers(each.free.size());
         std::iota(numbers.begin(), numbers.end(), 0);
@@ -97,6 +98,7 @@ Matrix3Xd FiniteRotations::moved(const Matrix3Xd& displacement, const Matrix3Xd&
     const Matrix3Xd missing = pull - (rest_.position + moved) * laplacian_;
     for (int axis = 0; axis < 3; ++axis) {
         const Axis& each = axes_[static_cast<std::size_t>(axis)];
+        if (each.free.empty()) continue;
         const Eigen::VectorXd right = missing(axis, each.free).transpose();
         moved(axis, each.free) += each.factor->solve(right).transpose();
     }
