@@ -75,22 +75,8 @@ EquilibriumResult by_newton(Engine& engine, const RestStiffness& stiffness, cons
                      [&](detail::EquilibriumSearch& search) { return detail::newton(search, start); });
 }
 
-/// What another method accepted, judged and corrected by the tangent.
-EquilibriumResult refined(const EquilibriumResult& found, Engine& engine, const RestStiffness& stiffness,
-                          const NodalConditions& conditions, const EquilibriumOptions& options, Observer& observer) {
-    EquilibriumResult result =
-        precisely(engine, stiffness, conditions, options, observer,
-                  [&](detail::EquilibriumSearch& search) { return detail::refinement(search, found.displacement); });
-    result.force_evaluations += found.force_evaluations;
-    result.lifted_residuals += found.lifted_residuals;
-    result.highest = found.highest;
-    result.method = found.method;
-    result.reason = found.reason;
-    return result;
-}
-
 /// On a GPU K₀ is not factorised; loads that follow the surface are not in the tangent.
-bool judged_by_tangent(const Engine& engine, const NodalConditions& conditions, const EquilibriumOptions& options) {
+bool tangent_judges(const Engine& engine, const NodalConditions& conditions, const EquilibriumOptions& options) {
     const NodalEffects& effects = conditions.effects;
     return options.rest != nullptr && engine.processor() == Processor::Cpu && !effects.contact && !effects.fluid &&
            effects.surface.pressure_faces.cols() == 0;
@@ -141,23 +127,36 @@ EquilibriumResult equilibrium(Engine& engine, const RestStiffness& stiffness, co
     };
     if (!automatic) return run(choice.method);
     const std::vector<EquilibriumMethod> methods = escalation(choice.method, conditions, options);
-    Eigen::Matrix3Xd accepted;  // by K₀, where the tangent does not agree
-    const auto run_and_judge = [&](EquilibriumMethod method) {
-        EquilibriumResult found = run(method);
-        if (method == EquilibriumMethod::Newton || !judged_by_tangent(engine, conditions, options)) return found;
-        accepted = found.displacement;
-        start = &accepted;
-        return refined(found, engine, stiffness, conditions, options, observer);
-    };
     for (std::size_t n = 0; n + 1 < methods.size(); ++n) {
         try {
-            return run_and_judge(methods[n]);
+            return run(methods[n]);
         } catch (const SolverFailure& failure) {
             choice.reason = std::string(name_of(methods[n])) + " failed (" + failure.what() + ")";
             observer.note(std::string("equilibrium by ") + name_of(methods[n + 1]) + ": " + choice.reason);
         }
     }
-    return run_and_judge(methods.back());
+    return run(methods.back());
+}
+
+EquilibriumResult judged_by_tangent(Engine& engine, const RestStiffness& stiffness, const NodalConditions& conditions,
+                                    const EquilibriumOptions& options, EquilibriumResult found, Observer& observer) {
+    if (found.method == EquilibriumMethod::Newton || !tangent_judges(engine, conditions, options)) return found;
+    const auto refine = [&](detail::EquilibriumSearch& search) {
+        return detail::refinement(search, found.displacement);
+    };
+    EquilibriumMethod method = found.method;
+    EquilibriumResult result;
+    try {
+        result = precisely(engine, stiffness, conditions, options, observer, refine);
+    } catch (const SolverFailure&) {
+        method = EquilibriumMethod::Newton;
+        result = by_newton(engine, stiffness, conditions, options, &found.displacement, observer);
+    }
+    result.force_evaluations += found.force_evaluations;
+    result.lifted_residuals += found.lifted_residuals;
+    result.method = method;
+    result.reason = std::move(found.reason);
+    return result;
 }
 
 }  // namespace tissuewarp::tled

@@ -38,11 +38,21 @@ public:
     }
 
     EquilibriumResult run_with_motion() {
-        if (!follow() && !found_after_motion()) give_up();
-        return std::move(result_);
+        if ((follow() && judged()) || found_after_motion()) return std::move(result_);
+        give_up();
     }
 
 private:
+    bool judged() {
+        try {
+            result_ = judged_by_tangent(engine_, stiffness_, conditions_, options_.equilibrium, result_, observer_);
+            return true;
+        } catch (const SolverFailure& failure) {
+            cause_ = failure.what();
+            return false;
+        }
+    }
+
     /// Whether the path leads to the whole load.
     bool follow() {
         double part = 1.0 / options_.first_parts;

@@ -23,7 +23,7 @@ EquilibriumResult equilibrium_along_load(Engine& engine, const RestStiffness& st
 
 /// The same for tissue that buckles, snaps through or topples on the way, beyond which there are no equilibria near:
 /// damped motion (tled/damped_motion.hpp) leads on from the last one, Newton's method ends it, and the observer is
-/// told. Without viscosity, and with the automatic choice of the method only.
+/// told. Without viscosity, and with the automatic choice of the method only. What is found is judged by the tangent.
 EquilibriumResult equilibrium_along_load_or_motion(Engine& engine, const RestStiffness& stiffness,
                                                    const NodalConditions& conditions,
                                                    const LoadPathOptions& options = {},
