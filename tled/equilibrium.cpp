@@ -75,10 +75,12 @@ EquilibriumResult by_newton(Engine& engine, const RestStiffness& stiffness, cons
                      [&](detail::EquilibriumSearch& search) { return detail::newton(search, start); });
 }
 
-/// On a GPU K₀ is not factorised; loads that follow the surface are not in the tangent.
+/// A method that was asked for stays alone; on a GPU K₀ is not factorised; loads that follow the surface are not in the
+/// tangent.
 bool tangent_judges(const Engine& engine, const NodalConditions& conditions, const EquilibriumOptions& options) {
     const NodalEffects& effects = conditions.effects;
-    return options.rest != nullptr && engine.processor() == Processor::Cpu && !effects.contact && !effects.fluid &&
+    return options.method == EquilibriumMethod::Automatic && options.rest != nullptr &&
+           engine.processor() == Processor::Cpu && !effects.contact && !effects.fluid &&
            effects.surface.pressure_faces.cols() == 0;
 }
 
