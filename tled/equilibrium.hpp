@@ -58,8 +58,9 @@ EquilibriumResult equilibrium(Engine& engine, const RestStiffness& stiffness, co
 
 /// What equilibrium() found, judged by the tangent where the tissue is, with forces in float64, and brought to within
 /// the tolerance by it; by Newton's method from there where K₀ does not prepare that or the tangent is not positive. As
-/// it was found without `rest`, on a GPU, by Newton's method, in contact and under loads that follow the tissue. The
-/// engine is left where the answer is. Throws SolverFailure where Newton's method finds no stable equilibrium near.
+/// it was found by a method that was asked for, without `rest`, on a GPU, by Newton's method, in contact and under
+/// loads that follow the tissue. The engine is left where the answer is. Throws SolverFailure where Newton's method
+/// finds no stable equilibrium near.
 EquilibriumResult judged_by_tangent(Engine& engine, const RestStiffness& stiffness, const NodalConditions& conditions,
                                     const EquilibriumOptions& options, EquilibriumResult found,
                                     Observer& observer = silent_observer());
