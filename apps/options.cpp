@@ -134,7 +134,7 @@ struct Parser {
         verb.number("--default-poissons-ratio", o.default_poissons_ratio, "RATIO", 0.0, 0.4999,
                     "Poisson's ratio without a table");
         verb.choice("--element", o.element, {"auto", "t4", "averaged-pressure"},
-                    "auto, t4 or averaged-pressure; auto: the latter from a Poisson's ratio of 0.45");
+                    "auto, t4 or averaged-pressure; auto: the latter above a Poisson's ratio of 0.46");
         verb.list("--anchor", anchors, "LABEL", "Labels of tissue that stays where the rigid placement has it")
             ->delimiter(',');
         verb.list("--rigid-neighbour", rigid_neighbours, "LABEL",

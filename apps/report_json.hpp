@@ -1,5 +1,5 @@
 #pragma once
-/// report.json: everything about a run that a machine may want to read. The keys are listed in docs/manual/register.md.
+/// report.json: everything about a run that a machine may want to read. The keys are listed in docs/manual/register-outputs.md.
 
 #include "apps/register_run.hpp"
 

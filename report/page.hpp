@@ -20,7 +20,7 @@ struct ReportInput {
     const imaging::Volume* moving_to_fixed = nullptr;  ///< displacement field of three channels, LPS mm, moving grid
     const imaging::Volume* uncertainty = nullptr;  ///< estimated error, 1 σ, mm, fixed frame, NaN outside the tissue
     const imaging::Volume* trust = nullptr;        ///< beside it: 0 no tissue, 1 shown, 2 carried, 3 unknown; one byte
-    nlohmann::json report;  ///< report.json, docs/manual/register.md; missing keys leave sections out
+    nlohmann::json report;  ///< report.json, docs/manual/register-outputs.md; missing keys leave sections out
 };
 
 /// Writes preview.png and report.html into an existing folder, each to a temporary name that is renamed.

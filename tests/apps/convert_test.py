@@ -255,7 +255,7 @@ class Maps(Registered):
     def test_the_report_names_every_file_and_so_does_the_manual(self):
         report = json.loads((self.output / "report.json").read_text())
         self.assertEqual(sorted(report["outputs"]), sorted(path.name for path in self.output.iterdir()))
-        page = (pathlib.Path(__file__).parents[2] / "docs" / "manual" / "register.md").read_text()
+        page = (pathlib.Path(__file__).parents[2] / "docs" / "manual" / "register-outputs.md").read_text()
         for name in report["outputs"]:
             self.assertIn(f"`{name}`", page)
         for word in ("displacement_magnitude", "jacobian", "organ", "markups", "inverse_transform", "dicom", "all"):
