@@ -39,7 +39,7 @@ std::vector<std::string> read_checked(const std::filesystem::path& path, const K
         if (!contains(known.names, name)) {
             const std::string nearest = nearest_name(name, known.names);
             throw InvalidInput(place + ": unknown key '" + name + "'" +
-                               (nearest.empty() ? "; see --help for the names" : "; did you mean '" + nearest + "'?"));
+                               (nearest.empty() ? "; see 'tissuewarp register --help-all'" : "; did you mean '" + nearest + "'?"));
         }
         if (contains(known.switches, name)) {
             append_switch(name, node, place, arguments);

@@ -60,6 +60,7 @@ struct Parser {
         declare_calibrate(
             verbs.emplace_back(app, "calibrate", "Measure on phantoms what --accuracy and --time-budget choose by"));
         declare_study(verbs.emplace_back(app, "study", "Measure what accuracy costs in time on this machine"));
+        for (Verb& verb : verbs) verb.arrange(help_layout(verb.name()));
     }
 
     void declare_register(Verb& verb) {
@@ -489,21 +490,22 @@ struct Parser {
         const auto verb =
             std::find_if(verbs.begin(), verbs.end(), [&](Verb& v) { return v.app().get_name() == arguments.front(); });
         if (verb == verbs.end())
-            refuse("there is no verb '" + arguments.front() + "'", arguments.front(), verb_names());
+            refuse("there is no verb '" + arguments.front() + "'", arguments.front(), verb_names(), "--help");
         std::vector<std::string> names;
         for (const CLI::Option* option : verb->app().get_options())
             for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
         for (const std::string& argument : arguments) {
             const std::string name = argument.substr(0, argument.find('='));
             if (name.starts_with("--") && std::find(names.begin(), names.end(), name) == names.end())
-                refuse("there is no option '" + name + "'", name, names);
+                refuse("there is no option '" + name + "'", name, names, arguments.front() + " --help-all");
         }
     }
 
     [[noreturn]] static void refuse(const std::string& message, const std::string& word,
-                                    const std::vector<std::string>& names) {
+                                    const std::vector<std::string>& names, const std::string& help) {
         const std::string nearest = nearest_name(word, names);
-        throw InvalidInput(message + (nearest.empty() ? "; see --help" : "; did you mean '" + nearest + "'?"));
+        throw InvalidInput(message +
+                           (nearest.empty() ? "; see 'tissuewarp " + help + "'" : "; did you mean '" + nearest + "'?"));
     }
 
     /// The verb that the arguments name, where it is a command-line module; or null.
@@ -534,7 +536,10 @@ Command parse_command_line(std::vector<std::string> arguments) {
     std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them last first
     try {
         parser.app.parse(arguments);
+    } catch (const CLI::CallForAllHelp&) {
+        throw HelpRequest{parser.app.help()};
     } catch (const CLI::CallForHelp&) {
+        for (Verb& verb : parser.verbs) verb.shorten_help();
         throw HelpRequest{parser.app.help()};
     } catch (const CLI::CallForVersion&) {
         throw HelpRequest{parser.app.version() + "\n"};
@@ -542,8 +547,9 @@ Command parse_command_line(std::vector<std::string> arguments) {
         const bool no_verb = parser.app.get_subcommands().empty();
         throw InvalidInput(no_verb ? "give a verb: register, mesh, warp, convert, evaluate, info, bench, simulate, "
                                      "explain, calibrate or study; "
-                                     "see --help"
-                                   : std::string(error.what()) + "; see --help");
+                                     "see 'tissuewarp --help'"
+                                   : fmt::format("{}; see 'tissuewarp {} --help-all'", error.what(),
+                                                 parser.app.get_subcommands().front()->get_name()));
     }
     return parser.result();
 }

@@ -3,6 +3,7 @@
 
 #include "apps/config_file.hpp"
 #include "apps/module_description.hpp"
+#include "apps/option_groups.hpp"
 #include "apps/options.hpp"
 
 #include <fmt/format.h>
@@ -21,6 +22,23 @@ class Verb {
 public:
     Verb(CLI::App& parent, const char* name, const char* what) : app_(*parent.add_subcommand(name, what)) {
         app_.set_help_flag("-h,--help", "Print this text and exit");
+        app_.set_help_all_flag("--help-all", "Print every option and exit");
+    }
+    /// After the declarations: headings, and what --help keeps of them.
+    void arrange(const HelpLayout& layout) {
+        for (const OptionGroup& group : layout.groups)
+            for (const std::string& option : group.options) app_.get_option(option)->group(group.name);
+        first_ = layout.first;
+    }
+    /// Leaves in the help what people need first, and says where the rest is.
+    void shorten_help() {
+        if (first_.empty()) return;
+        const CLI::Option* help = app_.get_help_ptr();
+        for (CLI::Option* option : app_.get_options())
+            if (option != help && !is_first(*option)) option->group("");
+        app_.footer(fmt::format("{}\n\nMore:\n  {:<34}every option, by purpose\n  {:<34}the page of this verb",
+                                app_.get_footer(), "tissuewarp " + name() + " --help-all",
+                                "docs/manual/" + name() + ".md"));
     }
     CLI::App& app() { return app_; }
     [[nodiscard]] std::string name() const { return app_.get_name(); }
@@ -162,8 +180,14 @@ private:
     }
     static std::string name_of(const CLI::Option* option) { return option->get_lnames().front(); }
 
+    [[nodiscard]] bool is_first(const CLI::Option& option) const {
+        return !option.get_lnames().empty() &&
+               std::find(first_.begin(), first_.end(), "--" + name_of(&option)) != first_.end();
+    }
+
     CLI::App& app_;
     std::vector<Declared> options_;
+    std::vector<std::string> first_;  ///< what --help shows; empty: everything
 };
 
 }  // namespace tissuewarp::apps

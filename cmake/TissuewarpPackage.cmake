@@ -23,7 +23,7 @@ foreach(verb register mesh warp simulate)
     RENAME tissuewarp-${verb})
 endforeach()
 
-# Man pages and shell completion say what --help says.
+# Man pages and shell completion say what --help-all says.
 if(TISSUEWARP_PYTHON3)
   install(CODE "execute_process(COMMAND ${TISSUEWARP_PYTHON3} ${packaging}/from_help.py $<TARGET_FILE:tissuewarp_app>
     \$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DATADIR} COMMAND_ERROR_IS_FATAL ANY)")

@@ -86,7 +86,7 @@ def options_of(text):
 def completion(program, verbs):
     cases = []
     for verb in verbs:
-        names, files = options_of(say(program, verb, "--help"))
+        names, files = options_of(say(program, verb, "--help-all"))
         cases.append(f"        {verb}) options='{' '.join(names)}'; files='{' '.join(files)}' ;;")
     return f"""# Completion of tissuewarp for bash.
 _tissuewarp() {{
@@ -116,7 +116,7 @@ def main(program, share):
     if not verbs:
         sys.exit(f"from_help.py: '{program} --help' lists no subcommands")
     pages = {"tissuewarp": say(program, "--help")}
-    pages.update({f"tissuewarp-{verb}": say(program, verb, "--help") for verb in verbs})
+    pages.update({f"tissuewarp-{verb}": say(program, verb, "--help-all") for verb in verbs})
     for name, text in pages.items():
         path = share / "man/man1" / f"{name}.1.gz"
         path.parent.mkdir(parents=True, exist_ok=True)

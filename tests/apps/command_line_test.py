@@ -16,14 +16,29 @@ from phantom import CENTRE_LPS, FIXED_AFFINE, MOVING_AFFINE, PROGRAM, PhantomTes
 class CommandLine(PhantomTest):
     def test_help_of_each_verb_names_units(self):
         for verb in ("register", "mesh", "warp", "evaluate", "info", "bench"):
-            result = run(verb, "--help")
+            result = run(verb, "--help-all")
             self.assertEqual(result.returncode, 0)
             self.assertIn("mm", result.stdout, verb)
             self.assertEqual(result.stderr, "")
-        text = run("register", "--help").stdout
+        text = run("register", "--help-all").stdout
         for option, unit in (("--edge-length", "mm"), ("--tolerance", "mm"), ("--default-youngs-modulus", "kPa"),
                              ("--data-stiffness", "kPa/mm"), ("--fade", "mm")):
             self.assertRegex(text, re.escape(option) + r"[^-]*\(" + unit + r"\)")
+
+    def test_short_help_shows_what_matters_and_where_the_rest_is(self):
+        def options(*arguments):
+            return set(re.findall(r"^  (?:-\w,)?(--[a-z-]+)", run(*arguments).stdout, re.MULTILINE)) - {"--help"}
+
+        short, full = options("register", "--help"), options("register", "--help-all")
+        self.assertEqual(len(short), 12, short)
+        self.assertLess(short, full)
+        text = run("register", "-h").stdout
+        self.assertIn("tissuewarp register --help-all", text)
+        self.assertLessEqual(len(text.splitlines()), 55)
+        whole = run("register", "--help-all").stdout
+        rest = whole.split("\nOptions:\n")[1].split("\n\n")[0]
+        self.assertEqual(re.findall(r"--[a-z-]+", rest), ["--help", "--help-all"], "every option has a purpose")
+        self.assertEqual(options("mesh", "--help"), options("mesh", "--help-all"))
 
     def test_dry_run_writes_nothing(self):
         before = sorted(self.phantom.folder.iterdir())

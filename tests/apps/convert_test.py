@@ -260,7 +260,7 @@ class Maps(Registered):
             self.assertIn(f"`{name}`", page)
         for word in ("displacement_magnitude", "jacobian", "organ", "markups", "inverse_transform", "dicom", "all"):
             self.assertIn(f"`{word}`", page)
-            self.assertIn(word, run("register", "--help").stdout)
+            self.assertIn(word, run("register", "--help-all").stdout)
 
 
 class Bids(PhantomTest):

@@ -1,4 +1,4 @@
-"""Man pages and completion hold what --help says, and are read by man and bash."""
+"""Man pages and completion hold what --help-all says, and are read by man and bash."""
 
 import gzip
 import os
@@ -13,8 +13,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROGRAM = os.environ["TISSUEWARP"]
 
 
-def help_of(*verb):
-    return subprocess.run([PROGRAM, *verb, "--help"], check=True, capture_output=True, text=True).stdout
+def help_of(verb=None, option="--help"):
+    return subprocess.run([PROGRAM, *([verb] if verb else []), option], check=True, capture_output=True, text=True).stdout
 
 
 class FromHelp(unittest.TestCase):
@@ -36,7 +36,7 @@ class FromHelp(unittest.TestCase):
         self.assertEqual(verbs, {"tissuewarp", *(f"tissuewarp-{verb}" for verb in listed)})
         for name in verbs - {"tissuewarp"}:
             text = self.page(name).replace(r"\-", "-")
-            for option in re.findall(r"^ +(--[a-z-]+)", help_of(name.split("-", 1)[1]), flags=re.MULTILINE):
+            for option in re.findall(r"^ +(--[a-z-]+)", help_of(name.split("-", 1)[1], "--help-all"), flags=re.MULTILINE):
                 self.assertIn(option, text, name)
             self.assertIn(".SH SYNOPSIS", text)
 

@@ -15,8 +15,8 @@ from phantom import PhantomTest, run  # noqa: E402
 
 MODULES = ["register", "mesh", "warp", "simulate"]
 # No choice of a run in a panel, or one that the values which 3D Slicer always passes would override (config).
-LEFT_OUT = {"register": {"help", "config", "dry-run", "quiet"}, "mesh": {"help", "quiet"}, "warp": {"help", "quiet"},
-            "simulate": {"help", "quiet", "init", "ablate"}}
+LEFT_OUT = {"register": {"help", "help-all", "config", "dry-run", "quiet"}, "mesh": {"help", "help-all", "quiet"}, "warp": {"help", "help-all", "quiet"},
+            "simulate": {"help", "help-all", "quiet", "init", "ablate"}}
 RETURNED = {"register": {"doubts"}, "mesh": {"tetrahedra"}}
 
 
@@ -30,7 +30,7 @@ def parameters(verb):
 
 
 def options_of_help(verb):
-    return set(re.findall(r"^  (?:-\w,)?--([a-z-]+)", run(verb, "--help").stdout, re.MULTILINE))
+    return set(re.findall(r"^  (?:-\w,)?--([a-z-]+)", run(verb, "--help-all").stdout, re.MULTILINE))
 
 
 def launcher(verb, folder):
