@@ -1,5 +1,5 @@
 #pragma once
-/// Scene files (docs/manual/simulate.md).
+/// Scene files (docs/manual/scene-file.md).
 
 #include "core/observer.hpp"
 #include "simulation/scene.hpp"

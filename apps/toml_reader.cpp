@@ -248,7 +248,7 @@ void TomlReader::finish() const {
         const std::string nearest = meant(name, names);
         throw InvalidInput(toml_place(path_, entry) + ": unknown key '" + name + "'" +
                            (name_.empty() ? "" : " in " + name_) +
-                           (nearest.empty() ? "; see docs/manual/simulate.md" : "; did you mean '" + nearest + "'?"));
+                           (nearest.empty() ? "; see docs/manual/scene-file.md" : "; did you mean '" + nearest + "'?"));
     }
 }
 

@@ -1,4 +1,4 @@
-// Prints the table of docs/performance.md, section "Error of the mesh": what its estimate costs beside a factor and an
+// Prints the table of docs/lab/performance.md, section "Error of the mesh": what its estimate costs beside a factor and an
 // equilibrium. Cube of 100 mm, jittered, bottom held, a part of its top pushed in by 8 mm.
 //     discretisation_bench [CELLS]
 

@@ -1,4 +1,4 @@
-// The table of effects of docs/verification.md: every verification case on every engine.
+// The table of effects of docs/lab/verification.md: every verification case on every engine.
 //     effect_table [--gpu]
 // Prints a table in Markdown: the reference, and each engine's difference from it beside what is accepted. Ends with 1
 // when one is larger.

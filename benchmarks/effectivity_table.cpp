@@ -1,4 +1,4 @@
-// Prints the table "Estimated error of the mesh" of docs/verification.md: estimated against true errors of the
+// Prints the table "Estimated error of the mesh" of docs/lab/verification.md: estimated against true errors of the
 // displacements of data/reference, linear tetrahedra on the two coarser levels; on the first, quadratic ones as well.
 //     effectivity_table [--problem PART]
 

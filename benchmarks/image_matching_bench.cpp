@@ -1,4 +1,4 @@
-// Prints the tables of docs/results.md, section "Block matching": blocks of the moving image found in the bare fixed
+// Prints the tables of docs/lab/results.md, section "Block matching": blocks of the moving image found in the bare fixed
 // image, against the true displacement of the phantoms and the landmarks of the lung.
 //     image_matching_bench DATA [--case PART] [--csv FILE] [--count POINTS] [--grid MM] [--radius VOXELS]
 // DATA holds phantom-brainshift, phantom-brain-sag and lung-ct; PART selects cases whose name holds it; FILE takes a

@@ -1,4 +1,4 @@
-// Prints the tables of docs/verification.md: the problems of data/reference by Newton's method, every element, on four
+// Prints the tables of docs/lab/verification.md: the problems of data/reference by Newton's method, every element, on four
 // meshes and extrapolated; then every engine against Newton's method on one mesh.
 //     verification_table [--csv FILE] [--problem PART]... [--element NAME] [--no-studies] [--no-engines] [--gpu]
 //     verification_table --list

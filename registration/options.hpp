@@ -48,7 +48,7 @@ struct BlockMatchingOptions {
     FinestGrid finest = FinestGrid::AllPoints;
     double search_mm = 16.0;    ///< range of the first level about the predicted position, along each axis
     double least_share = 0.05;  ///< share of a block that both images must show. Chosen on the stripped heads, of whose
-                                ///< rim a third lost three points in ten (docs/results.md, "Block matching")
+                                ///< rim a third lost three points in ten (docs/lab/results.md, "Block matching")
     double back_match_voxels = 1;  ///< standard deviation of the back-match error in the confidence
     Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< moving → fixed, that the predicted positions contain
 };
@@ -68,7 +68,7 @@ struct ImageOptions {
     BlockMatchingOptions matching;
     ConsistencyOptions consistency;
     /// After the search for blocks, dense searches on grids so many times doubled from the blocks' finest. Templates of
-    /// grey values have none. Chosen among some 35 settings on brain shift, both brain sags and lung (docs/results.md).
+    /// grey values have none. Chosen among some 35 settings on brain shift, both brain sags and lung (docs/lab/results.md).
     std::vector<int> dense_coarsening{1, 1, 0};
     double expected_motion_mm = 100;  ///< of the organ's surface in the field of view of the intraoperative image: free
     double unseen_motion_mm = 0.8;    ///< and out of it, along its normal: what is around holds it there, …
@@ -82,7 +82,7 @@ struct ImageOptions {
 /// what no datum shows.
 struct TissuePrior {
     /// Deviation of the strain of pieces of tissue. Chosen between what the clean and the degraded brain sag like best,
-    /// with the brain shift beside them (docs/results.md, "Stiffer or softer").
+    /// with the brain shift beside them (docs/lab/results.md, "Stiffer or softer").
     double expected_strain = 0.12;
     double strain_length_mm = 10;  ///< size of these pieces
     double free_motion_mm = 20;    ///< of the organ's surface, from where the organ lies as a whole; not chosen on the

@@ -22,10 +22,10 @@ double organ_size(const imaging::Volume& labels);
 /// Edges of the mesh, per edge of a cube of the organ's volume.
 struct EdgeOptions {
     /// With labels of the operation, into about 50 000 tetrahedra. 8 mm in place of 6 cost the brain shift accuracy
-    /// (docs/results.md, "What it says"); the random phantoms 5001–5008 need no more than 6 (docs/accuracy-time.md).
+    /// (docs/lab/results.md, "What it says"); the random phantoms 5001–5008 need no more than 6 (docs/lab/accuracy-time.md).
     double with_labels = 18;
     /// Without, into about 15 000. Chosen on images of the brain shift, both sags and the lung and on surfaces of the
-    /// brain shift and the liver (docs/results.md, "How fine a mesh").
+    /// brain shift and the liver (docs/lab/results.md, "How fine a mesh").
     double without_labels = 12;
 };
 
@@ -40,7 +40,7 @@ struct OffsetOptions {
 double suggested_edge_length(const imaging::Volume& labels);
 
 /// The same into about 15 000, over 12: where an image or points pull, without labels. Finer tetrahedra cost three to
-/// ten times the seconds and are no more accurate (docs/results.md, "How fine a mesh").
+/// ten times the seconds and are no more accurate (docs/lab/results.md, "How fine a mesh").
 double suggested_edge_length_without_labels(const imaging::Volume& labels);
 
 /// Edge length 0: that of suggested_edge_length. A function, because GCC 12 warns of uninitialised members where a

@@ -32,7 +32,7 @@ struct CourseOptions {
     int rounds_over_planned = 2;  ///< rounds at most, over those planned: the step bound repeats some
     int passes = 4;               ///< of a round at most, while following an equilibrium changes what is asked for
     /// Searches of an image beyond those planned, at most. The brain shift, both sags, the lung and the liver from
-    /// their images were looked at while this and SearchGain were chosen (docs/results.md, "Searching on").
+    /// their images were looked at while this and SearchGain were chosen (docs/lab/results.md, "Searching on").
     int more_searches = 4;
     int rounds_of_search = 2;  ///< weigh what such a search found
     int load_searches = 2;     ///< unknown loads are looked for so often: the first brings more points within reach

@@ -109,7 +109,7 @@ struct GpuStepShape {
     friend bool operator==(const GpuStepShape&, const GpuStepShape&) = default;
 };
 
-/// What measured best on an H100 for a mesh of so many tetrahedra (docs/performance.md), carried over to a device of
+/// What measured best on an H100 for a mesh of so many tetrahedra (docs/lab/performance.md), carried over to a device of
 /// so many multiprocessors; where these are unknown (0), to one of as many as an H100 has.
 GpuStepShape suggested_gpu_step_shape(int element_count, Element element = Element::T4, int multiprocessors = 0);
 

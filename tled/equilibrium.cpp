@@ -29,7 +29,7 @@ void require_usable(const NodalConditions& conditions, const EquilibriumOptions&
 }
 
 /// By expected work in force evaluations: relaxation's from the lowest frequency, L-BFGS's from the size of the factor
-/// (figures: docs/performance.md, "Equilibrium to a given error").
+/// (figures: docs/lab/performance.md, "Equilibrium to a given error").
 Choice choose(const Engine& engine, const RestStiffness& stiffness, const NodalConditions& conditions) {
     if (engine.processor() == Processor::Gpu)
         return {EquilibriumMethod::SelfCheckedRelaxation, "on the GPU a solve with the factor outweighs all steps"};

@@ -1,5 +1,5 @@
 #pragma once
-/// What a step costs by its arithmetic: a counted model, beside which measured times are read (docs/performance.md).
+/// What a step costs by its arithmetic: a counted model, beside which measured times are read (docs/lab/performance.md).
 
 #include "tled/engine.hpp"
 

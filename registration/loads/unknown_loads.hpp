@@ -10,7 +10,7 @@
 namespace tissuewarp::registration::detail {
 
 /// The loads that are drawn. Their kind and smoothness are part of the form of the error estimate, which was chosen on
-/// the random phantoms 1–60 and 1001–1120 and is reported on 2001–2112 (docs/accuracy-time.md); registrations took them
+/// the random phantoms 1–60 and 1001–1120 and is reported on 2001–2112 (docs/lab/accuracy-time.md); registrations took them
 /// over unchanged.
 struct LoadDraws {
     double smooth_over = 0.5;  ///< of the organ's radius, length over which tractions vary. Chosen there

@@ -30,7 +30,7 @@ struct SurfaceDoubtLimits {
     double most_rival_support = 0.95;  ///< of what the best pose explains, by one 8 mm or more away
     /// Share of the organ's surface that the points show. On less of a smooth organ another pose may fit as well.
     /// Chosen on draws 441 to 1160 of the liver phantom's surface, where 0.18 had missed two failures; reported on
-    /// others from 1281 on (docs/results.md).
+    /// others from 1281 on (docs/lab/results.md).
     double least_coverage = 0.25;
     /// Normals point inwards where the headers place this share of the points within so many mm of the model, and of
     /// those this share against its normals: a search of the pose puts such a patch on the other side of the organ, and

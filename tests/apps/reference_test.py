@@ -2,7 +2,7 @@
 
 Each is solved on two meshes. The finer one must agree within the reference's uncertainty and 1.5 times the distance to
 the coarser one, which is more than it has left to go itself if it converges in first order or better. The strict bars,
-on four meshes, are those of docs/verification.md. Corners, where the solutions are singular, are left out. Bars that
+on four meshes, are those of docs/lab/verification.md. Corners, where the solutions are singular, are left out. Bars that
 bend and ν = 0.45 take averaged pressure, where plain tetrahedra lock. mm, kPa and s; the references are in SI.
 """
 

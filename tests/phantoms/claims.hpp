@@ -1,5 +1,5 @@
 #pragma once
-/// What README.md and docs/results.md claim of a registration, held with room of a tenth on the files it is claimed
+/// What README.md and docs/lab/results.md claim of a registration, held with room of a tenth on the files it is claimed
 /// for.
 
 #include "registration/evaluation.hpp"
@@ -12,7 +12,7 @@
 
 namespace tissuewarp::registration::claims {
 
-/// Errors at targets, mm, as docs/results.md states them.
+/// Errors at targets, mm, as docs/lab/results.md states them.
 struct Claim {
     int count = 0;
     double before = 0;  ///< mean

@@ -55,7 +55,7 @@ TEST(CookVerification, PlaneStrain) {
     expect_met(problem, study(problem, Elements::AveragedPressure, {6, 12, 18, 24}));
 }
 
-// Why a corner of the reference can be missed (docs/verification.md): on finer meshes T10 keeps the tip of the
+// Why a corner of the reference can be missed (docs/lab/verification.md): on finer meshes T10 keeps the tip of the
 // reference, but its corner lies below by more than twice the uncertainty, as the reference's own meshes do the finer
 // they are.
 TEST(CookVerification, TheReferencesCornerIsNotConverged) {

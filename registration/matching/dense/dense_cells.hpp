@@ -10,7 +10,7 @@ namespace tissuewarp::registration::detail {
 
 /// What a dense force says (docs/method.md, 11). Chosen together with the grids of ImageOptions::dense_coarsening and
 /// the window among some 35 settings on the brain shift, both brain sags and the lung; the degraded brain shift and the
-/// liver were not looked at (docs/results.md, "A bare volume of the operation").
+/// liver were not looked at (docs/lab/results.md, "A bare volume of the operation").
 struct DenseForceRules {
     static constexpr double independent_share = 0.2;  ///< of the voxels: descriptors and what they miss agree with
                                                       ///< those beside them
