@@ -129,7 +129,7 @@ std::vector<Doubt> doubts_of(const Uncertainty& uncertainty, double tolerance_mm
 
 /// In words, where errors are not within `accuracy_mm` with a probability of 95 % on average over the tissue, what is
 /// at fault and what would help; otherwise nothing. Of random phantoms, the error over the tissue (root mean square) of
-/// 96 to 99 in a hundred is within that radius (docs/lab/accuracy-time.md, "Is an accuracy kept?").
+/// 96 to 99 in a hundred is within that radius (docs/lab/accuracy-time.md, "Are a time and an accuracy kept?").
 std::optional<Doubt> doubt_of_accuracy(const UncertaintySummary& summary, double accuracy_mm);
 
 /// The estimate on a grid of the fixed frame.
