@@ -13,7 +13,10 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/data/scenes DESTINATION ${CMAKE_INSTALL_
 install(FILES ${PROJECT_SOURCE_DIR}/data/LICENSE-Apache-2.0 DESTINATION ${CMAKE_INSTALL_DATADIR}/tissuewarp)
 install(FILES ${packaging}/copyright ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md
   ${PROJECT_SOURCE_DIR}/data/SOURCES.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs/manual ${PROJECT_SOURCE_DIR}/examples DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/examples DESTINATION ${CMAKE_INSTALL_DOCDIR})
+# The pages for users; their figures are looked at, and their paths are those that messages of the program name.
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs DESTINATION ${CMAKE_INSTALL_DOCDIR}
+  PATTERN lab EXCLUDE PATTERN decisions EXCLUDE PATTERN notebooks EXCLUDE)
 
 # 3D Slicer: the scripted module, and a program for each verb that is a command-line module.
 set(slicer ${CMAKE_INSTALL_DATADIR}/tissuewarp/slicer)
