@@ -3,6 +3,7 @@
 #include "apps/initial_transform.hpp"
 #include "apps/match_masks.hpp"
 #include "apps/moving_organ.hpp"
+#include "apps/naming_page.hpp"
 #include "apps/noted_images.hpp"
 #include "apps/point_files.hpp"
 #include "core/sha256.hpp"
@@ -230,7 +231,8 @@ void read_image_and_labels(const fs::path& image_path, const fs::path& labels_pa
 std::vector<Volume> read_contrasts(const std::vector<fs::path>& paths, std::vector<std::string>& notes) {
     std::vector<Volume> result;
     for (const fs::path& path : paths) {
-        const imaging::ReadResult read = imaging::read_volume_with_notes(path);
+        const imaging::ReadResult read =
+            naming_page(images_page, [&] { return imaging::read_volume_with_notes(path); });
         require_grey(read.volume, path);
         require_millimetres(read.volume.geometry, path);
         for (const std::string& note : notes_of(read, path)) notes.push_back(note);
@@ -269,13 +271,19 @@ RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observe
     for (const fs::path& path : options.fixed_contrasts) add_file(inputs, "fixed", path);
     if (!options.materials.empty()) inputs.materials = read_materials(options.materials);
     if (!options.label_names.empty()) inputs.label_names = imaging::read_label_names(options.label_names);
-    read_point_files(inputs, options);
+    naming_page(points_page, [&] { read_point_files(inputs, options); });
     observer.checkpoint("reading", 0.1);
 
     imaging::ReadResult moving, fixed, moving_labels, fixed_labels;
     tbb::task_group tasks;
-    tasks.run([&] { read_image_and_labels(options.moving, options.moving_labels, moving, moving_labels); });
-    tasks.run([&] { read_image_and_labels(options.fixed, options.fixed_labels, fixed, fixed_labels); });
+    tasks.run([&] {
+        naming_page(images_page,
+                    [&] { read_image_and_labels(options.moving, options.moving_labels, moving, moving_labels); });
+    });
+    tasks.run([&] {
+        naming_page(images_page,
+                    [&] { read_image_and_labels(options.fixed, options.fixed_labels, fixed, fixed_labels); });
+    });
     tasks.run([&] {
         for (InputFile& file : inputs.files)
             if (fs::is_regular_file(file.path)) file.sha256 = sha256_of_file(file.path);

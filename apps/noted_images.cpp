@@ -1,5 +1,7 @@
 #include "apps/noted_images.hpp"
 
+#include "apps/naming_page.hpp"
+
 namespace tissuewarp::apps {
 
 namespace {
@@ -18,11 +20,11 @@ std::vector<std::string> notes_of(const imaging::ReadResult& read, const std::fi
 }
 
 imaging::Volume read_noted_volume(const std::filesystem::path& path, Observer& observer) {
-    return noted(imaging::read_volume_with_notes(path), path, observer);
+    return noted(naming_page(images_page, [&] { return imaging::read_volume_with_notes(path); }), path, observer);
 }
 
 imaging::Volume read_noted_labels(const std::filesystem::path& path, Observer& observer) {
-    return noted(imaging::read_labels_with_notes(path), path, observer);
+    return noted(naming_page(images_page, [&] { return imaging::read_labels_with_notes(path); }), path, observer);
 }
 
 }  // namespace tissuewarp::apps

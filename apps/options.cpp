@@ -396,7 +396,7 @@ struct Parser {
                 throw InvalidInput(
                     registration.fixed.empty()
                         ? "nothing to register to; give --fixed, --fixed-labels, --fixed-surface, --fixed-points or "
-                          "--fixed-curves, or several"
+                          "--fixed-curves, or several (docs/which-data.md)"
                         : "matching the fixed image takes the moving one; give --moving");
             require_organ(registration);
             require_pairs(registration);
@@ -471,7 +471,8 @@ struct Parser {
         if (!o.moving_labels.empty() || !o.moving_surface.empty() || !o.moving_mesh.empty()) return;
         if (o.moving.empty())
             throw InvalidInput(
-                "nothing says where the organ is; give --moving-labels, --moving-surface, --moving-mesh or --moving");
+                "nothing says where the organ is; give --moving-labels, --moving-surface, --moving-mesh or --moving "
+                "(docs/which-data.md)");
         const auto refuse_without_labels = [](bool given, const std::string& option) {
             if (given)
                 throw InvalidInput(option +

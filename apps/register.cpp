@@ -198,8 +198,9 @@ void require_no_doubts(const RegistrationRun& run) {
     for (const Doubt& doubt : run.result.doubts)
         if (doubt.severity == Severity::Doubt) codes.push_back(doubt.code);
     if (codes.empty()) return;
-    throw SolverFailure(fmt::format("the result is doubted ({}); '{}' says why, and all files are written",
-                                    fmt::join(codes, ", "), (run.options.output / "report.json").string()));
+    throw SolverFailure(fmt::format(
+        "the result is doubted ({}); '{}' says why, docs/manual/doubts.md what it means; all files are written",
+        fmt::join(codes, ", "), (run.options.output / "report.json").string()));
 }
 
 Scores score(const RegistrationRun& run) {

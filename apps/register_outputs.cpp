@@ -286,6 +286,7 @@ std::string summary_text(const RegistrationRun& run, double total_seconds) {
             if (!run.dial || note != run.dial->reason) text += "note: " + note + "\n";  // said above
     for (const registration::Doubt& doubt : run.result.doubts)
         text += fmt::format("{}: {}\n", name_of(doubt.severity), full_text(doubt));
+    if (!run.result.doubts.empty()) text += "what doubts mean: docs/manual/doubts.md\n";
     return text + "results in " + run.options.output.string() + "\n";
 }
 

@@ -29,7 +29,8 @@ class WrongFiles(PhantomTest):
 
     def test_two_dimensional_image(self):
         path = save(self.phantom.moving_labels_array[:, :, 24], MOVING_AFFINE, self.phantom.folder / "flat.nii.gz")
-        self.assert_refused(self.phantom.register(moving=None, moving_labels=path), INPUT, "flat.nii.gz")
+        self.assert_refused(self.phantom.register(moving=None, moving_labels=path), INPUT, "flat.nii.gz",
+                            "(docs/manual/images.md)")
 
     def test_vector_image_in_place_of_grey(self):
         vectors = numpy.zeros((SIZE, SIZE, SIZE, 1, 3), numpy.float32)
@@ -127,7 +128,7 @@ class WrongTables(PhantomTest):
     def test_landmarks_with_a_word_in_place_of_a_number(self):
         path = self.phantom.folder / "landmarks.csv"
         path.write_text("pre_x,pre_y,pre_z,intra_x,intra_y,intra_z\n1,2,3,4,five,6\n")
-        self.assert_refused(self.phantom.register("--landmarks", path), INPUT, "landmarks.csv", "2")
+        self.assert_refused(self.phantom.register("--landmarks", path), INPUT, "landmarks.csv", "2", "(docs/manual/points.md)")
 
 
     def test_landmarks_in_ras(self):
