@@ -92,7 +92,7 @@ class ImagesAlone(PhantomTest):
         self.assert_refused(self.register("--anchor", 1), INPUT, "--anchor", "--moving-labels")
         self.assert_refused(self.register(fixed_labels=self.phantom.fixed_labels), INPUT, "--moving-labels")
         self.assert_refused(run("register", "--fixed-surface", "a.ply", "-o", self.phantom.output), INPUT,
-                            "--moving-labels")
+                            "--moving-labels", "docs/which-data.md")
 
 
 def ellipsoid_triangles(centre, axes, rings=24):

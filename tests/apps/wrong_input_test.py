@@ -128,8 +128,8 @@ class WrongTables(PhantomTest):
     def test_landmarks_with_a_word_in_place_of_a_number(self):
         path = self.phantom.folder / "landmarks.csv"
         path.write_text("pre_x,pre_y,pre_z,intra_x,intra_y,intra_z\n1,2,3,4,five,6\n")
-        self.assert_refused(self.phantom.register("--landmarks", path), INPUT, "landmarks.csv", "2", "(docs/manual/points.md)")
-
+        self.assert_refused(self.phantom.register("--landmarks", path), INPUT, "landmarks.csv", "2",
+                            "(docs/manual/points.md)")
 
     def test_landmarks_in_ras(self):
         path = self.phantom.folder / "landmarks.csv"
