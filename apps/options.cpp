@@ -48,6 +48,8 @@ struct Parser {
     Parser() {
         app.require_subcommand(1);
         app.set_version_flag("--version", "tissuewarp " + program_version());
+        app.footer(
+            "Documents:\n  docs/index.md               In the sources, and in /usr/share/doc/tissuewarp of packages");
         declare_register(verbs.emplace_back(app, "register", "Register a segmented volume to another, or to points"));
         declare_mesh(verbs.emplace_back(app, "mesh", "Turn a label map into tetrahedra"));
         declare_warp(verbs.emplace_back(app, "warp", "Carry an image, labels, points or a surface along"));

@@ -9,7 +9,7 @@ namespace tissuewarp::tled {
 
 enum class Element {
     T4,                  ///< linear tetrahedron; locks as ν → 0.5
-    AveragedPressureT4,  ///< linear tetrahedron, volumetric energy of nodal volumes (NUMERICS in docs/method.md)
+    AveragedPressureT4,  ///< linear tetrahedron, volumetric energy of nodal volumes (docs/method.md, 2)
 };
 
 struct Model {
