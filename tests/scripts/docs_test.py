@@ -139,6 +139,30 @@ class Figures(unittest.TestCase):
             self.assertRegex(laboratory, rf"\| {re.escape(mean)} \| {re.escape(percentile)} \|[^|]*\| {re.escape(within)}")
 
 
+class NumbersOfTheCode(unittest.TestCase):
+    """A number that a page states and the code holds: where it stands in the code, and the words around it on the page."""
+    NUMBERS = [
+        ("registration/uncertainty/error_model.hpp", r"failed_mm = (\d+)", "what-the-numbers-mean.md", "may lie {} mm off or more"),
+        ("registration/uncertainty.hpp", r"double failed_mm = (\d+)", "manual/register-outputs.md", "radius is more than {} mm"),
+        ("tled/model.cpp", r"> (0\.\d+)\) return Element::AveragedPressureT4", "manual/register-options.md", "above {} |"),
+        ("tled/model.cpp", r"> (0\.\d+)\) return Element::AveragedPressureT4", "manual/scene-file.md", "Poisson's ratio of {} |"),
+        ("tled/model.cpp", r"> (0\.\d+)\) return Element::AveragedPressureT4", "method.md", "Poisson's ratio is above {}"),
+    ]
+
+    def test_pages_say_what_the_code_holds(self):
+        for source, pattern, page, words in self.NUMBERS:
+            with self.subTest(source=source, page=page):
+                found = re.search(pattern, (ROOT / source).read_text())
+                self.assertTrue(found, "the code has no such number")
+                self.assertIn(words.format(found[1]), (DOCS / page).read_text())
+
+    def test_limits_in_words(self):
+        """A quarter of the surface, twice what was to be expected."""
+        surface = (ROOT / "registration" / "terms" / "surface.hpp").read_text()
+        self.assertIn("least_coverage = 0.25;", surface, "pages say 'a quarter'")
+        self.assertIn("most_z = 2;", (ROOT / "registration" / "uncertainty.hpp").read_text(), "pages say 'twice'")
+
+
 class Options(unittest.TestCase):
     VERBS = {"register": ["register-options.md"], "mesh": ["mesh.md"], "warp": ["warp.md"], "convert": ["convert.md"],
              "evaluate": ["evaluate.md"], "info": ["info.md"], "simulate": ["simulate.md"], "calibrate": ["calibrate.md"],
