@@ -383,6 +383,13 @@ struct Parser {
         verb.common(o.common);
     }
 
+    /// What CLI11 prints, with single blank lines.
+    [[nodiscard]] std::string help() const {
+        std::string text = app.help();
+        for (std::size_t at; (at = text.find("\n\n\n")) != std::string::npos;) text.erase(at, 1);
+        return text;
+    }
+
     Command result() {
         const std::string verb = app.get_subcommands().front()->get_name();
         if (verb == "register") {
@@ -540,10 +547,10 @@ Command parse_command_line(std::vector<std::string> arguments) {
     try {
         parser.app.parse(arguments);
     } catch (const CLI::CallForAllHelp&) {
-        throw HelpRequest{parser.app.help()};
+        throw HelpRequest{parser.help()};
     } catch (const CLI::CallForHelp&) {
         for (Verb& verb : parser.verbs) verb.shorten_help();
-        throw HelpRequest{parser.app.help()};
+        throw HelpRequest{parser.help()};
     } catch (const CLI::CallForVersion&) {
         throw HelpRequest{parser.app.version() + "\n"};
     } catch (const CLI::ParseError& error) {

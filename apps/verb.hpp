@@ -33,9 +33,12 @@ public:
     /// Leaves in the help what people need first, and says where the rest is.
     void shorten_help() {
         if (first_.empty()) return;
-        const CLI::Option* help = app_.get_help_ptr();
+        std::vector<CLI::Option*> hidden;
         for (CLI::Option* option : app_.get_options())
-            if (option != help && !is_first(*option)) option->group("");
+            if (option != app_.get_help_ptr() && !is_first(*option)) hidden.push_back(option);
+        for (CLI::Option* option : hidden) option->group("");
+        for (CLI::Option* option : app_.get_options())  // of what is shown, no word of what is not
+            for (CLI::Option* other : hidden) option->remove_excludes(other);
         app_.footer(fmt::format("{}\n\nMore:\n  {:<34}every option, by purpose\n  {:<34}the page of this verb",
                                 app_.get_footer(), "tissuewarp " + name() + " --help-all",
                                 "docs/manual/" + name() + ".md"));
