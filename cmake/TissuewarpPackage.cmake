@@ -14,9 +14,8 @@ install(FILES ${PROJECT_SOURCE_DIR}/data/LICENSE-Apache-2.0 DESTINATION ${CMAKE_
 install(FILES ${packaging}/copyright ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md
   ${PROJECT_SOURCE_DIR}/data/SOURCES.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/examples DESTINATION ${CMAKE_INSTALL_DOCDIR})
-# The pages for users; their figures are looked at, and their paths are those that messages of the program name.
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs DESTINATION ${CMAKE_INSTALL_DOCDIR}
-  PATTERN lab EXCLUDE PATTERN decisions EXCLUDE PATTERN notebooks EXCLUDE)
+# All pages, since they link to each other; their paths are those that messages of the program name.
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs DESTINATION ${CMAKE_INSTALL_DOCDIR})
 
 # 3D Slicer: the scripted module, and a program for each verb that is a command-line module.
 set(slicer ${CMAKE_INSTALL_DATADIR}/tissuewarp/slicer)
