@@ -22,7 +22,8 @@ def sphere(rings=8, columns=16):
     triangles = [[0, at(1, c), at(1, c + 1)] for c in range(columns)]
     for ring in range(1, rings - 1):
         for c in range(columns):
-            triangles += [[at(ring, c), at(ring + 1, c), at(ring + 1, c + 1)], [at(ring, c), at(ring + 1, c + 1), at(ring, c + 1)]]
+            triangles += [[at(ring, c), at(ring + 1, c), at(ring + 1, c + 1)],
+                          [at(ring, c), at(ring + 1, c + 1), at(ring, c + 1)]]
     last = len(points) - 1
     triangles += [[last, at(rings - 1, c + 1), at(rings - 1, c)] for c in range(columns)]
     return numpy.array(points), numpy.array(triangles)

@@ -141,12 +141,15 @@ class Figures(unittest.TestCase):
 
 class NumbersOfTheCode(unittest.TestCase):
     """A number that a page states and the code holds: where it stands in the code, and the words around it on the page."""
+    AVERAGES = ("tled/model.cpp", r"> (0\.\d+)\) return Element::AveragedPressureT4")
     NUMBERS = [
-        ("registration/uncertainty/error_model.hpp", r"failed_mm = (\d+)", "what-the-numbers-mean.md", "may lie {} mm off or more"),
-        ("registration/uncertainty.hpp", r"double failed_mm = (\d+)", "manual/register-outputs.md", "radius is more than {} mm"),
-        ("tled/model.cpp", r"> (0\.\d+)\) return Element::AveragedPressureT4", "manual/register-options.md", "above {} |"),
-        ("tled/model.cpp", r"> (0\.\d+)\) return Element::AveragedPressureT4", "manual/scene-file.md", "Poisson's ratio of {} |"),
-        ("tled/model.cpp", r"> (0\.\d+)\) return Element::AveragedPressureT4", "method.md", "Poisson's ratio is above {}"),
+        ("registration/uncertainty/error_model.hpp", r"failed_mm = (\d+)",
+         "what-the-numbers-mean.md", "may lie {} mm off or more"),
+        ("registration/uncertainty.hpp", r"double failed_mm = (\d+)",
+         "manual/register-outputs.md", "radius is more than {} mm"),
+        (*AVERAGES, "manual/register-options.md", "above {} |"),
+        (*AVERAGES, "manual/scene-file.md", "Poisson's ratio of {} |"),
+        (*AVERAGES, "method.md", "Poisson's ratio is above {}"),
     ]
 
     def test_pages_say_what_the_code_holds(self):
