@@ -71,8 +71,11 @@ EquilibriumResult precisely(Engine& engine, const RestStiffness& stiffness, cons
 EquilibriumResult by_newton(Engine& engine, const RestStiffness& stiffness, const NodalConditions& conditions,
                             const EquilibriumOptions& options, const Eigen::Matrix3Xd* start, Observer& observer) {
     if (options.rest == nullptr) throw InvalidInput("equilibrium: Newton's method takes the rest state");
-    return precisely(engine, stiffness, conditions, options, observer,
-                     [&](detail::EquilibriumSearch& search) { return detail::newton(search, start); });
+    return precisely(engine, stiffness, conditions, options, observer, [&](detail::EquilibriumSearch& search) {
+        if (options.tangent != nullptr) return detail::newton(search, start, *options.tangent);
+        detail::TangentFactor tangent(*options.rest, conditions.constrained);
+        return detail::newton(search, start, tangent);
+    });
 }
 
 /// A method that was asked for stays alone; on a GPU K₀ is not factorised; loads that follow the surface are not in the

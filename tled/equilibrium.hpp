@@ -9,6 +9,10 @@
 
 namespace tissuewarp::tled {
 
+namespace detail {
+class TangentFactor;
+}
+
 enum class EquilibriumMethod {
     Automatic,
     Lbfgs,                  ///< limited-memory BFGS with the factor of K₀ as metric (Liu and Nocedal 1989)
@@ -27,6 +31,8 @@ struct EquilibriumOptions {
                                       ///< relaxation then goes without a search for it, unless it finds it wrong
     const RestState* rest = nullptr;  ///< that of the engine: lets L-BFGS factorise a metric near the answer for tissue
                                       ///< of which almost only the volume is stiff, and Newton's method decide
+    detail::TangentFactor* tangent = nullptr;  ///< of that tissue at another state, which Newton's method begins with
+    bool on_the_way = false;  ///< a part of a load path: Newton's method need not know whether the tissue is stable
 };
 
 struct EquilibriumResult {

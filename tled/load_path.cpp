@@ -2,6 +2,7 @@
 
 #include "tled/damped_motion.hpp"
 #include "tled/statics/finite_rotations.hpp"
+#include "tled/stiffness/tangent_factor.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -45,7 +46,7 @@ public:
 private:
     bool judged() {
         try {
-            result_ = judged_by_tangent(engine_, stiffness_, conditions_, options_.equilibrium, result_, observer_);
+            result_ = judged_by_tangent(engine_, stiffness_, conditions_, equilibrium_options(), result_, observer_);
             return true;
         } catch (const SolverFailure& failure) {
             cause_ = failure.what();
@@ -74,6 +75,15 @@ private:
         double load;
         Matrix3Xd displacement;
     };
+
+    /// With the factor that the whole path shares.
+    [[nodiscard]] EquilibriumOptions equilibrium_options() {
+        EquilibriumOptions options = options_.equilibrium;
+        if (options.rest == nullptr) return options;
+        if (!tangent_) tangent_ = std::make_unique<detail::TangentFactor>(*options.rest, conditions_.constrained);
+        options.tangent = tangent_.get();
+        return options;
+    }
 
     [[nodiscard]] NodalConditions at(double load) const {
         if (from_rest_) return scaled(conditions_, load);
@@ -116,9 +126,10 @@ private:
 
     bool advance(double load) {
         const NodalConditions partial = at(load);
-        EquilibriumOptions options = options_.equilibrium;
+        EquilibriumOptions options = equilibrium_options();
         constexpr double loose = 10;  // of the tolerance, on the way
-        if (load < 1) options.tolerance_mm *= loose;
+        options.on_the_way = load < 1;
+        if (options.on_the_way) options.tolerance_mm *= loose;
         if (result_.method == EquilibriumMethod::Newton) options.method = EquilibriumMethod::Newton;  // others failed
         const bool first = from_rest_ && !before_ && now_.load == 0;
         if (first) options.last = EquilibriumMethod::Lbfgs;
@@ -164,7 +175,7 @@ private:
     }
 
     bool leads_to_equilibrium(const RestState& rest, double reached) {
-        EquilibriumOptions options = options_.equilibrium;
+        EquilibriumOptions options = equilibrium_options();
         options.method = EquilibriumMethod::Newton;
         const auto loads = [&](double part) { return at(reached + part * (1 - reached)); };
         try {
@@ -206,6 +217,7 @@ private:
     std::optional<Point> before_;
     std::optional<double> moderate_part_;
     std::unique_ptr<detail::FiniteRotations> rotations_;  // made where a step is predicted
+    std::unique_ptr<detail::TangentFactor> tangent_;
     std::string cause_;
     EquilibriumResult result_;
 };

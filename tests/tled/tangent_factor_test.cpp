@@ -33,7 +33,8 @@ Column column(Element element) {
     for (int n = 0; n < model.mesh.node_count(); ++n) {
         const Vector3d X = model.mesh.nodes.col(n);
         if (X.z() < 1e-9) conditions.prescribed.push_back({n, {true, true, true}, Vector3d::Zero()});
-        if (X.x() < 1e-9 && X.z() > 50) conditions.springs.push_back({n, 1e-3 * Eigen::Matrix3d::Identity(), Vector3d::Zero()});
+        if (X.x() < 1e-9 && X.z() > 50)
+            conditions.springs.push_back({n, 1e-3 * Eigen::Matrix3d::Identity(), Vector3d::Zero()});
         if (X.z() > 100 - 1e-9) made.aside(0, n) = 1;
     }
     made.conditions = nodal_conditions(conditions, made.rest);
@@ -50,10 +51,11 @@ TEST(TangentFactor, OfOneStatePreparesAnother) {
     for (const Element element : {Element::T4, Element::AveragedPressureT4}) {
         const Column made = column(element);
         const Matrix3Xd there = stretched(made.rest, 1.01);
-        detail::TangentFactor at_rest(made.rest, made.conditions), own(made.rest, made.conditions);
-        ASSERT_TRUE(at_rest.factorise(stretched(made.rest, 1.0)));
-        ASSERT_TRUE(own.factorise(there));
-        const std::optional<Matrix3Xd> found = at_rest.solve_at(there, made.aside);
+        detail::TangentFactor at_rest(made.rest, made.conditions.constrained),
+            own(made.rest, made.conditions.constrained);
+        ASSERT_TRUE(at_rest.factorise(made.conditions, stretched(made.rest, 1.0)));
+        ASSERT_TRUE(own.factorise(made.conditions, there));
+        const std::optional<Matrix3Xd> found = at_rest.solve_at(made.conditions, there, made.aside).x;
         ASSERT_TRUE(found);
         const Matrix3Xd expected = own.solve(made.aside);
         EXPECT_LT((*found - expected).norm(), 0.05 * expected.norm());
@@ -61,16 +63,23 @@ TEST(TangentFactor, OfOneStatePreparesAnother) {
     }
 }
 
-TEST(TangentFactor, LeavesTissueThatBucklesToAFactorOfItsOwn) {
+TEST(TangentFactor, OfStableTissuePreparesTissueThatBuckles) {
     const Column made = column(Element::T4);
     const Matrix3Xd there = stretched(made.rest, 0.7);
-    detail::TangentFactor tangent(made.rest, made.conditions);
-    EXPECT_FALSE(tangent.solve_at(there, made.aside)) << "nothing is factorised";
-    ASSERT_TRUE(tangent.factorise(stretched(made.rest, 1.0)));
+    detail::TangentFactor tangent(made.rest, made.conditions.constrained);
+    EXPECT_FALSE(tangent.solve_at(made.conditions, there, made.aside).x) << "nothing is factorised";
+    ASSERT_TRUE(tangent.factorise(made.conditions, stretched(made.rest, 1.0)));
     EXPECT_TRUE(tangent.stable());
-    EXPECT_FALSE(tangent.solve_at(there, made.aside));
-    ASSERT_TRUE(tangent.factorise(there));
+    const auto prepared = tangent.solve_at(made.conditions, there, made.aside);
+    EXPECT_FALSE(prepared.positive);
+    ASSERT_TRUE(prepared.x);
+
+    ASSERT_TRUE(tangent.factorise(made.conditions, there));
     EXPECT_FALSE(tangent.stable());
+    const Matrix3Xd of_positive_part = tangent.solve(made.aside);
+    EXPECT_LT((*prepared.x - of_positive_part).norm(), 0.1 * of_positive_part.norm());
+    ASSERT_TRUE(tangent.factorise_positive_part(made.conditions, there));
+    EXPECT_TRUE(tangent.solve(made.aside).isApprox(of_positive_part, 1e-12));
 }
 
 }  // namespace

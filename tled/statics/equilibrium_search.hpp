@@ -4,6 +4,7 @@
 
 #include "tled/equilibrium.hpp"
 #include "tled/model/vectors.hpp"
+#include "tled/stiffness/tangent_factor.hpp"
 
 #include <string>
 
@@ -64,7 +65,8 @@ constexpr double least_starting_jacobian = 0.1;
 
 EquilibriumResult lbfgs(EquilibriumSearch& search, const Eigen::Matrix3Xd* start);
 EquilibriumResult dynamic_relaxation(EquilibriumSearch& search, const Eigen::Matrix3Xd* start);
-EquilibriumResult newton(EquilibriumSearch& search, const Eigen::Matrix3Xd* start);  // options.rest is there
+/// options.rest is there; the factor is that of another state of the same tissue, or a new one.
+EquilibriumResult newton(EquilibriumSearch& search, const Eigen::Matrix3Xd* start, TangentFactor& tangent);
 /// A state that is nearly an equilibrium brought there and judged by the tangent; options.rest is there. Throws
 /// SolverFailure where K₀ does not prepare that, or the tangent is not positive.
 EquilibriumResult refinement(EquilibriumSearch& search, const Eigen::Matrix3Xd& start);

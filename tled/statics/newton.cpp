@@ -52,9 +52,9 @@ bool taken(EquilibriumSearch& search, const Matrix3Xd& u, const Matrix3Xd& next,
 
 }  // namespace
 
-EquilibriumResult newton(EquilibriumSearch& search, const Matrix3Xd* start) {
-    TangentFactor tangent(*search.options.rest, search.conditions);
-    const FiniteRotations rotations(*search.options.rest, search.conditions);
+EquilibriumResult newton(EquilibriumSearch& search, const Matrix3Xd* start, TangentFactor& tangent) {
+    const NodalConditions& conditions = search.conditions;
+    const FiniteRotations rotations(*search.options.rest, conditions);
     Matrix3Xd u = first_state(search, rotations, start);
     if (!search.admissible(u)) search.fail_stalled();
     Matrix3Xd r = search.residual();
@@ -62,19 +62,25 @@ EquilibriumResult newton(EquilibriumSearch& search, const Matrix3Xd* start) {
     bool was_unstable = false;
     bool last = false;
     for (int iteration = 0, idle = 0; iteration < most_iterations; ++iteration, ++idle) {
-        std::optional<Matrix3Xd> by_other_factor;
-        if (iteration > 0 && !last) by_other_factor = tangent.solve_at(u, r);
-        if (!by_other_factor && !tangent.factorise(u)) search.fail_stalled();
-        was_unstable |= !by_other_factor && !tangent.stable();
-        const Matrix3Xd d = by_other_factor ? *std::move(by_other_factor) : tangent.solve(r);
+        TangentFactor::Prepared prepared;
+        if (!last) prepared = tangent.solve_at(conditions, u, r);
+        was_unstable |= !prepared.positive;
+        if (!prepared.x) {
+            if (!(prepared.positive ? tangent.factorise(conditions, u)
+                                    : tangent.factorise_positive_part(conditions, u)))
+                search.fail_stalled();
+            was_unstable |= !tangent.stable();
+        }
+        const Matrix3Xd d = prepared.x ? *prepared.x : tangent.solve(r);
         const double correction = largest_norm(d);
         search.keep(u, correction);
         const bool near = correction <= search.options.tolerance_mm;
-        if (near && !by_other_factor && tangent.stable()) {
+        if (near && prepared.x && prepared.positive && search.options.on_the_way) return search.finish_with(d);
+        if (near && !prepared.x && tangent.stable()) {
             if (start == nullptr && was_unstable) search.observer.note(of_several);
             return search.finish_with(d);
         }
-        if (near && by_other_factor) {
+        if (near && prepared.x) {
             last = true;  // accepted by the factor where the tissue is alone, which also tells whether it is stable
             continue;
         }

@@ -71,6 +71,7 @@ struct CholmodFactor::Impl {
     cholmod_factor* L = nullptr;
     mutable cholmod_dense *x = nullptr, *y = nullptr, *e = nullptr;  // workspaces of cholmod_solve2
     bool small = false;                                              // too little work for two BLAS threads
+    double solves_per_factor = 0;
 
     Impl() {
         cholmod_start(&common);
@@ -149,6 +150,8 @@ CholmodFactor::CholmodFactor(const Eigen::SparseMatrix<double>& lower, const std
     impl_->require_success("analyse");
     constexpr double small_flops = 1e11;  // some seconds on one core; on busy cores spinning costs twenty times that
     impl_->small = common.fl < small_flops;
+    constexpr double operations_per_entry = 30;  // of a factorisation in the time in which a solve reads an entry twice
+    impl_->solves_per_factor = common.fl / (operations_per_entry * common.lnz);
 }
 
 CholmodFactor::CholmodFactor(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -161,6 +164,7 @@ CholmodFactor CholmodFactor::analysis() const {
     copy->symbolic = cholmod_copy_factor(impl_->symbolic, &copy->common);
     copy->require_success("copy the analysis of");
     copy->small = impl_->small;
+    copy->solves_per_factor = impl_->solves_per_factor;
     return CholmodFactor(std::move(copy));
 }
 
@@ -184,6 +188,10 @@ Eigen::VectorXd CholmodFactor::solve(const Eigen::VectorXd& b) const {
 
 Eigen::MatrixXd CholmodFactor::solve_columns(const Eigen::MatrixXd& b) const {
     return impl_->solved(b);
+}
+
+double CholmodFactor::solves_per_factor() const {
+    return impl_->solves_per_factor;
 }
 
 long long CholmodFactor::nonzeros() const {

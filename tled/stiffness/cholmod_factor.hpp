@@ -31,6 +31,9 @@ public:
     /// The same for every column at once: the factor is read once for all.
     [[nodiscard]] Eigen::MatrixXd solve_columns(const Eigen::MatrixXd& b) const;
 
+    /// About how many solves with one vector take as long as a factorisation.
+    [[nodiscard]] double solves_per_factor() const;
+
     /// Entries of L.
     [[nodiscard]] long long nonzeros() const;
 

@@ -4,19 +4,12 @@
 #include "tled/stiffness/conjugate_gradients.hpp"
 #include "tled/stiffness/effect_stiffness.hpp"
 
+#include <algorithm>
+#include <utility>
+
 namespace tissuewarp::tled::detail {
 
 using Eigen::Matrix3Xd;
-
-namespace {
-
-constexpr int most_iterations = 20;  // of conjugate gradients, each a solve with the factor
-constexpr double relative_tolerance = 0.05;
-
-}  // namespace
-
-TangentFactor::TangentFactor(const RestState& rest, const NodalConditions& conditions)
-    : rest_(rest), conditions_(conditions), free_(conditions.constrained) {}
 
 namespace {
 
@@ -33,29 +26,58 @@ Stiffness tangent_at(const RestState& rest, const NodalConditions& conditions, c
     return with_effects(stiffness(rest, displacement), rest, conditions);
 }
 
+namespace {
+
+Product product_of(Stiffness stiffness, const NodalConditions& conditions) {
+    return [&conditions, kept = std::make_shared<Stiffness>(std::move(stiffness))](const Matrix3Xd& x) -> Matrix3Xd {
+        return conditions.constrained.select(0.0, kept->multiply(x));
+    };
+}
+
+}  // namespace
+
 Product tangent_product(const RestState& rest, const NodalConditions& conditions, const Matrix3Xd& displacement) {
-    return [&conditions, tangent = std::make_shared<Stiffness>(tangent_at(rest, conditions, displacement))](
-               const Matrix3Xd& x) -> Matrix3Xd { return conditions.constrained.select(0.0, tangent->multiply(x)); };
+    return product_of(tangent_at(rest, conditions, displacement), conditions);
 }
 
-bool TangentFactor::factorise(const Matrix3Xd& displacement) {
-    stable_ = factorised(tangent_at(rest_, conditions_, displacement));
-    return stable_ || factorised(with_effects(positive_stiffness(rest_, displacement), rest_, conditions_));
+TangentFactor::TangentFactor(const RestState& rest, const Eigen::Matrix<bool, 3, Eigen::Dynamic>& constrained)
+    : rest_(rest), free_(constrained) {}
+
+bool TangentFactor::factorise(const NodalConditions& conditions, const Matrix3Xd& displacement) {
+    stable_ = factorise(tangent_at(rest_, conditions, displacement));
+    return stable_ || factorise_positive_part(conditions, displacement);
 }
 
-bool TangentFactor::factorised(const Stiffness& stiffness) {
+bool TangentFactor::factorise_positive_part(const NodalConditions& conditions, const Matrix3Xd& displacement) {
+    stable_ = false;
+    return factorise(with_effects(positive_stiffness(rest_, displacement), rest_, conditions));
+}
+
+bool TangentFactor::factorise(const Stiffness& stiffness) {
     const auto lower = scalar_matrix(assembled(stiffness, Triangle::Lower), free_.index(), Triangle::Lower);
     if (!factor_) factor_ = std::make_unique<CholmodFactor>(lower, free_.nodes());
-    return factor_->factorize(lower);
+    factorised_ = factor_->factorize(lower);
+    return factorised_;
 }
 
-std::optional<Matrix3Xd> TangentFactor::solve_at(const Matrix3Xd& displacement, const Matrix3Xd& force) const {
-    if (!factor_) return std::nullopt;
-    ConjugateGradients found = conjugate_gradients_within(
-        most_iterations, tangent_product(rest_, conditions_, displacement),
-        [&](const Matrix3Xd& f) { return solve(f); }, conditions_.constrained.select(0.0, force), relative_tolerance);
-    if (!found.positive || found.relative_residual > relative_tolerance) return std::nullopt;
-    return std::move(found.x);
+TangentFactor::Prepared TangentFactor::solve_at(const NodalConditions& conditions, const Matrix3Xd& displacement,
+                                                const Matrix3Xd& force) const {
+    constexpr double relative_tolerance = 0.05;
+    constexpr int fewest = 20;  // iterations before a factor is thought of, each a solve with the last one
+    Prepared prepared;
+    if (!factorised_) return prepared;
+    const int most = std::max(fewest, static_cast<int>(0.5 * factor_->solves_per_factor()));
+    const auto solved = [&](const Product& product) {
+        ConjugateGradients found = conjugate_gradients_within(
+            most, product, [&](const Matrix3Xd& f) { return solve(f); }, conditions.constrained.select(0.0, force),
+            relative_tolerance);
+        if (found.positive && found.relative_residual <= relative_tolerance) prepared.x = std::move(found.x);
+        return found.positive;
+    };
+    prepared.positive = solved(tangent_product(rest_, conditions, displacement));
+    if (!prepared.positive)
+        solved(product_of(with_effects(positive_stiffness(rest_, displacement), rest_, conditions), conditions));
+    return prepared;
 }
 
 Matrix3Xd TangentFactor::solve(const Matrix3Xd& force) const {

@@ -19,34 +19,41 @@ Stiffness tangent_at(const RestState& rest, const NodalConditions& conditions, c
 /// Products with it on the free degrees of freedom, 0 on the others.
 Product tangent_product(const RestState& rest, const NodalConditions& conditions, const Eigen::Matrix3Xd& displacement);
 
-/// The same factorised.
+/// The same factorised, at one state after the other.
 class TangentFactor {
 public:
-    /// Tissue and conditions outlive this.
-    TangentFactor(const RestState& rest, const NodalConditions& conditions);
+    /// Of tissue that outlives this, under conditions that constrain these degrees of freedom (3 × N).
+    TangentFactor(const RestState& rest, const Eigen::Matrix<bool, 3, Eigen::Dynamic>& constrained);
 
     /// Factorises the tangent at a displacement (3 × N, mm), where it is indefinite without what is negative in its
     /// tetrahedra: it then leads downhill. False where that is not positive definite either. Throws SolverFailure where
     /// det F ≤ 0.
-    [[nodiscard]] bool factorise(const Eigen::Matrix3Xd& displacement);
+    [[nodiscard]] bool factorise(const NodalConditions& conditions, const Eigen::Matrix3Xd& displacement);
+    /// The same of a tangent that is known to be indefinite.
+    [[nodiscard]] bool factorise_positive_part(const NodalConditions& conditions, const Eigen::Matrix3Xd& displacement);
     /// Whether the tangent of the last factorise() was positive definite.
     [[nodiscard]] bool stable() const { return stable_; }
 
     /// K⁻¹ f on the free degrees of freedom, 0 on the others (3 × N; mN, mm). Precondition: factorise() was true.
     [[nodiscard]] Eigen::Matrix3Xd solve(const Eigen::Matrix3Xd& force) const;
-    /// The same of the tangent at another displacement, to a few percent: by conjugate gradients, which the factor of
-    /// the last one prepares. None where these would take longer than a factor, or the tangent is not positive along
-    /// them. Throws SolverFailure where det F ≤ 0.
-    [[nodiscard]] std::optional<Eigen::Matrix3Xd> solve_at(const Eigen::Matrix3Xd& displacement,
-                                                           const Eigen::Matrix3Xd& force) const;
+
+    /// What the factor of another state prepares.
+    struct Prepared {
+        std::optional<Eigen::Matrix3Xd> x;  ///< none where it would take longer than a factor
+        bool positive = true;               ///< K along every direction seen
+    };
+    /// The same of the tangent at another displacement, to a few percent, by conjugate gradients, which the last factor
+    /// prepares; of its positive part where it is not positive along them. Throws SolverFailure where det F ≤ 0.
+    [[nodiscard]] Prepared solve_at(const NodalConditions& conditions, const Eigen::Matrix3Xd& displacement,
+                                    const Eigen::Matrix3Xd& force) const;
 
 private:
-    [[nodiscard]] bool factorised(const Stiffness& stiffness);
+    [[nodiscard]] bool factorise(const Stiffness& stiffness);
 
     const RestState& rest_;
-    const NodalConditions& conditions_;
     FreeDegrees free_;
     std::unique_ptr<CholmodFactor> factor_;
+    bool factorised_ = false;
     bool stable_ = false;
 };
 
