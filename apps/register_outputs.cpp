@@ -11,7 +11,6 @@
 #include "core/atomic_file.hpp"
 #include "meshing/mesh_io.hpp"
 #include "registration/field.hpp"
-#include "registration/io/point_map_field.hpp"
 #include "registration/io/transform_file.hpp"
 #include "registration/record.hpp"
 #include "report/page.hpp"
@@ -29,7 +28,6 @@ namespace tissuewarp::apps {
 namespace {
 
 using registration::Deformation;
-using registration::with_linear_part;
 using registration::write_itk_transform;
 
 /// The smallest integer type that holds the labels, as other programs write them.
@@ -156,13 +154,11 @@ private:
 void write_transforms(const Writer& writer) {
     const Products& products = writer.run().products;
     const Eigen::Isometry3d& placement = writer.run().result.deformation.placement;
-    writer.now(transform_name, [&](auto& path) {
-        write_itk_transform(with_linear_part(products.fixed_to_moving, placement.inverse()), path);
-    });
+    writer.now(transform_name,
+               [&](auto& path) { write_itk_transform(products.fixed_to_moving, placement.inverse(), path); });
     if (writes(writer.run().options, inverse_transform))
-        writer.now(inverse_transform.file, [&](auto& path) {
-            write_itk_transform(with_linear_part(products.moving_to_fixed, placement), path);
-        });
+        writer.now(inverse_transform.file,
+                   [&](auto& path) { write_itk_transform(products.moving_to_fixed, placement, path); });
 }
 
 /// What else --write names.

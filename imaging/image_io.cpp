@@ -195,14 +195,16 @@ void write_whole(const Volume& volume, const fs::path& temporary, detail::Format
     fs::rename(file.path(), temporary);
 }
 
-void write_compressed_nifti(const Volume& volume, const fs::path& path, const fs::path& temporary) {
+/// `steps`: voxels are whole steps, of which zlib's level 4 makes 3/4 of what level 1 does in 1.3 times the time; on
+/// other floats it wins nothing.
+void write_compressed_nifti(const Volume& volume, const fs::path& path, const fs::path& temporary, bool steps) {
     // ITK would deflate on one thread at level 6, which takes many seconds on a field; the plain file is packed here.
     fs::path plain_name = path;
     plain_name.replace_extension();
     const AtomicFile plain(plain_name);
     write_whole(volume, plain.path(), detail::Format::Nifti, path);
     const bool integers = volume.voxels.depth() < CV_32F;
-    detail::gzip_file(plain.path(), temporary, integers ? 4 : 1);
+    detail::gzip_file(plain.path(), temporary, integers || steps ? 4 : 1);
 }
 
 void write_checked(const Volume& volume, const fs::path& path, std::optional<FieldType> type) {
@@ -224,7 +226,7 @@ void write_checked(const Volume& volume, const fs::path& path, std::optional<Fie
         throw IoError("cannot write '" + path.string() + "': the folder does not exist; create it first");
     AtomicFile file(path);
     if (name.ends_with(".nii.gz")) {
-        write_compressed_nifti(volume, path, file.path());
+        write_compressed_nifti(volume, path, file.path(), type.has_value());
     } else {
         write_whole(volume, file.path(), format, path, type);
     }

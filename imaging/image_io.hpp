@@ -62,9 +62,9 @@ ReadResult as_labels(ReadResult image, const std::filesystem::path& path);
 /// except for .nii. Throws IoError (a full disk too); nothing half-written is left behind.
 void write_volume(const Volume& volume, const std::filesystem::path& path);
 
-/// Steps that the components of written displacements take: a whole power of two, which leaves bits of float32 zero and
-/// halves the files, and an error of half a micrometre at most.
-inline constexpr double displacement_step_mm = 1.0 / 1024;
+/// Steps that the components of written displacements take: a whole power of two, which leaves bits of float32 zero,
+/// and an error of a micrometre at most.
+inline constexpr double displacement_step_mm = 1.0 / 512;
 
 /// The nearest whole steps. `field` has float32 voxels.
 Volume rounded(const Volume& field, double step);

@@ -127,15 +127,30 @@ Volume displacement_on(const PointMap& map, const Geometry& grid) {
     return field;
 }
 
+WithoutLinearPart::WithoutLinearPart(const Volume& displacement, const Affine3d& linear)
+    : displacement_(&displacement), back_(inverse_of(linear)) {}
+
+void WithoutLinearPart::operator()(std::int64_t first, std::int64_t count, float* vectors) const {
+    const Geometry& grid = displacement_->geometry;
+    const auto* total = displacement_->data<cv::Vec3f>();
+    const std::int64_t nx = grid.size[0], ny = grid.size[1];
+    for (std::int64_t n = first; n < first + count; ++n, vectors += 3) {
+        const Vector3d y = grid.point({double(n % nx), double(n / nx % ny), double(n / nx / ny)});
+        const Vector3d vector = back_ * (y + Vector3d(total[n][0], total[n][1], total[n][2])) - y;
+        Eigen::Vector3f::Map(vectors) = vector.cast<float>();
+    }
+}
+
 PointMap with_linear_part(const Volume& displacement, const Affine3d& linear) {
-    const Affine3d back = inverse_of(linear);
+    const WithoutLinearPart rest(displacement, linear);
+    const Geometry& grid = displacement.geometry;
     PointMap map;
     map.after = linear;
-    map.field = Volume(displacement.geometry, CV_32FC3);
-    const auto* total = displacement.data<cv::Vec3f>();
-    auto* rest = map.field->data<cv::Vec3f>();
-    for_each_voxel(displacement.geometry, [&](std::int64_t n, const Vector3d& y) {
-        rest[n] = stored(back * (y + Vector3d(total[n][0], total[n][1], total[n][2])) - y);
+    map.field = Volume(grid, CV_32FC3);
+    auto* vectors = map.field->data<float>();
+    for_each_row(grid, [&](int j, int k) {
+        const std::int64_t first = (std::int64_t{k} * grid.size[1] + j) * grid.size[0];
+        rest(first, grid.size[0], vectors + 3 * first);
     });
     return map;
 }

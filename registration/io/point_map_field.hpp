@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 
+#include <cstdint>
 #include <optional>
 
 namespace tissuewarp::registration {
@@ -24,6 +25,19 @@ private:
 
 /// Where the map takes the voxels of a grid, less where they lie: three channels float32.
 imaging::Volume displacement_on(const PointMap& map, const imaging::Geometry& grid);
+
+/// Gives the vectors of the field that is left of displacements y ↦ y + d(y) where a linear map follows it:
+/// linear (y + vector(y)) = y + d(y). Refers to `displacement`. Throws InvalidInput where the linear map is singular.
+class WithoutLinearPart {
+public:
+    WithoutLinearPart(const imaging::Volume& displacement, const Eigen::Affine3d& linear);
+    /// Of voxels `first` to `first` + `count` (x fastest), three components each.
+    void operator()(std::int64_t first, std::int64_t count, float* vectors) const;
+
+private:
+    const imaging::Volume* displacement_;
+    Eigen::Affine3d back_;
+};
 
 /// The same map as y ↦ linear (y + field(y)), the field on the grid of the displacements.
 PointMap with_linear_part(const imaging::Volume& displacement, const Eigen::Affine3d& linear);

@@ -1,14 +1,11 @@
 #include "registration/io/transform_file.hpp"
 
 #include "core/atomic_file.hpp"
-#include "core/detail/hdf5.hpp"
 #include "core/errors.hpp"
-#include "imaging/image_io.hpp"
+#include "registration/io/itk_hdf5_writer.hpp"
+#include "registration/io/point_map_field.hpp"
 
 #include <itkAffineTransform.h>
-#include <itkCompositeTransform.h>
-#include <itkDisplacementFieldTransform.h>
-#include <itkHDF5TransformIO.h>
 #include <itkTransformFileWriter.h>
 #include <itkTxtTransformIO.h>
 
@@ -19,7 +16,6 @@
 #include <array>
 #include <cerrno>
 #include <charconv>
-#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <string>
@@ -28,75 +24,28 @@ namespace tissuewarp::registration {
 
 namespace {
 
-using Affine = itk::AffineTransform<double, 3>;
-using Composite = itk::CompositeTransform<double, 3>;
-using Field = itk::DisplacementFieldTransform<double, 3>;
-
-Affine::Pointer affine(const Eigen::Affine3d& map) {
-    const auto result = Affine::New();
-    Affine::MatrixType matrix;
-    Affine::OutputVectorType offset;
+void write_text(const Eigen::Affine3d& map, const std::filesystem::path& path) {
+    const auto transform = itk::AffineTransform<double, 3>::New();
+    itk::AffineTransform<double, 3>::MatrixType matrix;
+    itk::AffineTransform<double, 3>::OutputVectorType offset;
     for (unsigned row = 0; row < 3; ++row) {
         for (unsigned column = 0; column < 3; ++column) matrix(row, column) = map.linear()(row, column);
         offset[row] = map.translation()[row];
     }
-    result->SetMatrix(matrix);
-    result->SetOffset(offset);
-    return result;
-}
-
-Field::Pointer displacement_field(const imaging::Volume& volume) {
-    using Image = Field::DisplacementFieldType;
-    const imaging::Geometry& grid = volume.geometry;
-    const auto image = Image::New();
-    Image::SizeType size;
-    Image::PointType origin;
-    Image::SpacingType spacing;
-    Image::DirectionType direction;
-    for (unsigned axis = 0; axis < 3; ++axis) {
-        size[axis] = static_cast<itk::SizeValueType>(grid.size[axis]);
-        origin[axis] = grid.origin[axis];
-        spacing[axis] = grid.spacing[axis];
-        for (unsigned row = 0; row < 3; ++row) direction(row, axis) = grid.direction(row, axis);
-    }
-    image->SetRegions(size);
-    image->SetOrigin(origin);
-    image->SetSpacing(spacing);
-    image->SetDirection(direction);
-    image->Allocate();
-    constexpr double step = imaging::displacement_step_mm;
-    const auto* components = volume.data<float>();
-    std::transform(components, components + 3 * grid.voxel_count(), image->GetBufferPointer()->GetDataPointer(),
-                   [](float v) { return std::nearbyint(v / step) * step; });
-    const auto result = Field::New();
-    result->SetDisplacementField(image);
-    return result;
-}
-
-/// A composition applies its last part first.
-itk::TransformBaseTemplate<double>::Pointer itk_transform(const PointMap& map) {
-    if (!map.field) return affine(map.after * map.before).GetPointer();
-    const auto composite = Composite::New();
-    composite->AddTransform(affine(map.after));
-    composite->AddTransform(displacement_field(*map.field));
-    if (!map.before.isApprox(Eigen::Affine3d::Identity())) composite->AddTransform(affine(map.before));
-    return composite.GetPointer();
-}
-
-void write(const PointMap& map, itk::TransformIOBaseTemplate<double>& format, const std::filesystem::path& path) {
+    transform->SetMatrix(matrix);
+    transform->SetOffset(offset);
     const auto writer = itk::TransformFileWriterTemplate<double>::New();
-    writer->SetTransformIO(&format);
-    writer->SetInput(itk_transform(map));
-    writer->SetUseCompression(true);
+    writer->SetTransformIO(itk::TxtTransformIOTemplate<double>::New());
+    writer->SetInput(transform);
     writer->SetFileName(path.string());
     writer->Update();
 }
 
-/// HDF5 cannot recover from a disk that fills while it writes, and ends the process later: room for the parameters as
-/// they are, unpacked, must be there before. What others write meanwhile is not foreseen.
-void require_room(const PointMap& map, const std::filesystem::path& path) {
+/// HDF5 cannot recover from a disk that fills while it writes, and ends the process later: room for the vectors as they
+/// are, unpacked, must be there before. What others write meanwhile is not foreseen.
+void require_room(std::int64_t voxels, const std::filesystem::path& path) {
     constexpr std::int64_t rest = 1 << 20;  // of the file
-    const std::int64_t bytes = rest + (map.field ? 24 * map.field->geometry.voxel_count() : 0);
+    const std::int64_t bytes = rest + 12 * voxels;
     const int file = ::open(path.c_str(), O_CREAT | O_WRONLY | O_TRUNC | O_CLOEXEC, 0666);
     if (file < 0) throw IoError(std::strerror(errno));
     const int failure = ::posix_fallocate(file, 0, bytes);
@@ -107,31 +56,59 @@ void require_room(const PointMap& map, const std::filesystem::path& path) {
                       " MiB while it is written");
 }
 
-}  // namespace
-
-void write_itk_transform(const PointMap& map, const std::filesystem::path& path) {
-    const std::string extension = path.extension().string();
-    const bool text = extension == ".tfm" || extension == ".txt";
-    if (!text && extension != ".h5")
-        throw InvalidInput("cannot write '" + path.string() + "': the extension '" + extension +
-                           "' names no transform of ITK; use .h5, .tfm or .txt");
-    if (text && map.field)
-        throw InvalidInput("cannot write '" + path.string() +
-                           "': text holds linear transforms only, and this one has a displacement field; use .h5");
-    const Hdf5Quiet quiet;
+/// Calls write(path of a temporary file), and puts the file into its place.
+template <class Write>
+void write_complete(std::int64_t voxels, const std::filesystem::path& path, const Write& write) {
     AtomicFile file(path);
     try {
-        require_room(map, file.path());
-        if (text)
-            write(map, *itk::TxtTransformIOTemplate<double>::New(), file.path());
-        else
-            write(map, *itk::HDF5TransformIOTemplate<double>::New(), file.path());
+        require_room(voxels, file.path());
+        write(file.path());
     } catch (const itk::ExceptionObject& error) {
         throw IoError("cannot write '" + path.string() + "': " + error.GetDescription());
     } catch (const IoError& error) {
         throw IoError("cannot write '" + path.string() + "': " + error.what());
     }
     file.commit();
+}
+
+bool is_text(const std::filesystem::path& path) {
+    const std::string extension = path.extension().string();
+    if (extension == ".tfm" || extension == ".txt") return true;
+    if (extension == ".h5") return false;
+    throw InvalidInput("cannot write '" + path.string() + "': the extension '" + extension +
+                       "' names no transform of ITK; use .h5, .tfm or .txt");
+}
+
+void require_composite(const std::filesystem::path& path) {
+    if (is_text(path))
+        throw InvalidInput("cannot write '" + path.string() +
+                           "': text holds linear transforms only, and this one has a displacement field; use .h5");
+}
+
+}  // namespace
+
+void write_itk_transform(const PointMap& map, const std::filesystem::path& path) {
+    if (!map.field) {
+        const Eigen::Affine3d linear = map.after * map.before;
+        const auto write = is_text(path) ? write_text : detail::write_affine;
+        return write_complete(0, path, [&](auto& temporary) { write(linear, temporary); });
+    }
+    require_composite(path);
+    const auto* stored = map.field->data<float>();
+    const detail::FieldToWrite field{map.field->geometry, [&](std::int64_t first, std::int64_t count, float* vectors) {
+                                         std::copy_n(stored + 3 * first, 3 * count, vectors);
+                                     }};
+    write_complete(field.grid.voxel_count(), path,
+                   [&](auto& temporary) { detail::write_composite(map.before, field, map.after, temporary); });
+}
+
+void write_itk_transform(const imaging::Volume& displacement, const Eigen::Affine3d& linear,
+                         const std::filesystem::path& path) {
+    require_composite(path);
+    const detail::FieldToWrite field{displacement.geometry, WithoutLinearPart(displacement, linear)};
+    write_complete(field.grid.voxel_count(), path, [&](auto& temporary) {
+        detail::write_composite(Eigen::Affine3d::Identity(), field, linear, temporary);
+    });
 }
 
 void write_matrix(const Eigen::Affine3d& map, const std::filesystem::path& path) {
