@@ -30,6 +30,8 @@ namespace {
 using registration::Deformation;
 using registration::write_itk_transform;
 
+constexpr double jacobian_step = 1.0 / 8192;  ///< a whole power of two halves the file (imaging::displacement_step_mm)
+
 /// The smallest integer type that holds the labels, as other programs write them.
 imaging::Volume compact(const imaging::Volume& labels) {
     double most = 0;
@@ -143,6 +145,14 @@ public:
     void start(const std::string& name, const Write& write) const {
         tasks_->run([writer = *this, name, write] { writer.now(name, write); });
     }
+    /// Two files, one after the other.
+    template <class First, class Second>
+    void start_both(const std::string& name, const First& first, const std::string& then, const Second& second) const {
+        tasks_->run([writer = *this, name, first, then, second] {
+            writer.now(name, first);
+            writer.now(then, second);
+        });
+    }
 
 private:
     const RegistrationRun* run_;
@@ -169,10 +179,13 @@ void start_optional(const Writer& writer) {
         if (!writes(run.options, output)) continue;
         const std::string word = output.word, file = output.file;
         if (word == "displacement_magnitude")
-            writer.start(file, [&](auto& path) { write_volume(magnitude(products.fixed_to_moving), path); });
+            writer.start(file, [&](auto& path) {
+                write_volume(rounded(magnitude(products.fixed_to_moving), imaging::displacement_step_mm), path);
+            });
         else if (word == "jacobian")
             writer.start(file, [&](auto& path) {
-                write_volume(registration::jacobian_determinant(products.moving_to_fixed), path);
+                write_volume(rounded(registration::jacobian_determinant(products.moving_to_fixed), jacobian_step),
+                             path);
             });
         else if (word == "organ")
             writer.start(file, [&](auto& path) { write_organ(run, path); });
@@ -188,12 +201,12 @@ void start_optional(const Writer& writer) {
 void start_usual(const Writer& writer) {
     const RegistrationRun& run = writer.run();
     const Products& products = run.products;
-    writer.start(moving_to_fixed_name, [&](auto& path) {
-        write_displacement_field(products.moving_to_fixed, path, imaging::FieldType::Modeling);
-    });
-    writer.start(fixed_to_moving_name, [&](auto& path) {
-        write_displacement_field(products.fixed_to_moving, path, imaging::FieldType::Resampling);
-    });
+    // One after the other: each is packed on all threads, and takes twice its size in memory.
+    writer.start_both(
+        moving_to_fixed_name,
+        [&](auto& path) { write_displacement_field(products.moving_to_fixed, path, imaging::FieldType::Modeling); },
+        fixed_to_moving_name,
+        [&](auto& path) { write_displacement_field(products.fixed_to_moving, path, imaging::FieldType::Resampling); });
     if (products.uncertainty) {
         const registration::UncertaintyVolumes& volumes = products.uncertainty_volumes;
         writer.start("uncertainty.nii.gz", [&](auto& path) { write_volume(volumes.deviation, path); });

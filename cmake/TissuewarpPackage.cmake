@@ -17,6 +17,13 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/examples DESTINATION ${CMAKE_INSTALL_DOC
 # All pages, since they link to each other; their paths are those that messages of the program name.
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs DESTINATION ${CMAKE_INSTALL_DOCDIR})
 
+# Licences of what is compiled into the programs: archives of OpenCV, and templates.
+foreach(package libopencv-core-dev libcgal-dev libeigen3-dev libcli11-dev nlohmann-json3-dev pybind11-dev)
+  if(EXISTS /usr/share/doc/${package}/copyright)
+    install(FILES /usr/share/doc/${package}/copyright DESTINATION ${CMAKE_INSTALL_DOCDIR}/licences RENAME ${package})
+  endif()
+endforeach()
+
 # 3D Slicer: the scripted module, and a program for each verb that is a command-line module.
 set(slicer ${CMAKE_INSTALL_DATADIR}/tissuewarp/slicer)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/slicer/TissueWarp DESTINATION ${slicer} PATTERN __pycache__ EXCLUDE)
@@ -51,9 +58,11 @@ foreach(program ${programs})
 endforeach()
 install(CODE "execute_process(COMMAND \"${CMAKE_COMMAND}\" \"-DPROGRAMS=${program_files}\"
   \"-DDESTINATION=\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${bundle}\"
+  \"-DLICENCES=\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DOCDIR}/licences\"
   -P \"${packaging}/bundle_libraries.cmake\" COMMAND_ERROR_IS_FATAL ANY)" COMPONENT bundle EXCLUDE_FROM_ALL)
 
-set(TISSUEWARP_MAINTAINER "tissuewarp maintainers <maintainers@localhost>" CACHE STRING
+# A package that somebody built for themselves has nobody who answers mail; who gives it to others says who answers.
+set(TISSUEWARP_MAINTAINER "tissuewarp built from source <nobody@tissuewarp.invalid>" CACHE STRING
   "Who answers for a package: name <address>")
 set(CPACK_PACKAGE_CONTACT ${TISSUEWARP_MAINTAINER})
 set(CPACK_GENERATOR DEB TGZ)

@@ -73,7 +73,7 @@ void put_little_endian(std::FILE* file, std::uint32_t value, const fs::path& pat
 
 void gzip_file(const fs::path& source, const fs::path& destination, int level) {
     constexpr std::size_t block_bytes = std::size_t{1} << 20;
-    constexpr std::size_t blocks_at_once = 64;  // bounds memory to about 130 MB
+    constexpr std::size_t blocks_at_once = 16;  // bounds memory to about 33 MB
     const File in = open_file(source, "rb");
     File out = open_file(destination, "wb");
     // RFC 1952: magic, deflate, no flags, no time (the same image gives the same file), no hint, unknown system.

@@ -18,10 +18,9 @@ namespace tissuewarp::registration::detail {
 
 namespace {
 
-constexpr std::int64_t chunk_voxels = std::int64_t{1} << 16;  // 768 KiB: a reader's cache of HDF5 holds one chunk
-constexpr std::int64_t chunk_values = 3 * chunk_voxels;
-constexpr std::int64_t chunks_at_once = 16;  // bounds memory to about 40 MB
-constexpr int level = 4;                     // of zlib
+constexpr std::int64_t most_chunk_voxels = std::int64_t{1} << 16;  // 768 KiB: a reader's cache of HDF5 holds one
+constexpr std::int64_t chunks_at_once = 16;                        // bounds memory to about 40 MB
+constexpr int level = 4;                                           // of zlib
 
 using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
@@ -40,9 +39,9 @@ std::vector<unsigned char> shuffled(const std::vector<float>& values) {
 }
 
 /// A whole chunk of the dataset, rounded, shuffled and deflated; beyond the last voxel there is zero.
-std::vector<unsigned char> packed_chunk(const FieldToWrite& field, std::int64_t first) {
+std::vector<unsigned char> packed_chunk(const FieldToWrite& field, std::int64_t first, std::int64_t chunk_voxels) {
     constexpr auto step = static_cast<float>(imaging::displacement_step_mm);
-    std::vector<float> values(chunk_values, 0.0F);
+    std::vector<float> values(static_cast<std::size_t>(3 * chunk_voxels), 0.0F);
     field.vectors(first, std::min<std::int64_t>(chunk_voxels, field.grid.voxel_count() - first), values.data());
     for (float& value : values) value = std::nearbyint(value / step) * step;
     const std::vector<unsigned char> plain = shuffled(values);
@@ -124,8 +123,9 @@ private:
 
     /// Packs some chunks in parallel, and writes them as they are.
     void vectors(const std::string& name, const FieldToWrite& field) {
-        const std::int64_t voxels = field.grid.voxel_count(), chunks = (voxels + chunk_voxels - 1) / chunk_voxels;
-        const hsize_t chunk = chunk_values;
+        const std::int64_t voxels = field.grid.voxel_count(), chunk_voxels = std::min(voxels, most_chunk_voxels),
+                           chunks = (voxels + chunk_voxels - 1) / chunk_voxels;
+        const auto chunk = static_cast<hsize_t>(3 * chunk_voxels);  // HDF5 allows none beyond the dataset
         const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
         H5Pset_chunk(creation, 1, &chunk);
         H5Pset_shuffle(creation);
@@ -135,7 +135,7 @@ private:
             std::vector<std::vector<unsigned char>> packed(
                 static_cast<std::size_t>(std::min(chunks_at_once, chunks - first)));
             tbb::parallel_for(std::size_t{0}, packed.size(), [&](std::size_t n) {
-                packed[n] = packed_chunk(field, (first + static_cast<std::int64_t>(n)) * chunk_voxels);
+                packed[n] = packed_chunk(field, (first + static_cast<std::int64_t>(n)) * chunk_voxels, chunk_voxels);
             });
             for (std::size_t n = 0; n < packed.size(); ++n) {
                 const hsize_t at = static_cast<hsize_t>(first + static_cast<std::int64_t>(n)) * chunk;

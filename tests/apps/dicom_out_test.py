@@ -9,6 +9,7 @@ import nibabel
 import numpy
 import pydicom
 import pydicom.uid
+import pydicom.valuerep
 
 from phantom import FIXED_AFFINE, MOVING_AFFINE, SIZE, Phantom, PhantomTest
 
@@ -17,11 +18,18 @@ INPUT = 2
 MR = "1.2.840.10008.5.1.4.1.1.4"
 
 
+def decimal(values):
+    """Numbers as DICOM's decimal strings, of 16 letters at most."""
+    return [pydicom.valuerep.DSfloat(float(value), auto_format=True) for value in values]
+
+
 def write_series(array, affine, folder, frame_of_reference):
     """A folder of slices of MR, in a study of its own, whose axes and places are those of a NIfTI file."""
     folder.mkdir()
     study, series = pydicom.uid.generate_uid(), pydicom.uid.generate_uid()
     axes = affine[:3, :3] * [[-1], [-1], [1]]
+    spacing = numpy.linalg.norm(axes, axis=0)
+    axes = axes / spacing
     for k in range(array.shape[2]):
         image = pydicom.Dataset()
         image.SOPClassUID, image.SOPInstanceUID = MR, pydicom.uid.generate_uid()
@@ -29,10 +37,10 @@ def write_series(array, affine, folder, frame_of_reference):
         image.PatientName, image.PatientID, image.PatientSex, image.PatientBirthDate = "Doe^Jane", "42", "F", "19700101"
         image.StudyDate, image.StudyTime, image.StudyID, image.AccessionNumber = "20260102", "030405", "7", "A1"
         image.Modality, image.InstanceNumber = "MR", k + 1
-        image.ImagePositionPatient = list((affine @ [0, 0, k, 1])[:3] * [-1, -1, 1])
-        image.ImageOrientationPatient = [*axes[:, 0], *axes[:, 1]]
-        image.PixelSpacing, image.SliceThickness = [1, 1], 1
-        image.Rows, image.Columns, image.SamplesPerPixel = SIZE, SIZE, 1
+        image.ImagePositionPatient = decimal((affine @ [0, 0, k, 1])[:3] * [-1, -1, 1])
+        image.ImageOrientationPatient = decimal([*axes[:, 0], *axes[:, 1]])
+        image.PixelSpacing, image.SliceThickness = decimal(spacing[[1, 0]]), decimal(spacing[2:])[0]
+        image.Rows, image.Columns, image.SamplesPerPixel = array.shape[1], array.shape[0], 1
         image.BitsAllocated, image.BitsStored, image.HighBit, image.PixelRepresentation = 16, 16, 15, 0
         image.PhotometricInterpretation = "MONOCHROME2"
         image.PixelData = array[:, :, k].T.astype("<u2").tobytes()
@@ -104,7 +112,7 @@ class DicomOut(unittest.TestCase):
         text = "\n".join(" ".join(f"{x:.17g}" for x in point) for point in points)
         itk = subprocess.run([ITK, str(self.output / "transform.h5")], input=text, capture_output=True, text=True)
         expected = numpy.array([[float(x) for x in line.split()] for line in itk.stdout.splitlines()])
-        self.assertLess(numpy.linalg.norm(found - expected, axis=1).max(), 1e-3)
+        self.assertLess(numpy.linalg.norm(found - expected, axis=1).max(), 2e-3)  # transform.h5 is rounded, this is not
         self.assertGreater(numpy.linalg.norm(vectors, axis=-1).max(), 0.5)
         (own,) = object_.ReferencedSeriesSequence
         self.assertEqual((own.SeriesInstanceUID, len(own.ReferencedInstanceSequence)), (self.series, SIZE))

@@ -26,9 +26,9 @@ def lps_of_voxels(affine, shape=(SIZE, SIZE, SIZE)):
     return (index @ affine[:3, :3].T + affine[:3, 3]) * [-1, -1, 1]
 
 
-def ellipsoid(affine, centre, axes):
+def ellipsoid(affine, centre, axes, shape=(SIZE, SIZE, SIZE)):
     """Labels (1 with a core of 2) and a grey image that varies inside."""
-    scaled = (lps_of_voxels(affine) - centre) / axes
+    scaled = (lps_of_voxels(affine, shape) - centre) / axes
     radius = numpy.linalg.norm(scaled, axis=-1)
     labels = (radius < 1).astype(numpy.uint8) + (radius < 0.45).astype(numpy.uint8)
     grey = numpy.where(radius < 1, 100 + 40 * scaled[..., 0], 10).astype(numpy.float32)
