@@ -149,12 +149,20 @@ TEST(PointMapField, TheNearestLinearMapIsFoundAndItsDistanceSaid) {
 
 TEST(TransformFile, WhatIsWrittenIsReadBack) {
     const tissuewarp::test::TemporaryFolder folder;
-    PointMap map = with_linear_part(field_of(oblique_grid(), wave), some_affine());
-    map.before = Eigen::Translation3d(0.5, 0.25, -0.125);
-    write_itk_transform(map, folder / "a.h5");
-    const MappedPoint written(map), read(read_point_map(folder / "a.h5"));
-    for (const Vector3d& place : places_in(oblique_grid()))
-        EXPECT_NEAR((written(place) - read(place)).norm(), 0, micrometre);
+    for (const int size : {20, 60}) {  // one piece, and some of which the last is not full
+        const Geometry grid = oblique_grid(size);
+        const Volume total = field_of(grid, wave);
+        PointMap map = with_linear_part(total, some_affine());
+        write_itk_transform(total, some_affine(), folder / "a.h5");
+        const MappedPoint written(map), read(read_point_map(folder / "a.h5"));
+        map.before = Eigen::Translation3d(0.5, 0.25, -0.125);
+        write_itk_transform(map, folder / "b.h5");
+        const MappedPoint written_after(map), read_after(read_point_map(folder / "b.h5"));
+        for (const Vector3d& place : places_in(grid)) {
+            EXPECT_NEAR((written(place) - read(place)).norm(), 0, 2 * micrometre);  // of steps of 1/512 mm
+            EXPECT_NEAR((written_after(place) - read_after(place)).norm(), 0, 2 * micrometre);
+        }
+    }
     const PointMap linear{some_affine(), {}, some_affine()};
     write_itk_transform(linear, folder / "b.h5");
     write_itk_transform(linear, folder / "b.tfm");
