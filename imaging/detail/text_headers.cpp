@@ -73,12 +73,16 @@ std::vector<std::string> names_of_pattern(const std::filesystem::path& path, con
                                  "' is no pattern of file names with one number (such as slice%03d.raw); "
                                  "correct the header");
     long long first = 1, last = 0, step = 1;
+    const auto too_large = [](long long number) {
+        return number > std::numeric_limits<int>::max() || number < std::numeric_limits<int>::min();
+    };
     words >> first;
-    if (!(words >> last)) last = first + static_cast<long long>(slices) - 1;
+    if (!(words >> last)) last = too_large(first) ? first : first + static_cast<long long>(slices) - 1;
     words.clear();
     if (!(words >> step)) step = last < first ? -1 : 1;
     const auto most_files = static_cast<long long>(most);
-    if (step == 0 || (last - first) / step < 0 || (last - first) / step >= most_files)
+    if (too_large(first) || too_large(last) || too_large(step) || step == 0 || (last - first) / step < 0 ||
+        (last - first) / step >= most_files)
         throw unusable(path, "the file names '" + value + "' count from " + std::to_string(first) + " to " +
                                  std::to_string(last) + " by " + std::to_string(step) +
                                  "; one file for each slice is needed, at most " + std::to_string(most_files));

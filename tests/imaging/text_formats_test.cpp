@@ -122,6 +122,9 @@ TEST(MetaImage, ListsThatDoNotFitAreRefused) {
     EXPECT_THAT(refusal("s%d.raw 2 6 1\n"), HasSubstr("s6.raw"));
     EXPECT_THAT(refusal("s%d.raw 1 3 1\n"), HasSubstr("3 files for 5 slices"));
     EXPECT_THAT(refusal("s%s.raw 1 5 1\n"), HasSubstr("no pattern"));
+    for (const char* range : {"9223372036854775807", "99999999999999999999", "-9223372036854775808 1",
+                              "1 9223372036854775807", "2147483648 2147483652", "1 5 9223372036854775807"})
+        EXPECT_THAT(refusal("s%d.raw " + std::string(range) + "\n"), HasSubstr("count from")) << range;
     write(folder / "s4.raw", "half");
     EXPECT_THAT(refusal("s%d.raw 1 5 1\n"), testing::AllOf(HasSubstr("s4.raw"), HasSubstr("cut short")));
     write(folder / "s4.raw", std::string(40, 'x'));
