@@ -10,7 +10,7 @@
 
 namespace tissuewarp::apps {
 
-enum class FileKind { Image, Points, Surface, Mesh, Record, Unknown };
+enum class FileKind { Image, Points, Surface, Mesh, Record, Patient, Unknown };
 
 inline FileKind file_kind(const std::filesystem::path& path) {
     std::string name = path.filename().string();
@@ -21,6 +21,7 @@ inline FileKind file_kind(const std::filesystem::path& path) {
         if (name.ends_with(extension)) return FileKind::Surface;
     if (name.ends_with(".vtu")) return FileKind::Mesh;
     if (name.ends_with(".h5")) return FileKind::Record;
+    if (name.ends_with(".tw")) return FileKind::Patient;
     return imaging::is_image(path) ? FileKind::Image : FileKind::Unknown;
 }
 

@@ -1,6 +1,7 @@
 // tissuewarp info: what a file holds, and what this machine can compute on.
 
 #include "apps/file_kind.hpp"
+#include "apps/patient_file.hpp"
 #include "apps/progress.hpp"
 #include "apps/verbs.hpp"
 #include "core/errors.hpp"
@@ -138,6 +139,26 @@ void print_record(const fs::path& path) {
     for (const auto& [name, value] : record.provenance) fmt::print("  {:<24} {}\n", name, value);
 }
 
+void print_patient(const fs::path& path) {
+    ProgressLine notes({.quiet = true});
+    const PreparedPatient patient = read_patient_file(path, notes);
+    const registration::PreparedModel& model = *patient.model;
+    fmt::print("{}: prepared patient\n", path.string());
+    print_mesh(model.model.mesh);
+    fmt::print(
+        "  coarser model    {}\n",
+        model.coarse ? fmt::format("{} tetrahedra, for unknown loads", model.coarse->model.mesh.tet_count()) : "none");
+    fmt::print("  images to match  {}\n", (model.image ? 1 : 0) + model.contrasts.size());
+    for (const auto& [label, material] : model.model.materials)
+        fmt::print(
+            "  label {:<11}{}{}\n", label, tled::law_name(material),
+            patient.inputs.label_names.contains(label) ? ", '" + patient.inputs.label_names.at(label) + "'" : "");
+    for (const InputFile& file : patient.inputs.files)
+        fmt::print("  {:<16} {}  {}\n", file.role, file.path.string(), file.sha256.substr(0, 12));
+    for (const auto& [name, value] : patient.provenance) fmt::print("  {:<24} {}\n", name, value);
+    for (const std::string& note : patient.inputs.notes) fmt::print("note: {}\n", note);
+}
+
 void print_devices() {
     const auto devices = shaders::list_devices();
     if (devices.empty()) fmt::print("no EGL device; registrations run on the CPU\n");
@@ -159,12 +180,14 @@ void print_file(const fs::path& path, const InfoOptions& options) {
             return print_surface(path);
         case FileKind::Record:
             return print_record(path);
+        case FileKind::Patient:
+            return print_patient(path);
         case FileKind::Unknown:
             break;
     }
     throw InvalidInput("'" + path.string() +
                        "' has an unknown extension; give .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, a DICOM "
-                       "folder, .vtu, .ply, .stl, .obj, .vtk, .vtp, .csv, .xyz, .fcsv, .mrk.json or .h5");
+                       "folder, .vtu, .ply, .stl, .obj, .vtk, .vtp, .csv, .xyz, .fcsv, .mrk.json, .h5 or .tw");
 }
 
 }  // namespace

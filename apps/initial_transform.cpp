@@ -52,7 +52,7 @@ std::string nearness_text(const RegistrationInputs& inputs, const Eigen::Isometr
 
 }  // namespace
 
-void take_initial_transform(RegistrationInputs& inputs, const RegisterOptions& options) {
+void take_initial_transform(RegistrationInputs& inputs, const IntraoperativeOptions& options) {
     if (options.initial_transform.empty()) return;
     const std::string path = options.initial_transform.string();
     const registration::PointMap map = registration::read_point_map(options.initial_transform);

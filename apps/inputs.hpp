@@ -59,9 +59,13 @@ struct RegistrationInputs {
 
 /// Reads all files at once. Throws IoError or InvalidInput, each naming the file.
 RegistrationInputs read_inputs(const RegisterOptions& options, Observer& observer);
+/// The half that is known before the operation, and the other, which completes it.
+RegistrationInputs read_preoperative(const PreoperativeOptions& options, Observer& observer);
+void read_intraoperative(RegistrationInputs& inputs, const IntraoperativeOptions& options, Observer& observer);
 
-/// Throws InvalidInput where geometry, labels, units or materials cannot be registered; resamples labels when asked.
-void validate(RegistrationInputs& inputs, const RegisterOptions& options);
+/// Throw InvalidInput where geometry, labels, units or materials cannot be registered; resample labels when asked.
+void validate_preoperative(RegistrationInputs& inputs, const PreoperativeOptions& options, bool resample_labels);
+void validate_intraoperative(RegistrationInputs& inputs, const RegisterOptions& options);
 
 /// Throws InvalidInput unless both lie on one grid; says how far apart they are, in voxels.
 void require_same_grid(const imaging::Geometry& image, const imaging::Geometry& labels, const std::string& image_name,

@@ -22,6 +22,9 @@ using namespace tissuewarp;
 
 struct RunVerb {
     void operator()(const apps::RegisterOptions& options) const { apps::run_register(options); }
+    void operator()(const apps::PrepareModelOptions& options) const { apps::run_prepare(options); }
+    void operator()(const apps::UpdatePatientOptions& options) const { apps::run_update(options); }
+    void operator()(const apps::ServeOptions& options) const { apps::run_serve(options); }
     void operator()(const apps::MeshOptions& options) const { apps::run_mesh(options); }
     void operator()(const apps::WarpOptions& options) const { apps::run_warp(options); }
     void operator()(const apps::ConvertOptions& options) const { apps::run_convert(options); }

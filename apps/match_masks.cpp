@@ -36,8 +36,11 @@ imaging::Volume matched(const imaging::Volume& image, std::vector<imaging::Volum
 
 }  // namespace
 
-void exclude_unmatched(RegistrationInputs& inputs, const RegisterOptions& options) {
+void exclude_unmatched_moving(RegistrationInputs& inputs, const PreoperativeOptions& options) {
     inputs.moving_matched = matched(inputs.moving, inputs.moving_contrasts, options.moving_mask, inputs.notes);
+}
+
+void exclude_unmatched_fixed(RegistrationInputs& inputs, const IntraoperativeOptions& options) {
     inputs.fixed_matched = matched(inputs.fixed, inputs.fixed_contrasts, options.fixed_mask, inputs.notes);
 }
 

@@ -5,8 +5,9 @@
 
 namespace tissuewarp::apps {
 
-/// Reads --moving-mask and --fixed-mask and fills `moving_matched` and `fixed_matched`, with a note of how much each
-/// excludes. Throws IoError or InvalidInput, naming the file.
-void exclude_unmatched(RegistrationInputs& inputs, const RegisterOptions& options);
+/// Read --moving-mask and fill `moving_matched`, and --fixed-mask and `fixed_matched`, with a note of how much each
+/// excludes. Throw IoError or InvalidInput, naming the file.
+void exclude_unmatched_moving(RegistrationInputs& inputs, const PreoperativeOptions& options);
+void exclude_unmatched_fixed(RegistrationInputs& inputs, const IntraoperativeOptions& options);
 
 }  // namespace tissuewarp::apps

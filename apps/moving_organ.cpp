@@ -12,11 +12,11 @@ namespace tissuewarp::apps {
 
 namespace {
 
-/// Between the volumes of a surface by its triangles and by its voxels, of the latter; beyond it crosses itself. By hand:
-/// small bodies on coarse grids differ by some hundredths, a body inside out by more than half.
+/// Between the volumes of a surface by its triangles and by its voxels, of the latter; beyond it crosses itself. By
+/// hand: small bodies on coarse grids differ by some hundredths, a body inside out by more than half.
 constexpr double most_volume_difference = 0.05;
 
-void take_foreground(RegistrationInputs& inputs, const RegisterOptions& options) {
+void take_foreground(RegistrationInputs& inputs, const PreoperativeOptions& options) {
     try {
         inputs.foreground = imaging::foreground(inputs.moving);
     } catch (const InvalidInput& problem) {
@@ -47,7 +47,7 @@ imaging::Geometry grid_for(const meshing::ClosedSurface& surface, RegistrationIn
     return inputs.moving.geometry;
 }
 
-void take_surface(RegistrationInputs& inputs, const RegisterOptions& options) {
+void take_surface(RegistrationInputs& inputs, const PreoperativeOptions& options) {
     const std::string path = options.moving_surface.string();
     meshing::ClosedSurface surface;
     try {
@@ -64,7 +64,7 @@ void take_surface(RegistrationInputs& inputs, const RegisterOptions& options) {
     inputs.moving_labels = inside.as(CV_32S);
 }
 
-void take_mesh(RegistrationInputs& inputs, const RegisterOptions& options) {
+void take_mesh(RegistrationInputs& inputs, const PreoperativeOptions& options) {
     meshing::MeshFile file = meshing::read_tetrahedra(options.moving_mesh);
     for (const std::string& note : file.notes)
         inputs.notes.push_back(fmt::format("'{}': {}", options.moving_mesh.string(), note));
@@ -79,13 +79,13 @@ void take_mesh(RegistrationInputs& inputs, const RegisterOptions& options) {
 
 }  // namespace
 
-const std::filesystem::path& organ_file(const RegisterOptions& options) {
+const std::filesystem::path& organ_file(const PreoperativeOptions& options) {
     for (const auto* path : {&options.moving_labels, &options.moving_surface, &options.moving_mesh})
         if (!path->empty()) return *path;
     return options.moving;
 }
 
-void find_organ(RegistrationInputs& inputs, const RegisterOptions& options) {
+void find_organ(RegistrationInputs& inputs, const PreoperativeOptions& options) {
     if (!options.moving_surface.empty())
         take_surface(inputs, options);
     else if (!options.moving_mesh.empty())

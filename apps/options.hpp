@@ -1,5 +1,6 @@
 #pragma once
-/// What the command line of each verb says, as plain structs. The only place that knows the parser is options.cpp.
+/// What the command line of each verb says, as plain structs. The parser is known to options.cpp and verb_options_*.cpp
+/// alone.
 
 #include "apps/parameters.hpp"
 
@@ -45,44 +46,80 @@ struct CurveFiles {
     double deviation = 1.0;  ///< mm
 };
 
-struct RegisterOptions {
-    CommonOptions common;
-    std::filesystem::path moving, moving_labels, fixed, fixed_labels, output;
-    std::vector<std::filesystem::path> moving_contrasts, fixed_contrasts;  ///< further pairs of images, in their order
-    std::filesystem::path moving_surface, moving_mesh;  ///< of the organ; one of labels, surface and mesh, or none: the
-                                                        ///< foreground of the image
-    std::filesystem::path moving_mask, fixed_mask;      ///< 0 where the image may not be matched
-    std::filesystem::path fixed_surface;                ///< points of a part of the organ's surface
-    double surface_deviation = 1.0;                     ///< mm
-    PointPairFiles point_pairs;
-    CurveFiles curves;
-    LandmarkFiles landmarks;
-    std::filesystem::path initial_transform;      ///< fixed → moving points
-    std::filesystem::path label_names;            ///< a colour table or label file
-    std::filesystem::path points, surface;        ///< of the moving frame, carried along
-    std::optional<double> accuracy, time_budget;  ///< mm; s: they choose the mesh
-    double edge_length = 0.0;                     ///< mm; 0: from the volume of the organ and what is given
-    std::map<int, double> label_edge_length;      ///< mm
+/// What is known before the operation, and how the model is made of it.
+struct PreoperativeOptions {
+    std::filesystem::path moving, moving_labels;
+    std::vector<std::filesystem::path> moving_contrasts;  ///< further images, in their order
+    std::filesystem::path moving_surface, moving_mesh;    ///< of the organ; one of labels, surface and mesh, or none:
+                                                          ///< the foreground of the image
+    std::filesystem::path moving_mask;                    ///< 0 where the image may not be matched
+    std::filesystem::path label_names;                    ///< a colour table or label file
+    double edge_length = 0.0;                             ///< mm; 0: from the volume of the organ and what is given
+    std::map<int, double> label_edge_length;              ///< mm
     std::filesystem::path materials;
     double default_youngs_modulus = 3.0;  ///< kPa
     double default_poissons_ratio = 0.45;
-    std::string element = "auto";  ///< "auto", "t4" or "averaged-pressure"
-    int rounds = 8;
-    double tolerance = 0.05;                     ///< mm
-    double data_stiffness = 3.0;                 ///< kPa/mm
-    double fade = 60.0;                          ///< mm
+    std::string element = "auto";                ///< "auto", "t4" or "averaged-pressure"
     std::vector<int> anchors, rigid_neighbours;  ///< labels of the preoperative map
-    bool match_image = false;                    ///< implied where the fixed image is all there is
+    double data_stiffness = 3.0;                 ///< kPa/mm
+};
+
+/// What is seen during the operation, how the model is registered to it, and what is told of the result.
+struct IntraoperativeOptions {
+    std::filesystem::path fixed, fixed_labels;
+    std::vector<std::filesystem::path> fixed_contrasts;  ///< further images, each a pair with one of the moving ones
+    std::filesystem::path fixed_mask;                    ///< 0 where the image may not be matched
+    std::filesystem::path fixed_surface;                 ///< points of a part of the organ's surface
+    double surface_deviation = 1.0;                      ///< mm
+    PointPairFiles point_pairs;
+    CurveFiles curves;
+    LandmarkFiles landmarks;
+    std::filesystem::path initial_transform;  ///< fixed → moving points
+    std::filesystem::path points, surface;    ///< of the moving frame, carried along
+    int rounds = 8;
+    double tolerance = 0.05;   ///< mm
+    double fade = 60.0;        ///< mm
+    bool match_image = false;  ///< implied where the fixed image is all there is
     bool no_align = false;
-    bool resample_labels = false;
     bool no_error_estimate = false;
     bool strict = false;  ///< a result that is doubted ends with exit code 4
-    bool dry_run = false;
     DeviceChoice device;
+};
+
+struct RegisterOptions : PreoperativeOptions, IntraoperativeOptions {
+    CommonOptions common;
+    std::filesystem::path output;
+    std::optional<double> accuracy, time_budget;  ///< mm; s: they choose the mesh
+    bool resample_labels = false;
+    bool dry_run = false;
     std::string bids;                ///< subject: results in BIDS' folders under its names; `output` is the innermost
     std::vector<std::string> write;  ///< words of output_names.hpp: files beside the usual ones
     std::filesystem::path save_parameters;
     std::vector<Parameter> parameters;  ///< all of the above as written to files
+};
+
+struct PrepareModelOptions {
+    CommonOptions common;
+    PreoperativeOptions preoperative;
+    bool resample_labels = false;
+    bool for_labels = false;  ///< the mesh is as fine as labels of the operation make use of
+    std::filesystem::path output;
+    std::vector<Parameter> parameters;  ///< as those of register
+};
+
+struct UpdatePatientOptions {
+    CommonOptions common;
+    std::filesystem::path patient;
+    RegisterOptions registration;  ///< its preoperative part is that of the patient
+};
+
+struct ServeOptions {
+    CommonOptions common;
+    std::filesystem::path patient, log, folder, replay;
+    std::filesystem::path targets;  ///< points of the moving frame, carried along
+    std::string address = "127.0.0.1";
+    int port = 18944;
+    DeviceChoice device;
 };
 
 struct MeshOptions {
@@ -178,8 +215,9 @@ struct StudyOptions {
     DeviceChoice device;
 };
 
-using Command = std::variant<RegisterOptions, MeshOptions, WarpOptions, ConvertOptions, EvaluateOptions, InfoOptions,
-                             BenchOptions, SimulateOptions, ExplainOptions, CalibrateOptions, StudyOptions>;
+using Command = std::variant<RegisterOptions, PrepareModelOptions, UpdatePatientOptions, ServeOptions, MeshOptions,
+                             WarpOptions, ConvertOptions, EvaluateOptions, InfoOptions, BenchOptions, SimulateOptions,
+                             ExplainOptions, CalibrateOptions, StudyOptions>;
 
 /// The text that --help or --version asked for; not an error.
 struct HelpRequest {

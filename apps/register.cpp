@@ -1,232 +1,33 @@
-// tissuewarp register: read → prepare → update → fields → warp → score and write.
+// tissuewarp register: from files to the model, and on by what update takes too.
 
-#include "apps/bids.hpp"
 #include "apps/dial.hpp"
-#include "apps/module_description.hpp"
-#include "apps/output_folder.hpp"
+#include "apps/model_making.hpp"
 #include "apps/output_names.hpp"
-#include "apps/progress.hpp"
 #include "apps/register_dicom.hpp"
-#include "apps/register_outputs.hpp"
-#include "apps/report_json.hpp"
-#include "apps/silenced_stderr.hpp"
-#include "apps/update_device.hpp"
+#include "apps/register_steps.hpp"
 #include "apps/verbs.hpp"
 #include "apps/versions.hpp"
-#include "core/errors.hpp"
-#include "imaging/filters.hpp"
-#include "imaging/labels.hpp"
-#include "registration/evaluation/curve_residual.hpp"
-#include "registration/field.hpp"
-#include "registration/io/curves.hpp"
-#include "registration/warp.hpp"
 
 #include <fmt/format.h>
-#include <tbb/task_group.h>
 
 namespace tissuewarp::apps {
 
 namespace {
 
-using namespace registration;
-
-double edge_length(const RegisterOptions& options, const RegistrationInputs& inputs) {
-    if (options.edge_length > 0) return options.edge_length;
-    const imaging::Volume organ = imaging::without_labels(inputs.moving_labels, options.rigid_neighbours);
-    return inputs.fixed_labels.empty() ? suggested_edge_length_without_labels(organ) : suggested_edge_length(organ);
-}
-
-PrepareOptions prepare_options(const RegistrationRun& run) {
-    const RegisterOptions& options = run.options;
-    const RegistrationInputs& inputs = run.inputs;
-    PrepareOptions result;
-    result.meshing.edge_length = inputs.moving_mesh ? meshing::quality(*inputs.moving_mesh).edge_mm.median
-                                 : run.dial         ? run.dial->edge_length_mm
-                                                    : edge_length(options, inputs);
-    result.meshing.label_edge_length = options.label_edge_length;
-    for (const auto& [label, tissue] : inputs.materials) result.materials[label] = material_of(tissue);
-    result.default_material = tled::neo_hookean_lnj(options.default_youngs_modulus, options.default_poissons_ratio);
-    if (options.element == "t4") result.element = tled::Element::T4;
-    if (options.element == "averaged-pressure") result.element = tled::Element::AveragedPressureT4;
-    result.data_stiffness = options.data_stiffness;
-    result.anchors = options.anchors;
-    result.rigid_neighbours = options.rigid_neighbours;
-    return result;
-}
-
-UpdateOptions update_options(const RegistrationRun& run) {
-    const RegisterOptions& options = run.options;
-    UpdateOptions result = on_device(options.device);
-    result.align = !options.no_align;
-    result.rematches = options.rounds;
-    result.equilibrium.tolerance_mm = options.tolerance;
-    if (run.dial) result.time_budget_s = run.dial->update_budget_s;
-    return result;
-}
-
-PreparedModel prepared_model(const RegistrationRun& run, Observer& observer) {
-    const RegistrationInputs& inputs = run.inputs;
-    const PrepareOptions options = prepare_options(run);
-    return inputs.moving_mesh ? prepare(*inputs.moving_mesh, inputs.moving_labels, options, observer)
-                              : prepare(inputs.moving_labels, options, observer);
-}
-
-void print_plan(const RegistrationInputs& inputs, const RegisterOptions& options) {
-    const auto grid = [](const imaging::Geometry& g) {
-        return fmt::format("{} x {} x {} voxels of {:g} x {:g} x {:g} mm", g.size[0], g.size[1], g.size[2],
-                           g.spacing[0], g.spacing[1], g.spacing[2]);
-    };
-    const imaging::Geometry* fixed = inputs.fixed_grid();
-    fmt::print("moving grid   {}\nfixed grid    {}\nlabels        {}\n", grid(inputs.moving_grid()),
-               fixed ? grid(*fixed) : "the moving one, carried along by the rigid alignment",
-               fmt::join(imaging::labels_in(inputs.moving_labels), ", "));
-    if (!options.anchors.empty()) fmt::print("stay          {}\n", fmt::join(options.anchors, ", "));
-    if (!options.rigid_neighbours.empty()) fmt::print("rigid         {}\n", fmt::join(options.rigid_neighbours, ", "));
-    const std::string mesh = inputs.moving_mesh
-                                 ? fmt::format("take {} tetrahedra as they are", inputs.moving_mesh->tet_count())
-                                 : fmt::format("mesh with edges of {:.3g} mm", edge_length(options, inputs));
-    fmt::print("would {}, {}, match in {} rounds on device '{}', and write to '{}':\n", mesh,
-               options.no_align ? "not align" : "align rigidly", options.rounds, options.device.name,
-               options.output.string());
-    for (const std::string& name : output_names(options)) fmt::print("  {}\n", name);
-    for (const std::string& note : inputs.notes) fmt::print("note: {}\n", note);
-}
-
-/// Results of an older run go when the new ones come: an input must not be one of them.
-void require_inputs_stay(const RegistrationInputs& inputs, const std::filesystem::path& output) {
-    for (const InputFile& file : inputs.files) {
-        std::error_code none;
-        const bool within =
-            std::filesystem::equivalent(std::filesystem::absolute(file.path).parent_path(), output, none);
-        if (!none && within && is_register_output(file.path.filename().string()))
-            throw InvalidInput(
-                fmt::format("--{} '{}' is a result in the output folder, which this run would replace; "
-                            "choose another --output",
-                            file.role, file.path.string()));
-    }
-}
-
-/// Where no fixed image gives a grid: the moving one, carried along by the rigid alignment.
-imaging::Geometry output_grid(const RegistrationRun& run) {
-    if (const imaging::Geometry* fixed = run.inputs.fixed_grid()) return *fixed;
-    const Eigen::Isometry3d& placement = run.result.deformation.placement;
-    imaging::Geometry grid = run.inputs.moving_grid();
-    grid.origin = placement * grid.origin;
-    grid.direction = placement.linear() * grid.direction;
-    return grid;
-}
-
-Intraoperative seen(const RegistrationInputs& inputs, const RegisterOptions& options) {
-    Intraoperative seen{.surface = inputs.fixed_surface, .points = inputs.point_pairs, .curves = inputs.curves};
-    if (inputs.start) seen.start = inputs.start->placement;
-    if (options.match_image) {
-        seen.image = inputs.fixed_matched;
-        seen.contrasts = inputs.fixed_contrasts;
-    }
-    // An image that is only the grid of the output must not coarsen the boundary that is matched.
-    if (!inputs.fixed_labels.empty())
-        seen.labels = options.match_image ? inputs.fixed_labels : inputs.fixed_labels_as_given;
-    return seen;
-}
-
 /// Labels, and points of an organ that may lie anywhere, also tell loads that nobody stated.
-bool looks_for_loads(const RegistrationRun& run) {
-    return !run.options.match_image && (!run.inputs.fixed_labels.empty() || !run.options.no_align);
+bool looks_for_loads(const RegisterOptions& options) {
+    return !options.match_image && (!options.fixed_labels.empty() || !options.no_align);
 }
 
-void append(std::vector<StageTime>& times, const std::vector<StageTime>& more) {
-    times.insert(times.end(), more.begin(), more.end());
+double edge_length(const RegistrationRun& run) {
+    if (run.dial && !run.inputs.moving_mesh) return run.dial->edge_length_mm;
+    return chosen_edge_length(run.options, run.inputs, !run.inputs.fixed_labels.empty());
 }
 
-void make_fields(RegistrationRun& run, ProgressLine& progress) {
-    const FieldOptions options{run.options.fade};
-    const Deformation& deformation = run.result.deformation;
-    Products& products = run.products;
-    progress.begin("field forward", 0.47, 0.52);
-    products.moving_to_fixed = displacement_moving_to_fixed(deformation, run.inputs.moving_grid(), options, progress);
-    progress.begin("field backward", 0.52, 0.57);
-    products.fixed_to_moving = displacement_fixed_to_moving(deformation, output_grid(run), options, progress);
-}
-
-void warp_everything(RegistrationRun& run) {
-    const RegistrationInputs& inputs = run.inputs;
-    Products& products = run.products;
-    if (!inputs.moving.empty()) products.warped = warp_image(inputs.moving, products.fixed_to_moving);
-    products.warped_labels = warp_labels(inputs.moving_labels, products.fixed_to_moving);
-    if (!inputs.landmarks && !inputs.points && !inputs.surface) return;
-    const PointTransform transform(run.result.deformation, {run.options.fade});
-    if (inputs.landmarks) products.landmarks = transform(inputs.landmarks->moving);
-    if (inputs.points) products.points = transform(*inputs.points);
-    if (inputs.surface) {
-        products.surface = inputs.surface;
-        products.surface->nodes = transform(products.surface->nodes);
-    }
-}
-
-/// How far off the result may be, and what that says against it.
-void estimate_errors(RegistrationRun& run, ProgressLine& progress) {
-    progress.begin("error estimate", 0.57, 0.65);
-    Products& products = run.products;
-    products.uncertainty = uncertainty(*run.prepared, run.result, {}, progress);
-    products.uncertainty_volumes =
-        uncertainty_on_grid(*products.uncertainty, run.result.deformation, products.fixed_to_moving.geometry);
-    for (Doubt& doubt : doubts_of(*products.uncertainty, run.options.tolerance))
-        run.result.doubts.push_back(std::move(doubt));
-}
-
-CurveDistances curve_distances(const RegistrationRun& run) {
-    constexpr double step_mm = 1;  // tissue bends what is between two points of a file
-    const Curves& curves = *run.inputs.curves;
-    const PointTransform transform(run.result.deformation, {run.options.fade});
-    std::vector<Eigen::Matrix3Xd> carried;
-    for (const Eigen::Matrix3Xd& line : curves.moving) carried.push_back(transform(evenly_along(line, step_mm)));
-    return {curve_residual(curves.moving, curves.fixed, {}).to_lines,
-            curve_residual(carried, curves.fixed, {}).to_lines};
-}
-
-/// The field that is written, where the organ is: tissue never folds.
-void doubt_field(RegistrationRun& run) {
-    const imaging::Volume organ =
-        imaging::mask_of_all(imaging::without_labels(run.inputs.moving_labels, run.options.rigid_neighbours));
-    run.scores.organ = field_jacobians(run.products.moving_to_fixed, &organ);
-    if (auto doubt = doubt_of_folds(run.scores.organ)) run.result.doubts.push_back(std::move(*doubt));
-}
-
-/// After everything was written. Throws SolverFailure.
-void require_no_doubts(const RegistrationRun& run) {
-    std::vector<std::string> codes;
-    for (const Doubt& doubt : run.result.doubts)
-        if (doubt.severity == Severity::Doubt) codes.push_back(doubt.code);
-    if (codes.empty()) return;
-    throw SolverFailure(fmt::format(
-        "the result is doubted ({}); '{}' says why, docs/manual/doubts.md what it means; all files are written",
-        fmt::join(codes, ", "), (run.options.output / "report.json").string()));
-}
-
-Scores score(const RegistrationRun& run) {
-    Scores scores;
-    scores.organ = run.scores.organ;
-    const auto without_neighbours = [&](const imaging::Volume& labels) {
-        return imaging::without_labels(labels, run.options.rigid_neighbours);
-    };
-    const imaging::Volume moving = without_neighbours(run.inputs.moving_labels);
-    if (!run.inputs.fixed_labels.empty()) {
-        const imaging::Volume fixed = without_neighbours(run.inputs.fixed_labels);
-        scores.before = overlap(imaging::resample(moving, fixed.geometry, imaging::Interpolation::Nearest), fixed);
-        scores.after = overlap(without_neighbours(run.products.warped_labels), fixed);
-    }
-    scores.mesh = mesh_jacobians(run.result.deformation);
-    scores.grid = field_jacobians(run.products.moving_to_fixed);
-    if (run.inputs.landmarks) scores.target_error = target_error(*run.inputs.landmarks, run.products.landmarks);
-    if (run.inputs.curves) scores.curves = curve_distances(run);
-    return scores;
-}
-
-/// The codes of doubts in one line; "none" where there are none.
-std::string codes(const std::vector<Doubt>& doubts) {
-    std::vector<std::string> result;
-    for (const Doubt& doubt : doubts) result.push_back(doubt.code);
-    return result.empty() ? "none" : fmt::format("{}", fmt::join(result, ", "));
+std::string mesh_plan(const RegistrationRun& run) {
+    if (run.inputs.moving_mesh)
+        return fmt::format("take {} tetrahedra as they are", run.inputs.moving_mesh->tet_count());
+    return fmt::format("mesh with edges of {:.3g} mm", edge_length(run));
 }
 
 }  // namespace
@@ -244,12 +45,13 @@ void run_register(const RegisterOptions& options) {
     progress.begin("reading", 0.0, 0.02);
     run.inputs = read_inputs(options, progress);
     require_inputs_stay(run.inputs, options.output);
-    validate(run.inputs, options);
+    validate_preoperative(run.inputs, options, options.resample_labels);
+    validate_intraoperative(run.inputs, options);
     require_dicom_origins(options);
     run.times.push_back(clock.lap("read"));
     if (options.dry_run) {
         progress.clear();
-        return print_plan(run.inputs, options);
+        return print_plan(run.inputs, options, mesh_plan(run));
     }
 
     if (options.accuracy || options.time_budget) {
@@ -257,56 +59,12 @@ void run_register(const RegisterOptions& options) {
         progress.note(run.dial->reason);
     }
     progress.begin("preparing the model", 0.02, 0.20);
-    run.prepared = std::make_unique<PreparedModel>(prepared_model(run, progress));
-    if (options.match_image) {
-        prepare_image(*run.prepared, run.inputs.moving_matched, {}, progress);
-        for (const imaging::Volume& contrast : run.inputs.moving_contrasts)
-            prepare_contrast(*run.prepared, contrast, {}, progress);
-    }
-    if (looks_for_loads(run)) prepare_loads(*run.prepared, progress);
+    run.prepared =
+        std::make_unique<registration::PreparedModel>(made_model(options, run.inputs, edge_length(run), progress));
+    if (options.match_image) add_images(*run.prepared, run.inputs, progress);
+    if (looks_for_loads(options)) prepare_loads(*run.prepared, progress);
     append(run.times, run.prepared->times);
-
-    progress.begin("registering", 0.20, 0.47);
-    const double ready = clock.total();
-    run.result = update(*run.prepared, seen(run.inputs, options), update_options(run), progress);
-    append(run.times, run.result.times);
-    clock.lap("");
-
-    make_fields(run, progress);
-    run.times.push_back(clock.lap("fields"));
-    warp_everything(run);
-    run.times.push_back(clock.lap("warp"));
-    run.intraoperative_seconds = clock.total() - ready;
-    if (!options.no_error_estimate) {
-        estimate_errors(run, progress);
-        run.times.push_back(clock.lap("error estimate"));
-    }
-    if (run.dial) doubt_dial(run);
-    doubt_field(run);
-    for (Doubt& doubt : run.result.doubts) doubt.text = imaging::with_label_names(doubt.text, run.inputs.label_names);
-
-    progress.begin("writing and scoring", 0.65, 0.88);
-    auto silenced = std::make_unique<SilencedStandardError>();
-    tbb::task_group writing;  // compression takes one core per file; the scores run beside it
-    start_writing(run, *output, writing);
-    run.scores = score(run);
-    run.times.push_back(clock.lap("score"));
-    writing.wait();
-    silenced.reset();
-    run.times.push_back(clock.lap("write"));
-
-    progress.begin("report", 0.88, 1.0);
-    run.notes = progress.notes();
-    const nlohmann::json report = report_json(run, clock.total());
-    write_reports(run, report, *output);
-    output->commit();
-    if (!options.bids.empty()) write_bids_dataset(options);
-    if (!options.save_parameters.empty()) save_parameters(options.parameters, options.save_parameters);
-    run.times.push_back(clock.lap("report"));
-    write_return_parameters(options.common.return_parameters, {{"doubts", codes(run.result.doubts)}});
-    progress.clear();
-    if (!options.common.quiet) fmt::print("{}", summary_text(run, clock.total()));
-    if (options.strict) require_no_doubts(run);
+    register_and_write(run, *output, clock, progress);
 }
 
 }  // namespace tissuewarp::apps

@@ -1,5 +1,5 @@
 #pragma once
-/// One verb of the command line. For options.cpp alone, the one translation unit that includes CLI11.
+/// One verb of the command line. For options.cpp and verb_options_*.cpp, which alone include CLI11.
 
 #include "apps/config_file.hpp"
 #include "apps/module_description.hpp"
@@ -129,9 +129,21 @@ public:
         fixed->needs(moving)->excludes(csv);
     }
 
+    /// "--long" options, help among them.
+    [[nodiscard]] std::vector<std::string> long_options() const {
+        std::vector<std::string> names;
+        for (const CLI::Option* option : static_cast<const CLI::App&>(app_).get_options())
+            for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+        return names;
+    }
+    [[nodiscard]] bool has(const std::string& name) const {
+        const std::vector<std::string> names = long_options();
+        return std::find(names.begin(), names.end(), name) != names.end();
+    }
     [[nodiscard]] KnownOptions known() const {
         KnownOptions result;
         for (const auto& [option, kind, facts] : options_) {
+            if (option->get_positional()) continue;
             result.names.push_back(name_of(option));
             if (kind == Kind::Switch) result.switches.push_back(name_of(option));
         }
@@ -141,6 +153,7 @@ public:
     [[nodiscard]] std::vector<Parameter> parameters(const std::vector<std::string>& except) const {
         std::vector<Parameter> result;
         for (const auto& [option, kind, facts] : options_) {
+            if (option->get_positional()) continue;
             Parameter parameter{name_of(option), kind, {}};
             if (std::find(except.begin(), except.end(), parameter.name) != except.end()) continue;
             if (option->count() > 0)

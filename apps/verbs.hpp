@@ -6,6 +6,9 @@
 namespace tissuewarp::apps {
 
 void run_register(const RegisterOptions& options);
+void run_prepare(const PrepareModelOptions& options);
+void run_update(const UpdatePatientOptions& options);
+void run_serve(const ServeOptions& options);
 void run_mesh(const MeshOptions& options);
 void run_warp(const WarpOptions& options);
 void run_convert(const ConvertOptions& options);

@@ -1,6 +1,7 @@
 #include "registration/prepared_io.hpp"
 
 #include "registration/io/stored_model.hpp"
+#include "registration/io/stored_prepared.hpp"
 #include "registration/loads/coarse_twin.hpp"
 #include "registration/matching/image_matching.hpp"
 #include "registration/terms/anchors.hpp"
@@ -13,8 +14,6 @@ namespace tissuewarp::registration {
 
 namespace {
 
-constexpr const char* format = "tissuewarp prepared model";
-constexpr int version = 5, oldest_version = 1;
 constexpr const char* coarse_mesh = "coarse_mesh";  // absent without a coarse model; since version 3
 constexpr const char* image = "image";              // absent without an image model; since version 4
 
@@ -133,9 +132,7 @@ ImageModel read_image(const Hdf5Input& file, const std::string& group) {
 
 }  // namespace
 
-void write_prepared(const PreparedModel& prepared, const std::filesystem::path& path) {
-    AtomicFile target(path);
-    Hdf5Output file(target.path(), format, version);
+void detail::write_prepared_parts(Hdf5Output& file, const PreparedModel& prepared) {
     detail::write_model(file, prepared.model);
     write_labels(file, detail::with_neighbours(prepared));
     write_meshing(file, prepared.options.meshing);
@@ -149,14 +146,10 @@ void write_prepared(const PreparedModel& prepared, const std::filesystem::path& 
     for (std::size_t n = 0; n < prepared.contrasts.size(); ++n)
         write_image(file, contrast_group(n), *prepared.contrasts[n]);
     detail::write_stages(file, "stages/prepare", prepared.times);
-    file.close();
-    target.commit();
 }
 
-namespace {
-
-PreparedModel read_checked(const std::filesystem::path& path, Observer& observer) {
-    const Hdf5Input file(path, format, version, oldest_version);
+PreparedModel detail::read_prepared_parts(const Hdf5Input& file, const std::filesystem::path& path,
+                                          Observer& observer) {
     tled::Model model = detail::read_model(file);
     PrepareOptions options;
     options.meshing = read_meshing(file);
@@ -177,12 +170,20 @@ PreparedModel read_checked(const std::filesystem::path& path, Observer& observer
     return prepared;
 }
 
-}  // namespace
+void write_prepared(const PreparedModel& prepared, const std::filesystem::path& path) {
+    AtomicFile target(path);
+    Hdf5Output file(target.path(), detail::prepared_format, detail::prepared_version);
+    detail::write_prepared_parts(file, prepared);
+    file.close();
+    target.commit();
+}
 
 PreparedModel read_prepared(const std::filesystem::path& path, Observer& observer) {
     return naming(path, [&] {
         try {
-            return read_checked(path, observer);
+            const Hdf5Input file(path, detail::prepared_format, detail::prepared_version,
+                                 detail::oldest_prepared_version);
+            return detail::read_prepared_parts(file, path, observer);
         } catch (const SolverFailure& failure) {  // sizes or materials whose stiffness is no number
             throw InvalidInput(std::string("its tissue cannot be computed with: ") + failure.what());
         }

@@ -6,6 +6,7 @@
 #include "registration/field/inverse_transform.hpp"
 #include "registration/gpu_warp.hpp"
 #include "registration/matching/image_mask.hpp"
+#include "registration/patient_io.hpp"
 #include "registration/prepared_io.hpp"
 #include "registration/record.hpp"
 #include "registration/uncertainty.hpp"

@@ -15,8 +15,8 @@ from phantom import run
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 
-# Verbs that measure for minutes; their tests run them with --quick. Here their options must exist.
-MEASURING = {"bench": "bench_test.py", "study": "study_test.py", "calibrate": "dial_test.py"}
+# Verbs that measure for minutes, whose tests run them with --quick, or that do not end. Here their options must exist.
+MEASURING = {"serve": "serve_test.py", "bench": "bench_test.py", "study": "study_test.py", "calibrate": "dial_test.py"}
 # Beginnings of commands that are not the program, and what runs them.
 ELSEWHERE = {
     "git clone": "continuous integration",

@@ -26,8 +26,10 @@ const std::map<std::string, std::set<std::string>> may_include{
     {"registration", {"core", "imaging", "meshing", "shaders", "tled", "registration"}},
     {"report", {"core", "imaging", "report"}},
     {"study", {"core", "imaging", "meshing", "shaders", "tled", "registration", "report", "study"}},
+    {"server", {"core", "imaging", "meshing", "tled", "registration", "server"}},
     {"apps",
-     {"core", "imaging", "meshing", "shaders", "tled", "simulation", "registration", "report", "study", "apps"}},
+     {"core", "imaging", "meshing", "shaders", "tled", "simulation", "registration", "report", "study", "server",
+      "apps"}},
     {"python", {"core", "imaging", "meshing", "tled", "simulation", "registration", "apps", "python"}},  // scene files
 };
 

@@ -1,5 +1,6 @@
 // The program's own HDF5: records of a registration and prepared models.
 
+#include "registration/patient_io.hpp"
 #include "registration/prepared_io.hpp"
 #include "registration/record.hpp"
 #include "tests/fuzz/format.hpp"
@@ -48,6 +49,13 @@ std::vector<Seed> prepared_seeds(const std::filesystem::path& folder) {
     return all_kinds(folder, "prepared.h5");
 }
 
+std::vector<Seed> patient_seeds(const std::filesystem::path& folder) {
+    imaging::Volume image(test::oblique_grid({0, 0, 0}, {12, 10, 9}, {4, 4, 4}), CV_16SC1);
+    image.voxels.setTo(7);
+    write_patient(prepared_box(), image, R"({"facts_version": 1})", folder / "patient.tw");
+    return all_kinds(folder, "patient.tw");
+}
+
 void read_the_record(const std::filesystem::path& path, Digest& digest) {
     const Record record = read_record(path);
     digest.matrix(record.deformation.mesh.nodes);
@@ -68,11 +76,20 @@ void read_the_prepared_model(const std::filesystem::path& path, Digest& digest) 
     digest.number(prepared.options.meshing.edge_length);
 }
 
+void read_the_patient(const std::filesystem::path& path, Digest& digest) {
+    const Patient patient = read_patient(path);
+    digest.matrix(patient.prepared.model.mesh.nodes);
+    digest.voxels(patient.labels.voxels);
+    if (!patient.image.empty()) digest.voxels(patient.image.voxels);
+    digest.text(patient.facts);
+}
+
 }  // namespace
 
 std::vector<Format> model_formats() {
     return {{"record", record_seeds, read_the_record, {}, edit_hdf5},
-            {"prepared", prepared_seeds, read_the_prepared_model, {}, edit_hdf5}};
+            {"prepared", prepared_seeds, read_the_prepared_model, {}, edit_hdf5},
+            {"patient", patient_seeds, read_the_patient, {}, edit_hdf5}};
 }
 
 }  // namespace tissuewarp::fuzz

@@ -1,0 +1,39 @@
+#include "apps/model_making.hpp"
+
+#include "imaging/filters.hpp"
+#include "imaging/labels.hpp"
+#include "meshing/quality.hpp"
+
+namespace tissuewarp::apps {
+
+using namespace registration;
+
+double chosen_edge_length(const PreoperativeOptions& options, const RegistrationInputs& inputs, bool for_labels) {
+    if (inputs.moving_mesh) return meshing::quality(*inputs.moving_mesh).edge_mm.median;
+    if (options.edge_length > 0) return options.edge_length;
+    const imaging::Volume organ = imaging::without_labels(inputs.moving_labels, options.rigid_neighbours);
+    return for_labels ? suggested_edge_length(organ) : suggested_edge_length_without_labels(organ);
+}
+
+PreparedModel made_model(const PreoperativeOptions& options, const RegistrationInputs& inputs, double edge_length_mm,
+                         Observer& observer) {
+    PrepareOptions made;
+    made.meshing.edge_length = edge_length_mm;
+    made.meshing.label_edge_length = options.label_edge_length;
+    for (const auto& [label, tissue] : inputs.materials) made.materials[label] = material_of(tissue);
+    made.default_material = tled::neo_hookean_lnj(options.default_youngs_modulus, options.default_poissons_ratio);
+    if (options.element == "t4") made.element = tled::Element::T4;
+    if (options.element == "averaged-pressure") made.element = tled::Element::AveragedPressureT4;
+    made.data_stiffness = options.data_stiffness;
+    made.anchors = options.anchors;
+    made.rigid_neighbours = options.rigid_neighbours;
+    return inputs.moving_mesh ? prepare(*inputs.moving_mesh, inputs.moving_labels, made, observer)
+                              : prepare(inputs.moving_labels, made, observer);
+}
+
+void add_images(PreparedModel& model, const RegistrationInputs& inputs, Observer& observer) {
+    prepare_image(model, inputs.moving_matched, {}, observer);
+    for (const imaging::Volume& contrast : inputs.moving_contrasts) prepare_contrast(model, contrast, {}, observer);
+}
+
+}  // namespace tissuewarp::apps

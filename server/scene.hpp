@@ -1,0 +1,58 @@
+#pragma once
+/// What clients have said of the operation so far.
+
+#include "registration/intraoperative.hpp"
+#include "server/messages.hpp"
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace tissuewarp::server {
+
+/// How far the data of each kind may be trusted, mm: standard deviations of one point.
+struct Deviations {
+    double surface_mm = 1, points_mm = 1, curves_mm = 1;
+};
+
+/// What is known now. A device's name says what its message is (docs/manual/serve.md); its next one takes the place of
+/// the last. Copies share voxels.
+class Scene {
+public:
+    /// Takes in what a device sent; an empty mesh or list withdraws it. Throws InvalidInput for a name that stands for
+    /// nothing, or for something else.
+    void take(const std::string& device, const Message& message);
+    /// Withdraws what has this name. Throws InvalidInput where nothing may have it.
+    void forget(const std::string& name);
+
+    /// How many messages changed it: greater is newer.
+    [[nodiscard]] long long state() const { return state_; }
+    /// Names of what is there, of data to register to.
+    [[nodiscard]] std::vector<std::string> data() const;
+    /// Of the names in `use`, or everything where it is empty. Throws InvalidInput where one of them is not there, and
+    /// where pairs of points share no name.
+    [[nodiscard]] registration::Intraoperative seen(const std::vector<std::string>& use,
+                                                    const Deviations& deviations) const;
+    [[nodiscard]] const NamedPoints& targets() const { return targets_; }
+    void set_targets(NamedPoints targets) { targets_ = std::move(targets); }
+    /// Where a warped image is wanted: that of the image or of the labels; or nothing.
+    [[nodiscard]] const imaging::Geometry* grid() const;
+
+private:
+    void take_points(const std::string& name, const NamedPoints& points);
+    void take_mesh(const std::string& name, const PolyData& mesh);
+    void take_image(const std::string& name, const imaging::Volume& image);
+    [[nodiscard]] registration::PointPairs pairs() const;
+
+    long long state_ = 0;
+    NamedPoints moving_points_, fixed_points_, targets_;
+    std::optional<PolyData> surface_, moving_curves_, fixed_curves_;
+    std::map<std::string, imaging::Volume> images_;  // "fixed", "fixed_2", …, "fixed_labels"
+    std::optional<Eigen::Isometry3d> start_;
+};
+
+/// "Fixed Surface" and "fixed-surface" are "fixed_surface".
+std::string plain_name(const std::string& device);
+
+}  // namespace tissuewarp::server

@@ -1,0 +1,292 @@
+/// Updates that follow from messages: what is said of them, which are answered, and that the log gives the same bits.
+#include "server/session.hpp"
+#include "server/answers.hpp"
+#include "server/recall.hpp"
+#include "tests/registration/shapes.hpp"
+#include "tests/server/block.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <condition_variable>
+#include <mutex>
+
+namespace tissuewarp::server {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+
+struct Got {
+    std::string type, device;
+    Message message;
+    Bytes bytes;
+};
+
+/// Keeps what is sent, and may hold whoever sends it.
+class Kept final : public Outbox {
+public:
+    void send(std::uint32_t, const Parcel& parcel) override { keep(parcel); }
+    void show(const Parcel& parcel, std::uint32_t) override {
+        keep(parcel);
+        std::unique_lock lock(mutex_);
+        const Message& message = got_.back().message;
+        if (const auto* status = std::get_if<Status>(&message); status && status->code == 6 && gate_) {
+            at_gate_ = true;
+            changed_.notify_all();
+            changed_.wait(lock, [&] { return !gate_; });
+        }
+    }
+    void drop(std::uint32_t client, const std::string&) override {
+        const std::scoped_lock lock(mutex_);
+        dropped.push_back(client);
+    }
+    void note(const std::string&) override {}
+
+    /// From now on updates wait before they compute.
+    void close_gate() {
+        const std::scoped_lock lock(mutex_);
+        gate_ = true;
+        at_gate_ = false;
+    }
+    void wait_at_gate() {
+        std::unique_lock lock(mutex_);
+        changed_.wait_for(lock, std::chrono::seconds(60), [&] { return at_gate_; });
+    }
+    void open_gate() {
+        const std::scoped_lock lock(mutex_);
+        gate_ = false;
+        changed_.notify_all();
+    }
+
+    /// The answer to a request.
+    json answer(int sequence) {
+        json found;
+        wait([&](const Got& got) {
+            const auto* text = std::get_if<Text>(&got.message);
+            if (!text) return false;
+            found = json::parse(text->text);
+            return found.at("sequence") == sequence;
+        });
+        return found;
+    }
+    Got shown(const std::string& device) {
+        return wait([&](const Got& got) { return got.device == device; });
+    }
+    std::vector<std::string> order() {
+        const std::scoped_lock lock(mutex_);
+        std::vector<std::string> types;
+        for (const Got& got : got_) types.push_back(got.type);
+        return types;
+    }
+
+    std::vector<std::uint32_t> dropped;
+
+private:
+    void keep(const Parcel& parcel) {
+        const Header header = parse_header(ByteView(*parcel.bytes).first(header_bytes), {.text_bytes = 1 << 17});
+        Frame frame{header, {parcel.bytes->begin() + header_bytes, parcel.bytes->end()}};
+        const std::scoped_lock lock(mutex_);
+        got_.push_back({header.type, header.device, decode(frame), frame.body});
+        changed_.notify_all();
+    }
+    template <class Is>
+    Got wait(const Is& is) {
+        std::unique_lock lock(mutex_);
+        Got found;
+        const bool came = changed_.wait_for(lock, std::chrono::seconds(60), [&] {
+            for (const Got& got : got_)
+                if (is(got)) {
+                    found = got;
+                    return true;
+                }
+            return false;
+        });
+        EXPECT_TRUE(came) << "nothing of this kind was sent";
+        return found;
+    }
+
+    std::mutex mutex_;
+    std::condition_variable changed_;
+    std::vector<Got> got_;
+    bool gate_ = false, at_gate_ = false;
+};
+
+Frame frame(const char* type, const char* device, Bytes body) {
+    return {{1, type, device, 0, body.size(), 0}, std::move(body)};
+}
+
+Frame request(const json& object) {
+    return frame("STRING", "request", encode(Text{object.dump()}));
+}
+
+/// Places of the block, and where they are seen `shift` mm further and stretched.
+void send_pairs(Session& session, double shift) {
+    NamedPoints moving, fixed;
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j)
+            for (int k = 0; k < 3; ++k) {
+                const Eigen::Vector3d place(5 + 15 * i, 5 + 15 * j, 5 + 15 * k);
+                const std::string name = std::to_string(9 * i + 3 * j + k);
+                moving.push_back({name, "", place});
+                fixed.push_back({name, "", place + Eigen::Vector3d(shift, 0, 0.05 * place.z())});
+            }
+    session.receive(1, frame("POINT", "moving_points", encode(moving)));
+    session.receive(1, frame("POINT", "fixed_points", encode(fixed)));
+}
+
+json update(int sequence) {
+    return {{"do", "update"}, {"sequence", sequence}, {"points_sd_mm", 0.3}, {"rounds", 2}};
+}
+
+TEST(Session, AnUpdateTellsItsStateBeforeItsOrgan) {
+    Kept kept;
+    Session session(test::block(), {}, kept);
+    send_pairs(session, 4);
+    session.receive(1, frame("POINT", "targets", encode(NamedPoints{{"tumour", "", {20, 20, 40}}})));
+    session.receive(1, request(update(7)));
+    const json answer = kept.answer(7);
+    EXPECT_EQ(answer.at("status"), "ok") << answer;
+    EXPECT_EQ(answer.at("state"), 3);
+    EXPECT_EQ(answer.at("outdated"), false);
+    EXPECT_GT(answer.at("seconds").at("total"), 0);
+    const auto organ = std::get<PolyData>(kept.shown("organ").message);
+    EXPECT_EQ(organ.points.cols(), 152);  // nodes of the surface of 5 × 5 × 5 cubes
+    EXPECT_NEAR(organ.points.row(0).minCoeff(), 4, 0.5);
+    EXPECT_NEAR(organ.points.row(2).maxCoeff(), 42, 0.5);
+    const auto targets = std::get<NamedPoints>(kept.shown("targets_now").message);
+    EXPECT_LT((targets[0].position - Eigen::Vector3d(24, 20, 42)).norm(), 0.7);
+    EXPECT_THAT(targets[0].group, HasSubstr("95 %"));
+    const std::vector<std::string> order = kept.order();
+    const auto place = [&](const char* type) { return std::find(order.begin(), order.end(), type) - order.begin(); };
+    EXPECT_LT(place("STRING"), place("POLYDATA"));
+}
+
+TEST(Session, AnAnswerOfAnOlderStateSaysSo) {
+    Kept kept;
+    Session session(test::block(), {}, kept);
+    send_pairs(session, 4);
+    kept.close_gate();
+    session.receive(1, request(update(1)));
+    kept.wait_at_gate();
+    send_pairs(session, 6);
+    session.receive(1, request({{"do", "info"}, {"sequence", 2}}));
+    kept.answer(2);
+    kept.open_gate();
+    const json answer = kept.answer(1);
+    EXPECT_EQ(answer.at("state"), 2);
+    EXPECT_EQ(answer.at("newest_state"), 4);
+    EXPECT_EQ(answer.at("outdated"), true);
+}
+
+TEST(Session, ANewerRequestTakesThePlaceOfAnOlder) {
+    Kept kept;
+    Session session(test::block(), {}, kept);
+    send_pairs(session, 4);
+    kept.close_gate();
+    session.receive(1, request(update(1)));
+    kept.wait_at_gate();
+    session.receive(2, request(update(2)));
+    session.receive(2, request(update(3)));
+    session.receive(1, request({{"do", "info"}, {"sequence", 4}}));
+    kept.answer(4);
+    kept.open_gate();
+    EXPECT_EQ(kept.answer(1).at("status"), "cancelled");
+    EXPECT_EQ(kept.answer(2).at("status"), "superseded");
+    EXPECT_EQ(kept.answer(3).at("status"), "ok");
+}
+
+TEST(Session, UpdatesFollowTheData) {
+    Kept kept;
+    Session session(test::block(), {}, kept);
+    json follow = update(1);
+    follow["do"] = "follow";
+    session.receive(1, request(follow));
+    send_pairs(session, 4);
+    const auto organ = std::get<PolyData>(kept.shown("organ").message);
+    EXPECT_NEAR(organ.points.row(0).minCoeff(), 4, 0.5);
+}
+
+TEST(Session, WhatCannotBeRegisteredIsSaid) {
+    Kept kept;
+    Session session(test::block(), {}, kept);
+    session.receive(1, request(update(1)));
+    EXPECT_THAT(kept.answer(1).at("why"), HasSubstr("send data first"));
+    imaging::Volume image(registration::test::plain_grid({20, 20, 20}), CV_16SC1);
+    session.receive(1, frame("IMAGE", "fixed", encode(image)));
+    session.receive(1, request(update(2)));
+    const json answer = kept.answer(2);
+    EXPECT_EQ(answer.at("status"), "failed");
+    EXPECT_THAT(answer.at("why"), HasSubstr("image"));
+    EXPECT_TRUE(kept.dropped.empty());
+}
+
+TEST(Session, WhoSendsNoMessagesIsLetGo) {
+    Kept kept;
+    Session session(test::block(), {}, kept);
+    session.receive(3, frame("POINT", "targets", Bytes(135)));
+    session.receive(1, request({{"do", "info"}, {"sequence", 1}}));
+    kept.answer(1);
+    EXPECT_EQ(kept.dropped, std::vector<std::uint32_t>{3});
+}
+
+TEST(Session, ALogGoesOnWithTheSameBits) {
+    const tissuewarp::test::TemporaryFolder folder;
+    const SessionOptions options{{}, folder / "log", {}};
+    const ServedPatient patient = test::block();
+    Bytes organ;
+    {
+        Kept kept;
+        Session session(patient, options, kept);
+        send_pairs(session, 4);
+        session.receive(1, request(update(1)));
+        organ = kept.shown("organ").bytes;
+    }
+    Kept kept;
+    Session session(patient, options, kept);
+    EXPECT_EQ(kept.shown("organ").bytes, organ);
+    session.receive(1, request({{"do", "info"}, {"sequence", 5}}));
+    EXPECT_THAT(kept.answer(5).at("why"), HasSubstr("state 2"));
+    int updates = 0;
+    replay(patient, {}, options.log, [&](long long, bool same) {
+        EXPECT_TRUE(same);
+        ++updates;
+    });
+    EXPECT_EQ(updates, 1);
+}
+
+Products doubted() {
+    Products products;
+    products.result.deformation =
+        registration::test::deformed_by(registration::test::box_at({0, 0, 0}, {10, 10, 10}, {1, 1, 1}),
+                                        [](const Eigen::Vector3d&) { return Eigen::Vector3d::Zero(); });
+    products.result.doubts.push_back({"surface.off", 1, 0, "it lies elsewhere"});
+    return products;
+}
+
+TEST(Answers, AfterADoubtEveryMessageSaysSo) {
+    const Products products = doubted();
+    const json text = json::parse(answer({}, products, 0, {}));
+    EXPECT_EQ(text.at("status"), "doubted");
+    EXPECT_EQ(text.at("doubts").at(0).at("code"), "surface.off");
+    const Status status = status_of({}, products, 0);
+    EXPECT_NE(status.code, 1);
+    EXPECT_THAT(status.text, HasSubstr("surface.off"));
+    const PolyData organ = organ_of(products);
+    ASSERT_EQ(organ.point_arrays.back().name, "doubted");
+    EXPECT_EQ(organ.point_arrays.back().values.minCoeff(), 1);
+    EXPECT_EQ(targets_of(products, {{"t", "", {5, 5, 5}}}, 60)[0].group, "doubted");
+}
+
+TEST(Answers, WhatGaveNoResultLeavesAnOlderOne) {
+    Job job;
+    job.state = 5;
+    const Status status = status_of_failure(job, "no equilibrium");
+    EXPECT_NE(status.code, 1);
+    EXPECT_THAT(status.text, HasSubstr("older"));
+}
+
+}  // namespace
+}  // namespace tissuewarp::server
