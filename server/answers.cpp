@@ -40,10 +40,10 @@ constexpr int status_ok = 1, status_error = 2;
 
 }  // namespace
 
-std::string answer(const Job& job, const Products& products, long long newest_state,
+std::string answer(const Job& job, const Products& products, long long sequence, long long newest_state,
                    const std::vector<std::string>& notes) {
     json object{{"do", job.follows ? "follow" : "update"},
-                {"sequence", job.request.sequence},
+                {"sequence", sequence},
                 {"status", products.doubted() ? "doubted" : "ok"},
                 {"update", job.number},
                 {"state", job.state},

@@ -12,8 +12,9 @@ namespace tissuewarp::server {
 inline constexpr const char* device_name = "tissuewarp";
 
 /// Of an update that gave a result. `newest_state` is that of the scene when it is sent: a greater one than the job's
-/// says that newer data are on the way into the next.
-std::string answer(const Job& job, const Products& products, long long newest_state,
+/// says that newer data are on the way into the next. `sequence`: that of the request for whoever asked, 0 for others,
+/// who count for themselves.
+std::string answer(const Job& job, const Products& products, long long sequence, long long newest_state,
                    const std::vector<std::string>& notes);
 /// Of one that gave none: "failed", "cancelled", "superseded" or "refused", and why.
 std::string answer(const Request& request, const std::string& status, const std::string& why);

@@ -253,9 +253,8 @@ void Session::finish(const Job& job, Products products, const std::vector<std::s
     log(Entry::Kind::Result, job.client, logged(job, products));
     const long long newest = newest_state_;
     outbox_.show(shown(status_of(job, products, newest)));
-    const std::string text = answer(job, products, newest, notes);
-    if (job.client > 0) outbox_.send(job.client, said(text));
-    outbox_.show({"answer", said(text).bytes}, job.client);
+    if (job.client > 0) outbox_.send(job.client, said(answer(job, products, job.request.sequence, newest, notes)));
+    outbox_.show({"answer", said(answer(job, products, 0, newest, notes)).bytes}, job.client);
     outbox_.show(parcel("organ", "POLYDATA", "organ", encode(products.organ)));
     if (!products.targets.empty()) outbox_.show(parcel("targets", "POINT", "targets_now", encode(products.targets)));
     if (job.client > 0) {

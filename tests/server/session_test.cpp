@@ -268,7 +268,7 @@ Products doubted() {
 
 TEST(Answers, AfterADoubtEveryMessageSaysSo) {
     const Products products = doubted();
-    const json text = json::parse(answer({}, products, 0, {}));
+    const json text = json::parse(answer({}, products, 0, 0, {}));
     EXPECT_EQ(text.at("status"), "doubted");
     EXPECT_EQ(text.at("doubts").at(0).at("code"), "surface.off");
     const Status status = status_of({}, products, 0);
