@@ -56,7 +56,7 @@ public:
 
 private:
     struct Received {
-        std::uint32_t client;
+        std::uint32_t client = 0;
         Frame frame;
     };
     struct Running;

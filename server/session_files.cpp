@@ -23,8 +23,10 @@ Frame loaded_image(const std::string& name, const std::filesystem::path& path) {
     const std::string file = path.filename().string();
     if (!file.ends_with(".nii") && !file.ends_with(".nii.gz"))
         throw InvalidInput("'" + file + "' is no NIfTI image; .nii and .nii.gz are loaded");
-    Frame frame{{1, "IMAGE", name, 0, 0, 0},
-                encode(name == "fixed_labels" ? imaging::read_labels(path) : imaging::read_volume(path))};
+    Frame frame;
+    frame.header.type = "IMAGE";
+    frame.header.device = name;
+    frame.body = encode(name == "fixed_labels" ? imaging::read_labels(path) : imaging::read_volume(path));
     frame.header.body_bytes = frame.body.size();
     return frame;
 }
@@ -46,7 +48,9 @@ void Session::touch_file(const Received& received, const Request& request) {
         save(*last, name, path);
         return refuse(received.client, request, "ok", "saved '" + request.file + "'");
     }
-    Received loaded{received.client, loaded_image(name, path)};
+    Received loaded;
+    loaded.client = received.client;
+    loaded.frame = loaded_image(name, path);
     take_in(loaded, decode(loaded.frame));
     refuse(received.client, request, "ok", fmt::format("state {}", scene_.state()));
 }
