@@ -221,8 +221,9 @@ class Serving(unittest.TestCase):
         with self.server.client() as deaf:
             for _ in range(4):
                 deaf.request("update", send=["field"], rounds=1, error_estimate=False)
-            for _ in range(4):
-                self.assertIn(self.client.update(rounds=1, error_estimate=False)["status"], ("ok", "doubted"))
+            # Each of the four may take the place of one of these, whenever it arrives.
+            answers = [self.client.update(rounds=1, error_estimate=False)["status"] for _ in range(8)]
+            self.assertGreaterEqual(sum(status in ("ok", "doubted") for status in answers), 4, answers)
 
     def test_requests_that_are_none(self):
         for text in ("hello", '{"do": "fly"}', '{"do": "update", "rounds": -1}'):
