@@ -118,6 +118,14 @@ void require_labels_of_lengths(const std::map<int, double>& label_edge_length, c
     imaging::require_labels(labels, named, fmt::format("'{}', --label-edge-length", path.string()).c_str());
 }
 
+void require_labels_of_tissues(const std::map<int, std::string>& label_tissue, const Volume& labels,
+                               const fs::path& path) {
+    std::vector<int> named;
+    for (const auto& [label, tissue] : label_tissue) named.push_back(label);
+    if (named.empty()) return;
+    imaging::require_labels(labels, named, fmt::format("'{}', --label-tissue", path.string()).c_str());
+}
+
 void require_millimetres(const Geometry& grid, const fs::path& path) {
     double extent = 0;
     for (int axis = 0; axis < 3; ++axis)
@@ -165,6 +173,7 @@ void validate_preoperative(RegistrationInputs& inputs, const PreoperativeOptions
     require_known_surroundings(inputs.moving_labels, options);
     const Volume organ = imaging::without_labels(inputs.moving_labels, options.rigid_neighbours);
     require_labels_of_lengths(options.label_edge_length, organ, organ_file(options));
+    require_labels_of_tissues(options.label_tissue, organ, organ_file(options));
     if (!options.materials.empty()) require_materials(inputs.materials, imaging::labels_in(organ), options.materials);
 }
 

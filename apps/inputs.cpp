@@ -160,6 +160,7 @@ void note_reading(RegistrationInputs& inputs, const ImagesRead& read, const fs::
 
 void take_moving(RegistrationInputs& inputs, const PreoperativeOptions& options, const ImagesRead& read) {
     if (!options.materials.empty()) inputs.materials = read_materials(options.materials);
+    for (const auto& [label, tissue] : options.label_tissue) inputs.materials[label] = entry_of_tissue(tissue);
     if (!options.label_names.empty()) inputs.label_names = imaging::read_label_names(options.label_names);
     note_reading(inputs, read, options.moving, options.moving_labels);
     inputs.moving = read.image.volume;

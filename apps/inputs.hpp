@@ -79,6 +79,10 @@ void require_same_numbers(const imaging::LabelNames& names, const std::filesyste
 void require_labels_of_lengths(const std::map<int, double>& label_edge_length, const imaging::Volume& labels,
                                const std::filesystem::path& path);
 
+/// Throws InvalidInput where --label-tissue names a label that the map lacks.
+void require_labels_of_tissues(const std::map<int, std::string>& label_tissue, const imaging::Volume& labels,
+                               const std::filesystem::path& path);
+
 /// Throws InvalidInput where the extent of a grid is no part of a body: other units than millimetres.
 void require_millimetres(const imaging::Geometry& grid, const std::filesystem::path& path);
 

@@ -3,6 +3,7 @@
 #include "apps/parameters.hpp"
 #include "apps/toml_file.hpp"
 #include "core/file_message.hpp"
+#include "registration/tissues.hpp"
 
 #include <charconv>
 
@@ -63,6 +64,12 @@ tled::Material material_of(const TissueEntry& entry) {
     if (entry.law == "neo-hookean-lnj") return tled::neo_hookean_lnj(entry.youngs_modulus_kpa, entry.poissons_ratio);
     if (entry.law == "neo-hookean-iso") return tled::neo_hookean_iso(entry.youngs_modulus_kpa, entry.poissons_ratio);
     throw InvalidInput("unknown law '" + entry.law + "'; give neo-hookean-lnj or neo-hookean-iso");
+}
+
+TissueEntry entry_of_tissue(const std::string& name) {
+    const registration::Tissue& tissue = registration::tissue_named(name);
+    const double poissons_ratio = tled::poisson_ratio(tissue.material);
+    return {tissue.name, 2 * tled::shear_modulus(tissue.material) * (1 + poissons_ratio), poissons_ratio};
 }
 
 namespace {

@@ -21,6 +21,9 @@ struct TissueEntry {
 /// Throws InvalidInput for an unknown law or moduli out of range.
 tled::Material material_of(const TissueEntry& entry);
 
+/// That of a name in registration/tissues.hpp. Throws InvalidInput where there is none.
+TissueEntry entry_of_tissue(const std::string& name);
+
 /// Reads [label.<n>] tables. Throws IoError, InvalidInput with file and line.
 std::map<int, TissueEntry> read_materials(const std::filesystem::path& path);
 

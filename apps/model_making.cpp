@@ -4,6 +4,8 @@
 #include "imaging/labels.hpp"
 #include "meshing/quality.hpp"
 
+#include "registration/tissues.hpp"
+
 namespace tissuewarp::apps {
 
 using namespace registration;
@@ -21,7 +23,9 @@ PreparedModel made_model(const PreoperativeOptions& options, const RegistrationI
     made.meshing.edge_length = edge_length_mm;
     made.meshing.label_edge_length = options.label_edge_length;
     for (const auto& [label, tissue] : inputs.materials) made.materials[label] = material_of(tissue);
-    made.default_material = tled::neo_hookean_lnj(options.default_youngs_modulus, options.default_poissons_ratio);
+    made.default_material = options.tissue == tissues().front().name
+                                ? tled::neo_hookean_lnj(options.default_youngs_modulus, options.default_poissons_ratio)
+                                : tissue_named(options.tissue).material;
     if (options.element == "t4") made.element = tled::Element::T4;
     if (options.element == "averaged-pressure") made.element = tled::Element::AveragedPressureT4;
     made.data_stiffness = options.data_stiffness;

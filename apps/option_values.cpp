@@ -1,6 +1,7 @@
 #include "apps/option_values.hpp"
 
 #include "core/errors.hpp"
+#include "registration/tissues.hpp"
 
 #include <charconv>
 #include <cmath>
@@ -31,6 +32,23 @@ std::map<int, double> label_lengths(const std::vector<std::string>& entries) {
         lengths[label] = length;
     }
     return lengths;
+}
+
+std::map<int, std::string> label_tissues(const std::vector<std::string>& entries) {
+    std::map<int, std::string> tissues;
+    for (const std::string& entry : entries) {
+        int label = 0;
+        const char* end = entry.data() + entry.size();
+        const auto [stop, error] = std::from_chars(entry.data(), end, label);
+        if (error != std::errc() || stop == end || *stop != '=' || label <= 0)
+            throw InvalidInput("--label-tissue '" + entry + "' is not LABEL=TISSUE; write for instance 3=tumour");
+        try {
+            tissues[label] = registration::tissue_named(std::string(stop + 1, end)).name;
+        } catch (const InvalidInput& error_of_name) {
+            throw InvalidInput("--label-tissue '" + entry + "': " + error_of_name.what());
+        }
+    }
+    return tissues;
 }
 
 std::optional<double> quantity(const std::string& option, const std::string& text,

@@ -14,6 +14,8 @@ namespace tissuewarp::apps {
 std::string check_device(const std::string& value);
 /// Of --label-edge-length: "2=3.5" each, mm.
 std::map<int, double> label_lengths(const std::vector<std::string>& entries);
+/// Of --label-tissue: "3=tumour" each, names of registration/tissues.hpp.
+std::map<int, std::string> label_tissues(const std::vector<std::string>& entries);
 /// "0.5mm", "0.5 mm" or "0.5", in the first of the units (name, factor); nothing where there is no text.
 std::optional<double> quantity(const std::string& option, const std::string& text,
                                const std::vector<std::pair<std::string, double>>& units);

@@ -57,7 +57,9 @@ struct PreoperativeOptions {
     double edge_length = 0.0;                             ///< mm; 0: from the volume of the organ and what is given
     std::map<int, double> label_edge_length;              ///< mm
     std::filesystem::path materials;
-    double default_youngs_modulus = 3.0;  ///< kPa
+    std::string tissue = "default";           ///< of registration/tissues.hpp: of labels that nothing else tells of
+    std::map<int, std::string> label_tissue;  ///< of single labels
+    double default_youngs_modulus = 3.0;      ///< kPa
     double default_poissons_ratio = 0.45;
     std::string element = "auto";                ///< "auto", "t4" or "averaged-pressure"
     std::vector<int> anchors, rigid_neighbours;  ///< labels of the preoperative map

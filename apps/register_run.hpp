@@ -4,6 +4,7 @@
 #include "apps/inputs.hpp"
 #include "meshing/quality.hpp"
 #include "registration/dial/dial.hpp"
+#include "registration/stretched_update.hpp"
 #include "registration/uncertainty.hpp"
 #include "registration/update.hpp"
 
@@ -45,8 +46,9 @@ struct RegistrationRun {
     RegistrationInputs inputs;
     std::unique_ptr<registration::PreparedModel> prepared;
     registration::UpdateResult result;
-    std::optional<registration::DialChoice> dial;  ///< where an accuracy or a time was asked for
-    double intraoperative_seconds = 0;             ///< from data and model at hand to the warped image
+    std::optional<registration::StretchedUpdate> stretched;  ///< where `result` began from a stretch
+    std::optional<registration::DialChoice> dial;            ///< where an accuracy or a time was asked for
+    double intraoperative_seconds = 0;                       ///< from data and model at hand to the warped image
     Products products;
     Scores scores;
     std::vector<registration::StageTime> times;

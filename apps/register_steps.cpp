@@ -15,6 +15,7 @@
 #include "registration/evaluation/curve_residual.hpp"
 #include "registration/field.hpp"
 #include "registration/io/curves.hpp"
+#include "registration/stretched_update.hpp"
 #include "registration/warp.hpp"
 
 #include <fmt/format.h>
@@ -34,6 +35,20 @@ UpdateOptions update_options(const RegistrationRun& run) {
     result.equilibrium.tolerance_mm = options.tolerance;
     if (run.dial) result.time_budget_s = run.dial->update_budget_s;
     return result;
+}
+
+void register_to(RegistrationRun& run, const Intraoperative& seen, Observer& observer) {
+    const Tissue& tissue = tissue_named(run.options.tissue);
+    if (stretches_freely(*run.prepared, seen, tissue)) {
+        run.stretched = update_stretched(*run.prepared, seen, tissue, update_options(run), observer);
+        run.result = run.stretched->result;
+        return;
+    }
+    if (tissue.free_stretch > 0)
+        observer.note(
+            "the organ is not stretched as a whole before its tissue is strained: that takes fixed labels and "
+            "nothing else, without anchors and rigid neighbours");
+    run.result = update(*run.prepared, seen, update_options(run), observer);
 }
 
 /// Where no fixed image gives a grid: the moving one, carried along by the rigid alignment.
@@ -88,7 +103,8 @@ void warp_everything(RegistrationRun& run) {
 void estimate_errors(RegistrationRun& run, ProgressLine& progress) {
     progress.begin("error estimate", 0.57, 0.65);
     Products& products = run.products;
-    products.uncertainty = uncertainty(*run.prepared, run.result, {}, progress);
+    products.uncertainty = run.stretched ? uncertainty(*run.stretched, {}, progress)
+                                         : uncertainty(*run.prepared, run.result, {}, progress);
     products.uncertainty_volumes =
         uncertainty_on_grid(*products.uncertainty, run.result.deformation, products.fixed_to_moving.geometry);
     for (Doubt& doubt : doubts_of(*products.uncertainty, run.options.tolerance))
@@ -192,7 +208,7 @@ void register_and_write(RegistrationRun& run, OutputFolder& output, StageClock& 
     const RegisterOptions& options = run.options;
     progress.begin("registering", 0.20, 0.47);
     const double ready = clock.total();
-    run.result = update(*run.prepared, seen(run.inputs, options), update_options(run), progress);
+    register_to(run, seen(run.inputs, options), progress);
     append(run.times, run.result.times);
     clock.lap("");
 

@@ -96,7 +96,7 @@ json materials(const RegistrationRun& run) {
         const double mu = tled::shear_modulus(material), nu = tled::poisson_ratio(material);
         const auto entry = run.inputs.materials.find(label);
         object[std::to_string(label)] = {
-            {"name", entry == run.inputs.materials.end() ? "default" : entry->second.name},
+            {"name", entry == run.inputs.materials.end() ? run.options.tissue : entry->second.name},
             {"law", std::holds_alternative<tled::NeoHookeanIso>(material) ? "neo-hookean-iso" : "neo-hookean-lnj"},
             {"youngs_modulus_kpa", rounded(2 * mu * (1 + nu))},
             {"poissons_ratio", rounded(nu)}};
@@ -111,11 +111,16 @@ json alignment(const RegistrationRun& run) {
         const Eigen::Vector4d r = placement.matrix().row(row).transpose();
         matrix.push_back({r[0], r[1], r[2], r[3]});
     }
+    const Eigen::Matrix3d linear =
+        run.stretched ? run.stretched->stretch.linear() : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
+    json stretch = json::array();
+    for (int row = 0; row < 3; ++row) stretch.push_back(vector(linear.row(row).transpose()));
     const double angle = Eigen::AngleAxisd(placement.linear()).angle() * 180 / 3.14159265358979323846;
     return {{"performed", !run.options.no_align},
             {"matrix", matrix},
             {"rotation_deg", angle},
             {"translation_mm", vector(placement.translation())},
+            {"free_stretch", stretch},
             {"mean_distance_mm", number(run.result.alignment.mean_distance_mm)}};
 }
 

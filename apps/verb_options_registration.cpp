@@ -6,6 +6,7 @@
 #include "apps/registration_checks.hpp"
 #include "apps/verb_options.hpp"
 #include "core/errors.hpp"
+#include "registration/tissues.hpp"
 
 namespace tissuewarp::apps {
 
@@ -32,6 +33,26 @@ void declare_organ(Verb& verb, PreoperativeOptions& o) {
     verb.path("--label-names", o.label_names, label_names_text);
 }
 
+std::vector<std::string> tissue_names() {
+    std::vector<std::string> names;
+    for (const auto& tissue : registration::tissues()) names.push_back(tissue.name);
+    return names;
+}
+
+/// A tissue has moduli of its own, and a table tells of every label.
+void require_one_tissue(const PreoperativeOptions& o) {
+    const PreoperativeOptions untold;
+    const bool moduli = o.default_youngs_modulus != untold.default_youngs_modulus ||
+                        o.default_poissons_ratio != untold.default_poissons_ratio;
+    if (o.tissue != untold.tissue && moduli)
+        throw InvalidInput(
+            "--tissue " + o.tissue +
+            " has moduli of its own; leave out --default-youngs-modulus and --default-poissons-ratio, or "
+            "give them in a table (--materials)");
+    if (!o.label_tissue.empty() && !o.materials.empty())
+        throw InvalidInput("--materials tells of every label; leave out --label-tissue");
+}
+
 /// How the model is made of it.
 void declare_model(Verb& verb, PreoperativeOptions& o, RegistrationTexts& texts) {
     verb.number("--edge-length", o.edge_length, "MM", 0.0, 100.0,
@@ -40,6 +61,10 @@ void declare_model(Verb& verb, PreoperativeOptions& o, RegistrationTexts& texts)
         ->delimiter(',');
     verb.path("--materials", o.materials,
               "Material table (TOML): [label.1] youngs_modulus_kpa, poissons_ratio, law, name");
+    verb.choice("--tissue", o.tissue, tissue_names(),
+                "What the organ is: law, moduli and how it may change its size, in place of --default-...");
+    verb.list("--label-tissue", texts.tissues, "LABEL=TISSUE", "What one label is, likewise; repeatable")
+        ->delimiter(',');
     verb.number("--default-youngs-modulus", o.default_youngs_modulus, "KPA", 1e-3, 1e6,
                 "Young's modulus without a table (kPa)");
     verb.number("--default-poissons-ratio", o.default_poissons_ratio, "RATIO", 0.0, 0.4999,
@@ -140,6 +165,8 @@ void enter_bids_folder(RegisterOptions& o) {
 
 void take_texts(PreoperativeOptions& o, const RegistrationTexts& texts) {
     o.label_edge_length = label_lengths(texts.label_lengths);
+    o.label_tissue = label_tissues(texts.tissues);
+    require_one_tissue(o);
     o.anchors = label_list("--anchor", texts.anchors);
     o.rigid_neighbours = label_list("--rigid-neighbour", texts.rigid_neighbours);
 }

@@ -9,6 +9,8 @@
 #include "registration/patient_io.hpp"
 #include "registration/prepared_io.hpp"
 #include "registration/record.hpp"
+#include "registration/stretched_update.hpp"
+#include "registration/tissues.hpp"
 #include "registration/uncertainty.hpp"
 #include "registration/update.hpp"
 #include "registration/warp.hpp"

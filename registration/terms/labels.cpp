@@ -92,8 +92,17 @@ void LabelTerm::judge(const State& /*state*/, UpdateResult& result) {
                                  "the labelled volume changed by the factor " + to_text(growth) +
                                      ", which tissue of Poisson's ratio " + to_text(poisson) + " resists",
                                  std::string(cut ? "part of it may be what the image cuts off; " : "") +
-                                     "for lungs and other tissue that changes volume take 0.3 or less"});
+                                     "for lungs take --tissue lung, for other tissue that changes volume a ratio of "
+                                     "0.3 or less"});
     for (Doubt& doubt : about_labels) result.doubts.push_back(std::move(doubt));
+}
+
+std::optional<Doubt> doubt_of_growth(const imaging::Volume& moving, const imaging::Volume& fixed, double most_growth) {
+    const double growth = labelled_volume(fixed) / labelled_volume(moving);
+    if (growth <= most_growth && growth >= 1 / most_growth) return std::nullopt;
+    return Doubt{"labels.volume_changed", growth, growth > 1 ? most_growth : 1 / most_growth,
+                 "the labelled volume changed by the factor " + to_text(growth) + ", more than such tissue can",
+                 "check that both label maps show all of the organ"};
 }
 
 }  // namespace tissuewarp::registration::detail

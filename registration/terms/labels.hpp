@@ -39,4 +39,7 @@ private:
     Contribution last_;                         // without its springs
 };
 
+/// Of the labelled volume, where it grew by more than the factor or shrank by more than one over it.
+std::optional<Doubt> doubt_of_growth(const imaging::Volume& moving, const imaging::Volume& fixed, double most_growth);
+
 }  // namespace tissuewarp::registration::detail

@@ -200,6 +200,20 @@ def lung_masks(data, inputs):
     })
 
 
+def whole_breath(number):
+    """Masks of both lungs at full inspiration and at full expiration, with 300 points that an expert found in both."""
+    def build(data, inputs):
+        folder = data / "real" / "lung-copd-masks"
+        moving, fixed = [folder / f"copd{number}_{when}_mask.nii.gz" for when in ("insp", "exp")]
+        fixed_map, moving_map = [depth_map(mask, inputs) for mask in (fixed, moving)]
+        rows = numpy.genfromtxt(folder / f"copd{number}_landmarks_LPS.csv", delimiter=",", skip_header=1)[:, -6:]
+        return Case(targets={"landmarks": (rows[:, :3], rows[:, 3:])}, fixed_organ=fixed, moving_organ=moving, tools={
+            "tissuewarp": Tissuewarp(["--moving-labels", moving, "--fixed-labels", fixed, "--tissue", "lung"]),
+            "elastix": Elastix(fixed_map, moving_map, ["elastix-affine.txt", "elastix-labels.txt"]),
+        })
+    return build
+
+
 def liver(data, tools):
     return Case(targets={"landmarks": scoring.read_csv_landmarks(data / "landmarks.csv")},
                 fixed_organ=data / "intraop_labels.nii.gz", moving_organ=data / "preop_labels.nii.gz", tools=tools)
@@ -234,6 +248,7 @@ CASES = {
     "brain sag, masks": (brain_sag_masks, "phantom-brain-sag"),
     "lung, volume": (lung_volume, "lung-ct"),
     "lung, masks": (lung_masks, "lung-ct"),
+    **{f"whole breath {number}, masks": (whole_breath(number), "real/lung-copd-masks") for number in ("01", "03", "05", "07", "09")},
     "liver, labels": (liver_labels, "phantom-liver"),
     "liver, partial surface": (liver_surface, "phantom-liver"),
 }

@@ -62,6 +62,15 @@ def make_lung(folder):
         (folder / f"{when}_pts.txt").write_text(f"point\n2\n{' '.join(map(str, place))}\n{' '.join(map(str, place))}\n")
 
 
+def make_breaths(folder):
+    folder.mkdir(parents=True)
+    for number in ("01", "03", "05", "07", "09"):
+        for when, place in (("insp", CENTRE), ("exp", CENTRE + SHIFT)):
+            fields.write_image(folder / f"copd{number}_{when}_mask.nii.gz", block(place), AFFINE)
+        row = ",".join(map(str, [1, *CENTRE, *(CENTRE + SHIFT)]))
+        (folder / f"copd{number}_landmarks_LPS.csv").write_text(f"label,ix,iy,iz,ex,ey,ez\n{row}\n{row}\n")
+
+
 def options(tool):
     """What the program is told besides which files are which data, and how good points of a surface are."""
     data = ["--moving", "--moving-labels", "--fixed", "--fixed-labels", "--fixed-surface", "--match-image"]
@@ -82,6 +91,7 @@ class Cases(unittest.TestCase):
         for name in ("phantom-brainshift", "phantom-brain-sag", "phantom-liver"):
             make_phantom(data / name)
         make_lung(data / "lung-ct")
+        make_breaths(data / "real" / "lung-copd-masks")
         cls.cases = {name: cases.build(name, data, inputs) for name in cases.CASES}
 
     def each_tool(self):
