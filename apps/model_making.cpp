@@ -3,7 +3,6 @@
 #include "imaging/filters.hpp"
 #include "imaging/labels.hpp"
 #include "meshing/quality.hpp"
-
 #include "registration/tissues.hpp"
 
 namespace tissuewarp::apps {
