@@ -7,6 +7,7 @@
 #include "apps/verbs.hpp"
 #include "core/errors.hpp"
 #include "core/sha256.hpp"
+#include "registration/tissues.hpp"
 #include "server/hub.hpp"
 #include "server/recall.hpp"
 
@@ -20,6 +21,9 @@ namespace {
 
 server::ServedPatient served(const ServeOptions& options, Observer& observer) {
     PreparedPatient read = read_patient_file(options.patient, observer);
+    if (registration::tissue_named(read.options.tissue).free_stretch > 0)
+        observer.note("the server does not stretch the organ as a whole, as register and update do for '" +
+                      read.options.tissue + "'; take these where its volume changes by much");
     return {std::move(read.model), std::move(read.inputs.moving), std::move(read.inputs.moving_labels),
             sha256_of_file(options.patient), on_device(options.device)};
 }
@@ -67,6 +71,7 @@ void run_serve(const ServeOptions& options) {
     const auto note = [&](const std::string& text) {
         if (!options.common.quiet) say(text);
     };
+    for (const std::string& text : progress.notes()) note("note: " + text);
     server::Hub hub({options.address, options.port, {}}, note);
     server::Session session(std::move(patient), {options.folder, options.log, carried}, hub);
     say(fmt::format("serving '{}' on {} port {}", options.patient.string(), options.address, hub.port()));

@@ -25,7 +25,7 @@ std::vector<Tissue> table() {
         {"liver",    soft( 6.0, 0.45),   0,     watery,  "shear modulus 2: Venkatesh, Yin and Ehman, J Magn Reson Imaging 37 (2013) 544"},
         {"prostate", soft(60.0, 0.45),   0,     watery,  "Krouskop et al., Ultrason Imaging 20 (1998) 260"},
         {"breast",   soft( 3.2, 0.45),   0,     watery,  "Samani, Zubovits and Plewes, Phys Med Biol 52 (2007) 1565"},
-        {"kidney",   soft(14.0, 0.45),   0,     watery,  "shear modulus 4.7: Rouviere et al., Radiology 260 (2011) 671"},
+        {"kidney",   soft(14.0, 0.45),   0,     watery,  "shear modulus 4.7: Rouviere et al., J Magn Reson Imaging 34 (2011) 880"},
         {"muscle",   soft(11.0, 0.45),   0,     watery,  "shear modulus 3.7 at rest: Bensamoun et al., J Magn Reson Imaging 23 (2006) 242"},
         {"tumour",   soft(12.0, 0.45),   0,     watery,  "several times as stiff as what is around: Samani, Zubovits and Plewes, Phys Med Biol 52 (2007) 1565"},
     };
