@@ -2,6 +2,7 @@
 
 #include "core/file_message.hpp"
 #include "imaging/image_io.hpp"
+#include "registration/io/displacements.hpp"
 #include "registration/io/itk_transform.hpp"
 
 #include <cstdint>
@@ -117,6 +118,7 @@ PointMap displacement_image(const std::filesystem::path& path) {
                            " component; a displacement field has three");
     PointMap map;
     map.field = field.as(CV_32F);
+    require_displacements(*map.field, path);
     map.type = imaging::stated_field_type(path).value_or(imaging::FieldType::Resampling);
     map.notes = read.notes;
     return map;

@@ -127,9 +127,9 @@ class Kinds(PhantomTest):
         self.assertIn("3 components", result.stdout)
         self.assertIn("-1.5 to 2.5", result.stdout)
 
-    def field(self, values, name):
-        """Vectors (48 x 48 x 48 x 3) on the moving grid, NIfTI intent 1007."""
-        image = nibabel.Nifti1Image(values.astype(numpy.float32)[:, :, :, None, :], MOVING_AFFINE)
+    def field(self, values, name, affine=MOVING_AFFINE):
+        """Vectors (i, j, k, 3), on the moving grid if no other is named, NIfTI intent 1007."""
+        image = nibabel.Nifti1Image(values.astype(numpy.float32)[:, :, :, None, :], affine)
         image.header.set_intent(1007)
         image.header.set_xyzt_units("mm")
         nibabel.save(image, str(self.phantom.folder / name))
@@ -139,11 +139,33 @@ class Kinds(PhantomTest):
         positions = lps_of_voxels(MOVING_AFFINE)
         good = run("evaluate", "--displacement", self.field(0.1 * (positions - CENTRE_LPS), "good.nii.gz"))
         self.assertEqual(good.returncode, 0, good.stderr)
-        for values, frame in ((positions + [1, 2, 3], "LPS"), (1.05 * positions * [-1, -1, 1], "RAS")):
+        for values, frame in ((positions + [1, 2, 3], "LPS"), (1.05 * positions * [-1, -1, 1], "RAS"),
+                              (positions * [1, -1, 1], "of axes of their own")):
             path = self.field(values, "positions.nii.gz")
             self.assert_refused(run("evaluate", "--displacement", path), INPUT, f"positions ({frame})", "subtract")
             self.assert_refused(run("warp", self.phantom.moving, "-o", self.phantom.folder / "w.nii.gz",
                                     "--displacement", path), INPUT, f"positions ({frame})")
+
+    def test_a_field_of_voxels_is_no_field_of_displacements(self):
+        shape = (24, 30, 20)
+        voxels = numpy.stack(numpy.meshgrid(*map(numpy.arange, shape), indexing="ij"), axis=-1).astype(float)
+        bent = voxels + 2 * numpy.sin(voxels[..., ::-1] / 5) + [2, -1, 0]  # a few voxels from the identity
+        turned = numpy.array([[0.0, 2, 0, -20], [0, 0, -2, 40], [2, 0, 0, -10], [0, 0, 0, 1]])  # sagittal
+        for affine in (MOVING_AFFINE, numpy.diag([2.0, 2, 2, 1]), numpy.diag([-0.7, -0.7, 3.3, 1]), turned):
+            for values in (voxels, bent):
+                path = self.field(values, "voxels.nii.gz", affine)
+                self.assert_refused(run("evaluate", "--displacement", path), INPUT, "voxels.nii.gz",
+                                    "positions (in voxels)", "subtract")
+        self.assert_refused(self.phantom.register("--dry-run", "--initial-transform", path), INPUT, "voxels.nii.gz",
+                            "positions (in voxels)")
+        # Tissue that is stretched by 1 mm per voxel, and motions of the size of the grid.
+        coarse = numpy.diag([-3.3, -3.3, 3.3, 1])
+        places = lps_of_voxels(coarse, shape)
+        stretched = 0.3 * (places - places.mean(axis=(0, 1, 2)))
+        cycle = places[..., [1, 2, 0]] - places  # a turn by 120 degrees
+        for values in (stretched, stretched + [4, -6, 5], cycle, 0 * places + numpy.array(shape) / 2):
+            result = run("evaluate", "--displacement", self.field(values, "good.nii.gz", coarse))
+            self.assertEqual(result.returncode, 0, result.stderr)
 
     def test_markups_are_points_for_every_verb(self):
         path = self.phantom.folder / "points.fcsv"
