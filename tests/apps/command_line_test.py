@@ -156,6 +156,15 @@ class SmallVerbs(PhantomTest):
         self.assertAlmostEqual(sum(values["quality"]["label_volume_mm3"].values()) / voxels, 1, delta=0.05)
         self.assertIn(f"{values['tetrahedra']} tetrahedra", run("info", mesh).stdout)
 
+    def test_mesh_says_what_it_drops(self):
+        labels = self.phantom.moving_labels_array.copy()
+        labels[1, 1, 1] = labels[-2, -2, -2] = 1
+        path = save(labels, MOVING_AFFINE, self.phantom.folder / "specks.nii.gz")
+        result = run("mesh", path, "-o", self.phantom.folder / "organ.vtu", "--edge-length", 8)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("1 pieces\n", result.stdout)
+        self.assertRegex(result.stdout, r"note: meshing: 2 disconnected pieces of labels .* were given to")
+
     def test_mesh_refines_in_parallel_when_asked(self):
         mesh = self.phantom.folder / "parallel.vtu"
         result = run("mesh", self.phantom.moving_labels, "-o", mesh, "--edge-length", 5, "--refinement", "parallel")

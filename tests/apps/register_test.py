@@ -177,6 +177,24 @@ class Register(unittest.TestCase):
                          for path in (self.phantom.output / "warped_labels.nii.gz", again))
         self.assertEqual(numpy.count_nonzero(first != second), 0)
 
+    def test_warp_refuses_what_lies_in_metres_or_elsewhere(self):
+        record, surface = self.phantom.output / "record.h5", self.phantom.folder / "s.obj"
+        for scale, shift, words in ((1, 0, None), (0.001, 0, "in metres?"), (1, 3000, "mm from the model")):
+            corners = scale * (CENTRE_LPS + 40 * numpy.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])) + shift
+            surface.write_text("".join("v {} {} {}\n".format(*corner) for corner in corners) +
+                               "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+            points = self.phantom.folder / "p.csv"
+            numpy.savetxt(points, corners, delimiter=",", header="x,y,z", comments="")
+            for path in (surface, points):
+                warped = self.phantom.folder / f"warped{path.suffix}"
+                warped.unlink(missing_ok=True)
+                result = run("warp", path, "-o", warped, "--record", record)
+                self.assertEqual(result.returncode, 2 if words else 0, result.stderr)
+                self.assertEqual(warped.exists(), not words)
+                if words:
+                    self.assertIn(words, result.stderr)
+                    self.assertIn(path.name, result.stderr)
+
     def test_evaluate_repeats_the_scores(self):
         scores = self.phantom.folder / "scores.json"
         result = run("evaluate", "--labels", self.phantom.output / "warped_labels.nii.gz", "--reference-labels",

@@ -240,6 +240,18 @@ TEST(DicomFrames, GapsTwoStacksAndMissingPositionsAreRefused) {
                 testing::AllOf(HasSubstr("frame 4"), HasSubstr("states no position")));
 }
 
+// Frames of a screen, without functional groups: no place in the patient.
+TEST(DicomFrames, ASecondaryCaptureIsNoVolume) {
+    const TemporaryFolder folder;
+    const Geometry grid = ct_volume().geometry;
+    Elements data = described(grid, in_order(6), {.modality = "OT"}, 16);
+    data.words(0x7fe0, 0x10, std::vector<std::int16_t>(static_cast<std::size_t>(grid.voxel_count())));
+    write_dicom(folder / "sc.dcm", "1.2.840.10008.5.1.4.1.1.7.3", "1.2.3.9", data);
+    for (const auto& path : {folder / "sc.dcm", folder.path()})
+        EXPECT_THAT(message_of<InvalidInput>([&] { read_volume(path); }),
+                    testing::AllOf(HasSubstr("states no position"), HasSubstr("a secondary capture")));
+}
+
 TEST(DicomFrames, AFileThatIsCutShortIsAnError) {
     const TemporaryFolder folder;
     write_frames(folder / "mf.dcm", ct_volume(), in_order(6));

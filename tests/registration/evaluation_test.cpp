@@ -335,6 +335,24 @@ TEST_F(LandmarkFile, PointsWithoutPartnerAreLeftOutAndNamed) {
     EXPECT_THAT(notes.all, ::testing::AllOf(HasSubstr("hilum"), HasSubstr("tip")));
 }
 
+// By order tip would be paired with the hilum, and as many points would be left on both sides.
+TEST_F(LandmarkFile, PointsThatWereNotPlacedLeaveThePairsOfTheOthers) {
+    const auto markups = [](const std::string& tip, const std::string& apex) {
+        return R"({"markups": [{"type": "Fiducial", "coordinateSystem": "LPS", "coordinateUnits": "mm", "controlPoints": [
+            {"label": "tip", "position": [1, 0, 0], "positionStatus": ")" +
+               tip + R"("}, {"label": "hilum", "position": [20, 0, 0], "positionStatus": "defined"},
+            {"label": "apex", "position": [300, 0, 0], "positionStatus": ")" +
+               apex + R"("}, {"label": "base", "position": [4000, 0, 0]}]}]})";
+    };
+    Notes notes;
+    const Landmarks pairs = read_landmarks(write("m.mrk.json", markups("undefined", "defined")),
+                                           write("f.mrk.json", markups("defined", "missing")), notes);
+    ASSERT_EQ(pairs.moving.cols(), 2);
+    EXPECT_EQ(pairs.moving.row(0), Eigen::RowVector2d(20, 4000));
+    EXPECT_EQ(pairs.fixed, pairs.moving);
+    EXPECT_THAT(notes.all, ::testing::AllOf(HasSubstr("tip"), HasSubstr("apex")));
+}
+
 TEST_F(LandmarkFile, PointsOfSlicerThatDoNotCountAreLeftOutAndNamed) {
     const std::string head =
         "# CoordinateSystem = LPS\n# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n";

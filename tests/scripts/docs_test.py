@@ -81,6 +81,25 @@ class Links(unittest.TestCase):
         for name in re.findall(r"`([\w/]+(?:\.[ch]pp|/))`", (DOCS / "method.md").read_text()):
             self.assertTrue(any((place / name).exists() for place in places), name)
 
+    def test_tests_that_the_laboratory_names(self):
+        sources = " ".join(path.read_text() for path in (ROOT / "tests").rglob("*_test.cpp"))
+        sources += " ".join(path.read_text() for path in (ROOT / "tests" / "meshing").glob("test_*.cpp"))
+        listed = [name for row in rows(DOCS / "lab" / "awkward-files.md")
+                  for name in re.findall(r"`([^`]+)`", cells(row)[-1])]
+        self.assertGreater(len(listed), 50)
+        for name in listed:
+            with self.subTest(test=name):
+                script, _, test = name.rpartition(" ")
+                if script:
+                    kind, _, method = test.partition(".")
+                    text = (ROOT / "tests" / "apps" / script).read_text()
+                    body = re.search(rf"(?ms)^class {kind}\(.*?(?=^\S|\Z)", text)
+                    self.assertTrue(body, "no such class")
+                    self.assertIn(f"def {method or 'test_'}", body[0])
+                else:
+                    suite, _, case = name.partition(".")
+                    self.assertRegex(sources, rf"TEST(_F|_P)?\({suite}, {case}\)")
+
     def test_every_page_is_in_the_index_or_the_menu(self):
         menu = (ROOT / "mkdocs.yml").read_text()
         for page in user_pages():
