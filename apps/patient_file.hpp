@@ -2,7 +2,7 @@
 /// What `prepare` leaves to `update` and `serve` in a patient file.
 
 #include "apps/inputs.hpp"
-#include "registration/patient_io.hpp"
+#include "registration/prepared/patient_io.hpp"
 
 #include <filesystem>
 #include <map>

@@ -4,7 +4,7 @@
 #include "apps/inputs.hpp"
 #include "meshing/quality.hpp"
 #include "registration/dial/dial.hpp"
-#include "registration/stretched_update.hpp"
+#include "registration/stretch/stretched_update.hpp"
 #include "registration/uncertainty.hpp"
 #include "registration/update.hpp"
 

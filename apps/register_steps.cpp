@@ -15,7 +15,7 @@
 #include "registration/evaluation/curve_residual.hpp"
 #include "registration/field.hpp"
 #include "registration/io/curves.hpp"
-#include "registration/stretched_update.hpp"
+#include "registration/stretch/stretched_update.hpp"
 #include "registration/warp.hpp"
 
 #include <fmt/format.h>

@@ -4,7 +4,7 @@
 #include "python/core/bindings.hpp"
 #include "python/core/observer.hpp"
 #include "registration/prepare.hpp"
-#include "registration/prepared_io.hpp"
+#include "registration/prepared/prepared_io.hpp"
 
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>

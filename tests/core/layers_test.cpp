@@ -60,6 +60,8 @@ const std::map<std::string, std::set<std::string>> rooms_of_registration{
     {"loads", {"pose", "springs"}},
     {"terms", {"boundary", "evaluation", "io", "loads", "matching", "pose", "springs"}},
     {"uncertainty", {"field", "loads", "pose", "springs"}},
+    {"stretch", {"evaluation", "pose", "terms"}},
+    {"prepared", {"boundary", "io", "loads", "matching", "terms"}},
 };
 
 /// Rooms that are targets of their own, for tests, studies and benchmarks.

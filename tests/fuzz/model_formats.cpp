@@ -1,7 +1,7 @@
 // The program's own HDF5: records of a registration and prepared models.
 
-#include "registration/patient_io.hpp"
-#include "registration/prepared_io.hpp"
+#include "registration/prepared/patient_io.hpp"
+#include "registration/prepared/prepared_io.hpp"
 #include "registration/record.hpp"
 #include "tests/fuzz/format.hpp"
 #include "tests/fuzz/hdf5_edits.hpp"

@@ -1,7 +1,7 @@
 /// Rigid neighbours that the organ does not enter, and tissue that stays.
 #include "registration/terms/contact.hpp"
 #include "core/errors.hpp"
-#include "registration/prepared_io.hpp"
+#include "registration/prepared/prepared_io.hpp"
 #include "registration/springs/ground_springs.hpp"
 #include "registration/terms/anchors.hpp"
 #include "registration/update.hpp"

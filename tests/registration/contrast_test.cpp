@@ -3,7 +3,7 @@
 
 #include "core/errors.hpp"
 #include "registration/evaluation.hpp"
-#include "registration/prepared_io.hpp"
+#include "registration/prepared/prepared_io.hpp"
 #include "registration/uncertainty.hpp"
 #include "tests/registration/doubt_codes.hpp"
 #include "tests/registration/textured_phantom.hpp"

@@ -1,8 +1,8 @@
 /// Organs that change their size freely: the stretch is found, tissue starts from it, and what is said stays true.
-#include "registration/pose/free_stretch.hpp"
+#include "registration/stretch/free_stretch.hpp"
 
-#include "registration/strain_free.hpp"
-#include "registration/stretched_update.hpp"
+#include "registration/stretch/strain_free.hpp"
+#include "registration/stretch/stretched_update.hpp"
 #include "tests/registration/doubt_codes.hpp"
 #include "tests/support/label_shapes.hpp"
 

@@ -6,7 +6,7 @@
 #include "registration/field.hpp"
 #include "registration/matching/image_mask.hpp"
 #include "registration/matching/image_matching.hpp"
-#include "registration/prepared_io.hpp"
+#include "registration/prepared/prepared_io.hpp"
 #include "registration/uncertainty.hpp"
 #include "tests/registration/textured_phantom.hpp"
 #include "tests/support/label_shapes.hpp"

@@ -1,6 +1,6 @@
 /// Patients as files: the image as it was given, and the model that read_prepared reads too.
-#include "registration/patient_io.hpp"
-#include "registration/prepared_io.hpp"
+#include "registration/prepared/patient_io.hpp"
+#include "registration/prepared/prepared_io.hpp"
 #include "tests/registration/shapes.hpp"
 #include "tests/support/temporary_folder.hpp"
 

@@ -2,7 +2,7 @@
 #include "registration/record.hpp"
 #include "core/detail/hdf5_seal.hpp"
 #include "registration/io/stored_model.hpp"
-#include "registration/prepared_io.hpp"
+#include "registration/prepared/prepared_io.hpp"
 #include "tests/registration/shapes.hpp"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-#include "registration/pose/free_stretch.hpp"
+#include "registration/stretch/free_stretch.hpp"
 
 #include "registration/evaluation/percentile.hpp"
 #include "registration/pose/alignment.hpp"

@@ -1,4 +1,4 @@
-#include "registration/strain_free.hpp"
+#include "registration/stretch/strain_free.hpp"
 
 #include "core/errors.hpp"
 #include "imaging/sampling.hpp"

@@ -1,9 +1,9 @@
-#include "registration/stretched_update.hpp"
+#include "registration/stretch/stretched_update.hpp"
 
 #include "core/stopwatch.hpp"
-#include "registration/pose/free_stretch.hpp"
 #include "registration/pose/start_pose.hpp"
-#include "registration/strain_free.hpp"
+#include "registration/stretch/free_stretch.hpp"
+#include "registration/stretch/strain_free.hpp"
 #include "registration/terms/labels.hpp"
 
 #include <utility>

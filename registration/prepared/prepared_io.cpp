@@ -1,9 +1,9 @@
-#include "registration/prepared_io.hpp"
+#include "registration/prepared/prepared_io.hpp"
 
 #include "registration/io/stored_model.hpp"
-#include "registration/io/stored_prepared.hpp"
 #include "registration/loads/coarse_twin.hpp"
 #include "registration/matching/image_matching.hpp"
+#include "registration/prepared/stored_prepared.hpp"
 #include "registration/terms/anchors.hpp"
 
 #include "core/atomic_file.hpp"

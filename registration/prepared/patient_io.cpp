@@ -1,10 +1,10 @@
-#include "registration/patient_io.hpp"
+#include "registration/prepared/patient_io.hpp"
 
 #include "core/atomic_file.hpp"
 #include "core/file_message.hpp"
 #include "registration/boundary/surroundings.hpp"
 #include "registration/io/stored_model.hpp"
-#include "registration/io/stored_prepared.hpp"
+#include "registration/prepared/stored_prepared.hpp"
 
 namespace tissuewarp::registration {
 
