@@ -249,7 +249,13 @@ void Session::compute_jobs() {
 }
 
 /// What it is worth is said before it is shown.
-void Session::finish(const Job& job, Products products, const std::vector<std::string>& notes) {
+void Session::finish(const Job& job, Products made, const std::vector<std::string>& notes) {
+    const auto kept = std::make_shared<const Products>(std::move(made));
+    const Products& products = *kept;
+    {
+        const std::scoped_lock lock(mutex_);
+        last_ = kept;  // before the answer, after which it may be asked for
+    }
     log(Entry::Kind::Result, job.client, logged(job, products));
     const long long newest = newest_state_;
     outbox_.show(shown(status_of(job, products, newest)));
@@ -263,8 +269,6 @@ void Session::finish(const Job& job, Products products, const std::vector<std::s
         if (!products.field.empty())
             outbox_.send(job.client, parcel("field", "IMAGE", "field", encode(products.field)));
     }
-    const std::scoped_lock lock(mutex_);
-    last_ = std::make_shared<const Products>(std::move(products));
 }
 
 }  // namespace tissuewarp::server

@@ -71,7 +71,7 @@ private:
     void begin(std::uint32_t client, const Request& request, const std::string& text, bool follows);
     void cancel(const std::string& why);
     void compute_jobs();
-    void finish(const Job& job, Products products, const std::vector<std::string>& notes);
+    void finish(const Job& job, Products made, const std::vector<std::string>& notes);
     void refuse(std::uint32_t client, const Request& request, const std::string& status, const std::string& why);
     void go_on();
     void log(Entry::Kind kind, std::uint32_t client, ByteView payload);
