@@ -240,8 +240,10 @@ void Session::compute_jobs() {
             if (running->cancelled) throw Cancelled();
             finish(job, std::move(products), running->notes);
         } catch (const Cancelled&) {
-            const std::scoped_lock lock(mutex_);
-            fail("cancelled", running->why);
+            std::unique_lock lock(mutex_);
+            const std::string why = running->why;
+            lock.unlock();
+            fail("cancelled", why);
         } catch (const std::exception& problem) {  // whatever happened to one update, the next may succeed
             fail("failed", problem.what());
         }
