@@ -93,7 +93,8 @@ void EquilibriumSearch::keep(const Matrix3Xd& displacement, double error_mm) {
 
 EquilibriumResult EquilibriumSearch::finish() {
     if (!admissible(good_) || !(smallest_.value > 0))
-        fail("it holds inverted tissue (" + place(smallest_) + ")", "use a finer mesh there or softer springs");
+        fail("it holds inverted tissue (" + place(smallest_) + "), which its law admits",
+             "take neo-hookean-lnj, which does not, smaller loads or softer springs");
     result_.displacement = engine.displacement();
     result_.estimated_error_mm = good_error_mm_;
     result_.min_jacobian = smallest_.value;
