@@ -10,7 +10,7 @@
 
 namespace tissuewarp::registration::detail {
 
-/// How a stretch is searched. Chosen on synthetic breaths (docs/decisions/large_motion.md).
+/// How a stretch is searched. Set by hand; tried on synthetic breaths and patients (docs/decisions/large_motion.md).
 struct FreeStretchOptions {
     int samples = 6000;            ///< boundary points used, half from each image
     double trim_mm = 40;           ///< distances beyond this count as this much

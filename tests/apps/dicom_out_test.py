@@ -11,6 +11,7 @@ import pydicom
 import pydicom.uid
 import pydicom.valuerep
 
+from deformable_registration import deformation_of
 from phantom import FIXED_AFFINE, MOVING_AFFINE, SIZE, Phantom, PhantomTest
 
 ITK = os.environ["TISSUEWARP_ITK_POINTS"]
@@ -98,13 +99,7 @@ class DicomOut(unittest.TestCase):
         self.assertNotIn("DeformableRegistrationGridSequence", registered)
         self.assertEqual((len(item.ReferencedImageSequence), len(registered.ReferencedImageSequence)), (SIZE, SIZE))
         self.assertEqual(item.SourceFrameOfReferenceUID, self.moving_frame)
-        (grid,) = item.DeformableRegistrationGridSequence
-        before, after = (numpy.array(sequence[0].FrameOfReferenceTransformationMatrix, float).reshape(4, 4) for sequence
-                         in (item.PreDeformationMatrixRegistrationSequence, item.PostDeformationMatrixRegistrationSequence))
-        size = list(grid.GridDimensions)
-        vectors = numpy.frombuffer(grid.VectorGridData, "<f4").reshape(size[2], size[1], size[0], 3)
-        row, column = numpy.reshape(numpy.array(grid.ImageOrientationPatient, float), (2, 3))
-        axes = numpy.stack([row, column, numpy.cross(row, column)], axis=1) * grid.GridResolution
+        before, after, grid, vectors, axes = deformation_of(item)
         index = numpy.random.default_rng(2).integers(5, 43, size=(60, 3))
         points = numpy.array(grid.ImagePositionPatient, float) + index @ axes.T
         deformed = points @ before[:3, :3].T + before[:3, 3] + vectors[index[:, 2], index[:, 1], index[:, 0]]

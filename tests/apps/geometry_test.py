@@ -17,6 +17,7 @@ import pydicom
 import pydicom.uid
 
 from convert_test import MICROMETRE, OF_FIELDS, ROUNDED, columns, table, through_itk
+from deformable_registration import deformation_of
 from dicom_out_test import write_series
 from phantom import CENTRE_LPS, FIXED_AXES, MOVING_AXES, SHIFT_LPS, ellipsoid, run, save
 
@@ -173,13 +174,7 @@ class Series(Drawn, unittest.TestCase):
     def test_the_dicom_registration_maps_points(self):
         object_ = pydicom.dcmread(self.output / "registration.dcm")
         item = object_.DeformableRegistrationSequence[0]
-        (grid,) = item.DeformableRegistrationGridSequence
-        before, after = (numpy.array(sequence[0].FrameOfReferenceTransformationMatrix, float).reshape(4, 4) for sequence
-                         in (item.PreDeformationMatrixRegistrationSequence, item.PostDeformationMatrixRegistrationSequence))
-        size = list(grid.GridDimensions)
-        vectors = numpy.frombuffer(grid.VectorGridData, "<f4").reshape(size[2], size[1], size[0], 3)
-        row, column = numpy.reshape(numpy.array(grid.ImageOrientationPatient, float), (2, 3))
-        axes = numpy.stack([row, column, numpy.cross(row, column)], axis=1) * grid.GridResolution
+        before, after, grid, vectors, axes = deformation_of(item)
         index = numpy.linalg.solve(axes, (self.fixed_points - numpy.array(grid.ImagePositionPatient, float)).T).T
         self.assertLess(abs(index - index.round()).max(), MICROMETRE)
         at = index.round().astype(int)

@@ -82,6 +82,12 @@ class SameBits(unittest.TestCase):
                                      patient=prepared(self.phantom, *preoperative, name="tissues.tw"), preoperative=preoperative)
         self.assertEqual(second["materials"]["2"]["name"], "core")
 
+    def test_lungs_are_stretched_too(self):
+        preoperative = ["--tissue", "lung"]
+        _, second = self.assert_same(["--fixed-labels", self.phantom.fixed_labels], preoperative=preoperative,
+                                     patient=prepared(self.phantom, *preoperative, name="lung.tw"))
+        self.assertNotEqual(second["alignment"]["free_stretch"], [[1, 0, 0], [0, 1, 0], [0, 0, 1]])
+
 
 class Patients(PhantomTest):
     def test_info_tells_where_it_came_from(self):

@@ -288,6 +288,12 @@ class Logs(unittest.TestCase):
         self.assertEqual(replayed.returncode, 0, replayed.stderr)
         self.assertIn("0 with other bits", replayed.stdout)
 
+    def test_it_says_that_it_does_not_stretch_lungs(self):
+        for tissue, says in (("lung", True), ("liver", False)):
+            server = Server(prepared(self.phantom, "--tissue", tissue, moving=None, name=f"{tissue}.tw"))
+            server.stop()
+            self.assertEqual(any("does not stretch" in line for line in server.said), says, server.said)
+
     def test_of_another_patient(self):
         log = self.phantom.folder / "other.log"
         log.write_bytes(b"tissuewarp server log 1 " + b"0" * 64 + b"\n")
