@@ -35,6 +35,7 @@ struct RunVerb {
     void operator()(const apps::ExplainOptions& options) const { apps::run_explain(options); }
     void operator()(const apps::CalibrateOptions& options) const { apps::run_calibrate(options); }
     void operator()(const apps::StudyOptions& options) const { apps::run_study(options); }
+    void operator()(const apps::CohortOptions& options) const { apps::run_cohort(options); }
 };
 
 int report(const std::vector<std::string>& arguments, int code, std::string message) {

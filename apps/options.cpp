@@ -35,6 +35,7 @@ struct Parser {
     ExplainOptions explain;
     CalibrateOptions calibrate;
     StudyOptions study;
+    CohortOptions cohort;
     RegistrationTexts texts, prepare_texts;
     std::vector<std::string> mesh_lengths, info_files;
     std::deque<Verb> verbs;
@@ -66,6 +67,8 @@ struct Parser {
             verbs.emplace_back(app, "calibrate", "Measure on phantoms what --accuracy and --time-budget choose by"),
             calibrate);
         declare_study(verbs.emplace_back(app, "study", "Measure what accuracy costs in time on this machine"), study);
+        declare_cohort(verbs.emplace_back(app, "cohort", "Run a table of pairs here or on a cluster, and sum up"),
+                       cohort);
         for (Verb& verb : verbs) verb.arrange(help_layout(verb.name()));
     }
 
@@ -109,6 +112,7 @@ struct Parser {
         if (name == "explain") return explain;
         if (name == "calibrate") return calibrate;
         if (name == "study") return study;
+        if (name == "cohort") return cohort;
         info.files.assign(info_files.begin(), info_files.end());
         return info;
     }
@@ -160,8 +164,8 @@ struct Parser {
     }
 
     static std::vector<std::string> verb_names() {
-        return {"register", "prepare", "update", "serve",    "mesh",    "warp",      "convert",
-                "evaluate", "info",    "bench",  "simulate", "explain", "calibrate", "study"};
+        return {"register", "prepare", "update",   "serve",   "mesh",      "warp",  "convert", "evaluate",
+                "info",     "bench",   "simulate", "explain", "calibrate", "study", "cohort"};
     }
 };
 
@@ -190,7 +194,7 @@ Command parse_command_line(std::vector<std::string> arguments) {
         const bool no_verb = parser.app.get_subcommands().empty();
         throw InvalidInput(no_verb
                                ? "give a verb: register, prepare, update, serve, mesh, warp, convert, evaluate, info, "
-                                 "bench, simulate, explain, calibrate or study; see 'tissuewarp --help'"
+                                 "bench, simulate, explain, calibrate, study or cohort; see 'tissuewarp --help'"
                                : fmt::format("{}; see 'tissuewarp {} --help-all'", error.what(),
                                              parser.app.get_subcommands().front()->get_name()));
     }

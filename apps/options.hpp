@@ -203,6 +203,17 @@ struct CalibrateOptions {
     DeviceChoice device;
 };
 
+struct CohortOptions {
+    CommonOptions common;  ///< threads: of each job; 0: the cores over the jobs
+    std::filesystem::path table, output;
+    int jobs = 0;                      ///< at a time; 0: as the machine has cores or devices, or as Slurm likes
+    std::string slurm;                 ///< partition, or empty: this machine
+    std::vector<std::string> devices;  ///< "gpu:<n>", n counting EGL devices
+    int per_device = 1;                ///< jobs that share a device
+    std::string frame;                 ///< patient in whose frame the group's mean is made, or empty
+    bool dry_run = false;
+};
+
 struct StudyOptions {
     CommonOptions common;
     std::string name;                    ///< of the study
@@ -219,7 +230,7 @@ struct StudyOptions {
 
 using Command = std::variant<RegisterOptions, PrepareModelOptions, UpdatePatientOptions, ServeOptions, MeshOptions,
                              WarpOptions, ConvertOptions, EvaluateOptions, InfoOptions, BenchOptions, SimulateOptions,
-                             ExplainOptions, CalibrateOptions, StudyOptions>;
+                             ExplainOptions, CalibrateOptions, StudyOptions, CohortOptions>;
 
 /// The text that --help or --version asked for; not an error.
 struct HelpRequest {

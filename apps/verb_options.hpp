@@ -34,5 +34,6 @@ void declare_simulate(Verb& verb, SimulateOptions& o);
 void declare_explain(Verb& verb, ExplainOptions& o);
 void declare_calibrate(Verb& verb, CalibrateOptions& o);
 void declare_study(Verb& verb, StudyOptions& o);
+void declare_cohort(Verb& verb, CohortOptions& o);
 
 }  // namespace tissuewarp::apps

@@ -60,6 +60,26 @@ void declare_calibrate(Verb& verb, CalibrateOptions& o) {
     verb.common(o.common);
 }
 
+void declare_cohort(Verb& verb, CohortOptions& o) {
+    verb.app().footer("Example:\n  tissuewarp cohort table.csv --output cohort --jobs 2");
+    verb.path("table", o.table, "CSV table: a row for each pair, a column for each option of register")->required();
+    verb.path("-o,--output", o.output, "Folder for all pairs and the cohort's page; a cohort interrupted there goes on")
+        ->type_name("FOLDER")
+        ->required();
+    CLI::Option* slurm = verb.text("--slurm", o.slurm, "Run as arrays of Slurm in this partition");
+    slurm->type_name("PARTITION")->default_str("");
+    verb.number("--jobs", o.jobs, "COUNT", 0, 100000,
+                "Pairs at a time; 0: half of the cores, all places on devices, or with --slurm as many as it lets");
+    verb.list("--devices", o.devices, "gpu:INDEX", "GPUs of this machine to share out, by their EGL index")
+        ->delimiter(',');
+    verb.number("--per-device", o.per_device, "COUNT", 1, 64, "Pairs that share a device at a time");
+    verb.text("--frame", o.frame, "Patient of the columns 'from' and 'to' in whose frame the group's mean is made")
+        ->type_name("PATIENT")
+        ->default_str("");
+    verb.flag("--dry-run", o.dry_run, "Check the whole table, say what it would take, write nothing");
+    verb.common(o.common);
+}
+
 void declare_study(Verb& verb, StudyOptions& o) {
     verb.app().footer("Example:\n  tissuewarp study accuracy-time --quick --output out/study");
     verb.text("name", o.name, "accuracy-time, coverage or dial")->required();

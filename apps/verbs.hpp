@@ -19,5 +19,6 @@ void run_simulate(const SimulateOptions& options);
 void run_calibrate(const CalibrateOptions& options);
 void run_explain(const ExplainOptions& options);
 void run_study(const StudyOptions& options);
+void run_cohort(const CohortOptions& options);
 
 }  // namespace tissuewarp::apps
