@@ -32,6 +32,10 @@ foreach(verb register mesh warp simulate)
     RENAME tissuewarp-${verb})
 endforeach()
 
+# What `tissuewarp cohort` starts: Python's standard library, and Snakemake.
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/workflow DESTINATION ${CMAKE_INSTALL_DATADIR}/tissuewarp
+  PATTERN __pycache__ EXCLUDE)
+
 # Man pages and shell completion say what --help-all says.
 if(TISSUEWARP_PYTHON3)
   install(CODE "execute_process(COMMAND ${TISSUEWARP_PYTHON3} ${packaging}/from_help.py $<TARGET_FILE:tissuewarp_app>
@@ -81,7 +85,7 @@ if(TISSUEWARP_PYTHON)
   set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "python3 (>= 3.${Python_VERSION_MINOR}), python3 (<< 3.${next}), python3-numpy")
 endif()
 # For a GPU's own driver; and to build programs on the libraries.
-set(CPACK_DEBIAN_PACKAGE_SUGGESTS "libegl1, libopengl0, python3-nibabel, cmake, g++, pkg-config, libeigen3-dev, libtbb-dev, libhwy-dev, libsuitesparse-dev, libepoxy-dev, libssl-dev, zlib1g-dev, libopencv-dev, libinsighttoolkit5-dev, libgdcm-dev, libcgal-dev, libnlopt-dev, libnlopt-cxx-dev, libhdf5-dev, nlohmann-json3-dev")
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS "libegl1, libopengl0, snakemake, python3-nibabel, cmake, g++, pkg-config, libeigen3-dev, libtbb-dev, libhwy-dev, libsuitesparse-dev, libepoxy-dev, libssl-dev, zlib1g-dev, libopencv-dev, libinsighttoolkit5-dev, libgdcm-dev, libcgal-dev, libnlopt-dev, libnlopt-cxx-dev, libhdf5-dev, nlohmann-json3-dev")
 set(CPACK_PROJECT_CONFIG_FILE ${packaging}/cpack_options.cmake)
 include(CPack)
 

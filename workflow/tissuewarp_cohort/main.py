@@ -137,11 +137,15 @@ def finish(plan, options, program, lock):
     return 0 if code == 0 else 1
 
 
+def counted(problems):
+    return "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
+
+
 def main(arguments, program_path):
     try:
         return run(parsed(arguments), program_path)
     except Refused as refused:
-        print(f"{refused}\ntissuewarp cohort: {len(refused.problems)} problems in the table; nothing was run",
+        print(f"{refused}\ntissuewarp cohort: {counted(refused.problems)} in the table; nothing was run",
               file=sys.stderr)
         return 2
     except CohortError as failure:
