@@ -259,5 +259,19 @@ class CohortRuns(unittest.TestCase):
         self.assertIn("is being run already", result.stderr)
 
 
+@unittest.skipUnless(shutil.which("snakemake", path=ENVIRONMENT["PATH"]), "no snakemake")
+class CohortStudies(unittest.TestCase):
+    def test_a_study_in_parts_is_the_study(self):
+        with tempfile.TemporaryDirectory(prefix="tissuewarp-cohort-") as name:
+            problems, more = "phantom:2001-2002", ["--evidence", "points"]
+            script = [sys.executable, ROOT / "scripts" / "cluster_study", "coverage", problems, "--output", f"{name}/parts",
+                      "--jobs", "2", "--program", PROGRAM, "--quiet", "--", *more]
+            parts = subprocess.run(script, capture_output=True, text=True, env={**os.environ, **ENVIRONMENT})
+            self.assertEqual(parts.returncode, 0, parts.stderr)
+            whole = run("study", "coverage", "--problems", problems, *more, "--output", f"{name}/whole", "--quiet")
+            self.assertEqual(parts.stdout.splitlines()[:2], whole.stdout.splitlines()[:2])
+            self.assertTrue((pathlib.Path(name) / "parts" / "whole" / "coverage.svg").exists())
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -107,6 +107,8 @@ def work(layout, job, threads, log):
         run(prepare_command(layout, job, threads), log)
         return [os.path.relpath(layout.patient(job["id"]), layout.folder)]
     folder = layout.pair(job["id"])
+    if "command" in job:
+        return run_command(job, folder, threads)
     for name in ("scores.json", "thumbnail.png"):
         if os.path.exists(os.path.join(folder, name)):
             os.unlink(os.path.join(folder, name))
@@ -116,8 +118,20 @@ def work(layout, job, threads, log):
     if scoring:
         run(scoring, log)
     thumbnail.write(folder)
+    return written(job, folder)
+
+
+def written(job, folder):
     names = sorted(entry.name for entry in os.scandir(folder) if entry.is_file() and not entry.name.startswith("."))
     return [os.path.join("pairs", job["id"], name) for name in names]
+
+
+def run_command(job, folder, threads):
+    """A part of a study (studies.py): any command, what it prints as said.txt beside what it writes."""
+    os.makedirs(folder, exist_ok=True)
+    with open(os.path.join(folder, "said.txt"), "w", encoding="utf-8") as said:
+        run([word.replace("{folder}", folder).replace("{threads}", str(threads)) for word in job["command"]], said)
+    return written(job, folder)
 
 
 def do(layout, job, session, threads):

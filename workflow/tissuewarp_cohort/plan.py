@@ -126,13 +126,17 @@ class Plan:
                 "bytes": sum(job["foretold"]["bytes"] for job in jobs)}
 
     def write(self):
-        """What Snakemake and the jobs read."""
-        shutil.rmtree(os.path.join(self.layout.own, "marks"), ignore_errors=True)
-        for job in self.left + self.patients_left:
-            write_json(self.layout.job(job["kind"], job["id"]), job)
-        remaining = {job["id"] for job in self.patients_left}
-        write_json(self.layout.plan, {
-            "schema": SCHEMA, "settings": self.settings,
-            "left": {job["id"]: {"patient": job["patient"] if job["patient"] in remaining else None, **job["asked"]}
-                     for job in self.left},
-            "patients_left": {job["id"]: job["asked"] for job in self.patients_left}})
+        write_plan(self)
+
+
+def write_plan(plan):
+    """What Snakemake and the jobs read."""
+    shutil.rmtree(os.path.join(plan.layout.own, "marks"), ignore_errors=True)
+    for job in plan.left + plan.patients_left:
+        write_json(plan.layout.job(job["kind"], job["id"]), job)
+    remaining = {job["id"] for job in plan.patients_left}
+    write_json(plan.layout.plan, {
+        "schema": SCHEMA, "settings": plan.settings,
+        "left": {job["id"]: {"patient": job["patient"] if job["patient"] in remaining else None, **job["asked"]}
+                 for job in plan.left},
+        "patients_left": {job["id"]: job["asked"] for job in plan.patients_left}})
