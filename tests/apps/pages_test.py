@@ -16,7 +16,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 
 # Verbs that measure for minutes, whose tests run them with --quick, or that do not end. Here their options must exist.
-MEASURING = {"serve": "serve_test.py", "bench": "bench_test.py", "study": "study_test.py", "calibrate": "dial_test.py"}
+MEASURING = {"serve": "serve_test.py", "bench": "bench_test.py", "study": "study_test.py", "calibrate": "dial_test.py",
+             "cohort": "cohort_test.py"}
 # Beginnings of commands that are not the program, and what runs them.
 ELSEWHERE = {
     "git clone": "continuous integration",

@@ -189,7 +189,7 @@ class Options(unittest.TestCase):
     VERBS = {"register": ["register-options.md"], "mesh": ["mesh.md"], "warp": ["warp.md"], "convert": ["convert.md"],
              "evaluate": ["evaluate.md"], "info": ["info.md"], "simulate": ["simulate.md"],
              "explain": ["explain.md"], "calibrate": ["calibrate.md"], "study": ["study.md", "study-coverage.md"],
-             "bench": ["bench.md"], "serve": ["serve.md"]}
+             "bench": ["bench.md"], "cohort": ["cohort.md"], "serve": ["serve.md"]}
 
     @staticmethod
     def of_program(verb):
