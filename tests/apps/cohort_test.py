@@ -250,6 +250,24 @@ class CohortRuns(unittest.TestCase):
         self.assertIn("cut short", (folder / "out" / "cohort.html").read_text())
         self.assertFalse((folder / "out" / "pairs" / "p00001_t2" / "report.json").exists())
 
+    def test_loops_and_the_mean_of_linked_patients(self):
+        header = ["id", "moving", "labels", "fixed", "fixed_labels", "true_labels", "from", "to", "edge_length", "rounds", "device"]
+        files = {"A": "p00002", "B": "p00002_t1", "C": "p00002_t2"}
+        rows = [[a + b, f"{files[a]}.nii.gz", f"{files[a]}_labels.nii.gz", f"{files[b]}.nii.gz", f"{files[b]}_labels.nii.gz",
+                 f"{files[b]}_labels.nii.gz", a, b, "9", "2", "cpu"] for a, b in ("AB", "BC", "CA")]
+        table, output = write_table(self.folder / "linked.csv", header, *rows), self.folder / "linked"
+        self.assertIn("is no patient of the columns", self.again("--frame", "D", table=table, output=output).stderr)
+        result = self.again("--frame", "A", table=table, output=output)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with open(output / "group" / "loops.csv", encoding="utf-8") as file:
+            loop, = csv.DictReader(file)
+        self.assertEqual(loop["loop"], "A → B → C → A")
+        self.assertLess(float(loop["mean_mm"]), 3)
+        self.assertIn("Mean of 3 patients in the frame of A", (output / "cohort.html").read_text(encoding="utf-8"))
+        self.assertTrue((output / "group" / "mean_shape.nii.gz").exists())
+        with open(output / "cohort.csv", encoding="utf-8") as file:
+            self.assertGreater(min(float(row["true_dice"]) for row in csv.DictReader(file)), 0.9)
+
     def test_two_starts_in_one_folder(self):
         import fcntl
         with open(self.output / ".cohort" / "lock", "a") as lock:

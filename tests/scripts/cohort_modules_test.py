@@ -3,13 +3,14 @@
 import pathlib
 import sys
 import tempfile
+import types
 import unittest
 
 import nibabel
 import numpy
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "workflow"))
-from tissuewarp_cohort import devices, digests, fields, foretell, groups, headers, histogram, plan, summary, thumbnail
+from tissuewarp_cohort import devices, digests, fields, foretell, groups, headers, histogram, job, plan, summary, thumbnail
 from tissuewarp_cohort.layout import Layout
 
 
@@ -103,6 +104,29 @@ class Sums(unittest.TestCase):
     def test_what_is_asked_for_falls_into_few_classes(self):
         self.assertEqual(plan.asked(50, 700), {"memory_mb": 2048, "minutes": 2})
         self.assertEqual(plan.asked(1000, 20), {"memory_mb": 512, "minutes": 32})
+
+
+class Plans(Folder):
+    def test_records_of_other_options_go(self):
+        """Slurm's arrays take a record for the end of a job."""
+        layout = Layout(self.folder)
+        job = {"kind": "pair", "id": "a", "patient": None, "files": {}, "options": {"rounds": ["3"]},
+               "program": {"version": "1", "sha256": ""}, "asked": {"memory_mb": 512, "minutes": 2}}
+        (self.folder / "out").write_text("result")
+        digests.write_json(layout.record("pair", "a"), {"request": plan.request_of(job), "inputs": {}, "outputs": {
+            "out": digests.entry_of(str(self.folder / "out"))}})
+        self.assertTrue(plan.is_done(layout, job))
+        other = {**job, "options": {"rounds": ["4"]}}
+        self.assertFalse(plan.is_done(layout, other))
+        written = types.SimpleNamespace(layout=layout, settings={}, left=[other], patients_left=[])
+        plan.write_plan(written)
+        self.assertFalse(pathlib.Path(layout.record("pair", "a")).exists())
+
+    def test_what_another_try_does_not_change(self):
+        files = {"fixed": ["/data/image.nii.gz"]}
+        for why, code, lasting in (("'/data/image.nii.gz' is cut short", 3, True), ("cannot write '/out/x': No space left", 3, False),
+                                   ("no equilibrium", 4, True), ("killed by signal 9", -9, False)):
+            self.assertEqual(job.is_lasting({"files": files}, why, code), lasting, why)
 
 
 class Devices(Folder):

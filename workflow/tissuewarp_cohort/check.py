@@ -14,7 +14,7 @@ from .table import OWN, SEPARATOR, check_ids, read_table
 MOST_COMBINATIONS = 24  # of options, each tried once by the program itself
 SWITCHES = {"true": True, "1": True, "yes": True, "on": True, "false": False, "0": False, "no": False, "off": False}
 OWN_FILES = {"true-labels", "held-out"}
-GRIDS = (("moving", "moving-labels"), ("fixed", "fixed-labels"), ("fixed", "true-labels"))
+GRIDS = (("moving", "moving-labels"), ("fixed", "fixed-labels"), ("fixed", "true-labels"), ("fixed-labels", "true-labels"))
 
 
 @dataclasses.dataclass
@@ -111,6 +111,9 @@ class Checker:
                 if values is not None:
                     result.options[column] = values
         self.check_grids(row, result)
+        if "held-out" in result.files and "moving-labels" not in result.files:
+            self.refuse(row, "held-out", row.cells["held-out"], "is scored against the surface of labels",
+                        "give the column 'labels' too, or leave it out")
         return result
 
     def check_grids(self, row, pair):

@@ -17,7 +17,7 @@ from .digests import entry_of, read_json, write_json
 from .layout import Layout
 from .plan import TRUTH, is_done, request_of
 
-LASTING = {2, 4, 5}  # exit codes of the program that another try does not change: input, numerics, no GPU
+LASTING = {2, 4, 5}  # exit codes of the program that another try does not change: options, numerics, no GPU
 INTERRUPTED = 130
 
 
@@ -87,7 +87,10 @@ def evaluate_command(layout, job, threads):
     field = os.path.join(folder, "displacement_moving_to_fixed.nii.gz")
     inverse = os.path.join(folder, "displacement_fixed_to_moving.nii.gz")
     command = [job["program"]["path"], "evaluate", f"--displacement={field}", f"--inverse={inverse}"]
-    for name in ("landmarks", "landmarks-moving", "landmarks-fixed", "held-out", "moving-labels"):
+    names = ["landmarks", "landmarks-moving", "landmarks-fixed", "held-out"]
+    if set(names) & set(files):
+        names.append("moving-labels")
+    for name in names:
         command += [f"--{name}={path}" for path in files.get(name, [])]
     if "true-labels" in files:
         command += [f"--labels={os.path.join(folder, 'warped_labels.nii.gz')}",
@@ -152,8 +155,13 @@ def do(layout, job, session, threads):
 
 
 def tried_in_vain(layout, job, session):
-    failure = read_json(layout.failure(job["kind"], job["id"]))
-    return failure is not None and failure.get("session") == session and failure.get("code") in LASTING
+    failure = read_json(layout.failure(job["kind"], job["id"])) or {}
+    return failure.get("session") == session and failure.get("lasting", False)
+
+
+def is_lasting(job, why, code):
+    """Whether another try would end alike: by the exit code, or since an input cannot be read."""
+    return code in LASTING or any(path in why for paths in job["files"].values() for path in paths)
 
 
 def attempt(layout, kind, name, session, threads):
@@ -179,7 +187,7 @@ def attempt(layout, kind, name, session, threads):
         except OSError as failed:
             why, code = f"{failed.filename or ''}: {failed.strerror}", 3
         write_json(layout.failure(kind, name), {"id": name, "session": session, "code": code, "why": why,
-                                                "finished": time.time()})
+                                                "lasting": is_lasting(job, why, code), "finished": time.time()})
         return 1
 
 

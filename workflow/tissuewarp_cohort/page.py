@@ -12,10 +12,10 @@ from .summary import MEASURES
 PICTURES_INSIDE = 100
 SHOWN = ["worst_interval_95_mm", "interval_95_mm", "error_mean_mm", "dice", "true_dice", "least_j", "seconds"]
 STYLE = """
-body { font: 15px/1.45 system-ui, sans-serif; margin: 2em auto; max-width: 1200px; padding: 0 1em; color: #1a1a1a; background: #fff }
+body { font: 15px/1.45 system-ui, sans-serif; margin: 2em auto; max-width: 1400px; padding: 0 1em; color: #1a1a1a; background: #fff }
 h1 { font-size: 1.5em } h2 { font-size: 1.15em; margin-top: 2em }
 table { border-collapse: collapse; width: 100% } th, td { padding: .35em .6em; text-align: right; vertical-align: top; border-bottom: 1px solid #ddd }
-th { position: sticky; top: 0; background: #fff; cursor: pointer; font-weight: 600 } td.text, th.text { text-align: left }
+th { position: sticky; top: 0; background: #fff; cursor: pointer; font-weight: 600 } td.text, th.text { text-align: left } td:last-child { min-width: 24em }
 img { width: 96px; image-rendering: auto; display: block } a { color: #0b57a4 }
 .failed td { background: #fdecea } .left td { color: #777 } .out { color: #b3261e; font-weight: 600 }
 .figures { display: flex; flex-wrap: wrap; gap: 1em } figure { margin: 0 } figcaption { font-size: .85em; color: #444 }
@@ -61,17 +61,18 @@ def words(row):
     if row["state"] != "done":
         return html.escape(row["why"] or "not run yet")
     parts = [html.escape(doubt) for doubt in row["doubt_texts"]]
+    parts += [f"<small>{html.escape(notice)}</small>" for notice in row["notices"]]
     if row["outlier_of"]:
         names = ", ".join(MEASURES[key][0] for key in row["outlier_of"])
         parts.append(f'<span class="out">unlike the cohort: {html.escape(names)}</span>')
     return "<br>".join(parts)
 
 
-def table_row(layout, row, place):
+def table_row(layout, row, place, shown):
     cells = [f'<td data-v="">{picture(layout, row, place)}</td>',
              f'<td class="text" data-v="{html.escape(row["id"])}">{link(layout, row)}</td>',
              f'<td data-v="{"" if row["doubts"] is None else row["doubts"]}">{"–" if row["doubts"] is None else row["doubts"]}</td>']
-    for key in SHOWN:
+    for key in shown:
         mark = ' class="out"' if key in row["outlier_of"] else ""
         cells.append(f'<td{mark} data-v="{"" if row[key] is None else row[key]}">{number(row[key])}</td>')
     cells.append(f'<td class="text" data-v="">{words(row)}</td>')
@@ -107,9 +108,10 @@ def group_part(groups):
 
 
 def html_of(layout, rows, title, about, groups=""):
+    shown = [key for key in SHOWN if any(row[key] is not None for row in rows)]
     head = ("".join(['<th></th><th class="text" data-key="id">pair</th><th data-key="doubts">doubts</th>',
-                     *map(heading, SHOWN), '<th class="text">what speaks against it</th>']))
-    body = "".join(table_row(layout, row, place) for place, row in enumerate(rows))
+                     *map(heading, shown), '<th class="text">what speaks against it</th>']))
+    body = "".join(table_row(layout, row, place, shown) for place, row in enumerate(rows))
     return f"""<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}</title>
 <meta name="viewport" content="width=device-width"><style>{STYLE}</style></head><body>
 <h1>{html.escape(title)}</h1>{summary_words(rows)}<p><small>{html.escape(about)}</small></p>

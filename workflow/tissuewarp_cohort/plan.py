@@ -130,9 +130,12 @@ class Plan:
 
 
 def write_plan(plan):
-    """What Snakemake and the jobs read."""
+    """What Snakemake and the jobs read; records of what is left to do, which are of other inputs or options, go."""
     shutil.rmtree(os.path.join(plan.layout.own, "marks"), ignore_errors=True)
     for job in plan.left + plan.patients_left:
+        for stale in (plan.layout.record(job["kind"], job["id"]), plan.layout.failure(job["kind"], job["id"])):
+            if os.path.exists(stale):
+                os.unlink(stale)
         write_json(plan.layout.job(job["kind"], job["id"]), job)
     remaining = {job["id"] for job in plan.patients_left}
     write_json(plan.layout.plan, {

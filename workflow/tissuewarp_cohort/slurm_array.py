@@ -13,7 +13,6 @@ import sys
 import time
 
 from .digests import read_json, write_json
-from .job import LASTING
 from .layout import Layout
 
 TRIES = 3
@@ -81,14 +80,14 @@ class Array:
             if record is not None:
                 return False
             failure = read_json(self.layout.failure(self.kind, job)) or {}
-            return failure.get("session") != self.session or failure.get("code") not in LASTING
+            return failure.get("session") != self.session or not failure.get("lasting", False)
         return [job for job in self.jobs if is_open(job)]
 
     def resources(self, attempt, bundle):
         memory = min(self.settings["memory_mb"] or 1 << 40, int(self.memory_mb * 1.5 ** attempt))
         options = [f"--partition={self.settings['slurm']}", f"--cpus-per-task={self.settings['threads']}",
                    f"--mem={memory}M", f"--time={self.minutes * bundle * 2 ** attempt}"]
-        return options + ([f"--gpus-per-task=1", "--ntasks=1"] if self.settings["gpus"] else [])
+        return options + (["--gpus-per-task=1", "--ntasks=1"] if self.settings["gpus"] else [])
 
     def run_once(self, slurm, attempt, jobs):
         bundle = math.ceil(len(jobs) / MOST_TASKS)

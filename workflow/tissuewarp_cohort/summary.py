@@ -27,7 +27,7 @@ MEASURES = {
     "seconds": ("time", "s", "log", 1),
     "memory_mb": ("memory", "MB", "log", 1),
 }
-COLUMNS = ["id", "row", "state", "why", "doubts", "doubt_texts", "outlier_of", *MEASURES, "dice_before",
+COLUMNS = ["id", "row", "state", "why", "doubts", "doubt_texts", "notices", "outlier_of", *MEASURES, "dice_before",
            "error_mean_before_mm", "error_median_mm", "landmarks"]
 
 
@@ -38,13 +38,13 @@ def at(value, *keys):
     return value
 
 
-def text_of(doubt):
-    return doubt if isinstance(doubt, str) else str(at(doubt, "text") or at(doubt, "message") or doubt)
+def texts_of(report, severity):
+    """Doubts speak against a result; notices say that less is known than was asked for."""
+    return [doubt.get("text", "") for doubt in report.get("doubts", []) if doubt.get("severity") == severity]
 
 
 def measures_of(report, scores, record):
     errors = at(scores, "target_registration_error", "all") or at(report, "target_registration_error", "all")
-    true_dice = at(scores, "overlap", "all", "dice") or at(scores, "overlap", "after", "all", "dice")
     return {
         "worst_interval_95_mm": at(report, "error_estimate", "worst_interval_95_mm"),
         "interval_95_mm": at(report, "error_estimate", "interval_95_mm"),
@@ -52,11 +52,11 @@ def measures_of(report, scores, record):
         "dice": at(report, "overlap", "after", "all", "dice"),
         "dice_before": at(report, "overlap", "before", "all", "dice"),
         "hausdorff_95_mm": at(report, "overlap", "after", "all", "hausdorff_95_mm"),
-        "true_dice": true_dice,
+        "true_dice": at(scores, "overlap", "all", "dice"),
         "error_mean_mm": at(errors, "after", "mean"), "error_median_mm": at(errors, "after", "median"),
         "error_95_mm": at(errors, "after", "percentile_95"), "error_mean_before_mm": at(errors, "before", "mean"),
         "landmarks": at(errors, "after", "count"),
-        "held_out_mm": at(scores, "held_out", "mean") or at(scores, "held_out", "after", "mean"),
+        "held_out_mm": at(scores, "held_out_surface", "distance_mm", "mean"),
         "least_j": at(report, "jacobian", "field_in_organ", "minimum"),
         "folded_share": at(report, "jacobian", "field_in_organ", "folded_share"),
         "seconds": at(record, "took", "seconds"), "memory_mb": at(record, "took", "memory_mb"),
@@ -66,7 +66,7 @@ def measures_of(report, scores, record):
 def row_of(layout, job):
     name = job["id"]
     row = dict.fromkeys(COLUMNS)
-    row.update(id=name, row=job["row"], state="left", doubt_texts=[], outlier_of=[], doubts=None)
+    row.update(id=name, row=job["row"], state="left", doubt_texts=[], notices=[], outlier_of=[], doubts=None)
     record, failure = read_json(layout.record("pair", name)), read_json(layout.failure("pair", name))
     if failure and not record:
         row.update(state="failed", why=failure.get("why", ""))
@@ -77,8 +77,8 @@ def row_of(layout, job):
     if record:
         report = read_json(os.path.join(layout.pair(name), "report.json")) or {}
         scores = read_json(os.path.join(layout.pair(name), "scores.json")) or {}
-        doubts = [text_of(doubt) for doubt in report.get("doubts", [])]
-        row.update(state="done", doubts=len(doubts), doubt_texts=doubts, **measures_of(report, scores, record))
+        doubts, notices = texts_of(report, "doubt"), texts_of(report, "notice")
+        row.update(state="done", doubts=len(doubts), doubt_texts=doubts, notices=notices, **measures_of(report, scores, record))
     return row
 
 
