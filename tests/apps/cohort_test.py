@@ -214,7 +214,7 @@ class CohortRuns(unittest.TestCase):
         self.assertEqual(self.done_again(before), ["p00001_t1", "p00002_t2"])
 
     def test_interrupted_and_resumed(self):
-        output = self.folder / "interrupted"
+        output = self.folder / "in {terrupted}: it's $HOME"
         child = subprocess.Popen([PROGRAM, "cohort", self.table, "--output", output, "--jobs", "1"], text=True,
                                  env={**os.environ, **ENVIRONMENT}, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         until = time.time() + 90

@@ -213,7 +213,7 @@ class Foretold(Folder):
     def test_runs_teach(self):
         for number in range(6):
             digests.write_json(self.folder / "done" / f"{number}.json", {
-                "foretold": {"seconds": 10, "memory_mb": 100}, "took": {"seconds": 30, "memory_mb": 50}})
+                "foretold": {"seconds": 10, "memory_mb": 100}, "took": {"seconds": 60, "memory_mb": 50, "threads": 1}})
         scale = foretell.Scale(self.folder)
         self.assertEqual((scale.runs, scale.seconds, scale.memory), (6, 3.0, 0.5))
         (self.folder / "done" / "0.json").write_text("{")

@@ -25,7 +25,7 @@ def command_of(plan, session):
     settings = plan.settings
     command = ["snakemake", "--snakefile", os.path.join(WORKFLOW, "Snakefile"), "--profile",
                os.path.join(WORKFLOW, "profiles", "slurm" if settings["slurm"] else "local"),
-               "--directory", plan.layout.own, "--config", f"folder={plan.layout.folder}", f"session={session}"]
+               "--directory", plan.layout.own, "--config", f"session={session}"]
     if settings["slurm"]:
         return [*command, "--cores", "64"]  # arrays that are waited for at a time
     resources = [f"mem_mb={settings['memory_mb']}"]

@@ -35,6 +35,11 @@ def of_pair(pair):
     return seconds, memory, BYTES_START + BYTES_PER_VOXEL * voxels / 2
 
 
+def wall_seconds(seconds, threads):
+    """What takes so long on two cores; more than two are not counted on."""
+    return seconds * (2 if threads == 1 else 1)
+
+
 class Scale:
     """What runs of this cohort took, over what was foretold for them; 1 before there are any."""
 
@@ -44,7 +49,7 @@ class Scale:
         for record in records_of(folder, 200):
             told, took = record.get("foretold"), record.get("took")
             if told and took and told["seconds"] > 0 and took.get("memory_mb"):
-                ratios[0].append(took["seconds"] / told["seconds"])
+                ratios[0].append(took["seconds"] * min(2, took.get("threads", 2)) / 2 / told["seconds"])
                 ratios[1].append(took["memory_mb"] / told["memory_mb"])
         if len(ratios[0]) >= 5:
             self.runs = len(ratios[0])

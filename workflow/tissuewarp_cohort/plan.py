@@ -54,14 +54,14 @@ def job_of_pair(pair, key, program, settings, scale):
             "program": program_of(program), "options": options, "files": pair.files, "patients": list(pair.patients),
             "update_options": update_options({*options, *pair.files}, program.options) if key else [],
             "foretold": {"seconds": seconds, "memory_mb": memory, "bytes": disk},
-            "asked": asked(seconds * scale.seconds, memory * scale.memory)}
+            "asked": asked(foretell.wall_seconds(seconds * scale.seconds, settings["threads"]), memory * scale.memory)}
 
 
-def job_of_patient(key, request, first, program, scale):
+def job_of_patient(key, request, first, program, settings, scale):
     seconds, memory, disk = foretell.of_pair(first)
     return {"schema": SCHEMA, "kind": "prepare", "id": key, "program": program_of(program), **request,
             "foretold": {"seconds": seconds, "memory_mb": memory, "bytes": disk},
-            "asked": asked(seconds * scale.seconds, memory * scale.memory)}
+            "asked": asked(foretell.wall_seconds(seconds * scale.seconds, settings["threads"]), memory * scale.memory)}
 
 
 def program_of(program):
@@ -114,8 +114,7 @@ class Plan:
         self.pairs = [job_of_pair(pair, keys.get(pair.id), program, settings, self.scale) for pair in pairs]
         self.left = [job for job in self.pairs if not is_done(layout, job)]
         needed = {job["patient"] for job in self.left} - {None}
-        patients = [job_of_patient(key, requests[key], first[key], program, self.scale) for key in sorted(needed)]
-        self.patients = patients
+        patients = [job_of_patient(key, requests[key], first[key], program, settings, self.scale) for key in sorted(needed)]
         self.patients_left = [job for job in patients if not is_done(layout, job)]
 
     def foretold(self):

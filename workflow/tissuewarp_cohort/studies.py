@@ -7,7 +7,7 @@ from . import plan
 
 class StudyPlan:
     """As plan.Plan, of commands. `parts`: {name: words}, in which {folder} and {threads} stand for those of the job."""
-    patients, patients_left = [], []
+    patients_left = []
 
     def __init__(self, layout, parts, program, settings, seconds, memory_mb):
         self.layout, self.settings = layout, settings
