@@ -1,5 +1,6 @@
 """What `tissuewarp cohort` starts: cohort.py PROGRAM TABLE --output DIR …"""
 
+import os
 import sys
 
 if sys.version_info < (3, 10):
@@ -7,4 +8,10 @@ if sys.version_info < (3, 10):
 
 from tissuewarp_cohort.main import main  # noqa: E402
 
-sys.exit(main(sys.argv[2:], sys.argv[1]))
+try:
+    code = main(sys.argv[2:], sys.argv[1])
+    sys.stdout.flush()
+except BrokenPipeError:  # whoever read the output has gone
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    code = 1
+sys.exit(code)

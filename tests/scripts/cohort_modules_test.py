@@ -210,6 +210,14 @@ class Groups(Folder):
 
 
 class Foretold(Folder):
+    def test_images_that_are_matched_take_memory(self):
+        pair = types.SimpleNamespace(files={"moving": 0, "fixed": 0}, options={}, voxels=(8_400_000, 8_400_000), voxel_mm3=1.0)
+        self.assertGreater(foretell.of_pair(pair)[1], 3100)  # the largest of the real pairs
+        pair.files["fixed-labels"] = 0
+        self.assertLess(foretell.of_pair(pair)[1], 1100)
+        pair.options["match-image"] = []
+        self.assertGreater(foretell.of_pair(pair)[1], 3100)
+
     def test_runs_teach(self):
         for number in range(6):
             digests.write_json(self.folder / "done" / f"{number}.json", {
@@ -232,6 +240,17 @@ class Thumbnails(Folder):
         grid = headers.grid_of(str(self.folder / "warped.nii.gz"))
         self.assertEqual(thumbnail.nearest_slice(grid, [3, 3, 14]), 7)
         self.assertEqual(thumbnail.nearest_slice(grid, None), 5)
+
+    def test_the_slice_is_one_with_tissue_in_the_fixed_frame(self):
+        values = numpy.full((20, 20, 12), numpy.nan, numpy.float32)
+        values[5:15, 5:15, 3:6] = 1.5
+        nibabel.save(nibabel.Nifti1Image(values, numpy.diag([-1.0, -1, 2, 1])), self.folder / "uncertainty.nii.gz")
+        slices = thumbnail.Slices(str(self.folder / "uncertainty.nii.gz"))
+        self.assertEqual(thumbnail.slice_with_tissue(slices, 11, range(20), range(20)), 5)
+        self.assertEqual(thumbnail.slice_with_tissue(slices, 4, range(20), range(20)), 4)
+        moved = {"error_estimate": {"worst_place_mm": [1, 2, 3]},
+                 "alignment": {"matrix": [[0, -1, 0, 10], [1, 0, 0, 20], [0, 0, 1, 30], [0, 0, 0, 1]]}}
+        self.assertEqual(thumbnail.place_in_fixed(moved), [8, 21, 33])
 
     def test_no_image_no_picture(self):
         thumbnail.write(str(self.folder))

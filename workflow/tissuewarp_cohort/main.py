@@ -92,8 +92,8 @@ def write_summary(layout, jobs, table, program, frame):
         from . import groups as of_groups  # needs numpy, which a table without groups does not
         groups = of_groups.write(layout, jobs, frame)
     summary.write_tables(layout, rows)
-    about = f"{os.path.basename(table)}, tissuewarp {program.version}, {time.strftime('%Y-%m-%d %H:%M')}"
-    page.write(layout, rows, f"Cohort {os.path.basename(layout.folder)}", about, groups)
+    about = f"{layout.folder}, tissuewarp {program.version}, {time.strftime('%Y-%m-%d %H:%M')}"
+    page.write(layout, rows, f"Cohort of {table}", about, groups)
     return rows
 
 

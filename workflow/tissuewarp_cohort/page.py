@@ -36,7 +36,7 @@ for (const head of document.querySelectorAll('th[data-key]')) head.onclick = () 
 def number(value):
     if value is None:
         return "–"
-    return f"{value:.2f}" if abs(value) < 100 else f"{value:.0f}"
+    return f"{value:.2f}" if abs(value) < 10 else f"{value:.1f}" if abs(value) < 100 else f"{value:.0f}"
 
 
 def picture(layout, row, place):
@@ -88,7 +88,7 @@ def figures(rows):
     parts = []
     for key, (name, unit, how, _) in MEASURES.items():
         values = [row[key] for row in rows if row[key] is not None]
-        if len(values) > 1:
+        if len(set(values)) > 1:
             caption = f"{name}{f', {unit}' if unit else ''}: median {number(statistics.median(values))} of {len(values)}"
             parts.append(f"<figure>{histogram.svg(values, how == 'log')}<figcaption>{html.escape(caption)}</figcaption></figure>")
     return f'<div class="figures">{"".join(parts)}</div>' if parts else "<p>Nothing is done yet.</p>"
@@ -116,7 +116,7 @@ def html_of(layout, rows, title, about, groups=""):
 <meta name="viewport" content="width=device-width"><style>{STYLE}</style></head><body>
 <h1>{html.escape(title)}</h1>{summary_words(rows)}<p><small>{html.escape(about)}</small></p>
 <h2>Pairs</h2><p><small>Failures first, then doubts, then the worst expected error: look at these from the top. A click on a heading sorts.
-Pictures: the slice of the worst expected error, red where tissue may lie 5 mm off (1 σ).
+Pictures: a slice near the worst expected error, red where tissue may lie 5 mm off (1 σ).
 Unlike the cohort: more than 3.5 robust standard deviations from its median, for the worse.
 Tables for statistics: <a href="cohort.csv">cohort.csv</a>, <a href="labels.csv">labels.csv</a>.</small></p>
 <table id="pairs"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>

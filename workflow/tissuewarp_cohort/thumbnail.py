@@ -44,8 +44,25 @@ def nearest_slice(grid, place_lps):
     return min(grid.size[2] - 1, max(0, round(k)))
 
 
-def picked(count, step):
-    return range(0, count, step)
+def place_in_fixed(report):
+    """Of the worst expected error, LPS mm, carried by the rigid placement alone; None where no error was estimated."""
+    place = report.get("error_estimate", {}).get("worst_place_mm")  # moving frame
+    matrix = report.get("alignment", {}).get("matrix")
+    if not place or not matrix:
+        return place
+    return [sum(row[k] * place[k] for k in range(3)) + row[3] for row in matrix[:3]]
+
+
+def slice_with_tissue(slices, k, columns, lines):
+    """The one nearest to k of which a hundredth or more is tissue: where values are finite and not 0."""
+    least, count = 0.01 * len(columns) * len(lines), slices.grid.size[2]
+    for away in range(count):
+        for place in {k - away, k + away}:
+            if 0 <= place < count:
+                rows = slices.rows(place, columns, lines)
+                if sum(math.isfinite(value) and value != 0 for row in rows for value in row) >= least:
+                    return place
+    return k
 
 
 def grey_of(rows):
@@ -74,14 +91,15 @@ def picture(folder):
         return None
     image, report = Slices(base), read_json(os.path.join(folder, "report.json")) or {}
     size = image.grid.size
-    k = nearest_slice(image.grid, report.get("error_estimate", {}).get("worst_place_mm"))
     step = max(1, math.ceil(max(size[:2]) / SIDE))
-    columns, lines = picked(size[0], step), list(reversed(picked(size[1], step)))
+    columns, lines = range(0, size[0], step), list(reversed(range(0, size[1], step)))
+    path = os.path.join(folder, "uncertainty.nii.gz")
+    uncertainty = Slices(path) if os.path.exists(path) else None
+    if uncertainty and uncertainty.grid.size != size:
+        uncertainty = None
+    k = slice_with_tissue(uncertainty or image, nearest_slice(image.grid, place_in_fixed(report)), columns, lines)
     grey = grey_of(image.rows(k, columns, lines))
-    errors = None
-    if os.path.exists(os.path.join(folder, "uncertainty.nii.gz")):
-        uncertainty = Slices(os.path.join(folder, "uncertainty.nii.gz"))
-        errors = uncertainty.rows(k, columns, lines) if uncertainty.grid.size == size else None
+    errors = uncertainty.rows(k, columns, lines) if uncertainty else None
 
     def pixel(j, i):
         share = min(1.0, errors[j][i] / WORST_MM) if errors and math.isfinite(errors[j][i]) else 0.0
