@@ -21,6 +21,10 @@ LONGEST_WAIT_S = 15
 ENDED_WELL = {"COMPLETED"}
 
 
+class SlurmRefused(Exception):
+    """sbatch does not take the request."""
+
+
 class Slurm:
     """Arrays that this process submitted and has not seen end."""
 
@@ -33,7 +37,7 @@ class Slurm:
         script = "#!/bin/bash\nexec " + command + " $SLURM_ARRAY_TASK_ID\n"
         done = subprocess.run(["sbatch", *options], input=script, capture_output=True, text=True)
         if done.returncode != 0:
-            raise RuntimeError(f"sbatch refused: {done.stderr.strip()}")
+            raise SlurmRefused(f"Slurm refused its array: {(done.stderr.strip() or 'it said nothing').splitlines()[-1]}")
         number = done.stdout.strip().split(";")[0]
         self.alive.append(number)
         return number
@@ -113,9 +117,11 @@ class Array:
             state = states.get(place // bundle, "UNKNOWN")
             if (read_json(self.layout.record(self.kind, job)) is None and failure.get("session") != self.session
                     and state not in ENDED_WELL):
-                write_json(self.layout.failure(self.kind, job), {
-                    "id": job, "session": self.session, "code": -1, "finished": time.time(),
-                    "why": f"Slurm ended it: {state}; asked for were {self.memory_mb} MB and {self.minutes} minutes"})
+                self.fail(job, f"Slurm ended it: {state}; asked for were {self.memory_mb} MB and {self.minutes} minutes")
+
+    def fail(self, job, why):
+        write_json(self.layout.failure(self.kind, job), {"id": job, "session": self.session, "code": -1, "lasting": False,
+                                                         "finished": time.time(), "why": why})
 
     def run(self, slurm):
         for attempt in range(TRIES):
@@ -135,10 +141,13 @@ def main():
 
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
         signal.signal(number, end)
+    array = Array(Layout(folder), kind, name, session)
     try:
-        Array(Layout(folder), kind, name, session).run(slurm)
-    except RuntimeError as failure:
-        print(failure, file=sys.stderr)
+        array.run(slurm)
+    except SlurmRefused as refusal:
+        for job in array.open_jobs():
+            array.fail(job, f"{refusal} (asked for were {array.memory_mb} MB and {array.minutes} minutes)")
+        print(refusal, file=sys.stderr)
         return 1
     return 0
 
