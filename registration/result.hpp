@@ -56,10 +56,12 @@ struct PointFit {
 
 /// How points along vessels agree with the registered model.
 struct CurveFit {
-    int points = 0;           ///< that were taken
-    double inlier_share = 0;  ///< of them: within the scale of the last round of a line
-    double residual_mm = 0;   ///< root mean square of those, across the line
-    double length_mm = 0;     ///< of the preoperative lines in the model
+    int points = 0;            ///< that were taken
+    double inlier_share = 0;   ///< of them: within the scale of the last round of a line
+    double residual_mm = 0;    ///< root mean square of those, across the line
+    double length_mm = 0;      ///< of the preoperative lines in the model
+    double rival_mm = 0;       ///< how far these lie from the chosen start pose in the best other one, mean
+    double rival_support = 0;  ///< what that one explains of the points over what the chosen one explains
 };
 
 /// How the organ lies to its rigid neighbours.
@@ -98,6 +100,13 @@ enum class PriorMoves {
     WithData      ///< tissue that data show
 };
 
+/// Motions of the organ as a whole that data of a kind tell worse than their springs feel them: boundaries of smooth
+/// organs slide along themselves when the organ bends.
+struct HardlyShown {
+    double deviation_mm = 0;  ///< of a motion that springs do not feel, root mean square over the organ
+    double below_share = 0;   ///< what springs feel of a motion (ShownMotions::shares) from which on nothing is added
+};
+
 /// What pulled at the tissue in the last round.
 struct LastPulls {
     std::vector<PulledNode> springs;                              ///< in the order of their origins
@@ -107,6 +116,7 @@ struct LastPulls {
     PriorMoves prior_moves = PriorMoves::Not;
     bool parts_alone = false;       ///< points of it: neither labels nor an image show the organ as a whole
     bool placement_sought = false;  ///< by the data: neither headers nor what does not move place the organ
+    HardlyShown hardly_shown = {};  ///< of the data that placed the organ
     double load_size = 0;           ///< of unknown loads that were found: they strain tissue by about its square times
                                     ///< `energy`; 0: none
 

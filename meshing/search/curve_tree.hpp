@@ -41,6 +41,9 @@ public:
     /// Thread-safe.
     [[nodiscard]] std::optional<Hit> nearest(const Eigen::Vector3d& query, double reach, const TangentGate& gate) const;
 
+    /// 3 × P, mm.
+    [[nodiscard]] const Eigen::Matrix3Xd& points() const { return points_; }
+
 private:
     Eigen::Matrix3Xd points_;
     std::vector<Segment> segments_;

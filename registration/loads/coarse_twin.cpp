@@ -144,6 +144,7 @@ LastPulls pulls_on(const PreparedModel& coarse, const PreparedModel& prepared, c
     pulls.prior_moves = given.prior_moves;
     pulls.parts_alone = given.parts_alone;
     pulls.placement_sought = given.placement_sought;
+    pulls.hardly_shown = given.hardly_shown;
     return pulls;
 }
 

@@ -34,7 +34,7 @@ Alignment align_surfaces(const meshing::SurfaceMesh& moving, const SurfacePoints
         throw InvalidInput("the moving surface has no triangles, or nodes that are not finite");
     const detail::SurfacePose found = detail::search_surface_pose(meshing::SurfaceTree(moving), moving,
                                                                   detail::surface_data(fixed), options, observer);
-    return {found.placement, found.typical_distance_mm()};
+    return {found.pose.chosen.placement, found.pose.chosen.typical_distance_mm(found.scale_mm)};
 }
 
 }  // namespace tissuewarp::registration

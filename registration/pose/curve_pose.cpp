@@ -2,6 +2,7 @@
 
 #include "registration/pose/robust_weight.hpp"
 
+#include <tbb/parallel_for.h>
 #include <Eigen/Cholesky>
 
 #include <algorithm>
@@ -28,7 +29,6 @@ struct Weighed {
     std::vector<double> weights;
     Eigen::Vector3d centre = Eigen::Vector3d::Zero();
     double radius = 1;  // mm, so that turns count in mm
-    double mean_distance = 0;
 };
 
 Weighed weigh(const std::vector<CurveMatch>& matches, const CurvePoints& points, double scale) {
@@ -41,12 +41,10 @@ Weighed weigh(const std::vector<CurveMatch>& matches, const CurvePoints& points,
         result.weights.push_back(weight);
         result.centre += weight * match.hit.point;
         squared += weight * match.hit.point.squaredNorm();
-        result.mean_distance += weight * match.hit.distance;
         sum += weight;
     }
     if (sum <= 0) return result;
     result.centre /= sum;
-    result.mean_distance /= sum;
     result.radius = std::sqrt(std::max(1.0, squared / sum - result.centre.squaredNorm()));
     return result;
 }
@@ -73,23 +71,56 @@ Eigen::Isometry3d step(const std::vector<CurveMatch>& matches, const Weighed& we
     return Eigen::Translation3d(weighed.centre + shift) * rotation * Eigen::Translation3d(-weighed.centre);
 }
 
-}  // namespace
+/// Mean of d²/(d² + s²) over the points, 1 where no line has the tangent.
+double cost(const std::vector<CurveMatch>& matches, const CurvePoints& points, double scale) {
+    double sum = 0;
+    for (std::size_t n = 0; n < matches.size(); ++n) {
+        const double squared = matches[n].hit.distance * matches[n].hit.distance;
+        sum +=
+            points.shares[static_cast<Eigen::Index>(n)] * (matches[n].found ? squared / (squared + scale * scale) : 1);
+    }
+    return sum / points.shares.sum();
+}
 
-Alignment closest_curve_pose(const meshing::CurveTree& lines, const CurvePoints& points, const Eigen::Isometry3d& start,
-                             double last_scale_mm, double max_angle_deg) {
+FoundPose descend(const meshing::CurveTree& lines, const CurvePoints& points, Eigen::Isometry3d placement,
+                  double last_scale_mm, double max_angle_deg) {
     constexpr CurvePoseOptions rules = curve_pose_options;
-    Alignment result{start, 0};
     double scale = 0;
     for (int pass = 0; pass < rules.passes; ++pass) {
-        const auto matches = match_curves(lines, points, result.placement, everywhere, max_angle_deg);
+        const auto matches = match_curves(lines, points, placement, everywhere, max_angle_deg);
         scale = pass == 0 ? rules.first_of_median * median_distance(matches) : rules.falling * scale;
         scale = std::max(scale, last_scale_mm);
-        if (!std::isfinite(scale)) return result;
-        const Weighed weighed = weigh(matches, points, scale);
-        result.mean_distance_mm = weighed.mean_distance;
-        result.placement = result.placement * step(matches, weighed);
+        if (!std::isfinite(scale)) return {placement, 1};
+        placement = placement * step(matches, weigh(matches, points, scale));
     }
+    return {placement, cost(match_curves(lines, points, placement, everywhere, max_angle_deg), points, last_scale_mm)};
+}
+
+/// Of the moving frame.
+std::vector<Eigen::Isometry3d> starts(const meshing::CurveTree& lines, const CurvePoints& points,
+                                      const Eigen::Isometry3d& start) {
+    const Eigen::Vector3d middle = points.points.rowwise().mean(),
+                          middle_of_lines = start * lines.points().rowwise().mean();
+    std::vector<Eigen::Isometry3d> result;
+    for (const Eigen::Vector3d& shift : {Eigen::Vector3d::Zero().eval(), (middle - middle_of_lines).eval()})
+        for (const Eigen::Matrix3d& rotation : start_rotations(curve_pose_options.start_rotation_deg)) {
+            Eigen::Isometry3d turn = Eigen::Isometry3d::Identity();
+            turn.linear() = rotation;
+            turn.translation() = middle + rotation * (shift - middle);
+            result.push_back(turn * start);
+        }
     return result;
+}
+
+}  // namespace
+
+ChosenPose search_curve_pose(const meshing::CurveTree& lines, const CurvePoints& points, const Eigen::Isometry3d& start,
+                             double last_scale_mm, double max_angle_deg) {
+    const std::vector<Eigen::Isometry3d> from = starts(lines, points, start);
+    std::vector<FoundPose> found(from.size());
+    tbb::parallel_for(std::size_t{0}, from.size(),
+                      [&](std::size_t k) { found[k] = descend(lines, points, from[k], last_scale_mm, max_angle_deg); });
+    return choose_pose(found, lines.points(), start);
 }
 
 }  // namespace tissuewarp::registration::detail

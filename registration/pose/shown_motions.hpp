@@ -14,7 +14,7 @@ namespace tissuewarp::registration::detail {
 struct ShownMotions {
     Eigen::Matrix<double, 6, 1> shares;  ///< ascending: uᵀ K u over tr K for u of mean square 1; ⅓ where springs of all
                                          ///< directions lie all over the organ, 0 for a motion that no datum shows
-    Eigen::MatrixXd motions;             ///< 3N × 6, in the same order, orthogonal, each of mean square 1
+    Eigen::MatrixXd motions;  ///< 3N × 6, in the same order, orthogonal, each of mean square 1
 };
 
 /// Of the springs of data and supports, at nodes of these places (3 × N, mm). Precondition: some spring pulls.

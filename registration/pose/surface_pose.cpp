@@ -15,11 +15,6 @@ namespace {
 
 constexpr SurfacePoseOptions rules;
 
-struct Pose {
-    Eigen::Isometry3d placement;
-    double cost = 1;
-};
-
 /// How one descent goes.
 struct Descent {
     int points, steps;
@@ -36,12 +31,12 @@ public:
     }
 
     /// The headers' placement first.
-    [[nodiscard]] std::vector<Pose> starts() const {
-        std::vector<Pose> result{{Eigen::Isometry3d::Identity()}};
+    [[nodiscard]] std::vector<FoundPose> starts() const {
+        std::vector<FoundPose> result{{Eigen::Isometry3d::Identity()}};
         const Eigen::Index middle = middle_point();
         const std::vector<int> places = spread_nodes();
         const Eigen::Matrix3Xd normals = meshing::node_normals(surface_);
-        for (const Eigen::Matrix3d& rotation : start_rotations()) {
+        for (const Eigen::Matrix3d& rotation : start_rotations(rules.start_rotation_deg)) {
             const Eigen::Vector3d facing = rotation.transpose() * mean_normal(middle);
             for (const int place : places) {
                 const double cosine = facing.dot(normals.col(place));
@@ -55,7 +50,7 @@ public:
         return result;
     }
 
-    [[nodiscard]] Pose descend(Pose pose, const Descent& descent) const {
+    [[nodiscard]] FoundPose descend(FoundPose pose, const Descent& descent) const {
         for (int step = 0; step < descent.steps; ++step) {
             const double t = double(step) / std::max(1, descent.steps - 1);
             const double scale = descent.first_scale_mm * std::pow(descent.last_scale_mm / descent.first_scale_mm, t);
@@ -63,11 +58,6 @@ public:
         }
         pose.cost = cost(pose.placement, stride(descent.points));
         return pose;
-    }
-
-    /// Mean distance between two placements over the nodes, mm.
-    [[nodiscard]] double distance(const Pose& a, const Pose& b) const {
-        return ((a.placement * surface_.nodes) - (b.placement * surface_.nodes)).colwise().norm().mean();
     }
 
 private:
@@ -171,40 +161,11 @@ private:
         }
         return chosen;
     }
-
-    /// None, and turns about the corners of an icosahedron.
-    [[nodiscard]] static std::vector<Eigen::Matrix3d> start_rotations() {
-        std::vector<Eigen::Matrix3d> rotations{Eigen::Matrix3d::Identity()};
-        const double golden = 0.5 * (1 + std::sqrt(5.0));
-        for (int axis = 0; axis < 3; ++axis)
-            for (const double a : {-1.0, 1.0})
-                for (const double b : {-golden, golden}) {
-                    Eigen::Vector3d corner = Eigen::Vector3d::Zero();
-                    corner[(axis + 1) % 3] = a;
-                    corner[(axis + 2) % 3] = b;
-                    rotations.emplace_back(
-                        Eigen::AngleAxisd(rules.start_rotation_deg * EIGEN_PI / 180, corner.normalized())
-                            .toRotationMatrix());
-                }
-        return rotations;
-    }
 };
 
-void descend_all(const PoseSearch& search, std::vector<Pose>& poses, const Descent& descent) {
+void descend_all(const PoseSearch& search, std::vector<FoundPose>& poses, const Descent& descent) {
     tbb::parallel_for(std::size_t{0}, poses.size(),
                       [&](std::size_t i) { poses[i] = search.descend(poses[i], descent); });
-    std::stable_sort(poses.begin(), poses.end(), [](const Pose& a, const Pose& b) { return a.cost < b.cost; });
-}
-
-/// The best ones, no two of them nearly the same.
-std::vector<Pose> distinct(const PoseSearch& search, const std::vector<Pose>& poses, std::size_t most) {
-    std::vector<Pose> kept;
-    for (const Pose& pose : poses) {
-        if (kept.size() == most) break;
-        const auto same = [&](const Pose& other) { return search.distance(pose, other) < rules.same_pose_mm; };
-        if (std::none_of(kept.begin(), kept.end(), same)) kept.push_back(pose);
-    }
-    return kept;
 }
 
 }  // namespace
@@ -214,21 +175,17 @@ SurfacePose search_surface_pose(const meshing::SurfaceTree& model, const meshing
     const double scale =
         std::max(options.trim_mm / rules.scales_of_trim, rules.least_scale_deviations * data.deviation_mm);
     const PoseSearch search(model, surface, data, scale);
-    std::vector<Pose> poses = search.starts();
+    std::vector<FoundPose> poses = search.starts();
     descend_all(
         search, poses,
         {rules.coarse_points, rules.coarse_steps, rules.coarse_first_scale * scale, rules.coarse_last_scale * scale});
     observer.checkpoint("rigid alignment", 0.6);
-    poses = distinct(search, poses, rules.finalists);
+    const FoundPose near_headers = poses.front();
+    poses = distinct_poses(std::move(poses), surface.nodes, rules.finalists);
+    poses.push_back(near_headers);
     descend_all(search, poses, {rules.fine_points, rules.fine_steps, rules.fine_first_scale * scale, scale});
-    poses = distinct(search, poses, 2);
     observer.checkpoint("rigid alignment", 1.0);
-    SurfacePose result{poses[0].placement, poses[0].cost, scale};
-    if (poses.size() > 1) {
-        result.rival_cost = poses[1].cost;
-        result.rival_mm = search.distance(poses[0], poses[1]);
-    }
-    return result;
+    return {choose_pose(poses, surface.nodes, Eigen::Isometry3d::Identity()), scale};
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -63,6 +63,11 @@ std::vector<Doubt> doubts_of(const CurveFit& fit, double deviation_mm) {
                           "points along vessels lie " + to_text(fit.residual_mm) + " mm across from the curves where " +
                               to_text(deviation_mm) + " mm along each axis were stated",
                           "state how far off the points are (--curves-sd), or check that they show these vessels"});
+    if (fit.rival_support > rival_pose_options.alike)
+        doubts.push_back({"curves.two_poses", fit.rival_support, rival_pose_options.alike,
+                          "the points along vessels fit about as well with the organ placed " + to_text(fit.rival_mm) +
+                              " mm elsewhere",
+                          "show more of the vessels, or give landmarks"});
     return doubts;
 }
 
@@ -115,8 +120,9 @@ std::vector<CurveMatch> CurveTerm::matches(const State& state, double reach_mm) 
 }
 
 Alignment CurveTerm::pose(const Eigen::Isometry3d& start, Observer& /*observer*/) {
-    return closest_curve_pose({samples_, segments_}, data_, start, curve_pose_options.bending_mm + final_scale_mm(),
-                              options_.max_angle_deg);
+    const double scale_mm = curve_pose_options.bending_mm + final_scale_mm();
+    pose_ = search_curve_pose({samples_, segments_}, data_, start, scale_mm, options_.max_angle_deg);
+    return {pose_->chosen.placement, pose_->chosen.typical_distance_mm(scale_mm)};
 }
 
 /// A place (1 − α) a + α b on a segment moves with both ends: K (1 − α) at a and K α at b, each drawn by the same way,
@@ -180,6 +186,8 @@ CurveFit CurveTerm::fit(const State& state) const {
     }
     fit.inlier_share = inliers / double(fit.points);
     fit.residual_mm = inliers > 0 ? std::sqrt(squared / inliers) : final_scale_mm();
+    fit.rival_mm = pose_ ? pose_->rival_mm : 0;
+    fit.rival_support = pose_ ? pose_->rival_support() : 0;
     for (const meshing::Segment& segment : segments_)
         fit.length_mm += (samples_.col(segment.ends[1]) - samples_.col(segment.ends[0])).norm();
     return fit;

@@ -4,10 +4,12 @@
 #include "registration/intraoperative.hpp"
 #include "registration/options.hpp"
 #include "registration/pose/curve_matches.hpp"
+#include "registration/pose/rival_poses.hpp"
 #include "registration/prepare.hpp"
 #include "registration/springs/pull.hpp"
 #include "registration/terms/term.hpp"
 
+#include <optional>
 #include <vector>
 
 namespace tissuewarp::registration::detail {
@@ -38,7 +40,7 @@ public:
 
     [[nodiscard]] Shows shows() const override { return Shows::Parts; }
     [[nodiscard]] PoseClaim pose_claim() const override { return PoseClaim::NearStart; }
-    /// The rigid placement that brings most points to the lines at rest, the nearest to `start`.
+    /// The rigid placement that brings most points to the lines at rest (search_curve_pose).
     [[nodiscard]] Alignment pose(const Eigen::Isometry3d& start, Observer& observer) override;
 
     /// Pulls on the tissue of the lines, across them alone. The scale of the robust weights falls from three times the
@@ -56,6 +58,7 @@ private:
     std::vector<meshing::Location> places_;   // of the samples
     std::vector<meshing::Segment> segments_;  // between them
     FallingScale scale_;                      // of the robust weights
+    std::optional<ChosenPose> pose_;          // where one was searched
 
     void take_lines(const std::vector<Eigen::Matrix3Xd>& lines);
     void join_samples(int first, int last);

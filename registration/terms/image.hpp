@@ -4,6 +4,7 @@
 #include "registration/matching/image_search.hpp"
 #include "registration/matching/points/field_of_view.hpp"
 #include "registration/springs/pull.hpp"
+#include "registration/terms/datum_kind.hpp"
 #include "registration/terms/term.hpp"
 
 #include <optional>
@@ -51,6 +52,7 @@ public:
 
     [[nodiscard]] Shows shows() const override { return Shows::Volume; }
     [[nodiscard]] PoseClaim pose_claim() const override { return PoseClaim::Search; }
+    [[nodiscard]] HardlyShown hardly_shown() const override { return hardly_shown_motions.image; }
     /// The rigid motion that most matches of a first search agree on, the rest of them is for the tissue. Where part of
     /// the organ is out of view, a deformation of the part in view would turn it as a whole: then none, unless the
     /// headers are far off or a rigid motion explains nearly all; the placement then follows the tissue in view. Throws

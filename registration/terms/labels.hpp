@@ -4,6 +4,7 @@
 #include "registration/boundary/label_boundary_field.hpp"
 #include "registration/options.hpp"
 #include "registration/prepare.hpp"
+#include "registration/terms/datum_kind.hpp"
 #include "registration/terms/term.hpp"
 
 namespace tissuewarp::registration::detail {
@@ -24,6 +25,7 @@ public:
 
     [[nodiscard]] Shows shows() const override { return Shows::Boundary; }
     [[nodiscard]] PoseClaim pose_claim() const override { return PoseClaim::WholeSurface; }
+    [[nodiscard]] HardlyShown hardly_shown() const override { return hardly_shown_motions.labels; }
     [[nodiscard]] Alignment pose(const Eigen::Isometry3d& start, Observer& observer) override;
     /// Springs from every interface node along its normal to the boundary in the fixed labels. Throws InvalidInput when
     /// no boundary was found.

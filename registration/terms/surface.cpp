@@ -18,8 +18,7 @@ constexpr double least_deviation_mm = surface_pull_options.least_deviation_mm;
 std::vector<Doubt> doubts_of(const SurfaceFit& fit, double deviation_mm) {
     std::vector<Doubt> doubts;
     const double least_inliers = surface_doubt_limits.least_inliers, most_residual = surface_doubt_limits.most_residual,
-                 most_rival_support = surface_doubt_limits.most_rival_support,
-                 least_coverage = surface_doubt_limits.least_coverage;
+                 most_rival_support = rival_pose_options.alike, least_coverage = surface_doubt_limits.least_coverage;
     const double residual_limit = most_residual * std::max(deviation_mm, least_deviation_mm);
     if (fit.inlier_share < least_inliers)
         doubts.push_back({"surface.outliers", fit.inlier_share, least_inliers,
@@ -74,7 +73,7 @@ double SurfaceTerm::final_scale_mm() const {
 
 Alignment SurfaceTerm::pose(const Eigen::Isometry3d& /*start*/, Observer& observer) {
     pose_ = search_surface_pose(meshing::SurfaceTree(surface_.at_rest), surface_.at_rest, data_, alignment_, observer);
-    return {pose_.placement, pose_.typical_distance_mm()};
+    return {pose_.pose.chosen.placement, pose_.pose.chosen.typical_distance_mm(pose_.scale_mm)};
 }
 
 std::vector<SurfaceTerm::Match> SurfaceTerm::matches(const State& state, double reach_mm) const {
@@ -168,8 +167,8 @@ SurfaceFit SurfaceTerm::fit(const State& state) const {
     fit.residual_mm = inliers > 0 ? std::sqrt(squared / inliers) : limit;
     fit.coverage = area / surface_.area();
     fit.pose_searched = pose_.scale_mm > 0;
-    fit.rival_mm = pose_.rival_mm;
-    fit.rival_support = pose_.cost < 1 ? (1 - pose_.rival_cost) / (1 - pose_.cost) : 1;
+    fit.rival_mm = pose_.pose.rival_mm;
+    fit.rival_support = pose_.pose.rival_support();
     return fit;
 }
 

@@ -6,6 +6,7 @@
 #include "registration/pose/surface_data.hpp"
 #include "registration/pose/surface_pose.hpp"
 #include "registration/springs/pull.hpp"
+#include "registration/terms/datum_kind.hpp"
 #include "registration/terms/organ_surface.hpp"
 #include "registration/terms/term.hpp"
 
@@ -25,9 +26,8 @@ std::vector<Doubt> doubts_of(const SurfaceFit& fit, double deviation_mm);
 /// What points of a surface may show without a doubt. Chosen by hand, but for the coverage; on which data is not
 /// recorded.
 struct SurfaceDoubtLimits {
-    double least_inliers = 0.5;        ///< share of the points within the scale of the last round of the surface
-    double most_residual = 1.4;        ///< root mean square along the normals over the stated deviation
-    double most_rival_support = 0.95;  ///< of what the best pose explains, by one 8 mm or more away
+    double least_inliers = 0.5;  ///< share of the points within the scale of the last round of the surface
+    double most_residual = 1.4;  ///< root mean square along the normals over the stated deviation
     /// Share of the organ's surface that the points show. On less of a smooth organ another pose may fit as well.
     /// Chosen on draws 441 to 1160 of the liver phantom's surface, where 0.18 had missed two failures; reported on
     /// others from 1281 on (docs/lab/results.md).
@@ -48,6 +48,7 @@ public:
 
     [[nodiscard]] Shows shows() const override { return Shows::Parts; }
     [[nodiscard]] PoseClaim pose_claim() const override { return PoseClaim::Anywhere; }
+    [[nodiscard]] HardlyShown hardly_shown() const override { return hardly_shown_motions.surface; }
     /// The rigid placement, searched for all over the organ. Throws Cancelled.
     [[nodiscard]] Alignment pose(const Eigen::Isometry3d& start, Observer& observer) override;
 

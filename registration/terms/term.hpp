@@ -67,6 +67,9 @@ public:
     /// The rigid placement, near `start` where the claim is no more than that. Throws InvalidInput, Cancelled.
     [[nodiscard]] virtual Alignment pose(const Eigen::Isometry3d& start, Observer& observer);
 
+    /// Where it placed the organ.
+    [[nodiscard]] virtual HardlyShown hardly_shown() const { return {}; }
+
     /// Whether the placement is a motion that its data made, which the prior then moves along with.
     [[nodiscard]] virtual bool has_placed() const { return false; }
 

@@ -25,6 +25,10 @@ public:
     [[nodiscard]] PriorMoves prior_moves() const;
     /// The data say where the organ lies as a whole.
     [[nodiscard]] bool placement_sought() const { return placement_sought_; }
+    /// Of the data that do, nothing where others do.
+    [[nodiscard]] HardlyShown hardly_shown() const {
+        return placement_sought_ ? best_placed().hardly_shown() : HardlyShown{};
+    }
     /// Loads that nobody stated and that data may tell: of points of a free organ all, tractions too, since these also
     /// move what no point shows; of labels, which show the boundary all over, whatever presses on it there, a force
     /// within. Otherwise none.

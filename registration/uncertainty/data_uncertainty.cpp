@@ -86,12 +86,19 @@ LastPulls nothing_seen(const PreparedModel& prepared, LastPulls pulls) {
     return pulls;
 }
 
-/// One deviation of each motion of the organ as a whole that the data do not show, 3N × k, mm.
+/// Of a motion of the organ as a whole of which the data show this share.
+double unseen_deviation_mm(double share, const HardlyShown& hardly) {
+    if (share < shown_motion_limits.least_share) return error_model.unseen_motion_mm;
+    return share < hardly.below_share ? hardly.deviation_mm * std::sqrt(1 - share / hardly.below_share) : 0;
+}
+
+/// One deviation of each motion of the organ as a whole beyond what the springs of the data leave open, 3N × 6, mm.
 MatrixXd unseen_motions(const LastPulls& pulls, const Eigen::Matrix3Xd& nodes) {
     if (!pulls.placement_sought) return MatrixXd(nodes.size(), 0);
-    const ShownMotions shown = shown_motions(pulls, nodes);
-    const Eigen::Index unseen = (shown.shares.array() < shown_motion_limits.least_share).count();
-    return error_model.unseen_motion_mm * shown.motions.leftCols(unseen);
+    ShownMotions shown = shown_motions(pulls, nodes);
+    for (Eigen::Index k = 0; k < shown.shares.size(); ++k)
+        shown.motions.col(k) *= unseen_deviation_mm(shown.shares[k], pulls.hardly_shown);
+    return std::move(shown.motions);
 }
 
 /// What is missed if the tissue was not deformed but moved as a whole, as nearly as data show it move (3N × 1, mm):

@@ -229,6 +229,21 @@ TEST(CurvePose, IsFoundFromWhereTheHeadersPlaceIt) {
     }
 }
 
+// From a single start two of these eight end in another branch, centimetres off.
+TEST(CurvePose, IsFoundFromFarther) {
+    const PreparedModel prepared = prepare(shapes::organ_labels({}), coarse());
+    const CurveOptions options;
+    const Matrix3Xd places = targets(50);
+    for (unsigned seed = 11; seed <= 18; ++seed) {
+        Numbers numbers(seed);
+        const Eigen::Isometry3d truth = test::motion(22, numbers.direction(), 22 * numbers.direction());
+        const Map moved = [&](const Vector3d& x) -> Vector3d { return truth * bent(x); };
+        detail::CurveTerm term(prepared, seen_after(moved, 0.7, 0.2, numbers, seed % 2 == 0), options, 1);
+        const Alignment found = term.pose(Eigen::Isometry3d::Identity(), silent_observer());
+        EXPECT_LT(((truth * places) - (found.placement * places)).colwise().norm().mean(), 5) << seed;
+    }
+}
+
 // 20 % of other things, noise of a millimetre, part of the vessels not seen. Of forty draws the worst left 1.3 mm.
 TEST(CurveTerm, PartialNoisyPointsCarryTheTissueAboutTheVessels) {
     constexpr unsigned draws = 8;

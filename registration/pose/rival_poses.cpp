@@ -1,0 +1,63 @@
+#include "registration/pose/rival_poses.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+double mean_distance_mm(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, const Eigen::Matrix3Xd& places) {
+    return ((a * places) - (b * places)).colwise().norm().mean();
+}
+
+}  // namespace
+
+std::vector<FoundPose> distinct_poses(std::vector<FoundPose> poses, const Eigen::Matrix3Xd& places, std::size_t most) {
+    std::stable_sort(poses.begin(), poses.end(),
+                     [](const FoundPose& a, const FoundPose& b) { return a.cost < b.cost; });
+    std::vector<FoundPose> kept;
+    for (const FoundPose& pose : poses) {
+        if (kept.size() == most) break;
+        const auto same = [&](const FoundPose& other) {
+            return mean_distance_mm(pose.placement, other.placement, places) < rival_pose_options.same_pose_mm;
+        };
+        if (std::none_of(kept.begin(), kept.end(), same)) kept.push_back(pose);
+    }
+    return kept;
+}
+
+ChosenPose choose_pose(const std::vector<FoundPose>& found, const Eigen::Matrix3Xd& places,
+                       const Eigen::Isometry3d& start) {
+    const std::vector<FoundPose> poses = distinct_poses(found, places, found.size());
+    const auto alike = [&](const FoundPose& pose) {
+        return 1 - pose.cost >= rival_pose_options.alike * (1 - poses.front().cost);
+    };
+    const auto last = std::find_if_not(poses.begin(), poses.end(), alike);
+    const auto motion_mm = [&](const FoundPose& pose) { return mean_distance_mm(pose.placement, start, places); };
+    const auto chosen = std::min_element(
+        poses.begin(), last, [&](const FoundPose& a, const FoundPose& b) { return motion_mm(a) < motion_mm(b); });
+    ChosenPose result{*chosen};
+    if (poses.size() < 2) return result;
+    const FoundPose& rival = chosen == poses.begin() ? poses[1] : poses[0];
+    result.rival_cost = rival.cost;
+    result.rival_mm = mean_distance_mm(rival.placement, chosen->placement, places);
+    return result;
+}
+
+std::vector<Eigen::Matrix3d> start_rotations(double angle_deg) {
+    std::vector<Eigen::Matrix3d> rotations{Eigen::Matrix3d::Identity()};
+    const double golden = 0.5 * (1 + std::sqrt(5.0));
+    for (int axis = 0; axis < 3; ++axis)
+        for (const double a : {-1.0, 1.0})
+            for (const double b : {-golden, golden}) {
+                Eigen::Vector3d corner = Eigen::Vector3d::Zero();
+                corner[(axis + 1) % 3] = a;
+                corner[(axis + 2) % 3] = b;
+                rotations.emplace_back(
+                    Eigen::AngleAxisd(angle_deg * EIGEN_PI / 180, corner.normalized()).toRotationMatrix());
+            }
+    return rotations;
+}
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,51 @@
+/// Which of several poses is taken where more than one explains the data.
+#include "registration/pose/rival_poses.hpp"
+
+#include "tests/support/label_shapes.hpp"
+
+#include <gtest/gtest.h>
+
+namespace tissuewarp::registration::detail {
+namespace {
+
+Eigen::Matrix3Xd corners() {
+    Eigen::Matrix3Xd places(3, 4);
+    places << 0, 60, 0, 0, 0, 0, 40, 0, 0, 0, 0, 30;
+    return places;
+}
+
+FoundPose shifted(double mm, double cost) {
+    FoundPose pose;
+    pose.placement.translation()[0] = mm;
+    pose.cost = cost;
+    return pose;
+}
+
+TEST(RivalPoses, OfThoseThatFitAlikeTheNearestToTheStartIsTaken) {
+    const std::vector<FoundPose> found{shifted(80, 0.10), shifted(12, 0.12), shifted(-40, 0.11), shifted(2, 0.5)};
+    const ChosenPose pose = choose_pose(found, corners(), Eigen::Isometry3d::Identity());
+    EXPECT_EQ(pose.chosen.placement.translation()[0], 12);
+    EXPECT_EQ(pose.rival_cost, 0.10);
+    EXPECT_EQ(pose.rival_mm, 68);
+    EXPECT_NEAR(pose.rival_support(), 0.9 / 0.88, 1e-12);
+    const Eigen::Isometry3d far(Eigen::Translation3d(90, 0, 0));
+    EXPECT_EQ(choose_pose(found, corners(), far).chosen.placement.translation()[0], 80);
+}
+
+TEST(RivalPoses, ThatFitWorseDoNotWinByBeingNear) {
+    const std::vector<FoundPose> found{shifted(80, 0.10), shifted(0, 0.16)};
+    EXPECT_EQ(choose_pose(found, corners(), Eigen::Isometry3d::Identity()).chosen.placement.translation()[0], 80);
+    EXPECT_EQ(choose_pose({shifted(5, 0.3)}, corners(), Eigen::Isometry3d::Identity()).rival_cost, 1);
+}
+
+// A descent that stopped early is nearer to its start than one that arrived; both are one pose.
+TEST(RivalPoses, OfNearlyTheSameTheBestCounts) {
+    const std::vector<FoundPose> found{shifted(4, 0.13), shifted(10, 0.10)};
+    const ChosenPose pose = choose_pose(found, corners(), Eigen::Isometry3d::Identity());
+    EXPECT_EQ(pose.chosen.placement.translation()[0], 10);
+    EXPECT_EQ(pose.rival_mm, 0);
+    EXPECT_EQ(distinct_poses(found, corners(), 5).size(), 1U);
+}
+
+}  // namespace
+}  // namespace tissuewarp::registration::detail
