@@ -22,6 +22,7 @@ class PlaneView {
     const step = [1, grid.size[0], grid.size[0] * grid.size[1]];
     this.stepRight = step[plane.right]; this.stepDown = plane.flip * step[plane.down]; this.stepNormal = step[plane.normal];
     this.first = plane.flip < 0 ? (this.rows - 1) * step[plane.down] : 0;
+    this.onFixed = grid.voxels[0].some(Boolean) ? ["fixed"] : ["after"];  // the organ where nobody drew it
     this.longest = Math.max(...grid.size) * grid.spacing;
   }
   slice(point) {
@@ -95,7 +96,7 @@ class PlaneView {
     const line = this.left + state.swipe * this.columns * this.zoom, { width } = this.canvas;
     const sides = state.left === state.right ? [[state.left, 0, width]] : [[state.left, 0, line], [state.right, line, width]];
     for (const [name, from, to] of sides)
-      for (const shown of name === "fixed" ? ["fixed"] : ["fixed", name]) {
+      for (const shown of name === "fixed" ? this.onFixed : ["fixed", name]) {
         const style = OUTLINES[shown];
         context.save();
         context.beginPath(); context.rect(from, 0, to - from, width); context.clip();
