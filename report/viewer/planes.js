@@ -174,8 +174,10 @@ class PlaneView {
       context.lineJoin = "round"; context.strokeText(text, x, y); context.fillText(text, x, y);
     };
     write(right, edge, width / 2, "left", "#e8eaec"); write(left, width - edge, width / 2, "right", "#e8eaec");
-    write(top, width / 2, edge + size / 2, "center", "#e8eaec");
-    write(bottom, width / 2, width - edge - size / 2, "center", "#e8eaec");
+    const line = this.left + state.swipe * this.columns * this.zoom;  // letters stay clear of it
+    const middle = Math.abs(line - width / 2) < size ? line - size : width / 2;
+    write(top, middle, edge + size / 2, "center", "#e8eaec");
+    write(bottom, middle, width - edge - size / 2, "center", "#e8eaec");
     const n = this.plane.normal;
     write(`${this.plane.name}  ${"xyz"[n]} = ${state.point[n].toFixed(1)} mm`, edge, edge + size / 2, "left", this.plane.colour);
     if (this.plane.normal !== 2) return;
