@@ -26,13 +26,13 @@ def scaled(source, part, folder):
     return path
 
 
-def settings(tool, edges_mm, folder):
-    """Of a tool of scripts/compare; `edges_mm` are the meshes to try, `folder` takes changed settings of the peers."""
+def settings(tool, edges_mm, budgets_s, folder):
+    """Of a tool of scripts/compare; meshes and budgets to try, and the folder that takes changed settings of the peers."""
     if isinstance(tool, Tissuewarp):
         more = [("default", "", [])]
         more += [("mesh", f"{edge:g} mm", ["--edge-length", edge]) for edge in edges_mm]
         more += [("rounds", f"{count}", ["--rounds", count]) for count in (1, 2, 4)]
-        more += [("budget", f"{seconds:g} s", ["--time-budget", f"{seconds:g}s"]) for seconds in (0.5, 2, 8)]
+        more += [("budget", f"{seconds:g} s", ["--time-budget", f"{seconds:g}s"]) for seconds in budgets_s]
         return [Setting(series, value, Tissuewarp([*tool.arguments, *words])) for series, value, words in more]
     parts = ELASTIX_PARTS if isinstance(tool, Elastix) else PLASTIMATCH_PARTS
     if isinstance(tool, Elastix):

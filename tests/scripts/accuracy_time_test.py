@@ -20,7 +20,7 @@ def point(tool, series, seconds, error):
 class Sweep(unittest.TestCase):
     def settings(self, tool):
         with tempfile.TemporaryDirectory() as folder:
-            found = sweep.settings(tool, (12, 6), pathlib.Path(folder))
+            found = sweep.settings(tool, (12, 6), (2,), pathlib.Path(folder))
             texts = ["".join(path.read_text() for path in each.tool.settings) for each in found]
         return found, texts
 
