@@ -6,7 +6,8 @@ import math
 COLOURS = {"tissuewarp": "#1d4ed8", "tissuewarp, prepared before": "#60a5fa", "elastix": "#c2410c", "plastimatch": "#047857"}
 MARKS = {"default": "star", "mesh": "circle", "rounds": "square", "budget": "triangle", "iterations": "circle"}
 WIDTH, HEIGHT, LEFT, TOP, GAP = 440, 300, 62, 70, 74
-TICKS = [number * 10.0**power for power in range(-2, 5) for number in (1, 2, 5)]
+MOST = 6  # times the least error: beyond, a setting failed
+TICKS = [number * 10.0**power for power in range(-2, 5) for number in (1, 1.5, 2, 3, 5)]
 
 
 def text(x, y, content, anchor="middle", size=12, fill="#111827", turn=""):
@@ -41,8 +42,10 @@ def span(values):
     return low / 1.25, high * 1.25
 
 
-def panel(title, points, left, top):
-    """Points are dicts of tool, series, seconds, error (mm)."""
+def panel(title, everything, left, top):
+    """Points are dicts of tool, series, seconds, error (mm). Failures are named at the top, off the scale."""
+    most = MOST * min(p["error"] for p in everything)
+    points = [p for p in everything if p["error"] <= most]
     xs, ys = span([p["seconds"] for p in points]), span([p["error"] for p in points])
     x = lambda value: left + WIDTH * math.log(value / xs[0]) / math.log(xs[1] / xs[0])
     y = lambda value: top + HEIGHT * (1 - math.log(value / ys[0]) / math.log(ys[1] / ys[0]))
@@ -61,6 +64,9 @@ def panel(title, points, left, top):
         if path:
             yield f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="1.6" opacity="0.7"/>'
         yield from (mark(MARKS[p["series"]], x(p["seconds"]), y(p["error"]), colour) for p in own)
+    for number, p in enumerate(p for p in everything if p["error"] > most):
+        yield text(left + WIDTH - 8, top + 18 + 16 * number, f"{p['tool']}: {p['error']:.2g} mm in {p['seconds']:.2g} core seconds", "end",
+                   fill=COLOURS[p["tool"]])
     yield text(left + WIDTH / 2, top + HEIGHT + 36, "core seconds")
     middle = top + HEIGHT / 2
     yield text(left - 44, middle, "mean error, mm", turn=f' transform="rotate(-90 {left - 44} {middle})"')

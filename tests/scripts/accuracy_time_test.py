@@ -52,7 +52,7 @@ class Chart(unittest.TestCase):
         self.assertEqual([(p["seconds"], p["error"]) for p in chart.front(points)], [(1, 3), (4, 1), (16, 0.5)])
 
     def test_faster_is_to_the_left_and_better_is_lower(self):
-        text = chart.figure({"a <case>": [point("elastix", "iterations", 10, 2.0), point("elastix", "iterations", 100, 0.2)]})
+        text = chart.figure({"a <case>": [point("elastix", "iterations", 10, 1.0), point("elastix", "iterations", 100, 0.2)]})
         drawing = xml.etree.ElementTree.fromstring(text)
         marks = [(float(c.get("cx")), float(c.get("cy"))) for c in drawing.iter("{http://www.w3.org/2000/svg}circle")
                  if float(c.get("cy")) > chart.TOP - 20]
@@ -60,6 +60,11 @@ class Chart(unittest.TestCase):
         self.assertLess(marks[0][0], marks[1][0])
         self.assertLess(marks[0][1], marks[1][1])
         self.assertIn("a &lt;case&gt;", text)
+
+    def test_a_failure_is_named_off_the_scale(self):
+        text = chart.figure({"a": [point("elastix", "iterations", 10, 2.0), point("plastimatch", "iterations", 1, 20.0)]})
+        self.assertIn("plastimatch: 20 mm in 1 core seconds", text)
+        self.assertEqual(text.count(f'r="4" fill="{chart.COLOURS["plastimatch"]}"'), 1, "the legend's alone")
 
     def test_without_data_the_script_says_so(self):
         with tempfile.TemporaryDirectory() as folder:
