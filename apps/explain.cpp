@@ -1,5 +1,6 @@
 // tissuewarp explain: what a scene will run, without running it.
 
+#include "apps/naming_page.hpp"
 #include "apps/progress.hpp"
 #include "apps/scene_file.hpp"
 #include "apps/verbs.hpp"
@@ -67,7 +68,7 @@ void print_passes(const simulation::BuiltScene& built, Observer& observer) {
 void run_explain(const ExplainOptions& options) {
     ProgressLine progress(options.common);
     progress.begin("reading", 0.0, 0.05);
-    const simulation::Scene scene = read_scene(options.scene, progress);
+    const simulation::Scene scene = naming_page(scenes_page, [&] { return read_scene(options.scene, progress); });
     progress.begin("building", 0.05, 1.0);
     const simulation::BuiltScene built = simulation::build(scene, progress);
     const simulation::Plan plan = simulation::plan_of(built);

@@ -38,9 +38,17 @@ struct RunVerb {
     void operator()(const apps::CohortOptions& options) const { apps::run_cohort(options); }
 };
 
+/// The page that helps: the one that a message names, or that of the verb.
+std::string with_page(const std::string& message, const std::string& verb) {
+    if (message.find("docs/") != std::string::npos) return message;
+    const std::string page = verb.empty() ? "index" : "manual/" + (verb == "update" ? std::string("prepare") : verb);
+    return message + " (docs/" + page + ".md)";
+}
+
 int report(const std::vector<std::string>& arguments, int code, std::string message) {
     std::replace(message.begin(), message.end(), '\n', ' ');
     const std::string verb = apps::verb_of(arguments);
+    if (code >= 2 && code <= 5) message = with_page(message, verb);  // refused or failed, not interrupted
     spdlog::error("tissuewarp{}{}: {}", verb.empty() ? "" : " ", verb, message);
     return code;
 }

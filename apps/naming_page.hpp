@@ -13,11 +13,13 @@ auto naming_page(const char* page, Read&& read) {
     try {
         return read();
     } catch (const InvalidInput& refusal) {
-        throw InvalidInput(std::string(refusal.what()) + " (" + page + ")");
+        const std::string message = refusal.what();
+        throw InvalidInput(message.find("docs/") == std::string::npos ? message + " (" + page + ")" : message);
     }
 }
 
 inline constexpr const char* images_page = "docs/manual/images.md";
 inline constexpr const char* points_page = "docs/manual/points.md";
+inline constexpr const char* scenes_page = "docs/manual/scene-file.md";
 
 }  // namespace tissuewarp::apps

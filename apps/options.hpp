@@ -138,9 +138,10 @@ struct MeshOptions {
 struct WarpOptions {
     CommonOptions common;
     std::filesystem::path input, output, record, displacement, reference;
+    int frame = -1;        ///< of a scene's displacement.h5; -1: the last
     bool labels = false;   ///< nearest neighbour
     double outside = 0.0;  ///< value of voxels whose tissue lay outside the moving image
-    double fade = 60.0;    ///< mm, with --record
+    double fade = 60.0;    ///< mm, without a field on a grid
 };
 
 struct ConvertOptions {

@@ -238,11 +238,14 @@ void start_writing(const RegistrationRun& run, const OutputFolder& output, tbb::
 void write_reports(const RegistrationRun& run, const nlohmann::json& report, const OutputFolder& output) {
     const auto given = [](const imaging::Volume& volume) { return volume.empty() ? nullptr : &volume; };
     const Products& products = run.products;
+    const registration::Deformation& deformation = run.result.deformation;
+    const Eigen::Matrix3Xd nodes = deformation.deformed_nodes();
     write_json(report, output.path("report.json"));
     report::write_report(
         {given(run.inputs.moving), given(run.inputs.fixed), given(products.warped), &run.inputs.moving_labels,
          given(run.inputs.fixed_labels), &products.warped_labels, &products.moving_to_fixed,
-         given(products.uncertainty_volumes.deviation), given(products.uncertainty_volumes.trust), report},
+         given(products.uncertainty_volumes.deviation), given(products.uncertainty_volumes.trust),
+         &products.fixed_to_moving, &deformation.mesh, &nodes, report},
         output.staging());
 }
 

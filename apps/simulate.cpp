@@ -2,6 +2,7 @@
 
 #include "apps/ablate.hpp"
 #include "apps/module_description.hpp"
+#include "apps/naming_page.hpp"
 #include "apps/output_folder.hpp"
 #include "apps/progress.hpp"
 #include "apps/report_json.hpp"
@@ -95,7 +96,7 @@ void write_template(const SimulateOptions& options) {
 void run_ablation(const SimulateOptions& options) {
     ProgressLine progress(options.common);
     progress.begin("reading", 0.0, 0.02);
-    simulation::Scene scene = read_scene(options.scene, progress);
+    simulation::Scene scene = naming_page(scenes_page, [&] { return read_scene(options.scene, progress); });
     apply_device(options.device, scene.solve);
     simulation::require_supported(scene);
     progress.begin("simulating", 0.02, 1.0);
@@ -115,7 +116,7 @@ void run_simulate(const SimulateOptions& options) {
     if (options.output.empty()) throw InvalidInput("give --output, the folder for the frames");
     require_could_write(options.output, is_simulate_output);
     progress.begin("reading", 0.0, 0.02);
-    simulation::Scene scene = read_scene(options.scene, progress);
+    simulation::Scene scene = naming_page(scenes_page, [&] { return read_scene(options.scene, progress); });
     apply_device(options.device, scene.solve);
     simulation::require_supported(scene);
     progress.begin("building", 0.02, 0.3);

@@ -32,10 +32,12 @@ void declare_warp(Verb& verb, WarpOptions& o) {
     CLI::Option* field =
         verb.path("--displacement", o.displacement,
                   "Displacement field (mm, LPS): fixed_to_moving for images and labels, moving_to_fixed "
-                  "for points and surfaces");
+                  "for points and surfaces; or displacement.h5 of a scene");
     record->excludes(field);
+    verb.number("--frame", o.frame, "N", -1, 1000000, "Frame of a scene's displacement.h5: 0 at rest, -1 the last")
+        ->needs(field);
     verb.path("--reference", o.reference,
-              "Image whose grid an image is warped onto, with --record; default: the input's");
+              "Image whose grid an image is warped onto; default: the input's, or that of a field");
     verb.flag("--labels", o.labels, "The image is a label map: nearest neighbour");
     verb.number("--outside", o.outside, "VALUE", -1e9, 1e9, "Value of voxels that come from outside the image");
     verb.number("--fade", o.fade, "MM", 1.0, 1e4, "Distance from the organ where the field has become rigid (mm)");

@@ -1,4 +1,4 @@
-// tissuewarp warp: carries an image, a label map, points or a surface through a registration that was made before.
+// tissuewarp warp: carries an image, a label map, points or a surface through a registration or a scene.
 
 #include "registration/warp.hpp"
 
@@ -11,15 +11,18 @@
 #include "apps/progress.hpp"
 #include "apps/silenced_stderr.hpp"
 #include "apps/verbs.hpp"
+#include "apps/warp_motion.hpp"
 #include "core/errors.hpp"
 #include "meshing/mesh_io.hpp"
 #include "registration/field.hpp"
 #include "registration/io/slicer_markups.hpp"
-#include "registration/record.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
+#include <optional>
+#include <vector>
 
 namespace tissuewarp::apps {
 
@@ -38,19 +41,18 @@ Volume displacement(const WarpOptions& options, imaging::FieldType needed, Obser
     return read_displacement(options.displacement, observer);
 }
 
-/// The pulling field: the one that was given, or the record's on the reference grid.
-Volume fixed_to_moving(const WarpOptions& options, const Volume& image, Observer& observer) {
-    if (!options.displacement.empty()) return displacement(options, imaging::FieldType::Resampling, observer);
-    const registration::Record record = registration::read_record(options.record);
-    const imaging::Geometry grid =
-        options.reference.empty() ? image.geometry : read_noted_volume(options.reference, observer).geometry;
-    return registration::displacement_fixed_to_moving(record.deformation, grid, {options.fade}, observer);
-}
-
-void warp_volume(const WarpOptions& options, Observer& observer) {
-    const Volume image =
+void warp_volume(const WarpOptions& options, const std::optional<WarpMotion>& motion, Observer& observer) {
+    Volume image =
         options.labels ? read_noted_labels(options.input, observer) : read_noted_volume(options.input, observer);
-    const Volume field = fixed_to_moving(options, image, observer);
+    Volume field;
+    if (motion) {
+        take_out(image, *motion, options.labels ? 0 : options.outside, options.input);
+        const imaging::Geometry grid =
+            options.reference.empty() ? image.geometry : read_noted_volume(options.reference, observer).geometry;
+        field = registration::displacement_fixed_to_moving(motion->deformation, grid, {options.fade}, observer);
+    } else {
+        field = displacement(options, imaging::FieldType::Resampling, observer);
+    }
     const Volume warped = options.labels ? registration::warp_labels(image, field)
                                          : registration::warp_image(image, field, options.outside);
     const SilencedStandardError silenced;
@@ -68,25 +70,52 @@ void require_near(const Eigen::Matrix3Xd& points, const meshing::TetMesh& mesh, 
     std::nth_element(distances.begin(), middle, distances.end());
     if (*middle <= farthest_mm) return;
     throw InvalidInput(
-        fmt::format("'{}' lies {:.0f} mm from the model of the record, more than {:g}; coordinates must "
+        fmt::format("'{}' lies {:.0f} mm from the model, more than {:g}; coordinates must "
                     "be LPS mm of the moving image",
                     path.string(), *middle, farthest_mm));
 }
 
-Eigen::Matrix3Xd map_points(const WarpOptions& options, const Eigen::Matrix3Xd& points, Observer& observer) {
-    if (!options.displacement.empty())
-        return displaced(points, displacement(options, imaging::FieldType::Modeling, observer));
-    const registration::Record record = registration::read_record(options.record);
-    require_near(points, record.deformation.mesh, options.input);
-    return registration::PointTransform(record.deformation, {options.fade})(points);
+Eigen::Matrix3Xd map_points(const WarpOptions& options, const std::optional<WarpMotion>& motion,
+                            const Eigen::Matrix3Xd& points, Observer& observer) {
+    if (!motion) return displaced(points, displacement(options, imaging::FieldType::Modeling, observer));
+    require_near(points, motion->deformation.mesh, options.input);
+    return registration::PointTransform(motion->deformation, {options.fade})(points);
+}
+
+void warp_points(const WarpOptions& options, const std::optional<WarpMotion>& motion, Observer& observer) {
+    const Eigen::Matrix3Xd points = read_points(options.input, observer);
+    Eigen::Matrix3Xd mapped = map_points(options, motion, points, observer);
+    if (motion) {
+        const std::vector<bool> gone = points_gone(points, *motion);
+        for (Eigen::Index p = 0; p < points.cols(); ++p)
+            if (gone[static_cast<std::size_t>(p)]) mapped.col(p).setConstant(std::numeric_limits<double>::quiet_NaN());
+        if (const auto count = std::count(gone.begin(), gone.end(), true); count > 0)
+            observer.note(fmt::format("{} of {} points lay in tissue that was taken out; they are written as nan",
+                                      count, points.cols()));
+    }
+    std::vector<Column> columns;
+    append_points(columns, "", mapped);
+    write_columns(columns, options.output);
+}
+
+void warp_surface(const WarpOptions& options, const std::optional<WarpMotion>& motion, Observer& observer) {
+    meshing::SurfaceMesh surface = read_tissue_surface(options.input, observer);
+    if (motion) {
+        const std::vector<bool> gone = points_gone(surface.nodes, *motion);
+        if (const auto count = std::count(gone.begin(), gone.end(), true); count > 0)
+            throw InvalidInput(fmt::format(
+                "{} of {} nodes of '{}' lie in tissue that was taken out; give a surface of what is left, or --frame "
+                "with one before the resection",
+                count, surface.node_count(), options.input.string()));
+    }
+    surface.nodes = map_points(options, motion, surface.nodes, observer);
+    meshing::write_surface(surface, options.output);
 }
 
 }  // namespace
 
 void run_warp(const WarpOptions& options) {
     ProgressLine progress(options.common);
-    if (options.record.empty() && options.displacement.empty())
-        throw InvalidInput("nothing to warp with; give --record record.h5 or --displacement FIELD");
     const FileKind kind = file_kind(options.input);
     const bool writes_markups = registration::is_slicer_markups(options.output);
     if (file_kind(options.output) != kind || writes_markups)
@@ -94,16 +123,13 @@ void run_warp(const WarpOptions& options) {
                            "'; give an output of the same kind (image, points as .csv or surface)");
     require_could_write_file(options.output);
     progress.begin("warping", 0.0, 1.0);
+    const std::optional<WarpMotion> motion = read_motion(options, progress);
     if (kind == FileKind::Image) {
-        warp_volume(options, progress);
+        warp_volume(options, motion, progress);
     } else if (kind == FileKind::Points) {
-        std::vector<Column> columns;
-        append_points(columns, "", map_points(options, read_points(options.input, progress), progress));
-        write_columns(columns, options.output);
+        warp_points(options, motion, progress);
     } else if (kind == FileKind::Surface) {
-        meshing::SurfaceMesh surface = read_tissue_surface(options.input, progress);
-        surface.nodes = map_points(options, surface.nodes, progress);
-        meshing::write_surface(surface, options.output);
+        warp_surface(options, motion, progress);
     } else {
         throw InvalidInput("'" + options.input.string() +
                            "' is of no kind that can be warped; give an image, points (.csv, .xyz, .fcsv, .mrk.json) "

@@ -2,15 +2,14 @@
 
 #include "report/detail/encoding.hpp"
 #include "report/detail/picture.hpp"
-#include "report/detail/slice_stack.hpp"
 #include "report/detail/template.hpp"
 #include "report/detail/view.hpp"
+#include "report/detail/viewer_surface.hpp"
+#include "report/detail/viewer_volumes.hpp"
 
 #include "core/atomic_file.hpp"
 
-#include <cmath>
 #include <cstdio>
-#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,35 +18,52 @@ namespace tissuewarp::report {
 
 namespace {
 
-/// The slice nearest to where tissue moved most, or the middle one.
-std::size_t first_shown(const nlohmann::json& stack, const std::optional<detail::Focus>& focus) {
-    std::size_t best = stack.size() / 2;
-    double nearest = std::numeric_limits<double>::infinity();
-    for (std::size_t k = 0; focus && k < stack.size(); ++k) {
-        const double distance = std::abs(std::stod(stack[k]["mm"].get<std::string>()) - focus->fixed[2]);
-        if (distance < nearest) {
-            nearest = distance;
-            best = k;
-        }
-    }
-    return best;
+nlohmann::json place(const Eigen::Vector3d& point) {
+    return {point[0], point[1], point[2]};
 }
 
-nlohmann::json page_values(const ReportInput& input, const detail::Preview& preview,
-                           const std::vector<unsigned char>& png) {
+/// The voxel of the largest estimated error of tissue, LPS mm.
+std::optional<Eigen::Vector3d> least_known(const ReportInput& input) {
+    if (input.uncertainty == nullptr) return std::nullopt;
+    const imaging::Volume deviation = input.uncertainty->as(CV_32F), trust = input.trust->as(CV_8U);
+    const imaging::Geometry& grid = deviation.geometry;
+    std::int64_t worst = -1;
+    for (std::int64_t at = 0; at < grid.voxel_count(); ++at)
+        if (trust.data<std::uint8_t>()[at] != 0 &&
+            (worst < 0 || deviation.data<float>()[at] > deviation.data<float>()[worst]))
+            worst = at;
+    if (worst < 0) return std::nullopt;
+    const std::int64_t row = worst / grid.size[0];
+    return grid.point(Eigen::Vector3d(static_cast<double>(worst % grid.size[0]),
+                                      static_cast<double>(row % grid.size[1]),
+                                      static_cast<double>(row / grid.size[1])));
+}
+
+/// What the viewer shows, as report/viewer/scene.js reads it.
+nlohmann::json viewer_scene(const ReportInput& input, const detail::Preview& preview) {
+    const double displacement_mm = preview.displacement_mm, error_mm = preview.error_mm;
+    const std::optional<detail::Box> organ = detail::label_box(detail::organ_labels(input));
+    nlohmann::json scene = detail::viewer_volumes(input, *organ, displacement_mm, error_mm);
+    scene["displacement_mm"] = displacement_mm;
+    scene["error_mm"] = error_mm;
+    scene["focus"] = place(preview.focus ? preview.focus->fixed : organ->centre());
+    scene["moved_most"] = preview.focus.has_value();
+    if (const auto worst = least_known(input)) scene["least_known"] = place(*worst);
+    if (nlohmann::json surface = detail::viewer_surface(input, displacement_mm, error_mm); !surface.is_null())
+        scene["surface"] = std::move(surface);
+    return scene;
+}
+
+nlohmann::json page_values(const ReportInput& input, const detail::Preview& preview) {
     nlohmann::json values = detail::view_of(input.report);
-    values["preview"] = detail::base64(png);
+    values["preview"] = detail::base64(detail::jpeg(preview.picture, 92));
     if (preview.focus) {
         char millimetres[32];
         std::snprintf(millimetres, sizeof millimetres, "%.1f", preview.focus->displacement);
         values["summary"]["displacement"] = {{"largest", millimetres},
                                              {"beyond_alignment", input.report.contains("alignment")}};
     }
-    constexpr int slices = 20;  // a page below 3 MB
-    const nlohmann::json stack = detail::slice_stack(input, slices);
-    if (!stack.empty())
-        values["viewer"] = {
-            {"slices", stack}, {"last", stack.size() - 1}, {"first", first_shown(stack, preview.focus)}};
+    values["viewer"] = {{"scene", viewer_scene(input, preview).dump()}};
     return values;
 }
 
@@ -57,7 +73,7 @@ void write_report(const ReportInput& input, const std::filesystem::path& folder)
     const detail::Preview preview = detail::draw_preview(input);
     const std::vector<unsigned char> png = detail::png(preview.picture);
     write_file({reinterpret_cast<const char*>(png.data()), png.size()}, folder / "preview.png");
-    write_file(detail::fill(detail::page_template(), page_values(input, preview, png)), folder / "report.html");
+    write_file(detail::fill(detail::page_template(), page_values(input, preview)), folder / "report.html");
 }
 
 }  // namespace tissuewarp::report

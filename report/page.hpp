@@ -1,7 +1,8 @@
 #pragma once
-/// What a registration shows to people: a picture of three planes, and one page that needs no network.
+/// What a registration shows to people: a picture of three planes, and one page with a viewer that needs no network.
 
 #include "imaging/volume.hpp"
+#include "meshing/tet_mesh.hpp"
 
 #include <nlohmann/json.hpp>
 
@@ -20,6 +21,9 @@ struct ReportInput {
     const imaging::Volume* moving_to_fixed = nullptr;  ///< displacement field of three channels, LPS mm, moving grid
     const imaging::Volume* uncertainty = nullptr;  ///< estimated error, 1 σ, mm, fixed frame, NaN outside the tissue
     const imaging::Volume* trust = nullptr;        ///< beside it: 0 no tissue, 1 shown, 2 carried, 3 unknown; one byte
+    const imaging::Volume* fixed_to_moving = nullptr;  ///< displacement field of three channels, LPS mm, fixed grid
+    const meshing::TetMesh* mesh = nullptr;            ///< of the organ, moving frame
+    const Eigen::Matrix3Xd* fixed_nodes = nullptr;     ///< where its nodes are now, 3 × N, LPS mm, fixed frame
     nlohmann::json report;  ///< report.json, docs/manual/register-outputs.md; missing keys leave sections out
 };
 

@@ -19,8 +19,6 @@ using Eigen::Matrix3Xd;
 
 namespace {
 
-constexpr int format_version = 1;
-
 /// Shortest form that reads back, "nan" for what is gone.
 std::string number(double value) {
     if (!std::isfinite(value)) return "nan";
@@ -53,7 +51,7 @@ struct SeriesWriter::Impl {
     Impl(const BuiltScene& scene, const std::filesystem::path& where)
         : built(scene),
           folder(where),
-          record(folder / "displacement.h5", "tissuewarp simulation", format_version),
+          record(folder / "displacement.h5", series_format, series_version),
           probes(folder / "probes.csv", std::ios::binary) {
         record.columns<double>("mesh/nodes", built.mesh.nodes, "mm, LPS");
         record.columns<int>("mesh/tetrahedra", built.mesh.tets, "");

@@ -13,6 +13,10 @@
 
 namespace tissuewarp::simulation {
 
+/// Of displacement.h5.
+inline constexpr const char* series_format = "tissuewarp simulation";
+inline constexpr int series_version = 1;
+
 class SeriesWriter {
 public:
     /// Holds a reference. Throws IoError.

@@ -308,6 +308,27 @@ void Hdf5Input::array(const std::string& name, T* values, const std::vector<hsiz
             refuse(name, "holds values that are not finite");
 }
 
+hsize_t Hdf5Input::entries(const std::string& name, const std::vector<hsize_t>& wanted) const {
+    const std::vector<hsize_t> found = shape(dataset(name), name);
+    if (found.empty() || !std::equal(found.begin() + 1, found.end(), wanted.begin(), wanted.end()))
+        refuse(name, "another size than the format's or than that of its companions");
+    return found[0];
+}
+
+void Hdf5Input::entry(const std::string& name, hsize_t index, double* values,
+                      const std::vector<hsize_t>& wanted) const {
+    if (index >= entries(name, wanted)) refuse(name, "has no entry " + std::to_string(index));
+    const Hdf5Handle data = dataset(name);
+    const Hdf5Handle type(H5Dget_type(data), H5Tclose), space(H5Dget_space(data), H5Sclose);
+    if (H5Tget_class(type) != H5T_FLOAT) refuse(name, "another type than the format's");
+    std::vector<hsize_t> start(wanted.size() + 1, 0), one{1};
+    start[0] = index;
+    one.insert(one.end(), wanted.begin(), wanted.end());
+    if (H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), nullptr, one.data(), nullptr) < 0 ||
+        H5Dread(data, H5T_NATIVE_DOUBLE, simple_space(one), space, H5P_DEFAULT, values) < 0)
+        throw IoError("'" + path_.string() + "', dataset '" + name + "' is damaged");
+}
+
 template <class T>
 Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic> Hdf5Input::columns(const std::string& name, int rows) const {
     const std::vector<hsize_t> found = shape(dataset(name), name);

@@ -99,6 +99,10 @@ public:
     /// Fills memory for exactly this shape.
     template <class T>
     void array(const std::string& name, T* values, const std::vector<hsize_t>& shape) const;
+    /// How many entries of this shape a dataset holds that Hdf5Output::append made.
+    [[nodiscard]] hsize_t entries(const std::string& name, const std::vector<hsize_t>& shape) const;
+    /// One of them, which may hold NaN. `index` is below entries().
+    void entry(const std::string& name, hsize_t index, double* values, const std::vector<hsize_t>& shape) const;
     /// Whether there is a group or dataset of this name, `a/b/c`.
     [[nodiscard]] bool holds(const std::string& name) const;
     /// Throws unless the dataset has this shape: before memory is set aside for it.

@@ -7,6 +7,7 @@
 #include <png.h>
 #include <turbojpeg.h>
 
+#include <algorithm>
 #include <memory>
 #include <string>
 
@@ -49,6 +50,19 @@ std::vector<unsigned char> jpeg(const cv::Mat& picture, int quality) {
         throw IoError(std::string("a picture cannot be encoded as JPEG: ") + tjGetErrorStr2(encoder.get()));
     bytes.resize(size);
     return bytes;
+}
+
+std::string base64(const std::vector<unsigned char>& bytes) {
+    static constexpr char alphabet[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    std::string result;
+    result.reserve((bytes.size() + 2) / 3 * 4);
+    for (std::size_t at = 0; at < bytes.size(); at += 3) {
+        const std::size_t left = std::min<std::size_t>(3, bytes.size() - at);
+        unsigned group = 0;
+        for (std::size_t k = 0; k < 3; ++k) group = group << 8 | (k < left ? bytes[at + k] : 0u);
+        for (std::size_t k = 0; k < 4; ++k) result += k <= left ? alphabet[group >> (18 - 6 * k) & 63] : '=';
+    }
+    return result;
 }
 
 }  // namespace tissuewarp::report::detail

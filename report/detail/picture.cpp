@@ -342,7 +342,7 @@ Preview draw_preview(const ReportInput& input) {
         x += column.width();
     }
     legend(page, columns, scene);
-    return {page, scene.focus};
+    return {page, scene.focus, scene.displacement_limit, scene.error_limit};
 }
 
 }  // namespace tissuewarp::report::detail

@@ -6,8 +6,9 @@
 namespace tissuewarp::report::detail {
 
 struct Preview {
-    cv::Mat picture;             ///< 8-bit BGR
-    std::optional<Focus> focus;  ///< where tissue moved most, when there is a field
+    cv::Mat picture;                           ///< 8-bit BGR
+    std::optional<Focus> focus;                ///< where tissue moved most, when there is a field
+    double displacement_mm = 1, error_mm = 1;  ///< ends of the colour bars
 };
 
 /// Rows: axial, coronal, sagittal. Columns, as far as the data is there: before, after, the two differences, the

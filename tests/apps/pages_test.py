@@ -63,6 +63,9 @@ class Pages(unittest.TestCase):
         assert result.returncode == 0, result.stderr
         result = run("convert", "out/transform.h5", "ants_1Warp.nii.gz", folder=cls.folder)
         assert result.returncode == 0, result.stderr
+        for words in (["--init", "cube"], ["cube.toml", "-o", "out/shift"]):
+            result = run("simulate", *words, folder=cls.folder)
+            assert result.returncode == 0, result.stderr
         cls.done = set()
 
     @staticmethod

@@ -2,6 +2,7 @@
 
 import os
 import pathlib
+import re
 import subprocess
 import tempfile
 import unittest
@@ -9,6 +10,7 @@ import unittest
 import nibabel
 import numpy
 
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROGRAM = os.environ["TISSUEWARP"]
 SHIFT_LPS = numpy.array([2.0, -1.5, 1.0])  # mm, of the centre
 SIZE = 48
@@ -79,11 +81,13 @@ class PhantomTest(unittest.TestCase):
         self.addCleanup(self.phantom.temporary.cleanup)
 
     def assert_refused(self, result, code, *words):
-        """One line on standard error with these words, this exit code, and nothing left behind."""
+        """One line on standard error with these words and a page that is there, this exit code, and nothing left behind."""
         self.assertEqual(result.returncode, code, result.stderr)
         self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
         self.assertTrue(result.stderr.startswith("tissuewarp"), result.stderr)
         for word in words:
             self.assertIn(word, result.stderr)
+        page = re.search(r"docs/[\w/-]+\.md", result.stderr)
+        self.assertTrue(code not in (2, 3, 4, 5) or page and (ROOT / page[0]).is_file(), f"names no page: {result.stderr}")
         self.assertEqual(result.stdout, "")
         self.assertFalse(self.phantom.output.is_dir(), "an output folder was left behind")

@@ -31,6 +31,33 @@ if(inner)
   message(FATAL_ERROR "installed, but for nobody to include: ${inner}")
 endif()
 
+# What the page for users of C++ shows, with the page's own lines for CMake; the README shows the same.
+function(write_page_program folder)
+  file(READ ${SOURCE}/docs/from-cpp.md page)
+  file(READ ${SOURCE}/README.md readme)
+  string(REGEX MATCH "```cpp\n(#include [^\n]*\n\nusing namespace [^\n]*\n)([^`]*)```" snippet "${page}")
+  set(head "${CMAKE_MATCH_1}")
+  set(body "${CMAKE_MATCH_2}")
+  string(FIND "${readme}" "${snippet}" place)
+  if(snippet STREQUAL "" OR place EQUAL -1)
+    message(FATAL_ERROR "docs/from-cpp.md shows no program, or the README another one")
+  endif()
+  file(WRITE ${folder}/main.cpp "${head}
+using tissuewarp::imaging::Volume;
+void page(const Volume& preop_labels, const Volume& preop_image, const Volume& intraop_image,
+          const Eigen::Vector3d& tumour_before) {
+${body}}
+int main() {}
+")
+  string(REGEX MATCH "```cmake\n([^`]*)```" lines "${page}")
+  file(WRITE ${folder}/CMakeLists.txt "cmake_minimum_required(VERSION 3.25)
+project(page LANGUAGES C CXX)
+add_executable(navigation main.cpp)
+${CMAKE_MATCH_1}")
+endfunction()
+write_page_program(${BUILD}/consumer/page_source)
+build(${BUILD}/consumer/page_source page)
+
 build(${SOURCE}/tests/consumer solver)
 run(${BUILD}/consumer/solver/solver)
 build(${SOURCE}/examples/navigation navigation)

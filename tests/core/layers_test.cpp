@@ -24,7 +24,7 @@ const std::map<std::string, std::set<std::string>> may_include{
     {"tled", {"core", "meshing", "shaders", "tled"}},
     {"simulation", {"core", "imaging", "meshing", "shaders", "tled", "simulation"}},
     {"registration", {"core", "imaging", "meshing", "shaders", "tled", "registration"}},
-    {"report", {"core", "imaging", "report"}},
+    {"report", {"core", "imaging", "meshing", "report"}},
     {"study", {"core", "imaging", "meshing", "shaders", "tled", "registration", "report", "study"}},
     {"server", {"core", "imaging", "meshing", "tled", "registration", "server"}},
     {"apps",

@@ -1,5 +1,5 @@
 #include "report/detail/template.hpp"
-#include "report/detail/slice_stack.hpp"
+#include "report/detail/encoding.hpp"
 
 #include <gtest/gtest.h>
 

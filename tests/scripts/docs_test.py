@@ -219,7 +219,7 @@ class Options(unittest.TestCase):
                     option = re.match(r"`(?:-\w, )?(--[a-z-]+)", entry[0])
                     if not option or len(entry) < 3 or not known.get(option[1]):
                         continue
-                    stated = re.match(r"\w(?:[\w./-]|,(?=\w))*", entry[1].strip("`*"))
+                    stated = re.match(r"-?\w(?:[\w./-]|,(?=\w))*", entry[1].strip("`*"))
                     try:
                         same = stated is not None and float(stated[0]) == float(known[option[1]])
                     except ValueError:

@@ -7,6 +7,7 @@
 #include "meshing/mesh_io.hpp"
 #include "simulation/ablation.hpp"
 #include "simulation/plan.hpp"
+#include "simulation/series_frame.hpp"
 #include "tests/simulation/cube.hpp"
 
 #include <gmock/gmock.h>
@@ -70,6 +71,33 @@ TEST(Series, HoldsEveryFrameInEveryFormat) {
     EXPECT_THAT(description, HasSubstr("displacement.h5:/mesh/tetrahedra"));
     EXPECT_THAT(description, HasSubstr("displacement.h5:/remaining_mesh/1/tetrahedra"));
     EXPECT_NO_THROW(record.require_shape("displacement", {3, static_cast<hsize_t>(built.mesh.node_count()), 3}));
+    fs::remove_all(folder);
+}
+
+TEST(Series, GivesAFrameBack) {
+    const fs::path folder = fs::temp_directory_path() / ("tissuewarp-frame-" + std::to_string(::getpid()));
+    fs::create_directories(folder);
+    const fs::path file = folder / "displacement.h5";
+    const BuiltScene built = build(cut_cube());
+    SeriesWriter series(built, folder);
+    std::vector<Eigen::Matrix3Xd> frames;
+    simulate(built, [&](const Frame& frame) {
+        series.add(frame);
+        frames.push_back(frame.displacement);
+    });
+    series.finish();
+    const SeriesFrame whole = read_frame(file, 1), cut = read_frame(file);
+    EXPECT_EQ(whole.mesh.nodes, built.mesh.nodes);
+    EXPECT_EQ(whole.displacement, frames[1]);
+    EXPECT_EQ(whole.time, 0.5);
+    EXPECT_EQ(whole.gone.tet_count(), 0);
+    EXPECT_EQ(cut.index, 2);
+    EXPECT_EQ(cut.mesh.tets, built.stages[1].model.mesh.tets);
+    EXPECT_EQ(cut.displacement, frames[2]);
+    EXPECT_EQ(cut.mesh.tet_count() + cut.gone.tet_count(), built.mesh.tet_count());
+    EXPECT_GE(cut.gone.nodes.row(2).minCoeff(), 50.0) << "the upper half";
+    for (const int absent : {-2, 3}) EXPECT_THROW(read_frame(file, absent), InvalidInput);
+    EXPECT_THROW(read_frame(folder / "probes.csv"), IoError);
     fs::remove_all(folder);
 }
 
