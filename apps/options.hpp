@@ -79,9 +79,10 @@ struct IntraoperativeOptions {
     std::filesystem::path initial_transform;  ///< fixed → moving points
     std::filesystem::path points, surface;    ///< of the moving frame, carried along
     int rounds = 8;
-    double tolerance = 0.05;   ///< mm
-    double fade = 60.0;        ///< mm
-    bool match_image = false;  ///< implied where the fixed image is all there is
+    double tolerance = 0.05;          ///< mm
+    double fade = 60.0;               ///< mm
+    std::string similarity = "auto";  ///< "auto", "self-similarity" or "linear-combination"
+    bool match_image = false;         ///< implied where the fixed image is all there is
     bool no_align = false;
     bool no_error_estimate = false;
     bool strict = false;  ///< a result that is doubted ends with exit code 4

@@ -32,6 +32,8 @@ UpdateOptions update_options(const RegistrationRun& run) {
     UpdateOptions result = on_device(options.device);
     result.align = !options.no_align;
     result.rematches = options.rounds;
+    if (options.similarity == "self-similarity") result.image.similarity = Similarity::SelfSimilarity;
+    if (options.similarity == "linear-combination") result.image.similarity = Similarity::LinearCombination;
     result.equilibrium.tolerance_mm = options.tolerance;
     if (run.dial) result.time_budget_s = run.dial->update_budget_s;
     return result;

@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <string>
+#include <string_view>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -33,6 +34,16 @@ std::pair<study::Family, std::vector<std::string>> family_of(std::vector<std::st
     return {Family::Solved, std::move(problems)};
 }
 
+/// "ultrasound:7-9": organs that navigation puts near to where they are, seen by ultrasound alone.
+void take_ultrasound(std::vector<std::string>& problems, study::CoverageOptions& plan) {
+    constexpr std::string_view name = "ultrasound:";
+    constexpr study::Misplacement of_navigation{4, 4};
+    if (problems.size() != 1 || !problems.front().starts_with(name)) return;
+    problems.front().replace(0, name.size(), "phantom:");
+    plan.phantom.misplacement = of_navigation;
+    plan.evidence = {study::Evidence::Ultrasound};
+}
+
 study::Evidence evidence_of(const std::string& name) {
     std::vector<std::string> names;
     for (const study::Evidence each : study::all_evidence) {
@@ -45,7 +56,9 @@ study::Evidence evidence_of(const std::string& name) {
 study::CoverageOptions plan_of(const StudyOptions& options, Observer& observer) {
     study::CoverageOptions plan;
     plan.update = on_device(options.device);
-    const auto [family, problems] = family_of(options.problems);
+    std::vector<std::string> wanted = options.problems;
+    take_ultrasound(wanted, plan);
+    const auto [family, problems] = family_of(std::move(wanted));
     plan.phantom.family = family;
     std::tie(plan.first_seed, plan.last_seed) = phantom_seeds(problems, {plan.first_seed, plan.last_seed});
     if (options.quick) plan.last_seed = std::min(plan.last_seed, plan.first_seed + 1);

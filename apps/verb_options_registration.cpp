@@ -124,6 +124,8 @@ void declare_method(Verb& verb, IntraoperativeOptions& o) {
     verb.number("--tolerance", o.tolerance, "MM", 1e-6, 10.0, "Accepted error of each equilibrium (mm)");
     verb.number("--fade", o.fade, "MM", 1.0, 1e4, "Distance from the organ where the field has become rigid (mm)");
     verb.flag("--match-image", o.match_image, "Match blocks of the images besides the other data");
+    verb.choice("--similarity", o.similarity, {"auto", "self-similarity", "linear-combination"},
+                "How images are compared; auto: linear-combination where --fixed is ultrasound");
     verb.flag("--no-align", o.no_align,
               "Skip the rigid alignment: the images share one frame, or --initial-transform tells the placement");
     verb.flag("--no-error-estimate", o.no_error_estimate, "Leave out how far off targets may lie, for speed");

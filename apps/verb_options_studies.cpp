@@ -87,11 +87,11 @@ void declare_study(Verb& verb, StudyOptions& o) {
         ->type_name("FOLDER");
     verb.list("--problems", o.problems, "NAME",
               "Of cube, brain, brainshift, liver, phantom:SEED; dial: phantom:FIRST-LAST; coverage: that, "
-              "bent:FIRST-LAST, organ:FIRST-LAST or found:FIRST-LAST")
+              "bent:FIRST-LAST, ultrasound:FIRST-LAST, organ:FIRST-LAST or found:FIRST-LAST")
         ->delimiter(',');
     verb.list("--evidence", o.evidence, "KIND",
               "What coverage registers to, of labels, surface, surface-and-points, points, curves, image, "
-              "degraded-image, partial-image, other-contrast; otherwise all of them")
+              "degraded-image, partial-image, other-contrast, ultrasound; otherwise all but the last")
         ->delimiter(',');
     verb.path("--organs", o.organs, "Label map whose organs organ:FIRST-LAST and found:FIRST-LAST take");
     verb.list("--fields", o.fields, "FILE", "Displacement fields of any program, which bend found:FIRST-LAST")

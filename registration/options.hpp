@@ -63,12 +63,21 @@ struct ConsistencyOptions {
 
 enum class Device { Auto, Cpu, Gpu };
 
+/// How two images are compared. Auto: by LinearCombination where the fixed one is ultrasound.
+enum class Similarity {
+    Auto,
+    SelfSimilarity,    ///< of any contrasts (MIND-SSC)
+    LinearCombination  ///< of ultrasound and an image of another kind (LC2; Wein et al., MICCAI 2013)
+};
+
 /// How blocks of a bare volume are searched and weighed (docs/method.md, section 8).
 struct ImageOptions {
+    Similarity similarity = Similarity::Auto;
     BlockMatchingOptions matching;
     ConsistencyOptions consistency;
     /// After the search for blocks, dense searches on grids so many times doubled from the blocks' finest. Templates of
-    /// grey values have none. Chosen among some 35 settings on brain shift, both brain sags and lung (docs/lab/results.md).
+    /// grey values have none. Chosen among some 35 settings on brain shift, both brain sags and lung
+    /// (docs/lab/results.md).
     std::vector<int> dense_coarsening{1, 1, 0};
     double expected_motion_mm = 100;  ///< of the organ's surface in the field of view of the intraoperative image: free
     double unseen_motion_mm = 0.8;    ///< and out of it, along its normal: what is around holds it there, …

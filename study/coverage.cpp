@@ -55,13 +55,18 @@ public:
             case Evidence::OtherContrast:
                 seen.image = images().other_contrast;
                 break;
+            case Evidence::Ultrasound:
+                seen.image = ultrasound().fixed;
+                break;
         }
         return seen;
     }
 
     /// As `tissuewarp register` would, which knows nothing of the tissue.
     const PreparedModel& prepared(Evidence evidence, Observer& observer) {
-        std::optional<PreparedModel>& model = evidence == Evidence::Labels ? for_labels_ : for_others_;
+        std::optional<PreparedModel>& model = evidence == Evidence::Labels       ? for_labels_
+                                              : evidence == Evidence::Ultrasound ? for_ultrasound_
+                                                                                 : for_others_;
         if (!model) {
             registration::PrepareOptions options;
             options.meshing.edge_length =
@@ -70,13 +75,17 @@ public:
                     : registration::suggested_edge_length_without_labels(phantom_.moving_labels);
             model = registration::prepare(phantom_.moving_labels, options, observer);
         }
-        if (is_image(evidence) && !model->image) registration::prepare_image(*model, images().moving, {}, observer);
+        if (is_image(evidence) && !model->image)
+            registration::prepare_image(
+                *model, evidence == Evidence::Ultrasound ? ultrasound().moving : images().moving, {}, observer);
         return *model;
     }
 
-    /// Of a partial image: whether it shows where the target is. Of everything else yes.
+    /// Of a partial image or ultrasound: whether it shows where the target is. Of everything else yes.
     bool in_view(Evidence evidence, Eigen::Index target) {
-        return evidence != Evidence::PartialImage || images().view.holds(phantom_.targets.fixed.col(target));
+        const Eigen::Vector3d place = phantom_.targets.fixed.col(target);
+        if (evidence == Evidence::Ultrasound) return ultrasound().shows(place);
+        return evidence != Evidence::PartialImage || images().view.holds(place);
     }
 
 private:
@@ -85,9 +94,15 @@ private:
         return *images_;
     }
 
+    const PhantomUltrasound& ultrasound() {
+        if (!ultrasound_) ultrasound_ = phantom_.ultrasound();
+        return *ultrasound_;
+    }
+
     const Phantom& phantom_;
     std::optional<PhantomImages> images_;
-    std::optional<PreparedModel> for_labels_, for_others_;
+    std::optional<PhantomUltrasound> ultrasound_;
+    std::optional<PreparedModel> for_labels_, for_others_, for_ultrasound_;
 };
 
 std::vector<CoverageRow> rows_of(const Phantom& phantom, Patient& patient, Evidence evidence,
@@ -110,8 +125,8 @@ std::vector<CoverageRow> rows_of(const Phantom& phantom, Patient& patient, Evide
         const auto place = locator.find(X);
         if (!estimates[k] || !place) continue;  // in the organ, out of its mesh
         const Eigen::Vector3d u = meshing::interpolate(prepared.model.mesh, nodal, *place);
-        rows.push_back({phantom.seed, evidence, static_cast<int>(k), X + u - is.col(column), z,
-                        doubts, u.norm(), patient.in_view(evidence, column), *estimates[k]});
+        rows.push_back({phantom.seed, evidence, static_cast<int>(k), X + u - is.col(column), z, doubts, u.norm(),
+                        patient.in_view(evidence, column), *estimates[k]});
     }
     return rows;
 }
@@ -153,8 +168,8 @@ private:
 }  // namespace
 
 const char* name_of(Evidence evidence) {
-    constexpr std::array names{"labels", "surface",        "surface-and-points", "points",        "curves",
-                               "image",  "degraded-image", "partial-image",      "other-contrast"};
+    constexpr std::array names{"labels", "surface",        "surface-and-points", "points",         "curves",
+                               "image",  "degraded-image", "partial-image",      "other-contrast", "ultrasound"};
     return names[static_cast<std::size_t>(evidence)];
 }
 

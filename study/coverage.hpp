@@ -26,18 +26,20 @@ enum class Evidence {
     Image,
     DegradedImage,
     PartialImage,
-    OtherContrast
+    OtherContrast,
+    Ultrasound
 };
 constexpr std::array all_evidence{Evidence::Labels,        Evidence::Surface,      Evidence::SurfaceAndPoints,
                                   Evidence::Points,        Evidence::Curves,       Evidence::Image,
-                                  Evidence::DegradedImage, Evidence::PartialImage, Evidence::OtherContrast};
+                                  Evidence::DegradedImage, Evidence::PartialImage, Evidence::OtherContrast,
+                                  Evidence::Ultrasound};
 /// "labels", "surface", "surface-and-points", "points", "curves", "image", "degraded-image", "partial-image",
-/// "other-contrast".
+/// "other-contrast", "ultrasound".
 const char* name_of(Evidence evidence);
 
 struct CoverageOptions {
     std::uint64_t first_seed = 1001, last_seed = 1120;
-    std::vector<Evidence> evidence{all_evidence.begin(), all_evidence.end()};
+    std::vector<Evidence> evidence{all_evidence.begin(), all_evidence.end() - 1};  ///< without ultrasound
     PhantomOptions phantom;
     registration::UpdateOptions update;
     registration::UncertaintyOptions uncertainty;

@@ -15,14 +15,14 @@ using report::Scale;
 
 FigureCurve curve_of(const Coverage& coverage) {
     constexpr std::array<const char*, all_evidence.size()> colours{
-        "#1d4ed8", "#c2410c", "#047857", "#a21caf", "#0e7490", "#111827", "#b91c1c", "#a16207", "#6d28d9"};
+        "#1d4ed8", "#c2410c", "#047857", "#a21caf", "#0e7490", "#111827", "#b91c1c", "#a16207", "#6d28d9", "#4d7c0f"};
     return {colours[static_cast<std::size_t>(coverage.evidence)]};
 }
 
 std::string label_of(const Coverage& c) {
     constexpr std::array<const char*, all_evidence.size()> words{
-        "labels", "part of the surface", "surface and points", "points alone",  "vessels",
-        "image",  "degraded image",      "part of an image",   "other contrast"};
+        "labels", "part of the surface", "surface and points", "points alone",   "vessels",
+        "image",  "degraded image",      "part of an image",   "other contrast", "ultrasound"};
     return std::string(words[static_cast<std::size_t>(c.evidence)]) + (c.in_view ? "" : ", unseen") + " (" +
            std::to_string(c.phantoms) + " phantoms" + (c.unknown_share < 1 ? ")" : ", not trusted)");
 }

@@ -12,6 +12,7 @@
 #include "study/detail/random_loads.hpp"
 #include "study/detail/random_tissue.hpp"
 #include "study/detail/truth.hpp"
+#include "study/detail/ultrasound_phantom.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -44,18 +45,19 @@ void require_valid(const PhantomOptions& options) {
     require_between("the deviation of boundaries in mm", options.boundary_deviation_mm, 0, 3);
     require_between("the deviation of points in mm", options.point_deviation_mm, 0.01, 5);
     require_between("the number of targets", options.targets, 1, 100000);
+    if (options.misplacement) {
+        require_between("the misplacement in degrees", options.misplacement->most_deg, 0, 90);
+        require_between("the misplacement in mm", options.misplacement->most_mm, 0, 100);
+    }
     if (takes_organs(options.family) && options.organs.voxels.empty())
         throw InvalidInput("phantom: give the label map whose organs are to be bent");
     if (options.family == Family::Found && options.fields.empty())
         throw InvalidInput("phantom: give the displacement fields that are to bend organs");
 }
 
-struct Motion {
-    double most_deg, most_mm;
-};
-constexpr Motion solved_motion{10, 10}, bent_motion{20, 20};
+constexpr Misplacement solved_motion{10, 10}, bent_motion{20, 20};
 
-Eigen::Isometry3d random_motion(const Vector3d& centre, const Motion& most, detail::Random& random) {
+Eigen::Isometry3d random_motion(const Vector3d& centre, const Misplacement& most, detail::Random& random) {
     const double angle = random.uniform(0, most.most_deg) * EIGEN_PI / 180;
     const Vector3d axis = random.direction(), shift = random.uniform(0, most.most_mm) * random.direction();
     Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
@@ -93,12 +95,16 @@ constexpr double least_seen = 0.25, most_seen = 0.5;  // share of the surface
 /// What all families have in common: vessels and images, drawn from numbers of their own.
 void add_vessels_and_images(Phantom& phantom, const detail::TrueTissue& tissue, std::uint64_t seed,
                             const PhantomOptions& options) {
-    constexpr std::uint64_t of_vessels = 101, of_images = 102;
+    constexpr std::uint64_t of_vessels = 101, of_images = 102, of_ultrasound = 103;
     detail::Random random(derived(seed, of_vessels));
     phantom.curves = detail::vessels(tissue, options.point_deviation_mm, random);
     phantom.images = [tissue, seed] {
         detail::Random of_its_own(derived(seed, of_images));
         return detail::drawn_images(tissue, of_its_own);
+    };
+    phantom.ultrasound = [tissue, seed] {
+        detail::Random of_its_own(derived(seed, of_ultrasound));
+        return detail::drawn_ultrasound(tissue, of_its_own);
     };
 }
 
@@ -134,7 +140,8 @@ Phantom solved_phantom(std::uint64_t seed, const PhantomOptions& options, Observ
     const detail::OrganShape& shape = organ.shape;
     const double motion_mm = random.uniform(3, std::min(15.0, strain * shape.length()));
     const int elements = least_elements + random.index(most_elements - least_elements);
-    const Eigen::Isometry3d placement = random_motion(shape.centre(), solved_motion, random);
+    const Eigen::Isometry3d placement =
+        random_motion(shape.centre(), options.misplacement.value_or(solved_motion), random);
     const double seen_share = random.uniform(least_seen, most_seen);
     const int pairs = least_pairs + random.index(more_pairs);
 
@@ -187,7 +194,8 @@ Phantom bent_phantom(detail::TrueTissue tissue, imaging::Volume moving_labels, c
     const double seen_share = random.uniform(least_seen, most_seen);
     const int pairs = least_pairs + random.index(more_pairs);
     const Bend bend = random_bend(tissue, motion_mm, options, random);
-    const Eigen::Isometry3d placement = random_motion(tissue.centre, bent_motion, random);
+    const Eigen::Isometry3d placement =
+        random_motion(tissue.centre, options.misplacement.value_or(bent_motion), random);
     tissue.forward = [=](const Vector3d& X) { return Vector3d(placement * bend.forward(X)); };
     tissue.backward = [=](const Vector3d& x) { return bend.backward(placement.inverse() * x); };
     tissue.placement = placement;

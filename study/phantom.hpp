@@ -10,6 +10,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,11 @@ enum class Family {
     Found      ///< organs of a real label map; a motion that another program found between images
 };
 
+/// How far the organ as a whole is from where the headers put it, at most; along and about any axis.
+struct Misplacement {
+    double most_deg = 0, most_mm = 0;
+};
+
 struct PhantomOptions {
     Family family = Family::Solved;
     imaging::Volume organs = {};               ///< label map whose organs are taken, where they are Labelled or Found
@@ -32,6 +38,7 @@ struct PhantomOptions {
     double boundary_deviation_mm = 0.5;        ///< of the boundaries drawn in the intraoperative map, smooth over 10 mm
     double point_deviation_mm = 0.7;           ///< of surface points and pairs, along each axis
     int targets = 150;                         ///< places all over the organ
+    std::optional<Misplacement> misplacement = {};  ///< none: what the family has, 10 or 20 degrees and mm
 };
 
 struct Ball {
@@ -51,17 +58,25 @@ struct PhantomImages {
     Ball view;                       ///< fixed frame; holds 35 to 70 % of the organ
 };
 
+/// An image before, and ultrasound during the operation.
+struct PhantomUltrasound {
+    imaging::Volume moving;                             ///< as of magnetic resonance, float32
+    imaging::Volume fixed;                              ///< of a tracked sweep, compounded; 0 outside of the fan
+    std::function<bool(const Eigen::Vector3d&)> shows;  ///< whether a place (fixed frame) lies in the fan
+};
+
 /// One patient: what a registration is given, and what is true.
 struct Phantom {
     std::uint64_t seed = 0;
-    std::string story;                      ///< shape, tissue, what moves it, one line
-    imaging::Volume moving_labels;          ///< 0 outside, 1 organ, 2 inclusion; moving frame
-    imaging::Volume fixed_labels;           ///< the same drawn anew in the fixed frame, with boundary noise
-    registration::SurfacePoints surface;    ///< of a part of the organ's surface, fixed frame
-    registration::PointPairs points;        ///< a few places in the organ
-    registration::Curves curves;            ///< vessels through it
-    registration::Landmarks targets;        ///< moving and true fixed positions, LPS mm
-    std::function<PhantomImages()> images;  ///< drawn when asked for: they take seconds
+    std::string story;                              ///< shape, tissue, what moves it, one line
+    imaging::Volume moving_labels;                  ///< 0 outside, 1 organ, 2 inclusion; moving frame
+    imaging::Volume fixed_labels;                   ///< the same drawn anew in the fixed frame, with boundary noise
+    registration::SurfacePoints surface;            ///< of a part of the organ's surface, fixed frame
+    registration::PointPairs points;                ///< a few places in the organ
+    registration::Curves curves;                    ///< vessels through it
+    registration::Landmarks targets;                ///< moving and true fixed positions, LPS mm
+    std::function<PhantomImages()> images;          ///< drawn when asked for: they take seconds
+    std::function<PhantomUltrasound()> ultrasound;  ///< likewise
 };
 
 /// The same seed gives the same phantom, bit for bit on one machine; others round differently. Throws SolverFailure

@@ -1,5 +1,7 @@
 #include "registration/matching/image_search.hpp"
 
+#include "registration/matching/points/field_of_view.hpp"
+#include "registration/matching/ultrasound/speckle.hpp"
 #include "registration/springs/pull.hpp"
 
 #include <tbb/parallel_for.h>
@@ -18,11 +20,32 @@ ImageSearch::ImageSearch(const meshing::TetMesh& mesh, const ImageModel& moving,
       engine_(*tools.engine),
       dense_(mesh, moving, engine_) {
     engine_.finish_fixed(fixed_);
+    const bool stated = options.similarity == Similarity::LinearCombination;
+    if (stated || (options.similarity == Similarity::Auto && shows_echoes()))
+        ultrasound_.emplace(mesh, moving.image, fixed_);
+}
+
+bool ImageSearch::shows_echoes() const {
+    constexpr double most_found = 0.1;  // of the blocks that are expected to be seen
+    if (!is_speckled(fixed_)) return false;
+    const State by_headers{Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, mesh_.nodes.cols())};
+    const Eigen::Matrix3Xd& points = moving_.blocks.points();
+    const FieldOfView view(fixed_.seen);
+    Eigen::Index expected = 0;
+    for (Eigen::Index n = 0; n < points.cols(); ++n) expected += view.distance(points.col(n)) < 0;
+    if (expected == 0) return false;
+    return double(block_search(by_headers, silent_observer()).matches.size()) < most_found * double(expected);
+}
+
+std::optional<EchoPose> ImageSearch::echo_pose(const State& state, Observer& observer) {
+    return ultrasound_ ? std::optional(ultrasound_->pose(state, observer)) : std::nullopt;
 }
 
 LocatedMatches ImageSearch::search(const State& state, Observer& observer) {
-    LocatedMatches found = done_ == 0 ? block_search(state, observer) : dense_search(state);
-    if (done_ == 0) blocks_ = found;
+    LocatedMatches found = ultrasound_  ? echo_search(state)
+                           : done_ == 0 ? block_search(state, observer)
+                                        : dense_search(state);
+    if (done_ == 0 && !ultrasound_) blocks_ = found;
     ++done_;
     return found;
 }
@@ -45,6 +68,13 @@ LocatedMatches ImageSearch::dense_search(const State& state) {
     last_coarsening_ = coarsening;
     agreement_ = dense.agreement;
     return std::move(dense.found);
+}
+
+LocatedMatches ImageSearch::echo_search(const State& state) {
+    DenseMatches echoes = ultrasound_->matches(state, done_, locator_);
+    agreement_ = echoes.agreement;
+    blocks_ = echoes.found;
+    return std::move(echoes.found);
 }
 
 Eigen::Matrix3Xd ImageSearch::deformed(const Eigen::Matrix3Xd& points, const State& state) const {

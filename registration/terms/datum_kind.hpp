@@ -47,6 +47,8 @@ inline DatumKind image_kind(const imaging::Geometry& moving, const imaging::Geom
                             std::clamp(agreement, shared_errors.least_agreement, shared_errors.full_agreement);
     return {shared_errors.image_voxels * edge * doubtful, 0};
 }
+/// Chosen on `study coverage --problems ultrasound:1-12` (docs/decisions/ultrasound.md).
+inline constexpr DatumKind ultrasound_kind{0.8, 0};
 inline DatumKind surface_kind(const imaging::Geometry& moving) {
     return {shared_errors.surface_voxels * moving.spacing.maxCoeff(), shared_errors.shows_mm};
 }

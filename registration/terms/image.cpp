@@ -30,9 +30,8 @@ double median_distance(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
 
 }  // namespace
 
-std::vector<Doubt> doubts_of(const ImageFit& fit, const std::string& name) {
+std::vector<Doubt> doubts_of(const ImageFit& fit, const std::string& name, const ImageDoubtLimits& limits) {
     std::vector<Doubt> doubts;
-    constexpr ImageDoubtLimits limits = image_doubt_limits;
     if (fit.matched < limits.least_matched * fit.blocks)
         doubts.push_back({"image.blocks_lost", fit.matched / double(fit.blocks), limits.least_matched,
                           "only " + std::to_string(fit.matched) + " of " + std::to_string(fit.blocks) +
@@ -67,7 +66,16 @@ ImageTerm::ImageTerm(const PreparedModel& prepared, const ImageModel& moving, co
       view_(search_.seen()),
       fixed_grid_(fixed.geometry) {}
 
+void ImageTerm::tell_similarity(Observer& observer) {
+    if (told_ || search_.similarity() != Similarity::LinearCombination) return;
+    told_ = true;
+    observer.note("the fixed " + name_ +
+                  " is taken for ultrasound: what the moving one shows is fitted to its echoes, on the processor "
+                  "(--similarity states how images are compared)");
+}
+
 void ImageTerm::search(const State& state, Observer& observer) {
+    tell_similarity(observer);
     LocatedMatches located = search_.search(state, observer);
     found_.matches = std::move(located.matches);
     found_.places = std::move(located.places);
@@ -81,7 +89,14 @@ void ImageTerm::search(const State& state, Observer& observer) {
 }
 
 Alignment ImageTerm::pose(const Eigen::Isometry3d& /*start*/, Observer& observer) {
-    search({Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, prepared_.rest.node_count)}, observer);
+    const State by_headers{Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, prepared_.rest.node_count)};
+    echo_pose_ = search_.echo_pose(by_headers, observer);
+    if (echo_pose_) {
+        tell_similarity(observer);
+        has_placed_ = true;
+        return {echo_pose_->motion, 0};
+    }
+    search(by_headers, observer);
     const std::optional<Eigen::Isometry3d> motion = rigid_motion();
     has_placed_ = motion.has_value();
     return {motion.value_or(Eigen::Isometry3d::Identity()), 0};
@@ -144,8 +159,10 @@ Contribution ImageTerm::linearise(const RoundPlan& plan, const State& state, Obs
     result.candidates = std::max(static_cast<int>(moving_.blocks.points().cols()), static_cast<int>(matches.size()));
     result.matched = static_cast<int>(matches.size());
     result.mean_residual_mm = mean_residual(matches);
-    const DatumKind kind =
-        image_kind(moving_.image.geometry, fixed_grid_, search_.agreement().value_or(shared_errors.full_agreement));
+    const bool echoes = search_.similarity() == Similarity::LinearCombination;
+    const DatumKind kind = echoes ? ultrasound_kind
+                                  : image_kind(moving_.image.geometry, fixed_grid_,
+                                               search_.agreement().value_or(shared_errors.full_agreement));
     result.springs = pulled_by(kind, lumped_springs(found_.shares, memory_.forces, state.displacement));
     for (PulledNode& pulled : result.springs)
         if (view_.distance(state.placement * (prepared_.model.mesh.nodes.col(pulled.spring.node) +
@@ -163,8 +180,9 @@ int ImageTerm::blocks_in_view(const State& state) const {
 
 ImageFit ImageTerm::fit(const State& state) {
     const Eigen::Matrix3Xd& nodes = prepared_.model.mesh.nodes;
+    const bool echoes = search_.similarity() == Similarity::LinearCombination;
     ImageFit fit;
-    fit.blocks = blocks_in_view(state);
+    fit.blocks = echoes ? search_.places_sought() : blocks_in_view(state);
     fit.matched = static_cast<int>(search_.blocks_found());
     std::vector<Eigen::Vector3d> places;
     places.reserve(found_.matches.size());
@@ -180,13 +198,41 @@ ImageFit ImageTerm::fit(const State& state) {
         std::plus<>());
     fit.shown_share = double(shown) / double(nodes.cols());
     fit.residual_mm = mean_residual(pulled(state));
-    fit.agreement = search_.agreement();
+    if (!echoes) fit.agreement = search_.agreement();
     return fit;
 }
 
 void ImageTerm::judge(const State& state, UpdateResult& result) {
     result.images.push_back(fit(state));
-    for (Doubt& doubt : doubts_of(result.images.back(), name_)) result.doubts.push_back(std::move(doubt));
+    ImageDoubtLimits limits = image_doubt_limits;
+    if (search_.similarity() == Similarity::LinearCombination)
+        limits.most_residual_mm = echo_doubt_limits.most_residual_mm;
+    for (Doubt& doubt : doubts_of(result.images.back(), name_, limits)) result.doubts.push_back(std::move(doubt));
+    for (Doubt& doubt : echo_doubts()) result.doubts.push_back(std::move(doubt));
+}
+
+std::vector<Doubt> ImageTerm::echo_doubts() const {
+    if (search_.similarity() != Similarity::LinearCombination) return {};
+    constexpr EchoDoubtLimits limits = echo_doubt_limits;
+    std::vector<Doubt> doubts;
+    const double agreement = search_.agreement().value_or(0);
+    if (agreement < limits.least_agreement)
+        doubts.push_back({"image.echoes_unexplained", agreement, limits.least_agreement,
+                          "the moving " + name_ + " explains little of the echoes where the organ lies (" +
+                              to_text(agreement) + " of what chance leaves)",
+                          "check that they show the same organ, and look where the result lies"});
+    if (!echo_pose_) return doubts;
+    const auto& [motion, support, rival_mm, rival_support] = *echo_pose_;
+    if (support < limits.least_support)
+        doubts.push_back({"image.pose_unclear", support, limits.least_support,
+                          "the ultrasound hardly tells where the organ lies as a whole",
+                          "bring the images nearer with --initial-transform, or give pairs of points"});
+    if (rival_mm > 0 && rival_support > limits.most_rival * support)
+        doubts.push_back(
+            {"image.two_poses", rival_support / support, limits.most_rival,
+             "the ultrasound fits nearly as well " + to_text(rival_mm) + " mm from where the organ was put",
+             "bring the images nearer with --initial-transform, or give pairs of points"});
+    return doubts;
 }
 
 }  // namespace tissuewarp::registration::detail

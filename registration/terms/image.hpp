@@ -24,8 +24,14 @@ struct ImagePoseOptions {
 };
 inline constexpr ImagePoseOptions image_pose_options{};
 
-/// What is to be said against a registration that fits an image of this name so.
-std::vector<Doubt> doubts_of(const ImageFit& fit, const std::string& name = "image");
+/// What ultrasound is doubted for.
+struct EchoDoubtLimits {
+    double least_agreement = 0.05;  ///< UltrasoundSearch: of the variance that chance leaves
+    double most_rival = 0.8;        ///< support of the second-best pose over that of the best
+    double least_support = 6;       ///< of the pose: logarithm of the odds against chance
+    double most_residual_mm = 2;    ///< as ImageDoubtLimits'; single places of ultrasound err more than blocks do
+};
+inline constexpr EchoDoubtLimits echo_doubt_limits{};
 
 /// What an image may show without a doubt. Chosen by hand, but for the agreement; on which data is not recorded.
 struct ImageDoubtLimits {
@@ -39,6 +45,10 @@ struct ImageDoubtLimits {
     double least_agreement = 0.25;
 };
 inline constexpr ImageDoubtLimits image_doubt_limits{};
+
+/// What is to be said against a registration that fits an image of this name so.
+std::vector<Doubt> doubts_of(const ImageFit& fit, const std::string& name = "image",
+                             const ImageDoubtLimits& limits = image_doubt_limits);
 
 class ImageTerm : public Term {
 public:
@@ -93,17 +103,20 @@ private:
     ImageSearch search_;
     FieldOfView view_;
     imaging::Geometry fixed_grid_;
-    bool has_placed_ = false;
+    bool has_placed_ = false, told_ = false;
+    std::optional<EchoPose> echo_pose_;
     Found found_;
     Memory memory_;
 
     void search(const State& state, Observer& observer);
+    void tell_similarity(Observer& observer);
     [[nodiscard]] std::optional<Eigen::Isometry3d> rigid_motion() const;
     /// Of all matches, in `memory_`.
     const std::vector<PulledMatch>& pulled(const State& state);
     /// Blocks whose places in this state the fixed image shows.
     [[nodiscard]] int blocks_in_view(const State& state) const;
     [[nodiscard]] ImageFit fit(const State& state);
+    [[nodiscard]] std::vector<Doubt> echo_doubts() const;
 
     static double mean_residual(const std::vector<PulledMatch>& matches);
 };

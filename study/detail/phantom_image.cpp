@@ -2,12 +2,9 @@
 
 #include "imaging/filters.hpp"
 #include "study/detail/phantom_data.hpp"
-#include "study/detail/smooth_noise.hpp"
-
-#include <tbb/parallel_for.h>
+#include "study/detail/texture.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <vector>
 
@@ -18,41 +15,6 @@ using Eigen::Vector3d;
 namespace {
 
 constexpr double voxel_mm = 1.5;
-
-/// What tissue looks like, as a function of where it was at rest. Between 20 and 200 or so.
-class Texture {
-public:
-    explicit Texture(Random& random) : one_(1, 12, random), other_(1, 12, random) {
-        for (const double length : {3.0, 6.0, 12.0, 24.0}) octaves_.emplace_back(7, length, random);
-        for (double& level : levels_) level = random.uniform(70, 140);
-    }
-    double operator()(const Vector3d& point, int label) const {
-        constexpr double vessel_width = 0.12, vessel_depth = 40;  // where two smooth fields are 0 together
-        double value = levels_[std::size_t(label)];
-        for (const SmoothValues& octave : octaves_) value += octave(point);
-        const double off = std::pow(one_(point), 2) + std::pow(other_(point), 2);
-        return value + vessel_depth * std::exp(-off / (2 * vessel_width * vessel_width));
-    }
-
-private:
-    std::array<double, 3> levels_{};
-    std::vector<SmoothValues> octaves_;
-    SmoothValues one_, other_;
-};
-
-template <class Value>
-imaging::Volume filled(const imaging::Geometry& grid, const Value& value) {
-    imaging::Volume image(grid, CV_32FC1);
-    auto* voxels = image.data<float>();
-    const std::int64_t slice = std::int64_t{grid.size[0]} * grid.size[1];
-    tbb::parallel_for(0, grid.size[2], [&](int k) {
-        for (int j = 0; j < grid.size[1]; ++j)
-            for (int i = 0; i < grid.size[0]; ++i)
-                voxels[slice * k + std::int64_t{grid.size[0]} * j + i] =
-                    static_cast<float>(value(grid.point({double(i), double(j), double(k)})));
-    });
-    return image;
-}
 
 /// Dark where it was bright and the other way round, not linearly; 0 stays 0.
 imaging::Volume other_contrast(const imaging::Volume& image) {
@@ -82,15 +44,6 @@ imaging::Volume thick_slices(const imaging::Volume& image) {
     return result;
 }
 
-/// Rician.
-imaging::Volume noisy(const imaging::Volume& clean, double deviation, Random& random) {
-    imaging::Volume image = clean.clone();
-    float* value = image.data<float>();
-    for (std::int64_t n = 0; n < image.geometry.voxel_count(); ++n)
-        value[n] = static_cast<float>(std::hypot(value[n] + deviation * random.normal(), deviation * random.normal()));
-    return image;
-}
-
 /// Everything outside a ball becomes 0.
 imaging::Volume within(const imaging::Volume& whole, const Ball& view) {
     imaging::Volume image = whole.clone();
@@ -101,10 +54,6 @@ imaging::Volume within(const imaging::Volume& whole, const Ball& view) {
             for (int i = 0; i < grid.size[0]; ++i, ++value)
                 if (!view.holds(grid.point({double(i), double(j), double(k)}))) *value = 0;
     return image;
-}
-
-Eigen::Matrix3d small_turn(double most_deg, Random& random) {
-    return Eigen::AngleAxisd(random.uniform(0, most_deg) * EIGEN_PI / 180, random.direction()).toRotationMatrix();
 }
 
 /// A ball about a point of the surface that holds a share of these points.

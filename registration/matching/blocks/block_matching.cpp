@@ -1,5 +1,5 @@
 #include "registration/matching/blocks/block_search.hpp"
-#include "registration/matching/blocks/quadratic_fit.hpp"
+#include "registration/matching/blocks/cost_minimum.hpp"
 #include "registration/matching/blocks/squared_differences.hpp"
 #include "registration/matching/consistency/local_affine.hpp"
 #include "registration/matching/descriptors/matching_grid.hpp"
@@ -16,10 +16,13 @@
 
 namespace tissuewarp::registration {
 
+using detail::as_vector;
 using detail::BlockSight;
 using detail::CostLattice;
 using detail::FixedBlocks;
 using detail::MatchingImage;
+using detail::Minimum;
+using detail::minimum_of;
 using detail::SoughtBlock;
 using detail::Voxel;
 using imaging::Volume;
@@ -38,53 +41,6 @@ Voxel nearest_voxel(const imaging::Geometry& grid, const Eigen::Vector3d& point)
         voxel[a] = static_cast<int>(std::clamp(rounded, -1e6, 1e6));  // far off any grid stays far off
     }
     return voxel;
-}
-
-Eigen::Vector3d as_vector(const Voxel& v) {
-    return {double(v[0]), double(v[1]), double(v[2])};
-}
-
-/// A minimum of the cost over a lattice.
-struct Minimum {
-    Voxel at{0, 0, 0};
-    double cost = 0;
-    detail::Quadratic fit{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()};
-
-    [[nodiscard]] Eigen::Vector3d index() const { return as_vector(at) + fit.minimum; }
-};
-
-/// How clearly the minimum stands out: the least rise of cost, over the mean rise in the lattice, among the places
-/// that the curvature says are clearly worse. Along an edge the curvature says no such thing, and no place is a rival.
-double uniqueness(const CostLattice& lattice, const Minimum& minimum) {
-    double total = 0;
-    int count = 0;
-    for (const double cost : lattice.costs)
-        if (std::isfinite(cost)) {
-            total += cost - minimum.cost;
-            ++count;
-        }
-    const double mean_rise = total / std::max(count, 1);
-    double least = 0;
-    bool found = false;
-    for (std::size_t n = 0; n < lattice.costs.size(); ++n) {
-        if (!std::isfinite(lattice.costs[n])) continue;
-        const double rise = lattice.costs[n] - minimum.cost;
-        if (found && rise >= least) continue;
-        const Eigen::Vector3d away = as_vector(lattice.place(n)) - as_vector(minimum.at);
-        if (0.5 * away.dot(minimum.fit.hessian * away) <= mean_rise) continue;
-        least = rise;
-        found = true;
-    }
-    return found && mean_rise > 0 ? std::clamp(least / mean_rise, 0.0, 1.0) : 0.0;
-}
-
-/// The minimum of the costs about a place.
-std::optional<Minimum> minimum_of(const CostLattice& near) {
-    std::array<double, 27> about{};
-    std::copy(near.costs.begin(), near.costs.end(), about.begin());
-    const auto fit = detail::fit_quadratic(about);
-    if (!fit) return std::nullopt;
-    return Minimum{near.centre, about[13], *fit};
 }
 
 /// Error (voxels) of the way back, along what the block shows: it should lead to where the first block lay.
@@ -294,7 +250,7 @@ private:
         result.moving = level.moving.grid.point(as_vector(block));
         result.fixed = level.grid.point(found->index());
         result.cost = found->cost;
-        result.uniqueness = uniqueness(sight.first, *found);
+        result.uniqueness = detail::uniqueness(sight.first, *found);
         result.back_match_mm = error * level.grid.spacing[0];
         result.confidence = result.uniqueness * std::exp(-0.5 * scaled * scaled);
         result.information = information(*found, level.grid, moving_.options.block_radius);

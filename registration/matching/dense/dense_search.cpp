@@ -21,7 +21,8 @@ Eigen::Matrix3d deformation_gradient(const meshing::TetMesh& mesh, const State& 
     return state.placement.linear() * deformed * rest.inverse();
 }
 
-/// A force on the moving grid, seen from the fixed image.
+}  // namespace
+
 BlockMatch as_match(const DenseForce& force, const meshing::TetMesh& mesh, const State& state,
                     const meshing::Location& at) {
     const Eigen::Matrix3d F = deformation_gradient(mesh, state, at.tet), back = F.inverse();
@@ -32,8 +33,6 @@ BlockMatch as_match(const DenseForce& force, const meshing::TetMesh& mesh, const
     match.information = back.transpose() * force.information * back;
     return match;
 }
-
-}  // namespace
 
 DenseSearch::DenseSearch(const meshing::TetMesh& mesh, const ImageModel& image, ImageEngine& engine)
     : mesh_(mesh), image_(image), engine_(engine) {}

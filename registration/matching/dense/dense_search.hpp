@@ -37,6 +37,10 @@ struct DenseMatches {
     double agreement = 0;  ///< of both images as far as they show the organ: DenseForces::agreement
 };
 
+/// A force on the moving grid, seen from the fixed image.
+BlockMatch as_match(const DenseForce& force, const meshing::TetMesh& mesh, const State& state,
+                    const meshing::Location& at);
+
 class DenseSearch {
 public:
     /// `engine` has been made for both and given the fixed image.

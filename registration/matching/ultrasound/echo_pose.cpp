@@ -1,0 +1,206 @@
+#include "registration/matching/ultrasound/echo_pose.hpp"
+
+#include <tbb/parallel_for.h>
+#include <nlopt.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+using Pose = std::array<double, 6>;  // shift of the middle and rotation vector times the radius, mm
+
+class PoseEvidence {
+public:
+    PoseEvidence(const EchoCosts& costs, const EchoPoseOptions& options) : costs_(costs), options_(options) {
+        const std::size_t lattice = costs.lattice();
+        const double independent = costs.places.voxel_volume() / options.independent_mm3;
+        evidence_.resize(costs.cost.size());
+        places_.resize(3, static_cast<Eigen::Index>(costs.at.size()));
+        for (std::size_t n = 0; n < costs.at.size(); ++n) {
+            places_.col(static_cast<Eigen::Index>(n)) = costs.place(n);
+            add_evidence(costs.of(n), lattice, independent * costs.window_share[n], evidence_.data() + n * lattice);
+        }
+        centre_ = places_.rowwise().mean();
+        radius_ = std::sqrt((places_.colwise() - centre_).colwise().squaredNorm().mean());
+    }
+
+    [[nodiscard]] double radius() const { return radius_; }
+
+    /// −log posterior of a pose, 0 by chance where the headers put the organ.
+    [[nodiscard]] double operator()(const Pose& pose) const {
+        const Eigen::Isometry3d back = motion(pose).inverse();
+        const Eigen::Matrix3d along = costs_.places.direction.transpose() / costs_.step_mm;
+        double sum = 0;
+        for (Eigen::Index n = 0; n < places_.cols(); ++n)
+            sum += at(static_cast<std::size_t>(n), along * (places_.col(n) - back * places_.col(n)));
+        return sum + expectation(pose);
+    }
+
+    [[nodiscard]] Eigen::Isometry3d motion(const Pose& pose) const {
+        const Eigen::Vector3d rotation = Eigen::Vector3d(pose[3], pose[4], pose[5]) / radius_;
+        const double angle = rotation.norm();
+        Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
+        if (angle > 0) result.linear() = Eigen::AngleAxisd(angle, rotation / angle).toRotationMatrix();
+        result.translation() = centre_ + Eigen::Vector3d(pose[0], pose[1], pose[2]) - result.linear() * centre_;
+        return result;
+    }
+
+    /// Mean over the places.
+    [[nodiscard]] double distance(const Pose& a, const Pose& b) const {
+        return (motion(a) * places_ - motion(b) * places_).colwise().norm().mean();
+    }
+
+    /// The shifts that are lower than their neighbours, the lowest first.
+    [[nodiscard]] std::vector<Pose> lowest_shifts() const {
+        const std::size_t lattice = costs_.lattice();
+        std::vector<Pose> shifts(lattice);
+        std::vector<double> costs(lattice);
+        tbb::parallel_for(std::size_t{0}, lattice, [&](std::size_t entry) {
+            const Eigen::Vector3d shift =
+                costs_.places.direction * (costs_.step_mm * costs_.shift(entry).cast<double>());
+            shifts[entry] = {shift[0], shift[1], shift[2], 0, 0, 0};
+            costs[entry] = (*this)(shifts[entry]);
+        });
+        std::vector<std::size_t> order(lattice);
+        std::iota(order.begin(), order.end(), std::size_t{0});
+        std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return costs[a] < costs[b]; });
+        std::vector<Pose> result;
+        for (const std::size_t entry : order) {
+            const bool alone = std::none_of(result.begin(), result.end(), [&](const Pose& other) {
+                return distance(other, shifts[entry]) < 1.5 * costs_.step_mm;
+            });
+            if (alone) result.push_back(shifts[entry]);
+            if (static_cast<int>(result.size()) == options_.starts) break;
+        }
+        return result;
+    }
+
+private:
+    const EchoCosts& costs_;
+    const EchoPoseOptions& options_;
+    std::vector<float> evidence_;  // −log odds of each shift of each place against chance
+    Eigen::Matrix3Xd places_;
+    Eigen::Vector3d centre_;
+    double radius_ = 1;
+
+    static void add_evidence(const float* cost, std::size_t lattice, double independent, float* evidence) {
+        constexpr double least_cost = 1e-3;
+        double sum = 0;
+        int count = 0;
+        for (std::size_t entry = 0; entry < lattice; ++entry)
+            if (std::isfinite(cost[entry])) {
+                sum += std::log(std::max<double>(cost[entry], least_cost));
+                ++count;
+            }
+        const double chance = count > 0 ? sum / count : 0;
+        for (std::size_t entry = 0; entry < lattice; ++entry)
+            evidence[entry] = !std::isfinite(cost[entry])
+                                  ? 0.F
+                                  : static_cast<float>(0.5 * independent *
+                                                       (std::log(std::max<double>(cost[entry], least_cost)) - chance));
+    }
+
+    /// By quadratic B-splines: between the steps of a linear interpolation there are no minima. Beyond the lattice
+    /// nothing is known.
+    [[nodiscard]] double at(std::size_t n, const Eigen::Vector3d& shift) const {
+        const int side = costs_.side();
+        std::array<int, 3> low{};
+        std::array<std::array<double, 3>, 3> weight{};
+        for (std::size_t a = 0; a < 3; ++a) {
+            const double x = shift[static_cast<Eigen::Index>(a)] + costs_.reach, middle = std::round(x), t = x - middle;
+            if (!(middle >= 1 && middle <= side - 2)) return 0;
+            low[a] = static_cast<int>(middle) - 1;
+            weight[a] = {0.5 * (0.5 - t) * (0.5 - t), 0.75 - t * t, 0.5 * (0.5 + t) * (0.5 + t)};
+        }
+        const float* e = evidence_.data() + n * costs_.lattice() + low[0] + side * (low[1] + side * low[2]);
+        double sum = 0;
+        for (std::size_t k = 0; k < 3; ++k)
+            for (std::size_t j = 0; j < 3; ++j, e += side) {
+                sum += weight[2][k] * weight[1][j] * (weight[0][0] * e[0] + weight[0][1] * e[1] + weight[0][2] * e[2]);
+                if (j == 2) e += side * (side - 3);
+            }
+        return sum;
+    }
+
+    [[nodiscard]] double expectation(const Pose& pose) const {
+        const double shift = std::hypot(pose[0], pose[1], pose[2]) / options_.shift_mm,
+                     turn = std::hypot(pose[3], pose[4], pose[5]) / radius_ / (options_.turn_deg * EIGEN_PI / 180);
+        return 0.5 * (shift * shift + turn * turn);
+    }
+};
+
+struct Found {
+    Pose pose{};
+    double cost = 0;
+};
+
+Found descended(const PoseEvidence& evidence, const Pose& start, const EchoPoseOptions& options) {
+    nlopt::opt search(nlopt::LN_BOBYQA, 6);
+    const auto objective = [](unsigned, const double* x, double*, void* data) {
+        Pose pose;
+        std::copy(x, x + 6, pose.begin());
+        return (*static_cast<const PoseEvidence*>(data))(pose);
+    };
+    search.set_min_objective(objective, const_cast<PoseEvidence*>(&evidence));  // NLopt takes mutable data
+    const double turn = options.most_deg * EIGEN_PI / 180 * evidence.radius();
+    std::vector<double> bound{options.most_mm, options.most_mm, options.most_mm, turn, turn, turn}, low = bound;
+    for (double& b : low) b = -b;
+    search.set_lower_bounds(low);
+    search.set_upper_bounds(bound);
+    constexpr double first_step_mm = 2, tolerance_mm = 0.02;
+    search.set_initial_step(first_step_mm);
+    search.set_xtol_abs(tolerance_mm);
+    search.set_maxeval(options.evaluations);
+    std::vector<double> x(start.begin(), start.end());
+    for (std::size_t a = 0; a < x.size(); ++a) x[a] = std::clamp(x[a], low[a], bound[a]);
+    Found found;
+    try {
+        search.optimize(x, found.cost);
+    } catch (const nlopt::roundoff_limited&) {
+        // The best point so far is in x.
+    }
+    std::copy(x.begin(), x.end(), found.pose.begin());
+    found.cost = evidence(found.pose);
+    return found;
+}
+
+}  // namespace
+
+EchoPose echo_pose(const EchoCosts& costs, const EchoPoseOptions& options, Observer& observer) {
+    EchoPose result;
+    if (costs.at.empty()) return result;
+    const PoseEvidence evidence(costs, options);
+    std::vector<Pose> starts = evidence.lowest_shifts();
+    const std::size_t turned = std::min(starts.size(), static_cast<std::size_t>(options.turned_starts));
+    for (std::size_t n = 0; n < turned; ++n)
+        for (std::size_t axis = 3; axis < 6; ++axis)
+            for (const double sign : {-1.0, 1.0}) {
+                Pose start = starts[n];
+                start[axis] = sign * options.start_turn_deg * EIGEN_PI / 180 * evidence.radius();
+                starts.push_back(start);
+            }
+    starts.push_back(Pose{});
+    std::vector<Found> found(starts.size());
+    tbb::parallel_for(std::size_t{0}, starts.size(),
+                      [&](std::size_t n) { found[n] = descended(evidence, starts[n], options); });
+    observer.checkpoint("rigid alignment", 1.0);
+    std::stable_sort(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.cost < b.cost; });
+    result.motion = evidence.motion(found.front().pose);
+    result.support = -found.front().cost;
+    for (const Found& other : found) {
+        const double away = evidence.distance(other.pose, found.front().pose);
+        if (away < options.rival_mm) continue;
+        result.rival_mm = away;
+        result.rival_support = -other.cost;
+        break;
+    }
+    return result;
+}
+
+}  // namespace tissuewarp::registration::detail

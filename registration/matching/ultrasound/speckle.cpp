@@ -1,0 +1,70 @@
+#include "registration/matching/ultrasound/speckle.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+namespace tissuewarp::registration::detail {
+
+namespace {
+
+constexpr int apart = 3;  // voxels between places
+
+struct Patch {
+    double mean, deviation;
+};
+
+/// Of 27 voxels, all seen: about a plane through them.
+std::optional<Patch> patch_of(const SeenImage& image, int i, int j, int k) {
+    double sum = 0, squares = 0;
+    Eigen::Vector3d slope = Eigen::Vector3d::Zero();
+    for (int c = -1; c <= 1; ++c)
+        for (int b = -1; b <= 1; ++b)
+            for (int a = -1; a <= 1; ++a) {
+                const std::int64_t n = image.image.offset(i + a, j + b, k + c);
+                if (!image.seen.data<std::uint8_t>()[n]) return std::nullopt;
+                const double value = image.image.data<float>()[n];
+                sum += value;
+                squares += value * value;
+                slope += value * Eigen::Vector3d(a, b, c);
+            }
+    constexpr double count = 27, moments = 18;
+    const double left = squares - sum * sum / count - slope.squaredNorm() / moments;
+    return Patch{sum / count, std::sqrt(std::max(0.0, left) / (count - 4))};
+}
+
+double percentile(std::vector<double>& values, double share) {
+    const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * double(values.size() - 1));
+    std::nth_element(values.begin(), at, values.end());
+    return *at;
+}
+
+}  // namespace
+
+double speckle_of(const SeenImage& image) {
+    const auto& size = image.image.geometry.size;
+    std::vector<double> means, deviations;
+    for (int k = 1; k < size[2] - 1; k += apart)
+        for (int j = 1; j < size[1] - 1; j += apart)
+            for (int i = 1; i < size[0] - 1; i += apart)
+                if (const auto patch = patch_of(image, i, j, k)) {
+                    means.push_back(patch->mean);
+                    deviations.push_back(patch->deviation);
+                }
+    if (means.empty()) return 0;
+    std::vector<double> sorted = means;
+    const double dark = percentile(sorted, 0.01);
+    std::vector<double> speckle;
+    for (std::size_t n = 0; n < means.size(); ++n)
+        if (means[n] > dark) speckle.push_back(deviations[n] / (means[n] - dark));
+    return speckle.empty() ? 0 : percentile(speckle, 0.5);
+}
+
+bool is_speckled(const SeenImage& image, const SpeckleOptions& options) {
+    const auto seen = cv::countNonZero(image.seen.voxels.reshape(1, 1));
+    if (double(seen) > options.most_seen * double(image.seen.geometry.voxel_count())) return false;
+    return speckle_of(image) >= options.least_speckle;
+}
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,22 @@
+#pragma once
+/// Does an image show speckle, as ultrasound does?
+
+#include "registration/matching/descriptors/matching_image.hpp"
+
+namespace tissuewarp::registration::detail {
+
+/// Chosen on `ultrasound:1-12` and the images of data/ (docs/decisions/ultrasound.md): noise and bare skulls look so,
+/// too.
+struct SpeckleOptions {
+    double least_speckle = 0.1;  ///< see speckle_of
+    double most_seen = 0.95;     ///< of the grid: a fan leaves corners
+};
+
+/// Median over places of the deviation from a plane in the 27 voxels about them, over their mean above the darkest
+/// percent: 0.2 to 0.4 in ultrasound, a few hundredths in images of tissue without noise.
+double speckle_of(const SeenImage& image);
+
+/// Speckle, in a part of the grid.
+bool is_speckled(const SeenImage& image, const SpeckleOptions& options = {});
+
+}  // namespace tissuewarp::registration::detail

@@ -1,0 +1,148 @@
+/// Ultrasound of a generated organ: known as such, explained by the other image, and registered.
+#include "registration/matching/ultrasound/echo_costs.hpp"
+#include "registration/matching/ultrasound/speckle.hpp"
+#include "registration/matching/ultrasound/ultrasound_search.hpp"
+#include "registration/update.hpp"
+#include "tests/registration/doubt_codes.hpp"
+#include "tests/registration/textured_phantom.hpp"
+#include "tests/support/label_shapes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace tissuewarp::registration {
+namespace {
+
+using namespace test;
+using imaging::Volume;
+
+constexpr double spacing_mm = 1.5;
+
+struct Organ {
+    Volume labels, image;
+    PreparedModel model;
+};
+
+Organ organ() {
+    shapes::Organ shape;
+    shape.semi_axes = {30, 26, 24};
+    shape.inclusion_radius = 0;
+    const Volume labels = shapes::organ_labels(shape, Eigen::Isometry3d::Identity(), spacing_mm);
+    const Volume image = sampled(labels.geometry, Texture());
+    PrepareOptions options;
+    options.meshing.edge_length = 8;
+    PreparedModel model = prepare(labels, options);
+    ImageModelOptions for_image;
+    for_image.features.count = 200;
+    for_image.blocks.grid_spacing_mm = spacing_mm;
+    prepare_image(model, image, for_image);
+    return {labels, image, std::move(model)};
+}
+
+/// Where a probe on one side of the organ sees.
+bool in_fan(const Eigen::Vector3d& y) {
+    const Eigen::Vector3d from_probe = y - Eigen::Vector3d(0, 0, 45);
+    return from_probe.norm() < 75 && from_probe.z() < -0.75 * from_probe.norm();
+}
+
+/// Brighter where the organ's texture is dark or steep, with speckle; 0 outside of the fan.
+Volume echoes(const imaging::Geometry& grid, const Eigen::Isometry3d& pose) {
+    cv::RNG random(5);
+    const Texture texture;
+    return sampled(grid, [&](const Eigen::Vector3d& y) {
+        if (!in_fan(y)) return 0.0;
+        const Eigen::Vector3d X = pose.inverse() * y;
+        Eigen::Vector3d slope;
+        for (int axis = 0; axis < 3; ++axis)
+            slope[axis] = texture(X + Eigen::Vector3d::Unit(axis)) - texture(X - Eigen::Vector3d::Unit(axis));
+        const double echo = 40 + 60 * slope.norm() - 12 * texture(X);
+        return std::max(1.0, echo * (1 + random.gaussian(0.3)));
+    });
+}
+
+Eigen::Isometry3d moved() {
+    Eigen::Isometry3d pose(Eigen::AngleAxisd(0.06, Eigen::Vector3d(1, 2, 2).normalized()));
+    pose.translation() << 3, -4, 2;
+    return pose;
+}
+
+/// Mean over the nodes in the fan, mm.
+double error_in_view(const Deformation& found, const Eigen::Isometry3d& pose) {
+    double sum = 0;
+    int count = 0;
+    const Eigen::Matrix3Xd at = found.deformed_nodes();
+    for (Eigen::Index n = 0; n < at.cols(); ++n) {
+        const Eigen::Vector3d is = pose * found.mesh.nodes.col(n);
+        if (!in_fan(is)) continue;
+        sum += (at.col(n) - is).norm();
+        ++count;
+    }
+    return sum / count;
+}
+
+TEST(Speckle, IsWhatUltrasoundShowsAndTissueDoesNot) {
+    const Organ one = organ();
+    EXPECT_TRUE(detail::is_speckled(detail::SeenImage(echoes(one.labels.geometry, moved()))));
+    const Volume bright = sampled(
+        one.labels.geometry, [](const Eigen::Vector3d& y) { return in_fan(y) ? 100 + 20 * Texture()(y) : 0.0; }, 2);
+    EXPECT_FALSE(detail::is_speckled(detail::SeenImage(bright)));
+}
+
+TEST(EchoCosts, AreLeastAtTheShiftThatWasMade) {
+    const Organ one = organ();
+    Eigen::Isometry3d shift = Eigen::Isometry3d::Identity();
+    shift.translation() = one.labels.geometry.direction * Eigen::Vector3d(3, -6, 3);
+    const detail::SeenImage seen(echoes(one.labels.geometry, shift));
+    detail::EchoSource source(one.model.model.mesh, one.image, seen);
+    const detail::State rest{Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, one.model.rest.node_count)};
+    const detail::EchoCosts costs = detail::echo_costs(source.on_grid(rest, 3, 12), {8, 3, 3});
+    ASSERT_GT(costs.at.size(), 20U);
+    Eigen::VectorXd total = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(costs.lattice()));
+    for (std::size_t n = 0; n < costs.at.size(); ++n)
+        for (std::size_t entry = 0; entry < costs.lattice(); ++entry)
+            total[static_cast<Eigen::Index>(entry)] += std::min(costs.of(n)[entry], 1.F);
+    Eigen::Index least = 0;
+    total.minCoeff(&least);
+    EXPECT_EQ(costs.shift(static_cast<std::size_t>(least)), Eigen::Vector3i(1, -2, 1));
+}
+
+class Noted : public Observer {
+public:
+    void note(std::string_view text) override { notes.append(text).append("\n"); }
+    std::string notes;
+};
+
+TEST(UltrasoundUpdate, FindsTheOrganAndSaysHowItCompared) {
+    const Organ one = organ();
+    UpdateOptions options;
+    options.device = Device::Cpu;
+    Intraoperative seen;
+    seen.image = echoes(one.labels.geometry, moved());
+    Noted observer;
+    const UpdateResult result = update(one.model, seen, options, observer);
+    EXPECT_NE(observer.notes.find("ultrasound"), std::string::npos) << observer.notes;
+    Deformation before = result.deformation;
+    before.displacement.setZero();
+    before.placement.setIdentity();
+    EXPECT_GT(error_in_view(before, moved()), 4);
+    EXPECT_LT(error_in_view(result.deformation, moved()), 1);
+}
+
+TEST(UltrasoundUpdate, DoubtsEchoesOfSomethingElse) {
+    const Organ one = organ();
+    UpdateOptions options;
+    options.device = Device::Cpu;
+    options.image.similarity = Similarity::LinearCombination;
+    cv::RNG random(6);
+    Intraoperative seen;
+    seen.image = sampled(one.labels.geometry, [&](const Eigen::Vector3d& y) {
+        return in_fan(y) ? std::max(1.0, 40 * (1 + random.gaussian(0.3))) : 0.0;
+    });
+    const auto found = codes(update(one.model, seen, options).doubts);
+    EXPECT_NE(std::find(found.begin(), found.end(), "image.pose_unclear"), found.end());
+}
+
+}  // namespace
+}  // namespace tissuewarp::registration

@@ -1,0 +1,49 @@
+/// Phantoms of ultrasound: where it shows, what it shows, and that it shows what moved.
+#include "study/phantom.hpp"
+
+#include "imaging/sampling.hpp"
+
+#include <gtest/gtest.h>
+
+namespace tissuewarp::study {
+namespace {
+
+PhantomOptions bent() {
+    PhantomOptions options;
+    options.family = Family::Bent;
+    options.misplacement = Misplacement{4, 4};
+    return options;
+}
+
+TEST(UltrasoundPhantom, ShowsAFanOfTheOrganWithSpeckle) {
+    const Phantom phantom = random_phantom(11, bent());
+    const PhantomUltrasound seen = phantom.ultrasound();
+    const imaging::Geometry& grid = seen.fixed.geometry;
+    int shown = 0, wrong = 0;
+    for (int k = 0; k < grid.size[2]; ++k)
+        for (int j = 0; j < grid.size[1]; ++j)
+            for (int i = 0; i < grid.size[0]; ++i) {
+                const bool is = seen.fixed.data<float>()[seen.fixed.offset(i, j, k)] > 0;
+                shown += is;
+                wrong += is != seen.shows(grid.point({double(i), double(j), double(k)}));
+            }
+    EXPECT_EQ(wrong, 0);
+    EXPECT_GT(shown, 0.2 * double(grid.voxel_count()));
+    EXPECT_LT(shown, 0.7 * double(grid.voxel_count()));
+    int in_view = 0;
+    for (const auto& place : phantom.targets.fixed.colwise()) in_view += seen.shows(place);
+    EXPECT_GT(in_view, 5);
+}
+
+TEST(UltrasoundPhantom, IsMisplacedByNoMoreThanAsked) {
+    PhantomOptions options = bent();
+    options.misplacement = Misplacement{0, 0};
+    const Phantom still = random_phantom(11, options), moved = random_phantom(11, bent());
+    EXPECT_EQ(still.targets.moving, moved.targets.moving);
+    const Eigen::VectorXd apart = (still.targets.fixed - moved.targets.fixed).colwise().norm();
+    EXPECT_GT(apart.maxCoeff(), 0.5);
+    EXPECT_LT(apart.maxCoeff(), 4 + 0.07 * 160);
+}
+
+}  // namespace
+}  // namespace tissuewarp::study
