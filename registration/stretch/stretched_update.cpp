@@ -10,6 +10,18 @@
 
 namespace tissuewarp::registration {
 
+namespace {
+
+/// Errors along all axes alike, of a share of each node's displacement (3 × N, mm).
+void add_share_of(const Eigen::Matrix3Xd& displacement, NodalErrors& nodal) {
+    const Eigen::RowVectorXd squares =
+        stretch_errors.share * stretch_errors.share * displacement.colwise().squaredNorm();
+    nodal.data += squares;
+    nodal.covariance.topRows<3>().rowwise() += squares / 3;
+}
+
+}  // namespace
+
 bool stretches_freely(const PreparedModel& prepared, const Intraoperative& seen, const Tissue& tissue) {
     return tissue.free_stretch > 0 && seen.labels && !seen.image && !seen.surface && !seen.points && !seen.curves &&
            prepared.options.anchors.empty() && prepared.options.rigid_neighbours.empty();
@@ -46,7 +58,9 @@ Uncertainty uncertainty(const StretchedUpdate& update, const UncertaintyOptions&
     solved.deformation.displacement += given.nodes - mesh.nodes;
     solved.deformation.mesh = mesh;
     const Uncertainty there = uncertainty(*update.strain_free, solved, options, observer);
-    return {given, there.nodal(), there.held_out()};
+    NodalErrors nodal = there.nodal();
+    add_share_of(update.result.deformation.displacement, nodal);
+    return {given, std::move(nodal), there.held_out()};
 }
 
 }  // namespace tissuewarp::registration

@@ -27,7 +27,14 @@ bool stretches_freely(const PreparedModel& prepared, const Intraoperative& seen,
 StretchedUpdate update_stretched(const PreparedModel& prepared, const Intraoperative& seen, const Tissue& tissue,
                                  const UpdateOptions& options = {}, Observer& observer = silent_observer());
 
-/// How far off its result may be. Of the stretch itself nothing is said: labels tell it.
+/// What labels leave open of a stretch. Chosen on synthetic breaths 1 to 8, reported on 101 to 112 and on patients
+/// (docs/decisions/large_motion.md).
+struct StretchErrors {
+    double share = 0.1;  ///< of how far tissue was displaced: 1 σ, root of the expected square of the error's length
+};
+inline constexpr StretchErrors stretch_errors{};
+
+/// How far off its result may be: of the registration from the stretch, and of the stretch.
 Uncertainty uncertainty(const StretchedUpdate& update, const UncertaintyOptions& options = {},
                         Observer& observer = silent_observer());
 
