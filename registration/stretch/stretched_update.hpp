@@ -30,7 +30,7 @@ StretchedUpdate update_stretched(const PreparedModel& prepared, const Intraopera
 /// What labels leave open of a stretch. Chosen on synthetic breaths 1 to 8, reported on 101 to 112 and on patients
 /// (docs/decisions/large_motion.md).
 struct StretchErrors {
-    double share = 0.1;  ///< of how far tissue was displaced: 1 σ, root of the expected square of the error's length
+    double share = 0.14;  ///< of how far tissue was displaced: 1 σ, root of the expected square of the error's length
 };
 inline constexpr StretchErrors stretch_errors{};
 
