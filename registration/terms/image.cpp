@@ -55,6 +55,28 @@ std::vector<Doubt> doubts_of(const ImageFit& fit, const std::string& name, const
     return doubts;
 }
 
+std::vector<Doubt> doubts_of_echoes(double agreement, const std::optional<EchoPose>& pose, const std::string& name) {
+    constexpr EchoDoubtLimits limits = echo_doubt_limits;
+    std::vector<Doubt> doubts;
+    if (agreement < limits.least_agreement)
+        doubts.push_back({"image.echoes_unexplained", agreement, limits.least_agreement,
+                          "the moving " + name + " explains little of the echoes where the organ lies (" +
+                              to_text(agreement) + " of what chance leaves)",
+                          "check that they show the same organ, and look where the result lies"});
+    if (!pose) return doubts;
+    const auto& [motion, support, rival_mm, rival_support] = *pose;
+    if (support < limits.least_support)
+        doubts.push_back({"image.pose_unclear", support, limits.least_support,
+                          "the ultrasound hardly tells where the organ lies as a whole",
+                          "bring the images nearer with --initial-transform, or give pairs of points"});
+    if (rival_mm > 0 && rival_support > limits.most_rival * support)
+        doubts.push_back(
+            {"image.two_poses", rival_support / support, limits.most_rival,
+             "the ultrasound fits nearly as well " + to_text(rival_mm) + " mm from where the organ was put",
+             "bring the images nearer with --initial-transform, or give pairs of points"});
+    return doubts;
+}
+
 ImageTerm::ImageTerm(const PreparedModel& prepared, const ImageModel& moving, const imaging::Volume& fixed,
                      std::string name, const ImageOptions& options, ImageTools& tools, double energy)
     : prepared_(prepared),
@@ -208,31 +230,9 @@ void ImageTerm::judge(const State& state, UpdateResult& result) {
     if (search_.similarity() == Similarity::LinearCombination)
         limits.most_residual_mm = echo_doubt_limits.most_residual_mm;
     for (Doubt& doubt : doubts_of(result.images.back(), name_, limits)) result.doubts.push_back(std::move(doubt));
-    for (Doubt& doubt : echo_doubts()) result.doubts.push_back(std::move(doubt));
-}
-
-std::vector<Doubt> ImageTerm::echo_doubts() const {
-    if (search_.similarity() != Similarity::LinearCombination) return {};
-    constexpr EchoDoubtLimits limits = echo_doubt_limits;
-    std::vector<Doubt> doubts;
-    const double agreement = search_.agreement().value_or(0);
-    if (agreement < limits.least_agreement)
-        doubts.push_back({"image.echoes_unexplained", agreement, limits.least_agreement,
-                          "the moving " + name_ + " explains little of the echoes where the organ lies (" +
-                              to_text(agreement) + " of what chance leaves)",
-                          "check that they show the same organ, and look where the result lies"});
-    if (!echo_pose_) return doubts;
-    const auto& [motion, support, rival_mm, rival_support] = *echo_pose_;
-    if (support < limits.least_support)
-        doubts.push_back({"image.pose_unclear", support, limits.least_support,
-                          "the ultrasound hardly tells where the organ lies as a whole",
-                          "bring the images nearer with --initial-transform, or give pairs of points"});
-    if (rival_mm > 0 && rival_support > limits.most_rival * support)
-        doubts.push_back(
-            {"image.two_poses", rival_support / support, limits.most_rival,
-             "the ultrasound fits nearly as well " + to_text(rival_mm) + " mm from where the organ was put",
-             "bring the images nearer with --initial-transform, or give pairs of points"});
-    return doubts;
+    if (search_.similarity() != Similarity::LinearCombination) return;
+    for (Doubt& doubt : doubts_of_echoes(search_.agreement().value_or(0), echo_pose_, name_))
+        result.doubts.push_back(std::move(doubt));
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -33,6 +33,10 @@ struct EchoDoubtLimits {
 };
 inline constexpr EchoDoubtLimits echo_doubt_limits{};
 
+/// What is to be said against a registration to ultrasound whose last search left such an agreement, and whose pose,
+/// where one was sought, was found so.
+std::vector<Doubt> doubts_of_echoes(double agreement, const std::optional<EchoPose>& pose, const std::string& name);
+
 /// What an image may show without a doubt. Chosen by hand, but for the agreement; on which data is not recorded.
 struct ImageDoubtLimits {
     double least_matched = 0.1;     ///< share of the blocks that were found
@@ -116,7 +120,6 @@ private:
     /// Blocks whose places in this state the fixed image shows.
     [[nodiscard]] int blocks_in_view(const State& state) const;
     [[nodiscard]] ImageFit fit(const State& state);
-    [[nodiscard]] std::vector<Doubt> echo_doubts() const;
 
     static double mean_residual(const std::vector<PulledMatch>& matches);
 };

@@ -2,6 +2,7 @@
 #include "registration/matching/ultrasound/echo_costs.hpp"
 #include "registration/matching/ultrasound/speckle.hpp"
 #include "registration/matching/ultrasound/ultrasound_search.hpp"
+#include "registration/terms/image.hpp"
 #include "registration/update.hpp"
 #include "tests/registration/doubt_codes.hpp"
 #include "tests/registration/textured_phantom.hpp"
@@ -128,6 +129,17 @@ TEST(UltrasoundUpdate, FindsTheOrganAndSaysHowItCompared) {
     before.placement.setIdentity();
     EXPECT_GT(error_in_view(before, moved()), 4);
     EXPECT_LT(error_in_view(result.deformation, moved()), 1);
+}
+
+TEST(UltrasoundDoubts, AreOfEchoesThatNothingExplainsAndOfPosesThatFitAsWell) {
+    detail::EchoPose pose;
+    pose.support = 50;
+    pose.rival_mm = 11;
+    pose.rival_support = 20;
+    EXPECT_TRUE(detail::doubts_of_echoes(0.2, pose, "image").empty());
+    pose.rival_support = 45;
+    EXPECT_EQ(codes(detail::doubts_of_echoes(0.01, pose, "image")),
+              (std::vector<std::string>{"image.echoes_unexplained", "image.two_poses"}));
 }
 
 TEST(UltrasoundUpdate, DoubtsEchoesOfSomethingElse) {
