@@ -78,6 +78,8 @@ TEST(Doubts, OfPointsAndCurves) {
     EXPECT_THAT(of(CurveFit{100, 0.51, 1.69, 200}, 1.0), IsEmpty());
     EXPECT_THAT(of(CurveFit{100, 0.49, 1.69, 200}, 1.0), ElementsAre("curves.outliers"));
     EXPECT_THAT(of(CurveFit{100, 0.51, 1.71, 200}, 1.0), ElementsAre("curves.apart"));
+    EXPECT_THAT(of(CurveFit{100, 0.51, 1.69, 200, 30, 0.94}, 1.0), IsEmpty());
+    EXPECT_THAT(of(CurveFit{100, 0.51, 1.69, 200, 30, 0.96}, 1.0), ElementsAre("curves.two_poses"));
 }
 
 TEST(Doubts, OfTheCourse) {
