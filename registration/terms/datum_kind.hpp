@@ -31,7 +31,7 @@ inline constexpr SharedErrors shared_errors{};
 /// Chosen on the random patients 1 to 60 of the families *bent* and *labelled*; of images on parts of them and 1 to 40
 /// (docs/decisions/error_model.md).
 struct HardlyShownMotions {
-    HardlyShown labels{2, 0.15}, surface{10, 0.05}, image{0.6, 0.15};
+    HardlyShown labels{0.25, 0.15}, surface{4, 0.05}, image{0.1, 0.15};
 };
 inline constexpr HardlyShownMotions hardly_shown_motions{};
 

@@ -381,7 +381,8 @@ TEST(LinearRegistration, SharedErrorsDoNotAverageOut) {
     EXPECT_NEAR(deviation[1], 0.5 * std::sqrt(3), 0.15);
 }
 
-// Of a motion that springs feel half as much as where nothing is added, half of the variance.
+// Of a motion that springs feel half as much as where nothing is added, half of the variance; of four times the energy
+// four times.
 TEST(OpenParts, MotionsThatDataHardlyTellCount) {
     const PreparedModel prepared = organ();
     const Matrix3Xd& nodes = prepared.model.mesh.nodes;
@@ -389,14 +390,14 @@ TEST(OpenParts, MotionsThatDataHardlyTellCount) {
     LastPulls pulls = pulls_at_the_surface(prepared, 0.3);
     pulls.placement_sought = true;
     const auto mean_square = [&] {
-        const auto open = detail::open_parts(prepared, pulls, still, 1, {});
+        const auto open = detail::open_parts(prepared, pulls, still, 4 * pulls.energy, {});
         return open.data.covariance.topRows<3>().sum() / double(nodes.cols());
     };
     const double before = mean_square();
     pulls.hardly_shown = {3, 0.5};
     const auto shares = detail::shown_motions(pulls, nodes).shares;
     ASSERT_LT(shares.maxCoeff(), 0.5);
-    EXPECT_NEAR(mean_square() - before, 9 * (1 - shares.array() / 0.5).sum(), 1e-6);
+    EXPECT_NEAR(mean_square() - before, 4 * 9 * (1 - shares.array() / 0.5).sum(), 1e-6);
     pulls.hardly_shown = {3, shares.minCoeff()};
     EXPECT_NEAR(mean_square(), before, 1e-9);
     pulls.placement_sought = false;  // headers place the organ

@@ -145,8 +145,8 @@ TEST(Coverage, APhantomIsMeasuredOnceAndKept) {
     ASSERT_GT(rows.size(), 160u);
     for (const CoverageRow& row : rows) {
         EXPECT_TRUE(row.error.allFinite());
-        EXPECT_GT(row.estimate.deviation_mm, 0.30);  // 0.34 to 4.2
-        EXPECT_LT(row.estimate.deviation_mm, 4.6);
+        EXPECT_GT(row.estimate.deviation_mm, 0.30);  // 0.34 to 4.2, of the surface alone more
+        EXPECT_LT(row.estimate.deviation_mm, row.evidence == Evidence::Surface ? 20 : 4.6);
         EXPECT_NEAR(row.estimate.interval_mm, registration::interval_mm(row.estimate, 0.95),
                     1e-3 * row.estimate.interval_mm);
         EXPECT_TRUE(row.evidence != Evidence::Surface || row.estimate.trust == registration::Trust::Unknown);
