@@ -101,10 +101,10 @@ enum class PriorMoves {
 };
 
 /// Motions of the organ as a whole that data of a kind tell worse than their springs feel them: boundaries of smooth
-/// organs slide along themselves when the organ bends, and the farther the more strain energy that took.
+/// organs slide along themselves when the organ bends, and a turn of the whole hides there.
 struct HardlyShown {
-    double deviation_mm = 0;  ///< of a motion that springs do not feel (rms over the organ), over √(strain energy/unit)
-    double below_share = 0;  ///< what springs feel of a motion (ShownMotions::shares) from which on nothing is added
+    double deviation_mm = 0;  ///< of a motion that springs do not feel, root mean square over the organ
+    double below_share = 0;   ///< what springs feel of a motion (ShownMotions::shares) from which on nothing is added
 };
 
 /// What pulled at the tissue in the last round.

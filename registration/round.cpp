@@ -62,9 +62,15 @@ tled::NodalConditions RoundSolver::linearised(const RoundPlan& plan, Standing& s
     for (const PulledNode& pulled : sum.springs) all.springs.push_back(pulled.spring);
     if (sum.forces.cols() == 0) sum.forces.setZero(3, prepared_.rest.node_count);
     all.external_force = sum.forces;
-    standing.result.pulls = {std::move(sum.springs),    state.placement,       std::move(sum.forces),
-                             terms_.energy(),           terms_.prior_moves(),  terms_.parts_alone(),
-                             terms_.placement_sought(), terms_.hardly_shown(), state.load_size};
+    standing.result.pulls = {std::move(sum.springs),
+                             state.placement,
+                             std::move(sum.forces),
+                             terms_.energy(),
+                             terms_.prior_moves(),
+                             terms_.parts_alone(),
+                             terms_.placement_sought(),
+                             terms_.hardly_shown(state.placement, prepared_.model.mesh.nodes),
+                             state.load_size};
     return tled::nodal_conditions(all, prepared_.rest.node_count);
 }
 

@@ -88,16 +88,15 @@ ImageTerm::ImageTerm(const PreparedModel& prepared, const ImageModel& moving, co
       view_(search_.seen()),
       fixed_grid_(fixed.geometry) {}
 
-void ImageTerm::tell_similarity(Observer& observer) {
-    if (told_ || search_.similarity() != Similarity::LinearCombination) return;
-    told_ = true;
+void ImageTerm::tell_similarity(Observer& observer) const {
+    if (search_.similarity() != Similarity::LinearCombination) return;
     observer.note("the fixed " + name_ +
                   " is taken for ultrasound: what the moving one shows is fitted to its echoes, on the processor "
                   "(--similarity states how images are compared)");
 }
 
 void ImageTerm::search(const State& state, Observer& observer) {
-    tell_similarity(observer);
+    if (search_.done() == 0 && !echo_pose_) tell_similarity(observer);
     LocatedMatches located = search_.search(state, observer);
     found_.matches = std::move(located.matches);
     found_.places = std::move(located.places);

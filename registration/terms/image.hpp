@@ -66,7 +66,7 @@ public:
 
     [[nodiscard]] Shows shows() const override { return Shows::Volume; }
     [[nodiscard]] PoseClaim pose_claim() const override { return PoseClaim::Search; }
-    [[nodiscard]] HardlyShown hardly_shown() const override { return hardly_shown_motions.image; }
+    [[nodiscard]] HardlyTold hardly_told() const override { return hardly_told_motions.image; }
     /// The rigid motion that most matches of a first search agree on, the rest of them is for the tissue. Where part of
     /// the organ is out of view, a deformation of the part in view would turn it as a whole: then none, unless the
     /// headers are far off or a rigid motion explains nearly all; the placement then follows the tissue in view. Throws
@@ -107,13 +107,13 @@ private:
     ImageSearch search_;
     FieldOfView view_;
     imaging::Geometry fixed_grid_;
-    bool has_placed_ = false, told_ = false;
+    bool has_placed_ = false;
     std::optional<EchoPose> echo_pose_;
     Found found_;
     Memory memory_;
 
     void search(const State& state, Observer& observer);
-    void tell_similarity(Observer& observer);
+    void tell_similarity(Observer& observer) const;
     [[nodiscard]] std::optional<Eigen::Isometry3d> rigid_motion() const;
     /// Of all matches, in `memory_`.
     const std::vector<PulledMatch>& pulled(const State& state);

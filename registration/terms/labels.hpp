@@ -25,7 +25,7 @@ public:
 
     [[nodiscard]] Shows shows() const override { return Shows::Boundary; }
     [[nodiscard]] PoseClaim pose_claim() const override { return PoseClaim::WholeSurface; }
-    [[nodiscard]] HardlyShown hardly_shown() const override { return hardly_shown_motions.labels; }
+    [[nodiscard]] HardlyTold hardly_told() const override { return hardly_told_motions.labels; }
     [[nodiscard]] Alignment pose(const Eigen::Isometry3d& start, Observer& observer) override;
     /// Springs from every interface node along its normal to the boundary in the fixed labels. Throws InvalidInput when
     /// no boundary was found.

@@ -48,7 +48,7 @@ public:
 
     [[nodiscard]] Shows shows() const override { return Shows::Parts; }
     [[nodiscard]] PoseClaim pose_claim() const override { return PoseClaim::Anywhere; }
-    [[nodiscard]] HardlyShown hardly_shown() const override { return hardly_shown_motions.surface; }
+    [[nodiscard]] HardlyTold hardly_told() const override { return hardly_told_motions.surface; }
     /// The rigid placement, searched for all over the organ. Throws Cancelled.
     [[nodiscard]] Alignment pose(const Eigen::Isometry3d& start, Observer& observer) override;
 

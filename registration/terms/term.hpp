@@ -68,7 +68,7 @@ public:
     [[nodiscard]] virtual Alignment pose(const Eigen::Isometry3d& start, Observer& observer);
 
     /// Where it placed the organ.
-    [[nodiscard]] virtual HardlyShown hardly_shown() const { return {}; }
+    [[nodiscard]] virtual HardlyTold hardly_told() const { return {}; }
 
     /// Whether the placement is a motion that its data made, which the prior then moves along with.
     [[nodiscard]] virtual bool has_placed() const { return false; }

@@ -14,6 +14,7 @@
 #include "registration/terms/view_prior.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -78,6 +79,14 @@ PriorMoves Terms::prior_moves() const {
     if (free_placement_) return PriorMoves::WithSurface;
     const bool placed = std::any_of(terms_.begin(), terms_.end(), [](const auto& term) { return term->has_placed(); });
     return placed ? PriorMoves::WithData : PriorMoves::Not;
+}
+
+HardlyShown Terms::hardly_shown(const Eigen::Isometry3d& placement, const Eigen::Matrix3Xd& nodes) const {
+    if (!placement_sought_) return {};
+    const Eigen::Matrix3Xd arms = nodes.colwise() - nodes.rowwise().mean();
+    const double turned_mm = std::sqrt((placement.linear() * arms - arms).colwise().squaredNorm().mean());
+    const HardlyTold told = best_placed().hardly_told();
+    return {told.of_turn * turned_mm, told.below_share};
 }
 
 Alignment Terms::pose(Observer& observer) {

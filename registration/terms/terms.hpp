@@ -25,10 +25,9 @@ public:
     [[nodiscard]] PriorMoves prior_moves() const;
     /// The data say where the organ lies as a whole.
     [[nodiscard]] bool placement_sought() const { return placement_sought_; }
-    /// Of the data that do, nothing where others do.
-    [[nodiscard]] HardlyShown hardly_shown() const {
-        return placement_sought_ ? best_placed().hardly_shown() : HardlyShown{};
-    }
+    /// Of the data that do: the farther they turned the organ of these nodes (3 × N, mm), the more of a turn that they
+    /// do not tell is to be expected. Nothing where headers place the organ.
+    [[nodiscard]] HardlyShown hardly_shown(const Eigen::Isometry3d& placement, const Eigen::Matrix3Xd& nodes) const;
     /// Loads that nobody stated and that data may tell: of points of a free organ all, tractions too, since these also
     /// move what no point shows; of labels, which show the boundary all over, whatever presses on it there, a force
     /// within. Otherwise none.

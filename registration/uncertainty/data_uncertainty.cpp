@@ -93,13 +93,11 @@ double unseen_deviation_mm(double share, const HardlyShown& hardly) {
 }
 
 /// One deviation of each motion of the organ as a whole beyond what the springs of the data leave open, 3N × 6, mm.
-MatrixXd unseen_motions(const LastPulls& pulls, const Eigen::Matrix3Xd& nodes, double strain_energy) {
+MatrixXd unseen_motions(const LastPulls& pulls, const Eigen::Matrix3Xd& nodes) {
     if (!pulls.placement_sought) return MatrixXd(nodes.size(), 0);
     ShownMotions shown = shown_motions(pulls, nodes);
-    HardlyShown hardly = pulls.hardly_shown;
-    hardly.deviation_mm *= std::sqrt(strain_energy / pulls.energy);
     for (Eigen::Index k = 0; k < shown.shares.size(); ++k)
-        shown.motions.col(k) *= unseen_deviation_mm(shown.shares[k], hardly);
+        shown.motions.col(k) *= unseen_deviation_mm(shown.shares[k], pulls.hardly_shown);
     return std::move(shown.motions);
 }
 
@@ -137,8 +135,8 @@ OpenParts open_parts(const PreparedModel& prepared, const LastPulls& given, cons
     result.covariance = covariances_of(beside(on.error, in.error)) +
                         covariances_of(registration.inverse(forces_of(data, errors, prepared.rest.node_count)));
     const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
-    const Covariances placement = sum_of_squares(
-        beside(unseen_motions(pulls, nodes, strain_energy), missed_if_rigid(pulls, nodes, displacement, registration)));
+    const Covariances placement =
+        sum_of_squares(beside(unseen_motions(pulls, nodes), missed_if_rigid(pulls, nodes, displacement, registration)));
     result.held_out =
         held_out(prepared, pulls, unseen, displacement, few_of(on.truths, in.truths, held_out_options.draws),
                  few_of(errors, held_out_options.draws));
