@@ -27,10 +27,10 @@ bool stretches_freely(const PreparedModel& prepared, const Intraoperative& seen,
 StretchedUpdate update_stretched(const PreparedModel& prepared, const Intraoperative& seen, const Tissue& tissue,
                                  const UpdateOptions& options = {}, Observer& observer = silent_observer());
 
-/// What labels leave open of a stretch. Chosen on synthetic breaths 1 to 8, reported on 101 to 112 and on patients
+/// What labels leave open of a stretch. Chosen on synthetic breaths 1 to 5, reported on 105 to 110 and on patients
 /// (docs/decisions/large_motion.md).
 struct StretchErrors {
-    double share = 0.14;  ///< of how far tissue was displaced: 1 σ, root of the expected square of the error's length
+    double share = 0.35;  ///< of how far tissue was displaced: 1 σ, root of the expected square of the error's length
 };
 inline constexpr StretchErrors stretch_errors{};
 
