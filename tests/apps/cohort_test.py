@@ -137,7 +137,7 @@ class CohortTables(unittest.TestCase):
         self.assertLess(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss, 1_000_000)  # kB
 
 
-@unittest.skipUnless(shutil.which("snakemake", path=ENVIRONMENT["PATH"]), "no snakemake")
+@unittest.skipUnless(shutil.which("snakemake", path=ENVIRONMENT["PATH"]), "no snakemake; run scripts/setup --cluster")
 class CohortRuns(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -277,7 +277,7 @@ class CohortRuns(unittest.TestCase):
         self.assertIn("is being run already", result.stderr)
 
 
-@unittest.skipUnless(shutil.which("snakemake", path=ENVIRONMENT["PATH"]), "no snakemake")
+@unittest.skipUnless(shutil.which("snakemake", path=ENVIRONMENT["PATH"]), "no snakemake; run scripts/setup --cluster")
 class CohortStudies(unittest.TestCase):
     def test_a_study_in_parts_is_the_study(self):
         with tempfile.TemporaryDirectory(prefix="tissuewarp-cohort-") as name:
