@@ -9,9 +9,9 @@
 
 namespace tissuewarp::registration::detail {
 
-/// Chosen on the random patients 1 to 60 of the families *bent* and *labelled*, from a part of the surface: of smooth
-/// organs the best pose was wrong by more than a centimetre for 13 in 21, and that for 6 whatever from 0.70 to 0.97
-/// `alike` was.
+/// Chosen on the random patients 1 to 60 of the families *bent* and *labelled*, from a part of the surface: of 60
+/// smooth organs the best pose was wrong by more than a centimetre for 34, and the chosen one for 17 whatever from 0.70
+/// to 0.97 `alike` was (docs/decisions/error_model.md).
 struct RivalPoseOptions {
     double same_pose_mm = 8;  ///< mean over the organ: poses closer than this are one, others rivals
     double alike = 0.95;      ///< of what the best pose explains: poses that explain as much are told apart by headers

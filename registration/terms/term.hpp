@@ -67,7 +67,7 @@ public:
     /// The rigid placement, near `start` where the claim is no more than that. Throws InvalidInput, Cancelled.
     [[nodiscard]] virtual Alignment pose(const Eigen::Isometry3d& start, Observer& observer);
 
-    /// Where it placed the organ.
+    /// What its data tell badly of the placement.
     [[nodiscard]] virtual HardlyTold hardly_told() const { return {}; }
 
     /// Whether the placement is a motion that its data made, which the prior then moves along with.
