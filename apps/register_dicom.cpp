@@ -14,7 +14,7 @@ namespace {
 using imaging::read_dicom_origin;
 
 void write_registration(const RegistrationRun& run, const std::filesystem::path& path) {
-    const Eigen::Isometry3d back = run.result.deformation.placement.inverse();
+    const Eigen::Isometry3d back = run.result.deformation.far_motion().inverse();
     const registration::PointMap map = registration::with_linear_part(run.products.fixed_to_moving, back);
     imaging::write_deformable_registration(*map.field, back, read_dicom_origin(run.options.fixed),
                                            read_dicom_origin(run.options.moving), path);

@@ -163,12 +163,12 @@ private:
 /// Before other files, which could fill the disk meanwhile (transform_file.cpp).
 void write_transforms(const Writer& writer) {
     const Products& products = writer.run().products;
-    const Eigen::Isometry3d& placement = writer.run().result.deformation.placement;
+    const Eigen::Isometry3d& rigid = writer.run().result.deformation.far_motion();
     writer.now(transform_name,
-               [&](auto& path) { write_itk_transform(products.fixed_to_moving, placement.inverse(), path); });
+               [&](auto& path) { write_itk_transform(products.fixed_to_moving, rigid.inverse(), path); });
     if (writes(writer.run().options, inverse_transform))
         writer.now(inverse_transform.file,
-                   [&](auto& path) { write_itk_transform(products.moving_to_fixed, placement, path); });
+                   [&](auto& path) { write_itk_transform(products.moving_to_fixed, rigid, path); });
 }
 
 /// What else --write names.

@@ -15,6 +15,7 @@
 #include "registration/evaluation/curve_residual.hpp"
 #include "registration/field.hpp"
 #include "registration/io/curves.hpp"
+#include "registration/rigid_surroundings.hpp"
 #include "registration/stretch/stretched_update.hpp"
 #include "registration/warp.hpp"
 
@@ -78,9 +79,11 @@ Intraoperative seen(const RegistrationInputs& inputs, const RegisterOptions& opt
 
 void make_fields(RegistrationRun& run, ProgressLine& progress) {
     const FieldOptions options{run.options.fade};
-    const Deformation& deformation = run.result.deformation;
+    Deformation& deformation = run.result.deformation;
     Products& products = run.products;
     progress.begin("field forward", 0.47, 0.52);
+    if (!run.inputs.moving.empty() && !run.inputs.fixed.empty())
+        deformation.surroundings = rigid_surroundings(deformation, run.inputs.moving, run.inputs.fixed, options);
     products.moving_to_fixed = displacement_moving_to_fixed(deformation, run.inputs.moving_grid(), options, progress);
     progress.begin("field backward", 0.52, 0.57);
     products.fixed_to_moving = displacement_fixed_to_moving(deformation, output_grid(run), options, progress);

@@ -1,11 +1,21 @@
 #pragma once
 /// The result of the solver in the patient: where every point of the preoperative tissue went.
 
+#include "imaging/volume.hpp"
 #include "meshing/tet_mesh.hpp"
 
 #include <Eigen/Geometry>
 
+#include <optional>
+
 namespace tissuewarp::registration {
+
+/// How the surroundings of an organ moved: bone, for instance (rigid_surroundings.hpp).
+struct Surroundings {
+    Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();  ///< moving → fixed
+    imaging::Volume rigid;  ///< voxels != 0 moved by it exactly, uint8, moving frame; elsewhere they move so far from
+                            ///< the organ
+};
 
 /// y = placement · (X + u(X)): elastic displacement u in the preoperative (moving) frame, then a rigid motion into the
 /// intraoperative (fixed) frame. LPS mm.
@@ -13,6 +23,20 @@ struct Deformation {
     meshing::TetMesh mesh;                                        ///< rest positions X, moving frame
     Eigen::Matrix3Xd displacement;                                ///< u at the nodes, 3 × N, mm, moving frame
     Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();  ///< moving → fixed
+    std::optional<Surroundings> surroundings = {};                ///< where they are known to have moved otherwise
+
+    /// The same map with another rigid part.
+    [[nodiscard]] Deformation with_placement(const Eigen::Isometry3d& other) const {
+        Deformation same = *this;
+        if (other.matrix() == placement.matrix()) return same;
+        same.displacement = (other.inverse() * placement) * (mesh.nodes + displacement) - mesh.nodes;
+        same.placement = other;
+        return same;
+    }
+    /// What moves far from the organ: the motion of the surroundings, or the placement where that is not known.
+    [[nodiscard]] const Eigen::Isometry3d& far_motion() const {
+        return surroundings ? surroundings->motion : placement;
+    }
 
     /// Positions y of the nodes in the fixed frame, 3 × N.
     [[nodiscard]] Eigen::Matrix3Xd deformed_nodes() const { return placement * (mesh.nodes + displacement); }

@@ -4,6 +4,7 @@
 #include "meshing/point_location.hpp"
 #include "registration/field/continuation.hpp"
 #include "registration/field/growth.hpp"
+#include "registration/field/mesh_labels.hpp"
 #include "registration/field/rasterisation.hpp"
 #include "registration/field/row_inverse.hpp"
 #include "registration/field/uninitialised.hpp"
@@ -36,8 +37,17 @@ void require_usable(const Deformation& deformation, const FieldOptions& options)
             throw InvalidInput("deformation: the displacement of node " + std::to_string(n) + " is not finite");
     if (!deformation.placement.matrix().allFinite())
         throw InvalidInput("deformation: the placement is not finite; give a rigid motion");
+    if (!deformation.surroundings) return;
+    if (!deformation.surroundings->motion.matrix().allFinite())
+        throw InvalidInput("deformation: the motion of the surroundings is not finite; give a rigid motion");
+    if (deformation.surroundings->rigid.voxels.type() != CV_8UC1)
+        throw InvalidInput("deformation: the mask of rigid surroundings must be of uint8; give rigid_surroundings()");
     if (!(options.fade_mm >= 1.0 && options.fade_mm <= 1e4))
         throw InvalidInput("fade distance " + std::to_string(options.fade_mm) + " mm; give one from 1 to 10000 mm");
+}
+
+Volume rigid_mask(const Deformation& deformation) {
+    return deformation.surroundings ? deformation.surroundings->rigid : Volume();
 }
 
 /// Relative displacements on a grid, and which voxels the mesh covers.
@@ -128,11 +138,12 @@ void complete(Raster& raster, const Geometry& grid, const Eigen::Matrix3d& rotat
 
 }  // namespace
 
-Volume displacement_moving_to_fixed(const Deformation& deformation, const Geometry& moving_grid,
-                                    const FieldOptions& options, Observer& observer) {
+Volume displacement_moving_to_fixed(const Deformation& given, const Geometry& moving_grid, const FieldOptions& options,
+                                    Observer& observer) {
     constexpr auto stage = "field moving to fixed";
     imaging::require_valid(moving_grid, "moving grid");
-    require_usable(deformation, options);
+    require_usable(given, options);
+    const Deformation deformation = given.with_placement(given.far_motion());
     const auto& mesh = deformation.mesh;
     observer.checkpoint(stage, 0.0);
     Raster raster = rasterise_mesh(mesh.nodes, mesh.tets, deformation.displacement, moving_grid);
@@ -140,7 +151,7 @@ Volume displacement_moving_to_fixed(const Deformation& deformation, const Geomet
     std::optional<detail::Continuation> continuation;
     if (!raster.full())
         continuation.emplace(mesh.nodes, mesh.tets, meshing::boundary_surface(mesh), deformation.displacement,
-                             options.fade_mm);
+                             options.fade_mm, rigid_mask(deformation));
     observer.checkpoint(stage, 0.6);
     const Eigen::Matrix3d rotation = deformation.placement.linear();
     complete(raster, moving_grid, rotation, rotation - Eigen::Matrix3d::Identity(), deformation.placement.translation(),
@@ -161,11 +172,12 @@ Volume displacement_near_mesh(const Deformation& deformation, const Geometry& mo
     return raster.values;
 }
 
-Volume displacement_fixed_to_moving(const Deformation& deformation, const Geometry& fixed_grid,
-                                    const FieldOptions& options, Observer& observer) {
+Volume displacement_fixed_to_moving(const Deformation& given, const Geometry& fixed_grid, const FieldOptions& options,
+                                    Observer& observer) {
     constexpr auto stage = "field fixed to moving";
     imaging::require_valid(fixed_grid, "fixed grid");
-    require_usable(deformation, options);
+    require_usable(given, options);
+    const Deformation deformation = given.with_placement(given.far_motion());
     const auto& mesh = deformation.mesh;
     const Eigen::Isometry3d to_moving = deformation.placement.inverse();
     Geometry grid = fixed_grid;  // the fixed grid seen from the moving frame
@@ -181,12 +193,17 @@ Volume displacement_fixed_to_moving(const Deformation& deformation, const Geomet
     observer.checkpoint(stage, 0.15);
     const meshing::BoundarySurface boundary = meshing::boundary_surface(mesh);
     std::optional<detail::Continuation> forward;
-    if (!raster.full()) forward.emplace(mesh.nodes, mesh.tets, boundary, deformation.displacement, options.fade_mm);
-    detail::LazyContinuation backward(
-        [&] { return detail::Continuation(deformed, mesh.tets, boundary, inverse, options.fade_mm); });
+    if (!raster.full())
+        forward.emplace(mesh.nodes, mesh.tets, boundary, deformation.displacement, options.fade_mm,
+                        rigid_mask(deformation));
+    detail::LazyContinuation backward([&] {
+        return detail::Continuation(deformed, mesh.tets, boundary, inverse, options.fade_mm, rigid_mask(deformation));
+    });
     observer.checkpoint(stage, 0.6);
+    const imaging::MaskLookup organ(
+        deformation.surroundings ? mask_of_mesh(mesh, deformation.surroundings->rigid.geometry) : Volume());
     complete(raster, fixed_grid, Eigen::Matrix3d::Identity(), to_moving.linear() - Eigen::Matrix3d::Identity(),
-             to_moving.translation(), [&] { return detail::RowInverse(*forward, backward); });
+             to_moving.translation(), [&] { return detail::RowInverse(*forward, backward, organ); });
     observer.progress(stage, 1.0);
     return raster.values;
 }
@@ -197,10 +214,10 @@ struct PointTransform::Impl {
     detail::Continuation continuation;
 
     Impl(const Deformation& given, const FieldOptions& options)
-        : deformation(given),
-          locator(given.mesh),
-          continuation(given.mesh.nodes, given.mesh.tets, meshing::boundary_surface(given.mesh), given.displacement,
-                       options.fade_mm) {}
+        : deformation(given.with_placement(given.far_motion())),
+          locator(deformation.mesh),
+          continuation(deformation.mesh.nodes, deformation.mesh.tets, meshing::boundary_surface(deformation.mesh),
+                       deformation.displacement, options.fade_mm, rigid_mask(deformation)) {}
 
     [[nodiscard]] Eigen::Vector3d operator()(const Eigen::Vector3d& point) const {
         const auto location = locator.find(point);

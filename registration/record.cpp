@@ -6,6 +6,9 @@
 #include "core/file_message.hpp"
 
 #include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <optional>
 
 namespace tissuewarp::registration {
 
@@ -21,24 +24,74 @@ Eigen::VectorXd jacobians(const Deformation& deformation) {
     return meshing::tet_volumes(deformed).cwiseQuotient(meshing::tet_volumes(mesh));
 }
 
+void require_rigid(const Eigen::Matrix4d& motion, const std::string& name) {
+    const Eigen::Matrix3d rotation = motion.topLeftCorner<3, 3>();
+    const double error = (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+    constexpr double rounding = 1e-6;
+    if (!motion.allFinite() || !(error <= rounding) || rotation.determinant() < 0 ||
+        motion.row(3) != Eigen::RowVector4d(0, 0, 0, 1))
+        throw InvalidInput(name + " is not a rigid motion (rotation off by " + std::to_string(error) +
+                           ", at most 1e-6)");
+}
+
 void require_consistent(const Deformation& deformation) {
     if (deformation.displacement.cols() != deformation.mesh.nodes.cols())
         throw InvalidInput("a displacement of " + std::to_string(deformation.displacement.cols()) +
                            " nodes does not belong to a mesh of " + std::to_string(deformation.mesh.node_count()));
     if (!deformation.displacement.allFinite()) throw InvalidInput("the displacement holds values that are not finite");
-    const Eigen::Matrix4d& placement = deformation.placement.matrix();
-    const Eigen::Matrix3d rotation = placement.topLeftCorner<3, 3>();
-    const double error = (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-    constexpr double rounding = 1e-6;
-    if (!placement.allFinite() || !(error <= rounding) || rotation.determinant() < 0 ||
-        placement.row(3) != Eigen::RowVector4d(0, 0, 0, 1))
-        throw InvalidInput("the placement is not a rigid motion (rotation off by " + std::to_string(error) +
-                           ", at most 1e-6)");
+    require_rigid(deformation.placement.matrix(), "the placement");
+    if (deformation.surroundings)
+        require_rigid(deformation.surroundings->motion.matrix(), "the motion of the surroundings");
 }
 
 void write_matrix(Hdf5Output& file, const std::string& name, const Eigen::Isometry3d& motion) {
     file.columns<double>(name, motion.matrix().transpose(), "mm");
     file.attribute(name, "meaning", "homogeneous matrix, moving to fixed, LPS mm: y = A x");
+}
+
+Eigen::Isometry3d read_matrix(const Hdf5Input& file, const std::string& name) {
+    Eigen::Matrix4d rows;
+    file.array<double>(name, rows.data(), {4, 4});
+    Eigen::Isometry3d motion;
+    motion.matrix() = rows.transpose();
+    return motion;
+}
+
+/// The mask as lengths of runs of 0 and of 1 in turn, in the order of memory, beginning with 0.
+void write_surroundings(Hdf5Output& file, const Surroundings& surroundings) {
+    write_matrix(file, "surroundings/motion", surroundings.motion);
+    detail::write_grid(file, "surroundings/grid", surroundings.rigid.geometry);
+    const auto* voxel = surroundings.rigid.data<std::uint8_t>();
+    const std::int64_t count = surroundings.rigid.geometry.voxel_count();
+    std::vector<int> runs;
+    bool value = false;
+    for (std::int64_t from = 0; from < count; value = !value) {
+        std::int64_t to = from;
+        while (to < count && (voxel[to] != 0) == value && to - from < std::numeric_limits<int>::max()) ++to;
+        runs.push_back(static_cast<int>(to - from));
+        from = to;
+    }
+    file.vector<int>("surroundings/runs", Eigen::VectorXi::Map(runs.data(), static_cast<Eigen::Index>(runs.size())),
+                     "voxel");
+}
+
+std::optional<Surroundings> read_surroundings(const Hdf5Input& file) {
+    if (!file.holds("surroundings/runs")) return std::nullopt;
+    Surroundings surroundings{read_matrix(file, "surroundings/motion"),
+                              imaging::Volume(detail::read_grid(file, "surroundings/grid"), CV_8UC1)};
+    auto* voxel = surroundings.rigid.data<std::uint8_t>();
+    const std::int64_t count = surroundings.rigid.geometry.voxel_count();
+    std::int64_t at = 0;
+    bool value = false;
+    for (const int length : file.vector<int>("surroundings/runs")) {
+        if (length < 0 || length > count - at)
+            throw InvalidInput("the runs of the surroundings' mask do not fill its grid; the file is damaged");
+        std::fill_n(voxel + at, length, static_cast<std::uint8_t>(value));
+        at += length;
+        value = !value;
+    }
+    if (at != count) throw InvalidInput("the runs of the surroundings' mask do not fill its grid; the file is damaged");
+    return surroundings;
 }
 
 void write_rounds(Hdf5Output& file, const std::vector<Round>& rounds) {
@@ -74,6 +127,7 @@ void write_result(Hdf5Output& file, const UpdateResult& result) {
     file.columns<double>("displacement", deformation.displacement, "mm");
     file.attribute("displacement", "frame", "moving image, LPS; elastic part, before the placement");
     write_matrix(file, "placement", deformation.placement);
+    if (deformation.surroundings) write_surroundings(file, *deformation.surroundings);
     file.vector<double>("jacobian", jacobians(deformation), "1");
     write_matrix(file, "alignment/matrix", result.alignment.placement);
     file.scalar<double>("alignment/mean_distance_mm", result.alignment.mean_distance_mm, "mm");
@@ -123,9 +177,8 @@ Record read_checked(const std::filesystem::path& path) {
     record.element = model.element;
     record.deformation.mesh = std::move(model.mesh);
     record.deformation.displacement = file.columns<double>("displacement", 3);
-    Eigen::Matrix4d placement;
-    file.array<double>("placement", placement.data(), {4, 4});
-    record.deformation.placement.matrix() = placement.transpose();
+    record.deformation.placement = read_matrix(file, "placement");
+    record.deformation.surroundings = read_surroundings(file);
     require_consistent(record.deformation);
     record.jacobian = file.vector<double>("jacobian", record.deformation.mesh.tet_count());
     record.moving_grid = detail::read_grid(file, "moving_grid");

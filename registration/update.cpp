@@ -1,10 +1,12 @@
 #include "registration/update.hpp"
 
 #include "core/stopwatch.hpp"
+#include "imaging/labels.hpp"
 #include "registration/boundary/surroundings.hpp"
 #include "registration/engine_choice.hpp"
 #include "registration/pose/start_pose.hpp"
 #include "registration/register.hpp"
+#include "registration/rigid_surroundings.hpp"
 
 #include <string>
 #include <utility>
@@ -54,6 +56,9 @@ struct Updater::Impl {
         const double seconds = stopwatch.lap();
         UpdateResult result = detail::register_model(*prepared, terms, load_finder, *solver, options, observer);
         if (given.start) detail::return_to_fixed_frame(result, start);
+        if (prepared->neighbours)
+            result.deformation.surroundings =
+                rigid_bodies(imaging::mask_of_all(prepared->neighbours->labels), result.deformation);
         result.times.insert(result.times.begin() + 1, {stages::boundary_maps, seconds});
         return result;
     }

@@ -2,6 +2,7 @@
 
 #include "meshing/tet_mesh.hpp"
 #include "registration/field.hpp"
+#include "registration/rigid_surroundings.hpp"
 #include "registration/warp.hpp"
 #include "server/crc64.hpp"
 
@@ -107,6 +108,11 @@ Products Computer::compute(const Job& job, Observer& observer) {
         products.uncertainty = uncertainty(*patient_.model, products.result, {}, observer);
         for (Doubt& doubt : doubts_of(*products.uncertainty, job.request.tolerance_mm))
             products.result.doubts.push_back(std::move(doubt));
+    }
+    if (job.seen.image && !patient_.image.empty()) {
+        Deformation& deformation = products.result.deformation;
+        deformation.surroundings =
+            rigid_surroundings(deformation, patient_.image, *job.seen.image, {job.request.fade_mm});
     }
     products.organ = organ_of(products);
     products.targets = targets_of(products, job.targets, job.request.fade_mm);

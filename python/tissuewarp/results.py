@@ -57,8 +57,10 @@ class Inverse:
 class Result:
     """A registration: moving is before the operation, fixed during it. Lengths are mm, frames LPS."""
 
-    def __init__(self, model, core, tolerance, grid):
+    def __init__(self, model, core, tolerance, grid, image=None):
         self._model, self._core, self._tolerance, self._grid = model, core, tolerance, grid
+        if image is not None:  # bone around the organ stays bone
+            _core.hold_surroundings(core, model, image)
         self._transform = self._uncertainty = self._kept = None
         self.inverse = Inverse(self)
 

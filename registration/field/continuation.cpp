@@ -1,6 +1,7 @@
 #include "registration/field/continuation.hpp"
 
 #include "imaging/filters.hpp"
+#include "imaging/mask_lookup.hpp"
 #include "meshing/search/surface_proximity.hpp"
 #include "registration/field/rasterisation.hpp"
 
@@ -177,16 +178,19 @@ struct Continuation::Impl {
     double spacing;
     Level grid;
     meshing::SurfaceProximity surface;
+    imaging::MaskLookup rigid;
 
     Impl(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tets, const meshing::BoundarySurface& boundary,
-         const Eigen::Matrix3Xd& values, double fade_mm)
-        : spacing(spacing_for(nodes, fade_mm)),
+         const Eigen::Matrix3Xd& values, double fade_mm, const imaging::Volume& at_rest, double finest_spacing_mm)
+        : spacing(spacing_for(nodes, fade_mm, finest_spacing_mm)),
           grid(size_for(nodes, fade_mm), spacing),
-          surface(nodes, boundary, values, options.blend_spacings * spacing) {
+          surface(nodes, boundary, values, options.blend_spacings * spacing),
+          rigid(at_rest) {
         lower = nodes.rowwise().minCoeff().array() - fade_mm - 2.0 * spacing;
         const Eigen::Matrix3Xd index = (nodes.colwise() - lower) / spacing;
         fix_inside(index, tets, values);
         fix_thin_parts(index, boundary);
+        fix_rigid();
         fix_far(index, boundary, fade_mm);
         link_surface();
         solve(grid);
@@ -195,8 +199,8 @@ struct Continuation::Impl {
     static Eigen::Array3d extent_for(const Eigen::Matrix3Xd& nodes, double fade_mm) {
         return (nodes.rowwise().maxCoeff() - nodes.rowwise().minCoeff()).array() + 2.0 * fade_mm;
     }
-    static double spacing_for(const Eigen::Matrix3Xd& nodes, double fade_mm) {
-        return std::max(std::min(options.finest_spacing_mm, fade_mm / options.spacings_of_fade),
+    static double spacing_for(const Eigen::Matrix3Xd& nodes, double fade_mm, double finest_spacing_mm) {
+        return std::max(std::min(finest_spacing_mm, fade_mm / options.spacings_of_fade),
                         std::cbrt(extent_for(nodes, fade_mm).prod() / options.most_nodes));
     }
     [[nodiscard]] std::array<int, 3> size_for(const Eigen::Matrix3Xd& nodes, double fade_mm) const {
@@ -240,6 +244,14 @@ struct Continuation::Impl {
             }
         }
         for (const std::size_t n : thin) grid.fixed[n] = on_sheet;
+    }
+
+    /// Grid nodes in rigid surroundings are at rest.
+    void fix_rigid() {
+        if (rigid.empty()) return;
+        tbb::parallel_for(std::size_t{0}, grid.fixed.size(), [&](std::size_t n) {
+            if (!grid.fixed[n] && rigid(point_of(index_of(n)))) grid.fixed[n] = at_rest;
+        });
     }
 
     /// Cuts the edges from free nodes into the mesh at the surface.
@@ -350,14 +362,20 @@ struct Continuation::Impl {
 };
 
 Continuation::Continuation(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tets,
-                           const meshing::BoundarySurface& boundary, const Eigen::Matrix3Xd& values, double fade_mm)
-    : impl_(std::make_unique<Impl>(nodes, tets, boundary, values, fade_mm)) {}
+                           const meshing::BoundarySurface& boundary, const Eigen::Matrix3Xd& values, double fade_mm,
+                           const imaging::Volume& rigid, double finest_spacing_mm)
+    : impl_(std::make_unique<Impl>(nodes, tets, boundary, values, fade_mm, rigid, finest_spacing_mm)) {}
 Continuation::~Continuation() = default;
 Continuation::Continuation(Continuation&&) noexcept = default;
 Continuation& Continuation::operator=(Continuation&&) noexcept = default;
 
 Eigen::Vector3d Continuation::operator()(const Eigen::Vector3d& point) const {
+    if (rests(point)) return Eigen::Vector3d::Zero();
     return impl_->interpolated(point) + impl_->correction(point);
+}
+
+bool Continuation::rests(const Eigen::Vector3d& point) const {
+    return !impl_->rigid.empty() && impl_->rigid(point);
 }
 
 }  // namespace tissuewarp::registration::detail

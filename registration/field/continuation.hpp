@@ -1,6 +1,7 @@
 #pragma once
 /// A nodal field of a mesh, continued to all of space.
 
+#include "imaging/volume.hpp"
 #include "meshing/tet_mesh.hpp"
 
 #include <memory>
@@ -27,17 +28,23 @@ struct ContinuationOptions {
 /// corner where the gradient jumps at the surface; what it misses at the closest surface point is added within a few
 /// millimetres of the surface, so that the field is continuous there. In that layer and on the grid the continuation
 /// also approximates the field inside the mesh, which the inversion of a continued field needs close to the surface.
+///
+/// Rigid surroundings are at rest: the grid's nodes in them hold zero, and so does every point in one of their voxels.
 class Continuation {
 public:
-    /// `nodes` 3 × N mm, positions of the mesh whose elements and outer boundary are given; `values` 3 × N, mm.
+    /// `nodes` 3 × N mm, positions of the mesh whose elements and outer boundary are given; `values` 3 × N, mm; `rigid`
+    /// uint8, != 0 in surroundings at rest, or empty.
     Continuation(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tets, const meshing::BoundarySurface& boundary,
-                 const Eigen::Matrix3Xd& values, double fade_mm);
+                 const Eigen::Matrix3Xd& values, double fade_mm, const imaging::Volume& rigid = {},
+                 double finest_spacing_mm = ContinuationOptions().finest_spacing_mm);
     ~Continuation();
     Continuation(Continuation&&) noexcept;
     Continuation& operator=(Continuation&&) noexcept;
 
     /// The value at a point (mm, the frame of `nodes`). Thread-safe.
     [[nodiscard]] Eigen::Vector3d operator()(const Eigen::Vector3d& point) const;
+    /// Whether a point lies in rigid surroundings.
+    [[nodiscard]] bool rests(const Eigen::Vector3d& point) const;
 
 private:
     struct Impl;

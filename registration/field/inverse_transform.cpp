@@ -25,7 +25,9 @@ struct InversePointTransform::Impl {
     meshing::PointLocator deformed;
 
     Impl(const Deformation& given, const FieldOptions& options)
-        : deformation(given), forward(given, options), deformed(given.deformed_mesh()) {}
+        : deformation(given.with_placement(given.far_motion())),
+          forward(given, options),
+          deformed(given.deformed_mesh()) {}
 
     /// X ← X + part · P⁻¹(y − φ(X)), the part halved where the residual would grow.
     [[nodiscard]] Eigen::Vector3d outside(const Eigen::Vector3d& y) const {

@@ -158,6 +158,32 @@ TEST_F(Records, ComeBackBitByBit) {
     EXPECT_EQ(stiff.shear_modulus, std::get<tled::NeoHookeanIso>(prepared().model.materials.at(7)).shear_modulus);
 }
 
+TEST_F(Records, HoldHowTheSurroundingsMoved) {
+    UpdateResult result = some_result();
+    imaging::Volume mask(test::oblique_grid({1, 2, 3}, {13, 7, 5}, {1.1, 1.3, 0.9}), CV_8UC1);
+    cv::RNG random(4);
+    for (std::int64_t n = 0; n < mask.geometry.voxel_count(); ++n)
+        mask.data<std::uint8_t>()[n] = random.uniform(0.0, 1.0) < 0.4;
+    mask.data<std::uint8_t>()[0] = 1;  // the run of 0 that begins is empty
+    result.deformation.surroundings = {test::motion(11.0, {1, 2, 3}, {4.5, -5.5, 1.0 / 3.0}), mask};
+    write_record(prepared(), result, some_info(), path);
+    const auto back = read_record(path).deformation.surroundings;
+    ASSERT_TRUE(back);
+    EXPECT_EQ(back->motion.matrix(), result.deformation.surroundings->motion.matrix());
+    EXPECT_TRUE(imaging::same_grid(back->rigid.geometry, mask.geometry, 1e-12));
+    EXPECT_EQ(cv::norm(back->rigid.voxels, mask.voxels, cv::NORM_INF), 0);
+    for (const int wrong : {-1, 1 << 30, 2}) {
+        write_record(prepared(), result, some_info(), path);
+        poke<int>("surroundings/runs", 0, wrong);
+        EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr("do not fill its grid")));
+    }
+    write_record(prepared(), result, some_info(), path);
+    poke<double>("surroundings/motion", 0, 2.0);
+    EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr("the motion of the surroundings")));
+    write();
+    EXPECT_FALSE(read_record(path).deformation.surroundings);
+}
+
 TEST_F(Records, OfTheFirstVersionAreRead) {
     write();
     make_materials_old("materials");

@@ -3,7 +3,7 @@
 #include "core/errors.hpp"
 #include "imaging/filters.hpp"
 #include "registration/field.hpp"
-#include "registration/field/rasterisation.hpp"
+#include "registration/field/mesh_labels.hpp"
 #include "registration/matching/descriptors/grid_samples.hpp"
 #include "registration/matching/descriptors/matching_grid.hpp"
 
@@ -101,15 +101,7 @@ std::vector<float> normalised(const Volume& image, const Volume& weight) {
 
 /// 1 for voxels in the mesh or near it.
 Volume near_mesh(const meshing::TetMesh& mesh, const imaging::Geometry& grid, double outside_mm) {
-    Volume inside(grid, CV_8UC1);
-    const Eigen::Matrix3Xd index = grid.point_to_index() * (mesh.nodes.colwise() - grid.origin);
-    rasterise(index, mesh.tets, grid.size, [&](int, const Eigen::Vector4d&) {
-        return [&](const TetRow& row) {
-            auto* start = inside.data<std::uint8_t>() + inside.offset(0, row.j, row.k);
-            std::fill(start + row.first, start + row.last + 1, std::uint8_t{1});
-        };
-    });
-    return imaging::dilate(inside, outside_mm);
+    return imaging::dilate(mask_of_mesh(mesh, grid), outside_mm);
 }
 
 /// Voxel centres of what is seen, thinned.

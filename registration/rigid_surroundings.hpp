@@ -1,0 +1,27 @@
+#pragma once
+/// What lies around the organ and did not move with it: bone.
+///
+/// A field must continue beyond the organ, and whatever continues it smoothly bends the skull beside a craniotomy.
+/// Where both images are at hand they tell how the surroundings moved as a whole, which the rigid placement of an organ
+/// that deformed is only near to, and what of them moved so exactly: around every place the intraoperative image as
+/// that motion carries it is compared with itself shifted along the displacement that the continuation adds, each by
+/// what is left of the preoperative image after the best linear map of intensities in a window (as local correlation,
+/// so contrast and brightness may differ). A place is rigid where the least of that lies nearer to the motion than to
+/// the continuation. Places without structure say nothing and are left to the continuation.
+
+#include "registration/field.hpp"
+
+namespace tissuewarp::registration {
+
+/// How the surroundings moved, with the voxels of the moving image's grid that are rigid; those of
+/// `deformation.surroundings` among them. None of them lies in the organ, before or after it deformed. Only what
+/// `deformation` has where an image has several components or fewer than two voxels along an axis, or where no rigid
+/// motion explains the surroundings. Throws InvalidInput where the deformation is not usable.
+std::optional<Surroundings> rigid_surroundings(const Deformation& deformation, const imaging::Volume& moving,
+                                               const imaging::Volume& fixed, const FieldOptions& options = {});
+
+/// Bodies that are known to be rigid and to move with the placement, without what the organ covers, before or after it
+/// deformed. `mask` uint8, moving frame.
+Surroundings rigid_bodies(const imaging::Volume& mask, const Deformation& deformation);
+
+}  // namespace tissuewarp::registration
