@@ -2,6 +2,7 @@
 
 #include "apps/bids.hpp"
 #include "apps/dial.hpp"
+#include "apps/finished_tasks.hpp"
 #include "apps/module_description.hpp"
 #include "apps/output_names.hpp"
 #include "apps/register_outputs.hpp"
@@ -9,7 +10,6 @@
 #include "apps/silenced_stderr.hpp"
 #include "apps/update_device.hpp"
 #include "apps/versions.hpp"
-#include "core/cancel_only.hpp"
 #include "core/errors.hpp"
 #include "imaging/filters.hpp"
 #include "imaging/labels.hpp"
@@ -22,7 +22,6 @@
 #include <fmt/format.h>
 #include <tbb/parallel_invoke.h>
 #include <tbb/task_arena.h>
-#include <tbb/task_group.h>
 
 namespace tissuewarp::apps {
 
@@ -82,6 +81,11 @@ Intraoperative seen(const RegistrationInputs& inputs, const RegisterOptions& opt
 void make_backward_field(RegistrationRun& run, ProgressLine& progress) {
     progress.begin("field", 0.47, 0.55);
     run.products.fixed_to_moving = displacement_fixed_to_moving(run.result.deformation, output_grid(run),
+                                                                FieldOptions{run.options.fade}, progress);
+}
+
+void make_forward_field(RegistrationRun& run, ProgressLine& progress) {
+    run.products.moving_to_fixed = displacement_moving_to_fixed(run.result.deformation, run.inputs.moving_grid(),
                                                                 FieldOptions{run.options.fade}, progress);
 }
 
@@ -221,35 +225,32 @@ void register_and_write(RegistrationRun& run, OutputFolder& output, StageClock& 
     run.intraoperative_seconds = clock.total() - ready;
 
     progress.begin("error estimate", 0.55, 0.85);
-    // All that waits for nothing else runs at once: factors of the estimate, compression of files, the other field and
-    // scores. A stage's time is that until it was there.
+    // All that waits for nothing else runs at once, compression of files beside factors of the estimate; but what takes
+    // memory and is not needed yet waits until these are gone. A stage's time is that until it was there.
     auto silenced = std::make_unique<SilencedStandardError>();
-    CancelOnly quiet(progress);
-    tbb::task_group writing, scoring, forward;  // the last writes by the first, and ends before it
-    forward.run([&] {
-        run.products.moving_to_fixed = displacement_moving_to_fixed(run.result.deformation, run.inputs.moving_grid(),
-                                                                    FieldOptions{options.fade}, quiet);
-        start_writing_forward(run, output, writing);
-        score_forward_field(run);
-    });
-    if (writes(options, inverse_transform)) forward.wait();
+    FinishedTasks written, warped_scored, forward_scored;  // groups of their own: what fails ends its group
+    tbb::task_group& writing = written.group;
+    if (writes(options, inverse_transform)) make_forward_field(run, progress);
     start_writing_warped(run, output, writing);
-    scoring.run([&] { score_warped(run); });
     if (!options.no_error_estimate) {
         // Isolated, so that waiting for its parts does not begin the rest.
         tbb::this_task_arena::isolate([&] { estimate_errors(run, progress); });
         run.times.push_back(clock.lap("error estimate"));
     }
     progress.begin("writing and scoring", 0.85, 0.97);
-    forward.wait();
+    warped_scored.group.run([&] { score_warped(run); });
+    if (run.products.moving_to_fixed.empty()) make_forward_field(run, progress);
+    start_writing_forward(run, output, writing);
+    forward_scored.group.run([&] { score_forward_field(run); });
+    const report::Pictures pictures = draw_pictures(run);
+    run.times.push_back(clock.lap("pictures"));
+    warped_scored.group.wait();
+    forward_scored.group.wait();
+    run.times.push_back(clock.lap("score"));
     if (run.dial) doubt_dial(run);
     if (auto doubt = doubt_of_folds(run.scores.organ)) run.result.doubts.push_back(std::move(*doubt));
     for (Doubt& doubt : run.result.doubts) doubt.text = imaging::with_label_names(doubt.text, run.inputs.label_names);
     start_writing_estimates(run, output, writing);
-    scoring.wait();
-    run.times.push_back(clock.lap("score"));
-    const report::Pictures pictures = draw_pictures(run);
-    run.times.push_back(clock.lap("pictures"));
     writing.wait();
     silenced.reset();
     run.times.push_back(clock.lap("write"));

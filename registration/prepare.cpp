@@ -94,6 +94,10 @@ PrepareOptions with_edge_length(PrepareOptions options, const imaging::Volume& o
 class ModelBeside {
 public:
     explicit ModelBeside(Observer& observer) : notes_(observer) {}
+    /// To its end: where tasks are cancelled their loops end half done, and what follows reads what is not there.
+    ~ModelBeside() { task_.wait(); }
+    ModelBeside(const ModelBeside&) = delete;
+    ModelBeside& operator=(const ModelBeside&) = delete;
 
     void start(const imaging::Volume& labels, const PrepareOptions& options) {
         started_ = true;
@@ -113,14 +117,13 @@ public:
         notes_.tell(observer);
         return std::move(made_);
     }
-    void forget() { task_.wait(); }
 
 private:
     KeptNotes notes_;
     std::unique_ptr<PreparedModel> made_;
     std::exception_ptr failure_;
     bool started_ = false;
-    tbb::task_group task_;  // ends before what it writes to
+    tbb::task_group task_;
 };
 
 bool takes_coarse_model(const PreparedModel& prepared) {
@@ -220,8 +223,6 @@ PreparedModel prepare_for_loads(const imaging::Volume& moving_labels, const Prep
         Stopwatch stopwatch;
         prepared.coarse = coarse.take(observer);
         prepared.times.push_back({"coarse model", stopwatch.lap()});
-    } else {
-        coarse.forget();
     }
     return prepared;
 }

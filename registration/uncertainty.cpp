@@ -15,8 +15,10 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
+#include <exception>
 #include <limits>
 #include <map>
 #include <string>
@@ -117,6 +119,23 @@ struct AllErrors {
     NumericalErrors numerical;
 };
 
+/// At the same time, where there are threads for both. Isolated, so that one does not wait for its parts by beginning
+/// the other; and each to its end, since loops that an exception of the other cancels end half done.
+template <class First, class Second>
+void run_both(const First& first, const Second& second) {
+    std::array<std::exception_ptr, 2> failures;
+    const auto run = [&](std::size_t n, const auto& call) {
+        try {
+            tbb::this_task_arena::isolate(call);
+        } catch (...) {
+            failures[n] = std::current_exception();
+        }
+    };
+    tbb::parallel_invoke([&] { run(0, first); }, [&] { run(1, second); });
+    for (const std::exception_ptr& failure : failures)
+        if (failure) std::rethrow_exception(failure);
+}
+
 /// Of a model of so many nodes or fewer one factor serves all. Of a larger one what data leave open asks for the
 /// factors of the coarser model and the rest for its own, so that both are found at the same time.
 AllErrors all_errors(const PreparedModel& prepared, const UpdateResult& result, const UncertaintyOptions& options,
@@ -136,16 +155,8 @@ AllErrors all_errors(const PreparedModel& prepared, const UpdateResult& result, 
     if (!prepared.coarse) made = detail::coarse_model_for_loads(prepared, observer);
     const PreparedModel& coarse = made ? *made : *prepared.coarse;
     const tled::RestStiffness stiffness(prepared.rest, conditions, prepared.stiffness);
-    // Isolated, so that one does not wait for its parts by beginning the other.
-    tbb::parallel_invoke(
-        [&] {
-            tbb::this_task_arena::isolate(
-                [&] { errors.numerical = numerical_errors(prepared, stiffness, conditions, displacement); });
-        },
-        [&] {
-            tbb::this_task_arena::isolate(
-                [&] { errors.data = open_on_coarse(prepared, coarse, result.pulls, displacement, options); });
-        });
+    run_both([&] { errors.numerical = numerical_errors(prepared, stiffness, conditions, displacement); },
+             [&] { errors.data = open_on_coarse(prepared, coarse, result.pulls, displacement, options); });
     return errors;
 }
 

@@ -4,6 +4,7 @@
 
 #include <libdeflate.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 #include <zlib.h>
 
 #include <algorithm>
@@ -114,7 +115,8 @@ void put_little_endian(std::FILE* file, std::uint32_t value, const fs::path& pat
 
 void write_gzip(const ByteSource& source, std::uint64_t size, const fs::path& destination) {
     constexpr std::uint64_t block_bytes = std::uint64_t{1} << 20;
-    constexpr std::uint64_t blocks_at_once = 16;  // bounds memory to about 33 MB
+    // Bounds memory to about 4 MB a thread.
+    const auto blocks_at_once = 2 * static_cast<std::uint64_t>(tbb::this_task_arena::max_concurrency());
     File out = open_file(destination, "wb");
     // RFC 1952: magic, deflate, no flags, no time (the same image gives the same file), no hint, unknown system.
     constexpr std::array<unsigned char, 10> header{0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 255};

@@ -6,6 +6,7 @@
 
 #include <libdeflate.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
@@ -20,7 +21,6 @@ namespace tissuewarp::registration::detail {
 namespace {
 
 constexpr std::int64_t most_chunk_voxels = std::int64_t{1} << 16;  // 768 KiB: a reader's cache of HDF5 holds one
-constexpr std::int64_t chunks_at_once = 16;                        // bounds memory to about 40 MB
 constexpr int level = 1;                                           // of libdeflate
 
 using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
@@ -136,6 +136,8 @@ private:
         H5Pset_shuffle(creation);
         H5Pset_deflate(creation, level);  // which readers need not know
         const Hdf5Handle set = dataset(name, H5T_IEEE_F32LE, static_cast<hsize_t>(3 * voxels), creation);
+        // Bounds memory to about 5 MB a thread.
+        const std::int64_t chunks_at_once = 2 * tbb::this_task_arena::max_concurrency();
         for (std::int64_t first = 0; first < chunks; first += chunks_at_once) {
             std::vector<std::vector<unsigned char>> packed(
                 static_cast<std::size_t>(std::min(chunks_at_once, chunks - first)));
