@@ -20,6 +20,7 @@
 #include "registration/warp.hpp"
 
 #include <fmt/format.h>
+#include <malloc.h>
 #include <tbb/parallel_invoke.h>
 #include <tbb/task_arena.h>
 
@@ -233,6 +234,7 @@ void register_and_write(RegistrationRun& run, OutputFolder& output, StageClock& 
     if (writes(options, inverse_transform)) make_forward_field(run, progress);
     start_writing_warped(run, output, writing);
     if (!options.no_error_estimate) {
+        malloc_trim(0);  // before factors: what meshing and matching left in pieces goes back to the system
         // Isolated, so that waiting for its parts does not begin the rest.
         tbb::this_task_arena::isolate([&] { estimate_errors(run, progress); });
         run.times.push_back(clock.lap("error estimate"));

@@ -200,7 +200,7 @@ void write_compressed_nifti(const Volume& volume, const fs::path& path, const fs
                             std::optional<double> step) {
     // ITK would deflate on one thread at level 6, which takes many seconds on a field.
     fs::path plain_name = path;
-    plain_name.replace_extension();
+    plain_name.replace_extension().replace_extension(".nii");  // ITK knows small letters only
     const detail::NiftiBytes bytes(volume, step, plain_name);
     const auto source = [&](auto first, auto count, unsigned char* target) { bytes.copy(first, count, target); };
     detail::write_gzip(source, bytes.size(), temporary);

@@ -11,14 +11,9 @@
 #include "tled/model/internal_force.hpp"
 #include "tled/model/symmetric.hpp"
 
-#include <tbb/parallel_invoke.h>
-#include <tbb/task_arena.h>
-
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
-#include <exception>
 #include <limits>
 #include <map>
 #include <string>
@@ -110,8 +105,9 @@ struct NumericalErrors {
 
 NumericalErrors numerical_errors(const PreparedModel& prepared, const tled::RestStiffness& stiffness,
                                  const tled::NodalConditions& conditions, const Eigen::Matrix3Xd& displacement) {
-    return {tled::lifted_residual(prepared.rest, stiffness, conditions, displacement),
-            tled::discretisation_error(prepared.model, stiffness, conditions, displacement)};
+    // First: what it takes before it solves is gone when the factor is made.
+    tled::DiscretisationEstimate mesh = tled::discretisation_error(prepared.model, stiffness, conditions, displacement);
+    return {tled::lifted_residual(prepared.rest, stiffness, conditions, displacement), std::move(mesh)};
 }
 
 struct AllErrors {
@@ -119,25 +115,8 @@ struct AllErrors {
     NumericalErrors numerical;
 };
 
-/// At the same time, where there are threads for both. Isolated, so that one does not wait for its parts by beginning
-/// the other; and each to its end, since loops that an exception of the other cancels end half done.
-template <class First, class Second>
-void run_both(const First& first, const Second& second) {
-    std::array<std::exception_ptr, 2> failures;
-    const auto run = [&](std::size_t n, const auto& call) {
-        try {
-            tbb::this_task_arena::isolate(call);
-        } catch (...) {
-            failures[n] = std::current_exception();
-        }
-    };
-    tbb::parallel_invoke([&] { run(0, first); }, [&] { run(1, second); });
-    for (const std::exception_ptr& failure : failures)
-        if (failure) std::rethrow_exception(failure);
-}
-
-/// Of a model of so many nodes or fewer one factor serves all. Of a larger one what data leave open asks for the
-/// factors of the coarser model and the rest for its own, so that both are found at the same time.
+/// Of a model of so many nodes or fewer one factor serves all. Of a larger one its own, which takes most memory, is
+/// gone before those of the coarser model are made.
 AllErrors all_errors(const PreparedModel& prepared, const UpdateResult& result, const UncertaintyOptions& options,
                      Observer& observer) {
     const Eigen::Matrix3Xd displacement = displacement_under_pulls(result);
@@ -154,9 +133,10 @@ AllErrors all_errors(const PreparedModel& prepared, const UpdateResult& result, 
     std::optional<PreparedModel> made;
     if (!prepared.coarse) made = detail::coarse_model_for_loads(prepared, observer);
     const PreparedModel& coarse = made ? *made : *prepared.coarse;
-    const tled::RestStiffness stiffness(prepared.rest, conditions, prepared.stiffness);
-    run_both([&] { errors.numerical = numerical_errors(prepared, stiffness, conditions, displacement); },
-             [&] { errors.data = open_on_coarse(prepared, coarse, result.pulls, displacement, options); });
+    errors.numerical =
+        numerical_errors(prepared, {prepared.rest, conditions, prepared.stiffness}, conditions, displacement);
+    observer.checkpoint("error estimate", 0.6);
+    errors.data = open_on_coarse(prepared, coarse, result.pulls, displacement, options);
     return errors;
 }
 
