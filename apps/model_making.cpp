@@ -16,8 +16,10 @@ double chosen_edge_length(const PreoperativeOptions& options, const Registration
     return for_labels ? suggested_edge_length(organ) : suggested_edge_length_without_labels(organ);
 }
 
-PreparedModel made_model(const PreoperativeOptions& options, const RegistrationInputs& inputs, double edge_length_mm,
-                         Observer& observer) {
+namespace {
+
+PrepareOptions prepare_options(const PreoperativeOptions& options, const RegistrationInputs& inputs,
+                               double edge_length_mm) {
     PrepareOptions made;
     made.meshing.edge_length = edge_length_mm;
     made.meshing.label_edge_length = options.label_edge_length;
@@ -30,8 +32,25 @@ PreparedModel made_model(const PreoperativeOptions& options, const RegistrationI
     made.data_stiffness = options.data_stiffness;
     made.anchors = options.anchors;
     made.rigid_neighbours = options.rigid_neighbours;
+    return made;
+}
+
+}  // namespace
+
+PreparedModel made_model(const PreoperativeOptions& options, const RegistrationInputs& inputs, double edge_length_mm,
+                         Observer& observer) {
+    const PrepareOptions made = prepare_options(options, inputs, edge_length_mm);
     return inputs.moving_mesh ? prepare(*inputs.moving_mesh, inputs.moving_labels, made, observer)
                               : prepare(inputs.moving_labels, made, observer);
+}
+
+PreparedModel made_model_for_loads(const PreoperativeOptions& options, const RegistrationInputs& inputs,
+                                   double edge_length_mm, Observer& observer) {
+    if (!inputs.moving_mesh)
+        return prepare_for_loads(inputs.moving_labels, prepare_options(options, inputs, edge_length_mm), observer);
+    PreparedModel model = made_model(options, inputs, edge_length_mm, observer);
+    prepare_loads(model, observer);
+    return model;
 }
 
 void add_images(PreparedModel& model, const RegistrationInputs& inputs, Observer& observer) {

@@ -13,6 +13,10 @@ double chosen_edge_length(const PreoperativeOptions& options, const Registration
 registration::PreparedModel made_model(const PreoperativeOptions& options, const RegistrationInputs& inputs,
                                        double edge_length_mm, Observer& observer);
 
+/// The same with what updates take that look for loads (registration::prepare_loads).
+registration::PreparedModel made_model_for_loads(const PreoperativeOptions& options, const RegistrationInputs& inputs,
+                                                 double edge_length_mm, Observer& observer);
+
 /// What matching images takes: that of --moving, and the contrasts.
 void add_images(registration::PreparedModel& model, const RegistrationInputs& inputs, Observer& observer);
 

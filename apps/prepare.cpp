@@ -41,10 +41,9 @@ void run_prepare(const PrepareModelOptions& options) {
     RegistrationInputs inputs = read_preoperative(preoperative, progress);
     validate_preoperative(inputs, preoperative, options.resample_labels);
     progress.begin("preparing the model", 0.1, 0.9);
-    registration::PreparedModel model =
-        made_model(preoperative, inputs, chosen_edge_length(preoperative, inputs, options.for_labels), progress);
+    registration::PreparedModel model = made_model_for_loads(
+        preoperative, inputs, chosen_edge_length(preoperative, inputs, options.for_labels), progress);
     if (!inputs.moving.empty()) add_images(model, inputs, progress);
-    prepare_loads(model, progress);
     progress.begin("writing", 0.9, 1.0);
     write_patient_file(options, inputs, model, started);
     progress.clear();

@@ -59,10 +59,9 @@ void run_register(const RegisterOptions& options) {
         progress.note(run.dial->reason);
     }
     progress.begin("preparing the model", 0.02, 0.20);
-    run.prepared =
-        std::make_unique<registration::PreparedModel>(made_model(options, run.inputs, edge_length(run), progress));
+    const auto make = looks_for_loads(options) ? made_model_for_loads : made_model;
+    run.prepared = std::make_unique<registration::PreparedModel>(make(options, run.inputs, edge_length(run), progress));
     if (options.match_image) add_images(*run.prepared, run.inputs, progress);
-    if (looks_for_loads(options)) prepare_loads(*run.prepared, progress);
     append(run.times, run.prepared->times);
     register_and_write(run, *output, clock, progress);
 }

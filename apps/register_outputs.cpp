@@ -145,14 +145,6 @@ public:
     void start(const std::string& name, const Write& write) const {
         tasks_->run([writer = *this, name, write] { writer.now(name, write); });
     }
-    /// Two files, one after the other.
-    template <class First, class Second>
-    void start_both(const std::string& name, const First& first, const std::string& then, const Second& second) const {
-        tasks_->run([writer = *this, name, first, then, second] {
-            writer.now(name, first);
-            writer.now(then, second);
-        });
-    }
 
 private:
     const RegistrationRun* run_;
@@ -171,12 +163,20 @@ void write_transforms(const Writer& writer) {
                    [&](auto& path) { write_itk_transform(products.moving_to_fixed, rigid, path); });
 }
 
-/// What else --write names.
-void start_optional(const Writer& writer) {
+/// What a file that --write names is made of.
+enum class Part { Warped, Forward, Estimates };
+
+Part part_of(const OptionalOutput& output) {
+    const std::string word = output.word;
+    if (word == "displacement_magnitude") return Part::Warped;
+    return word == "jacobian" ? Part::Forward : Part::Estimates;
+}
+
+void start_optional(const Writer& writer, Part part) {
     const RegistrationRun& run = writer.run();
     const Products& products = run.products;
     for (const OptionalOutput& output : optional_outputs) {
-        if (!writes(run.options, output)) continue;
+        if (!writes(run.options, output) || part_of(output) != part) continue;
         const std::string word = output.word, file = output.file;
         if (word == "displacement_magnitude")
             writer.start(file, [&](auto& path) {
@@ -198,55 +198,65 @@ void start_optional(const Writer& writer) {
     }
 }
 
-void start_usual(const Writer& writer) {
-    const RegistrationRun& run = writer.run();
+}  // namespace
+
+void start_writing_warped(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks) {
+    const Writer writer(run, output, tasks);
+    tasks.run([writer, &run] {
+        const Products& products = run.products;
+        write_transforms(writer);
+        writer.start(fixed_to_moving_name, [&](auto& path) {
+            write_displacement_field(products.fixed_to_moving, path, imaging::FieldType::Resampling);
+        });
+        if (!products.warped.empty())
+            writer.start("warped.nii.gz", [&](auto& path) { write_volume(products.warped, path); });
+        writer.start("warped_labels.nii.gz", [&](auto& path) { write_volume(compact(products.warped_labels), path); });
+        writer.start("mesh.vtu", [&](auto& path) { write_mesh(run.result.deformation, path); });
+        if (products.surface)
+            writer.start(surface_name(run.options),
+                         [&](auto& path) { meshing::write_surface(*products.surface, path); });
+        start_optional(writer, Part::Warped);
+    });
+}
+
+void start_writing_forward(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks) {
+    const Writer writer(run, output, tasks);
+    writer.start(moving_to_fixed_name, [&](auto& path) {
+        write_displacement_field(run.products.moving_to_fixed, path, imaging::FieldType::Modeling);
+    });
+    start_optional(writer, Part::Forward);
+}
+
+void start_writing_estimates(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks) {
+    const Writer writer(run, output, tasks);
     const Products& products = run.products;
-    // One after the other: each is packed on all threads, and takes twice its size in memory.
-    writer.start_both(
-        moving_to_fixed_name,
-        [&](auto& path) { write_displacement_field(products.moving_to_fixed, path, imaging::FieldType::Modeling); },
-        fixed_to_moving_name,
-        [&](auto& path) { write_displacement_field(products.fixed_to_moving, path, imaging::FieldType::Resampling); });
     if (products.uncertainty) {
         const registration::UncertaintyVolumes& volumes = products.uncertainty_volumes;
         writer.start("uncertainty.nii.gz", [&](auto& path) { write_volume(volumes.deviation, path); });
         writer.start("uncertainty_trust.nii.gz", [&](auto& path) { write_volume(volumes.trust, path); });
     }
-    if (!products.warped.empty())
-        writer.start("warped.nii.gz", [&](auto& path) { write_volume(products.warped, path); });
-    writer.start("warped_labels.nii.gz", [&](auto& path) { write_volume(compact(products.warped_labels), path); });
-    writer.start("mesh.vtu", [&](auto& path) { write_mesh(run.result.deformation, path); });
     writer.start("record.h5",
                  [&](auto& path) { registration::write_record(*run.prepared, run.result, record_info(run), path); });
     if (run.inputs.landmarks) writer.start("warped_landmarks.csv", [&](auto& path) { write_landmarks(run, path); });
     if (run.inputs.points) writer.start("warped_points.csv", [&](auto& path) { write_points(run, path); });
-    if (products.surface)
-        writer.start(surface_name(run.options), [&](auto& path) { meshing::write_surface(*products.surface, path); });
+    start_optional(writer, Part::Estimates);
 }
 
-}  // namespace
-
-void start_writing(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks) {
-    const Writer writer(run, output, tasks);
-    tasks.run([writer] {
-        write_transforms(writer);
-        start_usual(writer);
-        start_optional(writer);
-    });
-}
-
-void write_reports(const RegistrationRun& run, const nlohmann::json& report, const OutputFolder& output) {
+report::Pictures draw_pictures(const RegistrationRun& run) {
     const auto given = [](const imaging::Volume& volume) { return volume.empty() ? nullptr : &volume; };
     const Products& products = run.products;
     const registration::Deformation& deformation = run.result.deformation;
     const Eigen::Matrix3Xd nodes = deformation.deformed_nodes();
+    return report::draw_pictures({given(run.inputs.moving), given(run.inputs.fixed), given(products.warped),
+                                  &run.inputs.moving_labels, given(run.inputs.fixed_labels), &products.warped_labels,
+                                  &products.moving_to_fixed, given(products.uncertainty_volumes.deviation),
+                                  given(products.uncertainty_volumes.trust), &products.fixed_to_moving,
+                                  &deformation.mesh, &nodes, alignment_json(run)});
+}
+
+void write_reports(const nlohmann::json& report, const report::Pictures& pictures, const OutputFolder& output) {
     write_json(report, output.path("report.json"));
-    report::write_report(
-        {given(run.inputs.moving), given(run.inputs.fixed), given(products.warped), &run.inputs.moving_labels,
-         given(run.inputs.fixed_labels), &products.warped_labels, &products.moving_to_fixed,
-         given(products.uncertainty_volumes.deviation), given(products.uncertainty_volumes.trust),
-         &products.fixed_to_moving, &deformation.mesh, &nodes, report},
-        output.staging());
+    report::write_report(report, pictures, output.staging());
 }
 
 std::string summary_text(const RegistrationRun& run, double total_seconds) {

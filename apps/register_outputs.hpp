@@ -3,6 +3,7 @@
 
 #include "apps/output_folder.hpp"
 #include "apps/register_run.hpp"
+#include "report/page.hpp"
 
 #include <tbb/task_group.h>
 #include <nlohmann/json_fwd.hpp>
@@ -11,12 +12,23 @@
 
 namespace tissuewarp::apps {
 
-/// Starts a task that writes the transforms and then one per file for images, fields, mesh, points and record; `run`
-/// and `output` must outlive `tasks`. wait() on the tasks rethrows the first IoError, or Cancelled.
-void start_writing(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks);
+/// Puts files into the output folder, each in a task of its own, as soon as what they hold is known. `run` and `output`
+/// must outlive `tasks`, and what a file holds must not change after its start. wait() on the tasks rethrows the first
+/// IoError, or Cancelled.
+///
+/// The transform, and then what lies in the fixed frame, mesh and surface. The inverse transform comes with it, so that
+/// `products.moving_to_fixed` is needed where --write names that.
+void start_writing_warped(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks);
+/// The field moving to fixed and what is made of it.
+void start_writing_forward(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks);
+/// Estimated errors, points with theirs, and the record with its doubts.
+void start_writing_estimates(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks);
+
+/// What report.html and preview.png show.
+report::Pictures draw_pictures(const RegistrationRun& run);
 
 /// report.json, preview.png and report.html.
-void write_reports(const RegistrationRun& run, const nlohmann::json& report, const OutputFolder& output);
+void write_reports(const nlohmann::json& report, const report::Pictures& pictures, const OutputFolder& output);
 
 /// What is printed at the end: stages, errors of landmarks, overlap, doubts.
 std::string summary_text(const RegistrationRun& run, double total_seconds);

@@ -2,6 +2,7 @@
 
 #include "apps/bids.hpp"
 #include "apps/dial.hpp"
+#include "apps/finished_tasks.hpp"
 #include "apps/module_description.hpp"
 #include "apps/output_names.hpp"
 #include "apps/register_outputs.hpp"
@@ -20,7 +21,9 @@
 #include "registration/warp.hpp"
 
 #include <fmt/format.h>
-#include <tbb/task_group.h>
+#include <malloc.h>
+#include <tbb/parallel_invoke.h>
+#include <tbb/task_arena.h>
 
 namespace tissuewarp::apps {
 
@@ -77,16 +80,18 @@ Intraoperative seen(const RegistrationInputs& inputs, const RegisterOptions& opt
     return seen;
 }
 
-void make_fields(RegistrationRun& run, ProgressLine& progress) {
+void make_backward_field(RegistrationRun& run, ProgressLine& progress) {
+    progress.begin("field", 0.47, 0.55);
     const FieldOptions options{run.options.fade};
     Deformation& deformation = run.result.deformation;
-    Products& products = run.products;
-    progress.begin("field forward", 0.47, 0.52);
     if (!run.inputs.moving.empty() && !run.inputs.fixed.empty())
         deformation.surroundings = rigid_surroundings(deformation, run.inputs.moving, run.inputs.fixed, options);
-    products.moving_to_fixed = displacement_moving_to_fixed(deformation, run.inputs.moving_grid(), options, progress);
-    progress.begin("field backward", 0.52, 0.57);
-    products.fixed_to_moving = displacement_fixed_to_moving(deformation, output_grid(run), options, progress);
+    run.products.fixed_to_moving = displacement_fixed_to_moving(deformation, output_grid(run), options, progress);
+}
+
+void make_forward_field(RegistrationRun& run, ProgressLine& progress) {
+    run.products.moving_to_fixed = displacement_moving_to_fixed(run.result.deformation, run.inputs.moving_grid(),
+                                                                FieldOptions{run.options.fade}, progress);
 }
 
 void warp_everything(RegistrationRun& run) {
@@ -106,7 +111,6 @@ void warp_everything(RegistrationRun& run) {
 
 /// How far off the result may be, and what that says against it.
 void estimate_errors(RegistrationRun& run, ProgressLine& progress) {
-    progress.begin("error estimate", 0.57, 0.65);
     Products& products = run.products;
     products.uncertainty = run.stretched ? uncertainty(*run.stretched, {}, progress)
                                          : uncertainty(*run.prepared, run.result, {}, progress);
@@ -126,14 +130,6 @@ CurveDistances curve_distances(const RegistrationRun& run) {
             curve_residual(carried, curves.fixed, {}).to_lines};
 }
 
-/// The field that is written, where the organ is: tissue never folds.
-void doubt_field(RegistrationRun& run) {
-    const imaging::Volume organ =
-        imaging::mask_of_all(imaging::without_labels(run.inputs.moving_labels, run.options.rigid_neighbours));
-    run.scores.organ = field_jacobians(run.products.moving_to_fixed, &organ);
-    if (auto doubt = doubt_of_folds(run.scores.organ)) run.result.doubts.push_back(std::move(*doubt));
-}
-
 /// After everything was written. Throws SolverFailure.
 void require_no_doubts(const RegistrationRun& run) {
     std::vector<std::string> codes;
@@ -145,23 +141,33 @@ void require_no_doubts(const RegistrationRun& run) {
         fmt::join(codes, ", "), (run.options.output / "report.json").string()));
 }
 
-Scores score(const RegistrationRun& run) {
-    Scores scores;
-    scores.organ = run.scores.organ;
-    const auto without_neighbours = [&](const imaging::Volume& labels) {
-        return imaging::without_labels(labels, run.options.rigid_neighbours);
-    };
-    const imaging::Volume moving = without_neighbours(run.inputs.moving_labels);
+imaging::Volume without_neighbours(const RegistrationRun& run, const imaging::Volume& labels) {
+    return imaging::without_labels(labels, run.options.rigid_neighbours);
+}
+
+/// How well labels agree, and points.
+void score_warped(RegistrationRun& run) {
+    Scores& scores = run.scores;
     if (!run.inputs.fixed_labels.empty()) {
-        const imaging::Volume fixed = without_neighbours(run.inputs.fixed_labels);
-        scores.before = overlap(imaging::resample(moving, fixed.geometry, imaging::Interpolation::Nearest), fixed);
-        scores.after = overlap(without_neighbours(run.products.warped_labels), fixed);
+        const imaging::Volume fixed = without_neighbours(run, run.inputs.fixed_labels);
+        tbb::parallel_invoke(
+            [&] {
+                const imaging::Volume moving = without_neighbours(run, run.inputs.moving_labels);
+                scores.before =
+                    overlap(imaging::resample(moving, fixed.geometry, imaging::Interpolation::Nearest), fixed);
+            },
+            [&] { scores.after = overlap(without_neighbours(run, run.products.warped_labels), fixed); });
     }
     scores.mesh = mesh_jacobians(run.result.deformation);
-    scores.grid = field_jacobians(run.products.moving_to_fixed);
     if (run.inputs.landmarks) scores.target_error = target_error(*run.inputs.landmarks, run.products.landmarks);
     if (run.inputs.curves) scores.curves = curve_distances(run);
-    return scores;
+}
+
+/// The field that is written, everywhere and where the organ is.
+void score_forward_field(RegistrationRun& run) {
+    const imaging::Volume organ = imaging::mask_of_all(without_neighbours(run, run.inputs.moving_labels));
+    run.scores.organ = field_jacobians(run.products.moving_to_fixed, &organ);
+    run.scores.grid = field_jacobians(run.products.moving_to_fixed);
 }
 
 /// The codes of doubts in one line; "none" where there are none.
@@ -217,33 +223,48 @@ void register_and_write(RegistrationRun& run, OutputFolder& output, StageClock& 
     append(run.times, run.result.times);
     clock.lap("");
 
-    make_fields(run, progress);
+    make_backward_field(run, progress);
     run.times.push_back(clock.lap("fields"));
     warp_everything(run);
     run.times.push_back(clock.lap("warp"));
     run.intraoperative_seconds = clock.total() - ready;
+
+    progress.begin("error estimate", 0.55, 0.85);
+    // All that waits for nothing else runs at once, compression of files beside factors of the estimate; but what takes
+    // memory and is not needed yet waits until these are gone. A stage's time is that until it was there.
+    auto silenced = std::make_unique<SilencedStandardError>();
+    FinishedTasks written, warped_scored, forward_scored;  // groups of their own: what fails ends its group
+    tbb::task_group& writing = written.group;
+    if (writes(options, inverse_transform)) make_forward_field(run, progress);
+    start_writing_warped(run, output, writing);
     if (!options.no_error_estimate) {
-        estimate_errors(run, progress);
+        malloc_trim(0);  // before factors: what meshing and matching left in pieces goes back to the system
+        // Isolated, so that waiting for its parts does not begin the rest.
+        tbb::this_task_arena::isolate([&] { estimate_errors(run, progress); });
         run.times.push_back(clock.lap("error estimate"));
     }
-    if (run.dial) doubt_dial(run);
-    doubt_field(run);
-    for (Doubt& doubt : run.result.doubts) doubt.text = imaging::with_label_names(doubt.text, run.inputs.label_names);
-
-    progress.begin("writing and scoring", 0.65, 0.88);
-    auto silenced = std::make_unique<SilencedStandardError>();
-    tbb::task_group writing;  // compression takes one core per file; the scores run beside it
-    start_writing(run, output, writing);
-    run.scores = score(run);
+    progress.begin("writing and scoring", 0.85, 0.97);
+    warped_scored.group.run([&] { score_warped(run); });
+    if (run.products.moving_to_fixed.empty()) make_forward_field(run, progress);
+    start_writing_forward(run, output, writing);
+    forward_scored.group.run([&] { score_forward_field(run); });
+    const report::Pictures pictures = draw_pictures(run);
+    run.times.push_back(clock.lap("pictures"));
+    warped_scored.group.wait();
+    forward_scored.group.wait();
     run.times.push_back(clock.lap("score"));
+    if (run.dial) doubt_dial(run);
+    if (auto doubt = doubt_of_folds(run.scores.organ)) run.result.doubts.push_back(std::move(*doubt));
+    for (Doubt& doubt : run.result.doubts) doubt.text = imaging::with_label_names(doubt.text, run.inputs.label_names);
+    start_writing_estimates(run, output, writing);
     writing.wait();
     silenced.reset();
     run.times.push_back(clock.lap("write"));
 
-    progress.begin("report", 0.88, 1.0);
+    progress.begin("report", 0.97, 1.0);
     run.notes = progress.notes();
     const nlohmann::json report = report_json(run, clock.total());
-    write_reports(run, report, output);
+    write_reports(report, pictures, output);
     output.commit();
     if (!options.bids.empty()) write_bids_dataset(options);
     if (!options.save_parameters.empty()) save_parameters(options.parameters, options.save_parameters);

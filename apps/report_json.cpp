@@ -313,6 +313,10 @@ json to_json(const meshing::Fidelity& fidelity) {
             {"hausdorff_mm", number(fidelity.hausdorff_mm)}};
 }
 
+json alignment_json(const RegistrationRun& run) {
+    return {{"alignment", alignment(run)}};
+}
+
 json report_json(const RegistrationRun& run, double total_seconds) {
     const Scores& scores = run.scores;
     json report{

@@ -1,5 +1,6 @@
 #pragma once
-/// report.json: everything about a run that a machine may want to read. The keys are listed in docs/manual/register-outputs.md.
+/// report.json: everything about a run that a machine may want to read. The keys are listed in
+/// docs/manual/register-outputs.md.
 
 #include "apps/register_run.hpp"
 
@@ -9,6 +10,9 @@ namespace tissuewarp::apps {
 
 /// Lengths in mm, times in s, stiffness in kPa. NaN and infinity become null.
 nlohmann::json report_json(const RegistrationRun& run, double total_seconds);
+
+/// Its entry "alignment" alone, which nothing later changes.
+nlohmann::json alignment_json(const RegistrationRun& run);
 
 /// Complete or absent. Bytes that are not UTF-8, as file names may hold, are replaced. Throws IoError.
 void write_json(const nlohmann::json& document, const std::filesystem::path& path);

@@ -85,7 +85,7 @@ if(TISSUEWARP_PYTHON)
   set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "python3 (>= 3.${Python_VERSION_MINOR}), python3 (<< 3.${next}), python3-numpy")
 endif()
 # For a GPU's own driver; and to build programs on the libraries.
-set(CPACK_DEBIAN_PACKAGE_SUGGESTS "libegl1, libopengl0, snakemake, python3-nibabel, cmake, g++, pkg-config, libeigen3-dev, libtbb-dev, libhwy-dev, libsuitesparse-dev, libepoxy-dev, libssl-dev, zlib1g-dev, libopencv-dev, libinsighttoolkit5-dev, libgdcm-dev, libcgal-dev, libnlopt-dev, libnlopt-cxx-dev, libhdf5-dev, nlohmann-json3-dev")
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS "libegl1, libopengl0, snakemake, python3-nibabel, cmake, g++, pkg-config, libeigen3-dev, libtbb-dev, libhwy-dev, libsuitesparse-dev, libepoxy-dev, libssl-dev, zlib1g-dev, libdeflate-dev, libopencv-dev, libinsighttoolkit5-dev, libgdcm-dev, libcgal-dev, libnlopt-dev, libnlopt-cxx-dev, libhdf5-dev, nlohmann-json3-dev")
 set(CPACK_PROJECT_CONFIG_FILE ${packaging}/cpack_options.cmake)
 include(CPack)
 

@@ -7,6 +7,7 @@
 #include "imaging/detail/header_checks.hpp"
 #include "imaging/detail/image_header.hpp"
 #include "imaging/detail/itk_image_io.hpp"
+#include "imaging/detail/nifti_bytes.hpp"
 #include "imaging/detail/structure_set.hpp"
 #include "imaging/detail/text_headers.hpp"
 
@@ -195,19 +196,19 @@ void write_whole(const Volume& volume, const fs::path& temporary, detail::Format
     fs::rename(file.path(), temporary);
 }
 
-/// `steps`: voxels are whole steps, of which zlib's level 4 makes 3/4 of what level 1 does in 1.3 times the time; on
-/// other floats it wins nothing.
-void write_compressed_nifti(const Volume& volume, const fs::path& path, const fs::path& temporary, bool steps) {
-    // ITK would deflate on one thread at level 6, which takes many seconds on a field; the plain file is packed here.
+void write_compressed_nifti(const Volume& volume, const fs::path& path, const fs::path& temporary,
+                            std::optional<double> step) {
+    // ITK would deflate on one thread at level 6, which takes many seconds on a field.
     fs::path plain_name = path;
-    plain_name.replace_extension();
-    const AtomicFile plain(plain_name);
-    write_whole(volume, plain.path(), detail::Format::Nifti, path);
-    const bool integers = volume.voxels.depth() < CV_32F;
-    detail::gzip_file(plain.path(), temporary, integers || steps ? 4 : 1);
+    plain_name.replace_extension().replace_extension(".nii");  // ITK knows small letters only
+    const detail::NiftiBytes bytes(volume, step, plain_name);
+    const auto source = [&](auto first, auto count, unsigned char* target) { bytes.copy(first, count, target); };
+    detail::write_gzip(source, bytes.size(), temporary);
 }
 
-void write_checked(const Volume& volume, const fs::path& path, std::optional<FieldType> type) {
+/// `step`: to which values of float32 are rounded.
+void write_checked(const Volume& volume, const fs::path& path, std::optional<FieldType> type,
+                   std::optional<double> step) {
     const detail::Format format = format_of(path, "write");
     const std::string name = lower_case_name(path);
     for (const char* pair : {".nhdr", ".mhd", ".hdr", ".hdr.gz", ".img", ".img.gz"})
@@ -226,9 +227,9 @@ void write_checked(const Volume& volume, const fs::path& path, std::optional<Fie
         throw IoError("cannot write '" + path.string() + "': the folder does not exist; create it first");
     AtomicFile file(path);
     if (name.ends_with(".nii.gz")) {
-        write_compressed_nifti(volume, path, file.path(), type.has_value());
+        write_compressed_nifti(volume, path, file.path(), step);
     } else {
-        write_whole(volume, file.path(), format, path, type);
+        write_whole(step ? rounded(volume, *step) : volume, file.path(), format, path, type);
     }
     file.commit();
 }
@@ -319,7 +320,7 @@ ReadResult as_labels(ReadResult read, const fs::path& path) {
 }
 
 void write_volume(const Volume& volume, const fs::path& path) {
-    write_checked(volume, path, {});
+    write_checked(volume, path, {}, {});
 }
 
 Volume rounded(const Volume& field, double step) {
@@ -338,7 +339,7 @@ Volume rounded(const Volume& field, double step) {
 void write_displacement_field(const Volume& field, const fs::path& path, FieldType type) {
     if (field.voxels.type() != CV_32FC3)
         throw InvalidInput("cannot write '" + path.string() + "': a displacement field has three float32 components");
-    write_checked(rounded(field, displacement_step_mm), path, type);
+    write_checked(field, path, type, displacement_step_mm);
 }
 
 std::optional<FieldType> stated_field_type(const fs::path& path) {

@@ -1,6 +1,7 @@
 // Before the operation: label map → mesh → rest state → rest stiffness.
 
 #include "registration/prepare.hpp"
+#include "core/kept_notes.hpp"
 #include "core/stopwatch.hpp"
 #include "registration/boundary/label_boundary_field.hpp"
 #include "registration/loads/coarse_twin.hpp"
@@ -11,7 +12,13 @@
 #include "registration/boundary/surroundings.hpp"
 #include "registration/matching/image_matching.hpp"
 
+#include <tbb/task_arena.h>
+#include <tbb/task_group.h>
+
 #include <cmath>
+#include <exception>
+#include <memory>
+#include <utility>
 
 namespace tissuewarp::registration {
 
@@ -78,6 +85,51 @@ PreparedModel of_mesh(meshing::TetMesh mesh, const imaging::Volume& moving_label
             {}};
 }
 
+PrepareOptions with_edge_length(PrepareOptions options, const imaging::Volume& organ) {
+    if (options.meshing.edge_length == 0) options.meshing.edge_length = suggested_edge_length(organ);
+    return options;
+}
+
+/// A model that is made on another thread, and may turn out not to be needed.
+class ModelBeside {
+public:
+    explicit ModelBeside(Observer& observer) : notes_(observer) {}
+    /// To its end: where tasks are cancelled their loops end half done, and what follows reads what is not there.
+    ~ModelBeside() { task_.wait(); }
+    ModelBeside(const ModelBeside&) = delete;
+    ModelBeside& operator=(const ModelBeside&) = delete;
+
+    void start(const imaging::Volume& labels, const PrepareOptions& options) {
+        started_ = true;
+        task_.run([this, labels, options] {
+            try {
+                made_ = std::make_unique<PreparedModel>(prepare(labels, options, notes_));
+            } catch (...) {
+                failure_ = std::current_exception();
+            }
+        });
+    }
+    [[nodiscard]] bool started() const { return started_; }
+    /// Throws what making it threw.
+    std::unique_ptr<PreparedModel> take(Observer& observer) {
+        task_.wait();
+        if (failure_) std::rethrow_exception(failure_);
+        notes_.tell(observer);
+        return std::move(made_);
+    }
+
+private:
+    KeptNotes notes_;
+    std::unique_ptr<PreparedModel> made_;
+    std::exception_ptr failure_;
+    bool started_ = false;
+    tbb::task_group task_;
+};
+
+bool takes_coarse_model(const PreparedModel& prepared) {
+    return detail::loads_take_coarse_model(prepared) && !detail::is_held(prepared);
+}
+
 }  // namespace
 
 double organ_size(const imaging::Volume& labels) {
@@ -94,10 +146,9 @@ double suggested_edge_length_without_labels(const imaging::Volume& labels) {
 }
 
 PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions& given, Observer& observer) {
-    PrepareOptions options = given;
-    require_surroundings(moving_labels, options);
-    const imaging::Volume organ = imaging::without_labels(moving_labels, options.rigid_neighbours);
-    if (options.meshing.edge_length == 0) options.meshing.edge_length = suggested_edge_length(organ);
+    require_surroundings(moving_labels, given);
+    const imaging::Volume organ = imaging::without_labels(moving_labels, given.rigid_neighbours);
+    const PrepareOptions options = with_edge_length(given, organ);
     Stopwatch stopwatch;
     meshing::TetMesh mesh = meshing::mesh_labels(organ, options.meshing, observer);
     const StageTime meshing_time{"meshing", stopwatch.lap()};
@@ -150,11 +201,30 @@ void prepare_contrast(PreparedModel& prepared, const imaging::Volume& moving, co
 }
 
 void prepare_loads(PreparedModel& prepared, Observer& observer) {
-    if (!detail::loads_take_coarse_model(prepared) || detail::is_held(prepared)) return;
+    if (!takes_coarse_model(prepared)) return;
     Stopwatch stopwatch;
     observer.checkpoint("coarse model", 0.0);
     prepared.coarse = std::make_unique<PreparedModel>(detail::coarse_model_for_loads(prepared, observer));
     prepared.times.push_back({"coarse model", stopwatch.lap()});
+}
+
+PreparedModel prepare_for_loads(const imaging::Volume& moving_labels, const PrepareOptions& given, Observer& observer) {
+    require_surroundings(moving_labels, given);
+    const imaging::Volume organ = imaging::without_labels(moving_labels, given.rigid_neighbours);
+    const PrepareOptions options = with_edge_length(given, organ);
+    ModelBeside coarse(observer);
+    if (detail::loads_will_take_coarse_model(organ, options))
+        coarse.start(organ, detail::coarse_options_for_loads(organ, options));
+    // Isolated, so that waiting for parts of this one does not begin the other.
+    PreparedModel prepared = tbb::this_task_arena::isolate([&] { return prepare(moving_labels, options, observer); });
+    if (!coarse.started()) {
+        prepare_loads(prepared, observer);
+    } else if (takes_coarse_model(prepared)) {
+        Stopwatch stopwatch;
+        prepared.coarse = coarse.take(observer);
+        prepared.times.push_back({"coarse model", stopwatch.lap()});
+    }
+    return prepared;
 }
 
 }  // namespace tissuewarp::registration

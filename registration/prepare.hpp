@@ -22,7 +22,8 @@ double organ_size(const imaging::Volume& labels);
 /// Edges of the mesh, per edge of a cube of the organ's volume.
 struct EdgeOptions {
     /// With labels of the operation, into about 50 000 tetrahedra. 8 mm in place of 6 cost the brain shift accuracy
-    /// (docs/lab/results.md, "What it says"); the random phantoms 5001–5008 need no more than 6 (docs/lab/accuracy-time.md).
+    /// (docs/lab/results.md, "What it says"); the random phantoms 5001–5008 need no more than 6
+    /// (docs/lab/accuracy-time.md).
     double with_labels = 18;
     /// Without, into about 15 000. Chosen on images of the brain shift, both sags and the lung and on surfaces of the
     /// brain shift and the liver (docs/lab/results.md, "How fine a mesh").
@@ -124,5 +125,10 @@ void prepare_contrast(PreparedModel& prepared, const imaging::Volume& moving, co
 /// found. Without it the first such update makes one, in seconds. Adds nothing to a smaller model, nor to one that
 /// anchors or rigid neighbours hold, whose loads are not looked for. Throws InvalidInput, Cancelled.
 void prepare_loads(PreparedModel& prepared, Observer& observer = silent_observer());
+
+/// prepare() and prepare_loads() in one, with the same bits; both meshes are made at the same time where edges tell
+/// that the model will be large. `observer` is asked from two threads whether to stop. Throws InvalidInput, Cancelled.
+PreparedModel prepare_for_loads(const imaging::Volume& moving_labels, const PrepareOptions& options = {},
+                                Observer& observer = silent_observer());
 
 }  // namespace tissuewarp::registration

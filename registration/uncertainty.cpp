@@ -78,28 +78,66 @@ double radius_mm(const Eigen::Matrix3d& covariance, double z) {
     return std::sqrt(mean * (freedom_of_size - 2) / freedom_of_size * y * y * y);
 }
 
-/// Of so many nodes or fewer; of a finer mesh on a coarser model: a factor of a large one takes long and says nothing
+/// What data leave open of a model, found on its coarser one: a factor of a large model takes long and says nothing
 /// else, since what data leave open varies smoothly.
-detail::OpenParts open_parts(const PreparedModel& prepared, const UpdateResult& result,
-                             const UncertaintyOptions& options, Observer& observer) {
-    const Eigen::Matrix3Xd displacement = displacement_under_pulls(result);
-    const double energy = tled::elastic_energy(prepared.rest, displacement);
-    if (!detail::loads_take_coarse_model(prepared))
-        return detail::open_parts(prepared, result.pulls, displacement, energy, options);
-    std::optional<PreparedModel> made;
-    if (!prepared.coarse) made = detail::coarse_model_for_loads(prepared, observer);
-    const PreparedModel& coarse = made ? *made : *prepared.coarse;
+detail::DataUncertainty open_on_coarse(const PreparedModel& prepared, const PreparedModel& coarse,
+                                       const LastPulls& given, const Eigen::Matrix3Xd& displacement,
+                                       const UncertaintyOptions& options) {
     const meshing::TetMesh& mesh = coarse.model.mesh;
     // Targets from where the tissue is: a coarse node lies elsewhere and moved otherwise than the one whose spring it
     // has.
-    LastPulls residuals = result.pulls;
+    LastPulls residuals = given;
     for (PulledNode& pulled : residuals.springs) pulled.spring.target -= displacement.col(pulled.spring.node);
     LastPulls pulls = detail::pulls_on(coarse, prepared, residuals);
     const Eigen::Matrix3Xd there = detail::carried(prepared.model.mesh, displacement, mesh.nodes);
     for (PulledNode& pulled : pulls.springs) pulled.spring.target += there.col(pulled.spring.node);
+    const double energy = tled::elastic_energy(prepared.rest, displacement);
     detail::DataUncertainty data = detail::open_parts(coarse, pulls, there, energy, options).data;
     data.covariance = detail::carried(mesh, data.covariance, prepared.model.mesh.nodes);
-    return {std::move(data), {prepared.rest, conditions_of(prepared, result.pulls), prepared.stiffness}};
+    return data;
+}
+
+/// Of the solver and of the mesh.
+struct NumericalErrors {
+    Eigen::Matrix3Xd algebraic;  // 3 × N, mm
+    tled::DiscretisationEstimate mesh;
+};
+
+NumericalErrors numerical_errors(const PreparedModel& prepared, const tled::RestStiffness& stiffness,
+                                 const tled::NodalConditions& conditions, const Eigen::Matrix3Xd& displacement) {
+    // First: what it takes before it solves is gone when the factor is made.
+    tled::DiscretisationEstimate mesh = tled::discretisation_error(prepared.model, stiffness, conditions, displacement);
+    return {tled::lifted_residual(prepared.rest, stiffness, conditions, displacement), std::move(mesh)};
+}
+
+struct AllErrors {
+    detail::DataUncertainty data;
+    NumericalErrors numerical;
+};
+
+/// Of a model of so many nodes or fewer one factor serves all. Of a larger one its own, which takes most memory, is
+/// gone before those of the coarser model are made.
+AllErrors all_errors(const PreparedModel& prepared, const UpdateResult& result, const UncertaintyOptions& options,
+                     Observer& observer) {
+    const Eigen::Matrix3Xd displacement = displacement_under_pulls(result);
+    const tled::NodalConditions conditions = conditions_of(prepared, result.pulls);
+    AllErrors errors;
+    if (!detail::loads_take_coarse_model(prepared)) {
+        const double energy = tled::elastic_energy(prepared.rest, displacement);
+        detail::OpenParts open = detail::open_parts(prepared, result.pulls, displacement, energy, options);
+        observer.checkpoint("error estimate", 0.6);
+        errors.data = std::move(open.data);
+        errors.numerical = numerical_errors(prepared, open.stiffness, conditions, displacement);
+        return errors;
+    }
+    std::optional<PreparedModel> made;
+    if (!prepared.coarse) made = detail::coarse_model_for_loads(prepared, observer);
+    const PreparedModel& coarse = made ? *made : *prepared.coarse;
+    errors.numerical =
+        numerical_errors(prepared, {prepared.rest, conditions, prepared.stiffness}, conditions, displacement);
+    observer.checkpoint("error estimate", 0.6);
+    errors.data = open_on_coarse(prepared, coarse, result.pulls, displacement, options);
+    return errors;
 }
 
 /// Whether data show the tissue about each node.
@@ -287,20 +325,15 @@ Uncertainty uncertainty(const PreparedModel& prepared, const UpdateResult& resul
                         Observer& observer) {
     require_related(prepared, result);
     observer.checkpoint("error estimate", 0.0);
-    const detail::OpenParts open = open_parts(prepared, result, options, observer);
-    observer.checkpoint("error estimate", 0.6);
-    const Eigen::Matrix3Xd displacement = displacement_under_pulls(result);
-    const tled::NodalConditions conditions = conditions_of(prepared, result.pulls);
-    const Eigen::Matrix3Xd algebraic = tled::lifted_residual(prepared.rest, open.stiffness, conditions, displacement);
-    observer.checkpoint("error estimate", 0.7);
-    const tled::DiscretisationEstimate mesh =
-        tled::discretisation_error(prepared.model, open.stiffness, conditions, displacement);
+    const AllErrors errors = all_errors(prepared, result, options, observer);
+    const Eigen::Matrix3Xd& algebraic = errors.numerical.algebraic;
+    const tled::DiscretisationEstimate& mesh = errors.numerical.mesh;
     if (!mesh.error) observer.note("no estimate of the error of the mesh: " + mesh.reason);
     observer.checkpoint("error estimate", 1.0);
     NodalErrors nodal;
     nodal.algebraic = algebraic.colwise().squaredNorm();
-    nodal.data = traces(open.data.covariance);
-    nodal.covariance = open.data.covariance;
+    nodal.data = traces(errors.data.covariance);
+    nodal.covariance = errors.data.covariance;
     for (Eigen::Index n = 0; n < algebraic.cols(); ++n)
         nodal.covariance.col(n) += tled::symmetric_entries(algebraic.col(n) * algebraic.col(n).transpose());
     nodal.discretisation.setConstant(algebraic.cols(), std::numeric_limits<double>::quiet_NaN());
@@ -311,7 +344,7 @@ Uncertainty uncertainty(const PreparedModel& prepared, const UpdateResult& resul
     }
     nodal.shown = shown_nodes(prepared, result.pulls);
     nodal.placed = !place_is_uncertain(result);
-    return {prepared.model.mesh, std::move(nodal), open.data.held_out};
+    return {prepared.model.mesh, std::move(nodal), errors.data.held_out};
 }
 
 double interval_mm(const ErrorEstimate& estimate, double probability) {

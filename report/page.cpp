@@ -9,6 +9,8 @@
 
 #include "core/atomic_file.hpp"
 
+#include <tbb/parallel_invoke.h>
+
 #include <cstdio>
 #include <optional>
 #include <string>
@@ -54,26 +56,39 @@ nlohmann::json viewer_scene(const ReportInput& input, const detail::Preview& pre
     return scene;
 }
 
-nlohmann::json page_values(const ReportInput& input, const detail::Preview& preview) {
-    nlohmann::json values = detail::view_of(input.report);
-    values["preview"] = detail::base64(detail::jpeg(preview.picture, 92));
-    if (preview.focus) {
+nlohmann::json page_values(const nlohmann::json& report, const Pictures& pictures) {
+    nlohmann::json values = detail::view_of(report);
+    values["preview"] = pictures.preview_jpeg;
+    if (pictures.most_displacement_mm) {
         char millimetres[32];
-        std::snprintf(millimetres, sizeof millimetres, "%.1f", preview.focus->displacement);
+        std::snprintf(millimetres, sizeof millimetres, "%.1f", *pictures.most_displacement_mm);
         values["summary"]["displacement"] = {{"largest", millimetres},
-                                             {"beyond_alignment", input.report.contains("alignment")}};
+                                             {"beyond_alignment", report.contains("alignment")}};
     }
-    values["viewer"] = {{"scene", viewer_scene(input, preview).dump()}};
+    values["viewer"] = {{"scene", pictures.scene}};
     return values;
 }
 
 }  // namespace
 
-void write_report(const ReportInput& input, const std::filesystem::path& folder) {
+Pictures draw_pictures(const ReportInput& input) {
     const detail::Preview preview = detail::draw_preview(input);
-    const std::vector<unsigned char> png = detail::png(preview.picture);
+    Pictures pictures;
+    if (preview.focus) pictures.most_displacement_mm = preview.focus->displacement;
+    tbb::parallel_invoke([&] { pictures.preview_png = detail::png(preview.picture); },
+                         [&] { pictures.preview_jpeg = detail::base64(detail::jpeg(preview.picture, 92)); },
+                         [&] { pictures.scene = viewer_scene(input, preview).dump(); });
+    return pictures;
+}
+
+void write_report(const nlohmann::json& report, const Pictures& pictures, const std::filesystem::path& folder) {
+    const std::vector<unsigned char>& png = pictures.preview_png;
     write_file({reinterpret_cast<const char*>(png.data()), png.size()}, folder / "preview.png");
-    write_file(detail::fill(detail::page_template(), page_values(input, preview)), folder / "report.html");
+    write_file(detail::fill(detail::page_template(), page_values(report, pictures)), folder / "report.html");
+}
+
+void write_report(const ReportInput& input, const std::filesystem::path& folder) {
+    write_report(input.report, draw_pictures(input), folder);
 }
 
 }  // namespace tissuewarp::report

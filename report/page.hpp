@@ -7,6 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
 
 namespace tissuewarp::report {
 
@@ -27,9 +30,21 @@ struct ReportInput {
     nlohmann::json report;  ///< report.json, docs/manual/register-outputs.md; missing keys leave sections out
 };
 
-/// Writes preview.png and report.html into an existing folder, each to a temporary name that is renamed.
+/// What of a report takes time to draw, and none of its figures but "alignment".
+struct Pictures {
+    std::vector<unsigned char> preview_png;
+    std::string preview_jpeg;                    ///< base64, for the page
+    std::string scene;                           ///< JSON that the page's viewer reads
+    std::optional<double> most_displacement_mm;  ///< in the organ, where there is a field
+};
+
 /// Throws InvalidInput without the label maps that are needed, when they hold no label, or when a volume has the wrong
-/// number of channels; IoError when the files cannot be written.
+/// number of channels.
+Pictures draw_pictures(const ReportInput& input);
+
+/// Writes preview.png and report.html into an existing folder, each to a temporary name that is renamed. Throws IoError
+/// when the files cannot be written. The second draws the pictures too, and throws as that does.
+void write_report(const nlohmann::json& report, const Pictures& pictures, const std::filesystem::path& folder);
 void write_report(const ReportInput& input, const std::filesystem::path& folder);
 
 }  // namespace tissuewarp::report

@@ -151,4 +151,16 @@ std::vector<DeviceInfo> list_devices() {
     return devices;
 }
 
+bool has_hardware_device() {
+    const detail::Candidates candidates = detail::enumerate();
+    for (int i = 0; i < static_cast<int>(candidates.list.size()); ++i) {
+        if (!candidates.list[static_cast<std::size_t>(i)].hardware) continue;
+        try {
+            if (Device(i).hardware()) return true;
+        } catch (const GpuUnavailable&) {  // another may do
+        }
+    }
+    return false;
+}
+
 }  // namespace tissuewarp::shaders

@@ -22,6 +22,9 @@ struct DeviceInfo {
 /// context on each, which takes a fraction of a second per device.
 std::vector<DeviceInfo> list_devices();
 
+/// Whether one of them is hardware and usable. Software ones are not opened, whose compiler takes 50 MB.
+bool has_hardware_device();
+
 struct DeviceLimits {
     std::size_t shared_memory_bytes = 0;   ///< per workgroup
     std::size_t storage_buffer_bytes = 0;  ///< largest storage block

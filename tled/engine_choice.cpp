@@ -2,7 +2,6 @@
 
 #include "shaders/device.hpp"
 
-#include <algorithm>
 #include <string>
 
 namespace tissuewarp::tled {
@@ -15,9 +14,7 @@ constexpr int least_elements_for_gpu = 20000;
 }  // namespace
 
 bool has_gpu() {
-    const auto devices = shaders::list_devices();
-    return std::any_of(devices.begin(), devices.end(),
-                       [](const shaders::DeviceInfo& device) { return device.hardware && device.problem.empty(); });
+    return shaders::has_hardware_device();
 }
 
 std::unique_ptr<Engine> make_suitable_engine(const RestState& rest, int gpu_index, Observer& observer) {

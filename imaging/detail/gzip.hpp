@@ -1,16 +1,21 @@
 #pragma once
-/// Deflate streams: parallel compression of a file, and verification that a stream is whole.
+/// Deflate streams: parallel compression, and verification that a stream is whole.
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 
 namespace tissuewarp::imaging::detail {
 
-/// Compresses `source` into the gzip file `destination`: one member, made of blocks that are deflated in parallel and
-/// joined at byte boundaries (as pigz does), so that every reader takes it. The bytes do not depend on the number of
-/// threads. `level` is zlib's, 1 (fast) to 9. Throws IoError when the disk is full or a file cannot be opened.
-void gzip_file(const std::filesystem::path& source, const std::filesystem::path& destination, int level);
+/// Fills `target` with bytes [first, first + count) of what is compressed; asked by several threads at once, for pieces
+/// of 1 MiB from the beginning on.
+using ByteSource = std::function<void(std::uint64_t first, std::uint64_t count, unsigned char* target)>;
+
+/// Compresses `size` bytes into the gzip file `destination`: one member, made of blocks that are deflated in parallel
+/// and joined at byte boundaries (as pigz does), so that every reader takes it. The bytes do not depend on the number
+/// of threads. Throws IoError when the disk is full or the file cannot be opened.
+void write_gzip(const ByteSource& source, std::uint64_t size, const std::filesystem::path& destination);
 
 /// True when a file begins as gzip files do, whatever its name says.
 bool is_gzip(const std::filesystem::path& path);

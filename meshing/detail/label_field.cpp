@@ -22,33 +22,60 @@ std::vector<float> gaussian(double sigma) {
     return weights;
 }
 
-/// 1 where the box of ± radius around a voxel holds more than one class; row, column, slice in turn. A voxel is pure
-/// when the smallest and the largest class of its box agree.
-std::vector<char> mixed_voxels(const LabelGrid& grid, int radius) {
-    std::vector<std::uint16_t> low = grid.classes, high = grid.classes, source;
-    const std::array<std::size_t, 3> stride{1, grid.offset(0, 1, 0), grid.offset(0, 0, 1)};
-    const auto slice = stride[2];
-    for (int axis = 0; axis < 3; ++axis) {
-        for (const bool maximum : {false, true}) {
-            auto& values = maximum ? high : low;
-            source = values;
-            tbb::parallel_for(0, grid.size[2], [&](int k) {
-                for (std::size_t v = slice * static_cast<std::size_t>(k); v < slice * static_cast<std::size_t>(k + 1);
-                     ++v) {
-                    const int at = static_cast<int>(v / stride[axis] % static_cast<std::size_t>(grid.size[axis]));
-                    for (int x = std::max(-radius, -at); x <= std::min(radius, grid.size[axis] - 1 - at); ++x) {
-                        const auto neighbour = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(v) +
-                                                                        x * static_cast<std::ptrdiff_t>(stride[axis]));
-                        values[v] =
-                            maximum ? std::max(values[v], source[neighbour]) : std::min(values[v], source[neighbour]);
-                    }
-                }
-            });
+/// The smallest or the largest of each value and those up to `radius` before and after it, `stride` apart, along rows
+/// of `length`; each call takes `width` rows beside each other.
+template <class Choose>
+void spread(const std::uint16_t* source, std::uint16_t* values, int length, std::size_t stride, std::size_t width,
+            int radius, const Choose& choose) {
+    for (int at = 0; at < length; ++at) {
+        std::uint16_t* row = values + static_cast<std::size_t>(at) * stride;
+        for (int x = std::max(-radius, -at); x <= std::min(radius, length - 1 - at); ++x) {
+            const std::uint16_t* neighbour = source + static_cast<std::size_t>(at + x) * stride;
+            for (std::size_t v = 0; v < width; ++v) row[v] = choose(row[v], neighbour[v]);
         }
     }
+}
+
+/// Over boxes of ± radius, one axis after the other.
+template <class Choose>
+std::vector<std::uint16_t> spread_in_boxes(const LabelGrid& grid, int radius, const Choose& choose) {
+    const auto nx = static_cast<std::size_t>(grid.size[0]), slice = grid.offset(0, 0, 1);
+    std::vector<std::uint16_t> values = grid.classes, source = values;
+    const auto next_axis = [&](int count, const auto& along) {
+        tbb::parallel_for(0, count, along);
+        source = values;
+    };
+    next_axis(grid.size[1] * grid.size[2], [&](int row) {
+        const std::size_t at = nx * static_cast<std::size_t>(row);
+        spread(&source[at], &values[at], grid.size[0], 1, 1, radius, choose);
+    });
+    next_axis(grid.size[2], [&](int k) {
+        const std::size_t at = slice * static_cast<std::size_t>(k);
+        spread(&source[at], &values[at], grid.size[1], nx, nx, radius, choose);
+    });
+    tbb::parallel_for(0, grid.size[1], [&](int j) {
+        const std::size_t at = nx * static_cast<std::size_t>(j);
+        spread(&source[at], &values[at], grid.size[2], slice, nx, radius, choose);
+    });
+    return values;
+}
+
+/// 1 where the box of ± radius around a voxel holds more than one class: where the smallest and the largest differ.
+std::vector<char> mixed_voxels(const LabelGrid& grid, int radius) {
+    const auto low = spread_in_boxes(grid, radius, [](std::uint16_t a, std::uint16_t b) { return std::min(a, b); });
+    const auto high = spread_in_boxes(grid, radius, [](std::uint16_t a, std::uint16_t b) { return std::max(a, b); });
     std::vector<char> mixed(grid.voxel_count());
     for (std::size_t v = 0; v < mixed.size(); ++v) mixed[v] = low[v] != high[v];
     return mixed;
+}
+
+/// Weights of the voxels of the box of ± radius, rows of x in slices of y.
+std::vector<float> box_weights(const std::vector<float>& kernel) {
+    std::vector<float> weights;
+    for (const float z : kernel)
+        for (const float y : kernel)
+            for (const float x : kernel) weights.push_back(x * y * z);
+    return weights;
 }
 
 }  // namespace
@@ -62,7 +89,7 @@ LabelField::LabelField(const LabelGrid& grid, double smoothing)
 }
 
 void LabelField::smooth(const LabelGrid& grid, double smoothing) {
-    const std::vector<float> kernel = gaussian(smoothing);
+    const std::vector<float> kernel = gaussian(smoothing), weights = box_weights(kernel);
     const int radius = static_cast<int>(kernel.size() / 2);
     const std::vector<char> mixed = mixed_voxels(grid, std::max(radius, 1));
     list_.assign(grid.voxel_count(), -1);
@@ -80,25 +107,30 @@ void LabelField::smooth(const LabelGrid& grid, double smoothing) {
             for (int i = 0; i < size_[0]; ++i) {
                 if (!mixed[grid.offset(i, j, k)]) continue;
                 list.clear();
+                std::size_t last = 0;  // neighbours mostly share their class
                 const auto add = [&](std::uint16_t index, float weight) {
-                    for (Entry& entry : list)
-                        if (entry.index == index) {
-                            entry.weight += weight;
+                    if (last < list.size() && list[last].index == index) {
+                        list[last].weight += weight;
+                        return;
+                    }
+                    for (last = 0; last < list.size(); ++last)
+                        if (list[last].index == index) {
+                            list[last].weight += weight;
                             return;
                         }
                     list.push_back({index, weight});
                 };
+                const float* weight = weights.data();
                 for (int z = -radius; z <= radius; ++z)
-                    for (int y = -radius; y <= radius; ++y)
-                        for (int x = -radius; x <= radius; ++x) {
-                            const int a = i + x, b = j + y, c = k + z;
-                            const bool inside =
-                                a >= 0 && b >= 0 && c >= 0 && a < size_[0] && b < size_[1] && c < size_[2];
-                            add(inside ? grid.classes[grid.offset(a, b, c)] : std::uint16_t{0},
-                                kernel[static_cast<std::size_t>(x + radius)] *
-                                    kernel[static_cast<std::size_t>(y + radius)] *
-                                    kernel[static_cast<std::size_t>(z + radius)]);
+                    for (int y = -radius; y <= radius; ++y) {
+                        const int b = j + y, c = k + z;
+                        const bool row_inside = b >= 0 && c >= 0 && b < size_[1] && c < size_[2];
+                        const std::uint16_t* row = row_inside ? &grid.classes[grid.offset(0, b, c)] : nullptr;
+                        for (int x = -radius; x <= radius; ++x, ++weight) {
+                            const int a = i + x;
+                            add(row != nullptr && a >= 0 && a < size_[0] ? row[a] : std::uint16_t{0}, *weight);
                         }
+                    }
                 part.length.push_back(static_cast<std::int64_t>(list.size()));
                 part.entries.insert(part.entries.end(), list.begin(), list.end());
             }

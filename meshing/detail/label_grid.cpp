@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <numeric>
 #include <set>
 #include <string>
 
@@ -102,34 +103,89 @@ LabelGrid make_label_grid(const imaging::Volume& volume, const std::vector<int>&
     return grid;
 }
 
-Components connected_components(const LabelGrid& grid, const std::vector<std::uint16_t>& classes) {
-    Components components;
-    components.of_voxel.assign(classes.size(), -1);
-    const std::array<std::size_t, 3> stride{1, grid.offset(0, 1, 0), grid.offset(0, 0, 1)};
-    std::vector<std::size_t> stack;
-    for (std::size_t start = 0; start < classes.size(); ++start) {
-        if (components.of_voxel[start] >= 0) continue;
-        const auto id = static_cast<std::int32_t>(components.class_of.size());
-        components.class_of.push_back(classes[start]);
-        components.voxels.push_back(0);
-        components.of_voxel[start] = id;
-        stack.push_back(start);
-        while (!stack.empty()) {
-            const std::size_t v = stack.back();
-            stack.pop_back();
-            ++components.voxels.back();
-            const std::array<std::size_t, 3> index{
-                v % stride[1], v / stride[1] % static_cast<std::size_t>(grid.size[1]), v / stride[2]};
-            const auto visit = [&](std::size_t neighbour) {
-                if (components.of_voxel[neighbour] >= 0 || classes[neighbour] != classes[start]) return;
-                components.of_voxel[neighbour] = id;
-                stack.push_back(neighbour);
-            };
-            for (int axis = 0; axis < 3; ++axis) {
-                if (index[axis] > 0) visit(v - stride[axis]);
-                if (index[axis] + 1 < static_cast<std::size_t>(grid.size[axis])) visit(v + stride[axis]);
+namespace {
+
+/// Voxels of one class beside each other in a row: [first, end) in voxel order.
+struct Run {
+    std::size_t first, end;
+};
+
+/// Runs row by row, and where those of each row begin; one more at the end.
+struct Runs {
+    std::vector<Run> runs;
+    std::vector<std::size_t> row_begin;
+};
+
+Runs runs_of(const LabelGrid& grid, const std::vector<std::uint16_t>& classes) {
+    Runs result;
+    const auto length = static_cast<std::size_t>(grid.size[0]);
+    for (std::size_t row = 0; row < classes.size(); row += length) {
+        result.row_begin.push_back(result.runs.size());
+        for (std::size_t v = row; v < row + length;) {
+            const std::size_t first = v;
+            while (++v < row + length && classes[v] == classes[first]) {
             }
+            result.runs.push_back({first, v});
         }
+    }
+    result.row_begin.push_back(result.runs.size());
+    return result;
+}
+
+/// Union-find whose representative is the first of a set.
+class Sets {
+public:
+    explicit Sets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), std::size_t{0}); }
+    std::size_t first_of(std::size_t a) {
+        while (parent_[a] != a) a = parent_[a] = parent_[parent_[a]];
+        return a;
+    }
+    void join(std::size_t a, std::size_t b) {
+        const auto [first, second] = std::minmax({first_of(a), first_of(b)});
+        parent_[second] = first;
+    }
+
+private:
+    std::vector<std::size_t> parent_;
+};
+
+/// Joins runs of equal class that touch across two rows, `apart` voxels from each other.
+void join_rows(const Runs& all, std::size_t row, std::size_t earlier, std::size_t apart,
+               const std::vector<std::uint16_t>& classes, Sets& sets) {
+    std::size_t a = all.row_begin[row], b = all.row_begin[earlier];
+    while (a < all.row_begin[row + 1] && b < all.row_begin[earlier + 1]) {
+        if (classes[all.runs[a].first] == classes[all.runs[b].first]) sets.join(a, b);
+        const std::size_t end_a = all.runs[a].end, end_b = all.runs[b].end + apart;
+        if (end_a <= end_b) ++a;
+        if (end_b <= end_a) ++b;
+    }
+}
+
+}  // namespace
+
+Components connected_components(const LabelGrid& grid, const std::vector<std::uint16_t>& classes) {
+    const Runs all = runs_of(grid, classes);
+    Sets sets(all.runs.size());
+    const auto length = static_cast<std::size_t>(grid.size[0]), rows = static_cast<std::size_t>(grid.size[1]);
+    for (std::size_t row = 0; row + 1 < all.row_begin.size(); ++row) {
+        if (row % rows > 0) join_rows(all, row, row - 1, length, classes, sets);
+        if (row >= rows) join_rows(all, row, row - rows, length * rows, classes, sets);
+    }
+    Components components;
+    components.of_voxel.resize(classes.size());
+    std::vector<std::int32_t> number(all.runs.size());
+    for (std::size_t r = 0; r < all.runs.size(); ++r) {
+        const auto [first, end] = all.runs[r];
+        const std::size_t representative = sets.first_of(r);
+        if (representative == r) {
+            number[r] = static_cast<std::int32_t>(components.class_of.size());
+            components.class_of.push_back(classes[first]);
+            components.voxels.push_back(0);
+        }
+        number[r] = number[representative];
+        components.voxels[static_cast<std::size_t>(number[r])] += static_cast<std::int64_t>(end - first);
+        std::fill(components.of_voxel.begin() + static_cast<std::ptrdiff_t>(first),
+                  components.of_voxel.begin() + static_cast<std::ptrdiff_t>(end), number[r]);
     }
     return components;
 }

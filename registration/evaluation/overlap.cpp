@@ -5,11 +5,16 @@
 #include "registration/evaluation/percentile.hpp"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
+#include <algorithm>
 #include <array>
+#include <cstdint>
 #include <limits>
 #include <numeric>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace tissuewarp::registration {
 
@@ -19,64 +24,115 @@ using detail::percentile;
 using imaging::Geometry;
 using imaging::Volume;
 
-/// Faces between voxels of a label and others, as their centres (mm along the axes), and the number of voxels.
+/// Faces between voxels of a label and others, in the order of the grid, and the number of voxels.
 struct Region {
-    std::vector<Eigen::Vector3d> faces;
+    std::vector<Eigen::Vector3d> centres;  ///< mm along the axes
+    std::vector<std::int64_t> places;      ///< 3 · voxel + axis of each
     long long voxels = 0;
+
+    void add(std::int64_t place, const Eigen::Vector3d& centre) {
+        places.push_back(place);
+        centres.push_back(centre);
+    }
 };
 
 /// Every label's region, and under key 0 that of all labels together.
+class Regions {
+public:
+    Region& operator[](int label) {
+        if (last_ == nullptr || label != label_) last_ = &all_[label_ = label];
+        return *last_;
+    }
+    [[nodiscard]] std::map<int, Region> taken() && { return std::move(all_); }
+
+private:
+    std::map<int, Region> all_;
+    int label_ = 0;
+    Region* last_ = nullptr;  // neighbours in the grid ask for the same one
+};
+
 std::map<int, Region> regions_of(const Volume& labels) {
-    std::map<int, Region> regions;
+    Regions regions;
     const Geometry& grid = labels.geometry;
-    const auto* value = labels.data<std::int32_t>();
-    const std::array<std::int64_t, 3> stride{1, grid.size[0], std::int64_t{grid.size[0]} * grid.size[1]};
+    const std::int64_t per_row = grid.size[0], per_slice = per_row * grid.size[1];
+    long long labelled = 0;
     for (int k = 0; k < grid.size[2]; ++k) {
         for (int j = 0; j < grid.size[1]; ++j) {
+            const std::int64_t first = labels.offset(0, j, k);
+            const auto* row = labels.data<std::int32_t>() + first;
+            // Beyond the grid itself: no face.
+            const auto* beside = j + 1 < grid.size[1] ? row + per_row : row;
+            const auto* above = k + 1 < grid.size[2] ? row + per_slice : row;
             for (int i = 0; i < grid.size[0]; ++i) {
-                const std::array<int, 3> index{i, j, k};
-                const std::int64_t voxel = labels.offset(i, j, k);
-                const int here = value[voxel];
+                const int here = row[i];
                 if (here != 0) {
                     ++regions[here].voxels;
-                    ++regions[0].voxels;
+                    ++labelled;
                 }
+                const std::array<int, 3> next{row[std::min(i + 1, grid.size[0] - 1)], beside[i], above[i]};
+                if (next[0] == here && next[1] == here && next[2] == here) continue;
                 for (int axis = 0; axis < 3; ++axis) {
-                    if (index[axis] + 1 >= grid.size[axis]) continue;
-                    const int there = value[voxel + stride[axis]];
+                    const int there = next[static_cast<std::size_t>(axis)];
                     if (there == here) continue;
                     Eigen::Vector3d centre(i, j, k);
                     centre[axis] += 0.5;
                     centre = centre.cwiseProduct(grid.spacing);
-                    if (here != 0) regions[here].faces.push_back(centre);
-                    if (there != 0) regions[there].faces.push_back(centre);
-                    if (here == 0 || there == 0) regions[0].faces.push_back(centre);
+                    const std::int64_t place = 3 * (first + i) + axis;
+                    if (here != 0) regions[here].add(place, centre);
+                    if (there != 0) regions[there].add(place, centre);
+                    if (here == 0 || there == 0) regions[0].add(place, centre);
                 }
             }
         }
     }
-    return regions;
+    if (labelled > 0) regions[0].voxels = labelled;
+    return std::move(regions).taken();
 }
 
-std::vector<double> distances(const std::vector<Eigen::Vector3d>& from, const meshing::PointTree& to) {
-    std::vector<double> result(from.size());
-    tbb::parallel_for(std::size_t{0}, from.size(), [&](std::size_t n) { result[n] = to.distance(from[n]); });
+/// From each face of a region to the nearest of another, mm. Of faces of both no tree is asked: most are, where labels
+/// nearly agree.
+std::vector<double> distances(const Region& from, const Region& to, const meshing::PointTree& tree) {
+    std::vector<double> result(from.places.size(), 0.0);
+    std::vector<std::size_t> apart;
+    auto same = to.places.begin();
+    for (std::size_t n = 0; n < from.places.size(); ++n) {
+        while (same != to.places.end() && *same < from.places[n]) ++same;
+        if (same == to.places.end() || *same != from.places[n]) apart.push_back(n);
+    }
+    tbb::parallel_for(std::size_t{0}, apart.size(),
+                      [&](std::size_t n) { result[apart[n]] = tree.distance(from.centres[apart[n]]); });
     return result;
 }
 
 void measure_surfaces(const Region& a, const Region& b, Overlap& overlap) {
-    if (a.faces.empty() && b.faces.empty() && overlap.dice == 1.0) return;  // both fill the image
-    if (a.faces.empty() || b.faces.empty()) {
+    if (a.places.empty() && b.places.empty() && overlap.dice == 1.0) return;  // both fill the image
+    if (a.places.empty() || b.places.empty()) {
         overlap.mean_surface_distance_mm = overlap.hausdorff_95_mm = std::numeric_limits<double>::infinity();
         return;
     }
-    std::vector<double> to_b = distances(a.faces, meshing::PointTree(b.faces));
-    std::vector<double> to_a = distances(b.faces, meshing::PointTree(a.faces));
+    std::vector<double> to_b, to_a;
+    tbb::parallel_invoke([&] { to_b = distances(a, b, meshing::PointTree(b.centres)); },
+                         [&] { to_a = distances(b, a, meshing::PointTree(a.centres)); });
     const auto mean = [](const std::vector<double>& d) {
         return std::accumulate(d.begin(), d.end(), 0.0) / static_cast<double>(d.size());
     };
     overlap.mean_surface_distance_mm = 0.5 * (mean(to_a) + mean(to_b));
     overlap.hausdorff_95_mm = std::max(percentile(to_a, 95.0), percentile(to_b, 95.0));
+}
+
+/// Voxels that have the same label in both, and under key 0 any label.
+std::map<int, long long> voxels_in_both(const Volume& a, const Volume& b) {
+    std::map<int, long long> common;
+    const auto *in_a = a.data<std::int32_t>(), *in_b = b.data<std::int32_t>();
+    const std::int64_t count = a.geometry.voxel_count();
+    for (std::int64_t n = 0; n < count;) {  // by runs, since a map is slow to ask
+        const std::int64_t first = n;
+        while (n < count && in_a[n] == in_a[first] && in_b[n] == in_b[first]) ++n;
+        if (in_a[first] == 0 || in_b[first] == 0) continue;
+        common[0] += n - first;
+        if (in_a[first] == in_b[first]) common[in_a[first]] += n - first;
+    }
+    return common;
 }
 
 }  // namespace
@@ -90,13 +146,9 @@ std::map<int, Overlap> overlap(const Volume& labels, const Volume& reference) {
                            std::to_string(imaging::grid_distance(labels.geometry, reference.geometry)) +
                            " voxels, limit 0.001; resample one map onto the grid of the other");
     const Volume a = labels.as(CV_32S), b = reference.as(CV_32S);
-    std::map<int, long long> common;
-    for (std::int64_t n = 0; n < a.geometry.voxel_count(); ++n) {
-        const int in_a = a.data<std::int32_t>()[n], in_b = b.data<std::int32_t>()[n];
-        if (in_a != 0 && in_b != 0) ++common[0];
-        if (in_a != 0 && in_a == in_b) ++common[in_a];
-    }
-    std::map<int, Region> regions_a = regions_of(a), regions_b = regions_of(b);
+    std::map<int, long long> common = voxels_in_both(a, b);
+    std::map<int, Region> regions_a, regions_b;
+    tbb::parallel_invoke([&] { regions_a = regions_of(a); }, [&] { regions_b = regions_of(b); });
     for (const auto& [label, region] : regions_a) regions_b[label];
     std::map<int, Overlap> result;
     for (const auto& [label, region_b] : regions_b) {

@@ -4,13 +4,15 @@
 #include "core/errors.hpp"
 #include "imaging/image_io.hpp"
 
+#include <libdeflate.h>
 #include <tbb/parallel_for.h>
-#include <zlib.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -19,8 +21,7 @@ namespace tissuewarp::registration::detail {
 namespace {
 
 constexpr std::int64_t most_chunk_voxels = std::int64_t{1} << 16;  // 768 KiB: a reader's cache of HDF5 holds one
-constexpr std::int64_t chunks_at_once = 16;                        // bounds memory to about 40 MB
-constexpr int level = 4;                                           // of zlib
+constexpr int level = 1;                                           // of libdeflate
 
 using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
@@ -38,6 +39,10 @@ std::vector<unsigned char> shuffled(const std::vector<float>& values) {
     return result;
 }
 
+struct FreeCompressor {
+    void operator()(libdeflate_compressor* compressor) const { libdeflate_free_compressor(compressor); }
+};
+
 /// A whole chunk of the dataset, rounded, shuffled and deflated; beyond the last voxel there is zero.
 std::vector<unsigned char> packed_chunk(const FieldToWrite& field, std::int64_t first, std::int64_t chunk_voxels) {
     constexpr auto step = static_cast<float>(imaging::displacement_step_mm);
@@ -45,11 +50,11 @@ std::vector<unsigned char> packed_chunk(const FieldToWrite& field, std::int64_t 
     field.vectors(first, std::min<std::int64_t>(chunk_voxels, field.grid.voxel_count() - first), values.data());
     for (float& value : values) value = std::nearbyint(value / step) * step;
     const std::vector<unsigned char> plain = shuffled(values);
-    uLongf size = compressBound(plain.size());
-    std::vector<unsigned char> packed(size);
-    if (compress2(packed.data(), &size, plain.data(), plain.size(), level) != Z_OK)
-        throw IoError("zlib cannot pack a piece of the field: out of memory");
-    packed.resize(size);
+    const std::unique_ptr<libdeflate_compressor, FreeCompressor> compressor(libdeflate_alloc_compressor(level));
+    if (!compressor) throw IoError("libdeflate cannot start: out of memory");
+    std::vector<unsigned char> packed(libdeflate_zlib_compress_bound(compressor.get(), plain.size()));
+    packed.resize(libdeflate_zlib_compress(compressor.get(), plain.data(), plain.size(), packed.data(), packed.size()));
+    if (packed.empty()) throw IoError("libdeflate cannot pack a piece of the field");
     return packed;
 }
 
@@ -129,8 +134,10 @@ private:
         const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
         H5Pset_chunk(creation, 1, &chunk);
         H5Pset_shuffle(creation);
-        H5Pset_deflate(creation, level);
+        H5Pset_deflate(creation, level);  // which readers need not know
         const Hdf5Handle set = dataset(name, H5T_IEEE_F32LE, static_cast<hsize_t>(3 * voxels), creation);
+        // Bounds memory to about 5 MB a thread.
+        const std::int64_t chunks_at_once = 2 * tbb::this_task_arena::max_concurrency();
         for (std::int64_t first = 0; first < chunks; first += chunks_at_once) {
             std::vector<std::vector<unsigned char>> packed(
                 static_cast<std::size_t>(std::min(chunks_at_once, chunks - first)));

@@ -27,6 +27,13 @@ PreparedModel coarse_model(const PreparedModel& prepared, double edge_length, Ob
 /// has more than 6000 nodes.
 bool loads_take_coarse_model(const PreparedModel& prepared);
 
+/// Whether it will, as far as edges tell before the mesh is made: never where anchors or rigid neighbours hold the
+/// organ.
+bool loads_will_take_coarse_model(const imaging::Volume& organ, const PrepareOptions& options);
+
+/// How that coarser model of an organ is prepared.
+PrepareOptions coarse_options_for_loads(const imaging::Volume& organ, const PrepareOptions& options);
+
 /// That model. The second is of a mesh that was made for it before. Throws InvalidInput, Cancelled.
 PreparedModel coarse_model_for_loads(const PreparedModel& prepared, Observer& observer);
 PreparedModel coarse_model_for_loads(const PreparedModel& prepared, meshing::TetMesh mesh, Observer& observer);

@@ -5,9 +5,13 @@
 #include "imaging/labels.hpp"
 #include "registration/pose/alignment.hpp"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <optional>
 #include <utility>
 
 namespace tissuewarp::registration::detail {
@@ -44,20 +48,26 @@ Eigen::Matrix3Xd boundary_points(const Volume& mask, int most) {
     const auto& size = mask.geometry.size;
     std::vector<Eigen::Vector3d> centres;
     const auto* voxels = mask.data<std::uint8_t>();
+    const std::int64_t per_row = size[0], per_slice = per_row * size[1];
     for (int k = 0; k < size[2]; ++k)
-        for (int j = 0; j < size[1]; ++j)
+        for (int j = 0; j < size[1]; ++j) {
+            const std::uint8_t* row = voxels + mask.offset(0, j, k);
+            // Beyond the grid itself: no face.
+            const std::uint8_t* beside = j + 1 < size[1] ? row + per_row : row;
+            const std::uint8_t* above = k + 1 < size[2] ? row + per_slice : row;
             for (int i = 0; i < size[0]; ++i) {
-                const bool here = voxels[mask.offset(i, j, k)] != 0;
-                const std::array<std::array<int, 3>, 3> next{{{i + 1, j, k}, {i, j + 1, k}, {i, j, k + 1}}};
+                const bool here = row[i] != 0;
+                const std::array<bool, 3> face{(row[std::min(i + 1, size[0] - 1)] != 0) != here,
+                                               (beside[i] != 0) != here, (above[i] != 0) != here};
+                if (!face[0] && !face[1] && !face[2]) continue;
                 for (std::size_t axis = 0; axis < 3; ++axis) {
-                    if (next[axis][axis] >= size[axis]) continue;
-                    const bool there = voxels[mask.offset(next[axis][0], next[axis][1], next[axis][2])] != 0;
-                    if (here == there) continue;
+                    if (!face[axis]) continue;
                     Eigen::Vector3d index(i, j, k);
                     index[static_cast<Eigen::Index>(axis)] += 0.5;
                     centres.push_back(mask.geometry.point(index));
                 }
             }
+        }
     const std::size_t stride = std::max<std::size_t>(
         1, (centres.size() + static_cast<std::size_t>(most) - 1) / static_cast<std::size_t>(most));
     Eigen::Matrix3Xd points(3, static_cast<Eigen::Index>((centres.size() + stride - 1) / stride));
@@ -82,11 +92,21 @@ Volume coarsened(const Volume& labels, double spacing_mm) {
 BoundaryDistances::BoundaryDistances(const Volume& points_from, const Volume& maps_from, const std::vector<int>& labels,
                                      int samples) {
     const Volume coarse = coarsened(maps_from, LabelPoseOptions().map_spacing_mm);
-    for (const int label : labels) {
-        const Volume inside = mask(coarse, label);
-        if (cv::countNonZero(inside.voxels.reshape(1, 1)) == 0) continue;
-        maps_.push_back(imaging::signed_distance(inside));
-        points_.push_back(boundary_points(mask(points_from, label), samples / static_cast<int>(labels.size())));
+    struct Boundary {
+        Volume map;
+        Eigen::Matrix3Xd points;
+    };
+    std::vector<std::optional<Boundary>> boundaries(labels.size());
+    tbb::parallel_for(std::size_t{0}, labels.size(), [&](std::size_t n) {
+        const Volume inside = mask(coarse, labels[n]);
+        if (cv::countNonZero(inside.voxels.reshape(1, 1)) == 0) return;
+        boundaries[n] = {imaging::signed_distance(inside),
+                         boundary_points(mask(points_from, labels[n]), samples / static_cast<int>(labels.size()))};
+    });
+    for (auto& boundary : boundaries) {
+        if (!boundary) continue;
+        maps_.push_back(std::move(boundary->map));
+        points_.push_back(std::move(boundary->points));
     }
     for (const Volume& map : maps_) samplers_.emplace_back(map);
 }

@@ -2,6 +2,8 @@
 
 #include "core/errors.hpp"
 
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
@@ -123,14 +125,16 @@ std::optional<HeldOut> held_out(const PreparedModel& prepared, const LastPulls& 
     const std::vector<int> region = regions_of(data, prepared.model.mesh.nodes, count);
     if (data.empty() || *std::max_element(region.begin(), region.end()) + 1 < folds) return std::nullopt;
     std::vector<Region> regions(static_cast<std::size_t>(count));
-    for (int number = 0; number < folds; ++number) {
+    const auto leave_out = [&](int number) {
         const Fold fold = fold_of(number, folds, data, errors, region);
         try {
             const LinearRegistration rest(prepared, without_fold(pulls, fold.kept), unseen);
             add_fold(fold, rest, displacement, truths, regions);
         } catch (const InvalidInput&) {  // the rest holds the tissue no longer
         }
-    }
+    };
+    // Each has regions of its own, and a factor; isolated, so that no thread holds those of two.
+    tbb::parallel_for(0, folds, [&](int number) { tbb::this_task_arena::isolate([&] { leave_out(number); }); });
     HeldOut result;
     double sum = 0;
     for (const Region& region_left_out : regions) {

@@ -8,8 +8,8 @@
 
 namespace tissuewarp::report::detail {
 
-/// A PNG of a picture of three bytes a pixel (blue, green, red). Throws InvalidInput for any other type, IoError where
-/// libpng gives up.
+/// A PNG of a picture of three bytes a pixel (blue, green, red). Throws InvalidInput for any other type, IoError without
+/// memory.
 std::vector<unsigned char> png(const cv::Mat& picture);
 
 /// The same as a JPEG; `quality` from 1 to 100.

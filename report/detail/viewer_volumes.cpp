@@ -3,9 +3,12 @@
 #include "report/detail/encoding.hpp"
 #include "report/detail/picture.hpp"
 
+#include <tbb/task_group.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 namespace tissuewarp::report::detail {
 
@@ -160,19 +163,32 @@ nlohmann::json values(const ReportInput& input, const Geometry& grid, double dis
 nlohmann::json viewer_volumes(const ReportInput& input, const Box& organ, double displacement_mm, double error_mm) {
     const imaging::Volume& finest = input.fixed != nullptr ? *input.fixed : organ_labels(input);
     const Geometry grid = viewer_grid(organ, finest.geometry.spacing.minCoeff(), most_viewer_voxels);
-    nlohmann::json result{{"grid", grid_json(grid)}, {"labels", label_picture(input, grid)}};
-    if (input.fixed != nullptr) result["fixed"] = grey_picture(*input.fixed, window_of(*input.fixed, organ), grid);
     const Volume* moving = input.moving != nullptr ? input.moving : input.warped;
-    if (moving != nullptr) {
-        const std::optional<Box> lay = label_box(*input.moving_labels);
-        const Window window = window_of(*moving, input.moving != nullptr && lay ? *lay : organ);
-        if (input.moving != nullptr) result["before"] = grey_picture(*input.moving, window, grid);
-        if (input.warped != nullptr) result["after"] = grey_picture(*input.warped, window, grid);
-    }
-    if (input.fixed_to_moving != nullptr || input.uncertainty != nullptr) {
-        const Geometry coarse = viewer_grid(organ, 2 * grid.spacing[0], most_viewer_voxels / 8);
-        result["values"] = values(input, coarse, displacement_mm, error_mm);
-    }
+    nlohmann::json result{{"grid", grid_json(grid)}};
+    std::string labels, fixed, before, after;
+    nlohmann::json shown_values;
+    tbb::task_group pictures;
+    pictures.run([&] { labels = label_picture(input, grid); });
+    if (input.fixed != nullptr)
+        pictures.run([&] { fixed = grey_picture(*input.fixed, window_of(*input.fixed, organ), grid); });
+    if (moving != nullptr)
+        pictures.run([&] {
+            const std::optional<Box> lay = label_box(*input.moving_labels);
+            const Window window = window_of(*moving, input.moving != nullptr && lay ? *lay : organ);
+            if (input.moving != nullptr) before = grey_picture(*input.moving, window, grid);
+            if (input.warped != nullptr) after = grey_picture(*input.warped, window, grid);
+        });
+    if (input.fixed_to_moving != nullptr || input.uncertainty != nullptr)
+        pictures.run([&] {
+            const Geometry coarse = viewer_grid(organ, 2 * grid.spacing[0], most_viewer_voxels / 8);
+            shown_values = values(input, coarse, displacement_mm, error_mm);
+        });
+    pictures.wait();
+    result["labels"] = std::move(labels);
+    for (auto& [name, picture] :
+         {std::pair<const char*, std::string&>{"fixed", fixed}, {"before", before}, {"after", after}})
+        if (!picture.empty()) result[name] = std::move(picture);
+    if (!shown_values.is_null()) result["values"] = std::move(shown_values);
     return result;
 }
 

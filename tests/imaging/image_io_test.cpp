@@ -217,18 +217,61 @@ TEST(ImageIo, ANrrdInRasSpaceLandsInLps) {
     EXPECT_TRUE(grid.point({1, 1, 1}).isApprox(Eigen::Vector3d(-12, -23, 34), 1e-12));
 }
 
+std::string bytes_of(const std::filesystem::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    std::stringstream text;
+    text << file.rdbuf();
+    return text.str();
+}
+
 TEST(ImageIo, WritingTwiceGivesTheSameBytes) {
     const TemporaryFolder folder;
     const Volume volume = test::random_volume(test::plain_grid({100, 100, 100}), CV_16S);
     std::array<std::string, 2> bytes;
     for (std::size_t i = 0; i < 2; ++i) {
         write_volume(volume, folder / "twice.nii.gz");
-        std::ifstream file(folder / "twice.nii.gz", std::ios::binary);
-        std::stringstream text;
-        text << file.rdbuf();
-        bytes[i] = text.str();
+        bytes[i] = bytes_of(folder / "twice.nii.gz");
     }
     EXPECT_EQ(bytes[0], bytes[1]);
+}
+
+/// Of one gzip member, which must be all there is.
+std::string unpacked(std::string packed, std::size_t size) {
+    std::string plain(size + 1, '\0');
+    z_stream stream{};
+    EXPECT_EQ(inflateInit2(&stream, MAX_WBITS + 16), Z_OK);
+    stream.next_in = reinterpret_cast<Bytef*>(packed.data());
+    stream.avail_in = static_cast<uInt>(packed.size());
+    stream.next_out = reinterpret_cast<Bytef*>(plain.data());
+    stream.avail_out = static_cast<uInt>(plain.size());
+    EXPECT_EQ(inflate(&stream, Z_FINISH), Z_STREAM_END);
+    EXPECT_EQ(stream.avail_in, 0U);
+    plain.resize(stream.total_out);
+    inflateEnd(&stream);
+    return plain;
+}
+
+// Compressed files are made in pieces, plain ones by ITK.
+TEST(ImageIo, CompressedNiftiUnpacksToThePlainFile) {
+    const TemporaryFolder folder;
+    for (const int type : {CV_8U, CV_8S, CV_16U, CV_16S, CV_32S, CV_32F, CV_64F, CV_32FC3, CV_64FC3}) {
+        SCOPED_TRACE(type);
+        Volume volume = test::random_volume(oblique_grid({61, 73, 87}, true), type);  // up to nine blocks of 1 MiB
+        volume.voxels.row(5).setTo(0);                                                // and what packs well
+        volume.voxels.rowRange(20, 40).setTo(1);
+        write_volume(volume, folder / "plain.nii");
+        write_volume(volume, folder / "packed.nii.gz");
+        const std::string plain = bytes_of(folder / "plain.nii");
+        EXPECT_TRUE(unpacked(bytes_of(folder / "packed.nii.gz"), plain.size()) == plain);
+    }
+}
+
+TEST(ImageIo, MoreVoxelsThanNiftiCountsAreRefused) {
+    const TemporaryFolder folder;
+    const Volume needle(test::plain_grid({40'000, 2, 2}), CV_8U);
+    const std::string message = test::message_of<IoError>([&] { write_volume(needle, folder / "needle.nii.gz"); });
+    EXPECT_THAT(message, testing::AllOf(testing::HasSubstr("40000"), testing::HasSubstr(".nrrd")));
+    EXPECT_TRUE(folder.is_empty());
 }
 
 TEST(ImageIo, CompressedNiftiIsOneGzipMember) {
@@ -236,20 +279,7 @@ TEST(ImageIo, CompressedNiftiIsOneGzipMember) {
     const TemporaryFolder folder;
     const Volume volume = test::random_volume(test::plain_grid({200, 200, 100}), CV_8U);  // 4 blocks of 1 MiB
     write_volume(volume, folder / "one.nii.gz");
-    std::ifstream file(folder / "one.nii.gz", std::ios::binary);
-    std::stringstream text;
-    text << file.rdbuf();
-    std::string packed = text.str(), plain(5'000'000, '\0');
-    z_stream stream{};
-    ASSERT_EQ(inflateInit2(&stream, MAX_WBITS + 16), Z_OK);
-    stream.next_in = reinterpret_cast<Bytef*>(packed.data());
-    stream.avail_in = static_cast<uInt>(packed.size());
-    stream.next_out = reinterpret_cast<Bytef*>(plain.data());
-    stream.avail_out = static_cast<uInt>(plain.size());
-    EXPECT_EQ(inflate(&stream, Z_FINISH), Z_STREAM_END);
-    EXPECT_EQ(stream.avail_in, 0U);
-    EXPECT_EQ(stream.total_out, 352U + 4'000'000U);
-    inflateEnd(&stream);
+    EXPECT_EQ(unpacked(bytes_of(folder / "one.nii.gz"), 5'000'000).size(), 352U + 4'000'000U);
 }
 
 TEST(ImageIo, WrittenDisplacementsAreWholeStepsLessThanAMicrometreAway) {

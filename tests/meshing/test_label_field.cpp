@@ -5,7 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cstdint>
+#include <random>
 #include <set>
+#include <vector>
 
 namespace tissuewarp::meshing::detail {
 namespace {
@@ -44,6 +48,56 @@ TEST(LabelGrid, SpecksGoToTheirSurroundingsAndTheLargestPieceStays) {
     EXPECT_EQ(remove_specks(grid, voxels), 1);
     EXPECT_EQ(std::count(grid.classes.begin(), grid.classes.end(), 3), 2);
     EXPECT_EQ(std::count(grid.classes.begin(), grid.classes.end(), 2), 1);
+}
+
+/// By a flood from each voxel that has no number yet.
+std::vector<std::int32_t> flooded(const LabelGrid& grid) {
+    std::vector<std::int32_t> number(grid.voxel_count(), -1);
+    std::int32_t next = 0;
+    for (std::size_t start = 0; start < number.size(); ++start) {
+        if (number[start] >= 0) continue;
+        std::vector<std::array<int, 3>> stack;
+        const auto reach = [&](int i, int j, int k) {
+            if (i < 0 || j < 0 || k < 0 || i >= grid.size[0] || j >= grid.size[1] || k >= grid.size[2]) return;
+            const std::size_t v = grid.offset(i, j, k);
+            if (number[v] >= 0 || grid.classes[v] != grid.classes[start]) return;
+            number[v] = next;
+            stack.push_back({i, j, k});
+        };
+        const auto at = static_cast<int>(start);
+        reach(at % grid.size[0], at / grid.size[0] % grid.size[1], at / grid.size[0] / grid.size[1]);
+        while (!stack.empty()) {
+            const auto [i, j, k] = stack.back();
+            stack.pop_back();
+            for (const int step : {-1, 1}) {
+                reach(i + step, j, k);
+                reach(i, j + step, k);
+                reach(i, j, k + step);
+            }
+        }
+        ++next;
+    }
+    return number;
+}
+
+TEST(LabelGrid, PiecesAreThoseOfAFlood) {
+    std::mt19937 random(7);
+    for (const int classes : {1, 2, 3}) {
+        LabelGrid grid;
+        grid.size = {13, 11, 9};
+        grid.classes.resize(13 * 11 * 9);
+        for (auto& voxel : grid.classes) voxel = static_cast<std::uint16_t>(random() % static_cast<unsigned>(classes));
+        const Components components = connected_components(grid, grid.classes);
+        EXPECT_EQ(components.of_voxel, flooded(grid));
+        ASSERT_EQ(components.class_of.size(), components.voxels.size());
+        std::vector<std::int64_t> counted(components.voxels.size(), 0);
+        for (std::size_t v = 0; v < grid.voxel_count(); ++v) {
+            const auto c = static_cast<std::size_t>(components.of_voxel[v]);
+            ++counted[c];
+            EXPECT_EQ(components.class_of[c], grid.classes[v]);
+        }
+        EXPECT_EQ(components.voxels, counted);
+    }
 }
 
 TEST(LabelField, APlaneStaysHalfwayBetweenVoxels) {

@@ -7,8 +7,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
+#include <limits>
+#include <random>
+#include <vector>
 
 namespace tissuewarp::registration {
 namespace {
@@ -115,6 +120,63 @@ TEST(Overlap, OfConcentricBallsIsTheDifferenceOfTheirRadii) {
     EXPECT_NEAR(result.dice, 2.0 * 1000.0 / (1000.0 + 2197.0), 0.003);
     EXPECT_NEAR(result.mean_surface_distance_mm, 3.0, 0.15);
     EXPECT_NEAR(result.hausdorff_95_mm, 3.0, 0.35);  // voxel steps of 0.5 mm
+}
+
+/// Centres of faces between a label (0: all) and what is not of it, mm along the axes.
+std::vector<Eigen::Vector3d> faces_of(const imaging::Volume& labels, int label) {
+    std::vector<Eigen::Vector3d> centres;
+    const auto& size = labels.geometry.size;
+    const auto is_of = [&](int i, int j, int k) {
+        const int value = labels.data<int>()[labels.offset(i, j, k)];
+        return label == 0 ? value != 0 : value == label;
+    };
+    for (int k = 0; k < size[2]; ++k)
+        for (int j = 0; j < size[1]; ++j)
+            for (int i = 0; i < size[0]; ++i)
+                for (int axis = 0; axis < 3; ++axis) {
+                    std::array<int, 3> next{i, j, k};
+                    if (++next[axis] == size[axis] || is_of(i, j, k) == is_of(next[0], next[1], next[2])) continue;
+                    const Eigen::Vector3d centre = Eigen::Vector3d(i, j, k) + 0.5 * Eigen::Vector3d::Unit(axis);
+                    centres.push_back(centre.cwiseProduct(labels.geometry.spacing));
+                }
+    return centres;
+}
+
+double mean_distance(const std::vector<Eigen::Vector3d>& from, const std::vector<Eigen::Vector3d>& to) {
+    double sum = 0;
+    for (const Eigen::Vector3d& a : from) {
+        double nearest = std::numeric_limits<double>::infinity();
+        for (const Eigen::Vector3d& b : to) nearest = std::min(nearest, (a - b).norm());
+        sum += nearest;
+    }
+    return sum / double(from.size());
+}
+
+// Most faces of maps that nearly agree are the same, and the others are near.
+TEST(Overlap, OfScatteredLabelsIsThatOfEveryPairOfFaces) {
+    imaging::Geometry grid;
+    grid.size = {12, 9, 8};
+    grid.spacing = {1, 0.7, 1.6};
+    imaging::Volume a(grid, CV_32S), b(grid, CV_32S);
+    std::mt19937 random(3);
+    for (std::int64_t n = 0; n < grid.voxel_count(); ++n) {
+        a.data<int>()[n] = static_cast<int>(random() % 3);
+        b.data<int>()[n] = random() % 8 == 0 ? static_cast<int>(random() % 3) : a.data<int>()[n];
+    }
+    const auto measured = overlap(a, b);
+    for (const int label : {0, 1, 2}) {
+        const auto in_a = faces_of(a, label), in_b = faces_of(b, label);
+        EXPECT_NEAR(measured.at(label).mean_surface_distance_mm,
+                    0.5 * (mean_distance(in_a, in_b) + mean_distance(in_b, in_a)), 1e-12);
+        long long here = 0, there = 0, both = 0;
+        for (std::int64_t n = 0; n < grid.voxel_count(); ++n) {
+            const auto is = [&](int value) { return label == 0 ? value != 0 : value == label; };
+            here += is(a.data<int>()[n]);
+            there += is(b.data<int>()[n]);
+            both += is(a.data<int>()[n]) && is(b.data<int>()[n]);
+        }
+        EXPECT_DOUBLE_EQ(measured.at(label).dice, 2.0 * double(both) / double(here + there));
+    }
 }
 
 TEST(Overlap, OfALabelMissingInOneMapIsZeroAndInfinitelyFar) {

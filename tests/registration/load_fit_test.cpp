@@ -324,5 +324,28 @@ TEST(UnknownLoads, TakeACoarserModelOfALargeFreeOneAlone) {
     EXPECT_FALSE(large.coarse);
 }
 
+// Both meshes at the same time are those of one after the other, whatever the edges promised.
+TEST(UnknownLoads, PreparedInOneGoHaveTheSameModels) {
+    for (const double edge_mm : {3.6, 6.5}) {
+        PrepareOptions options;
+        options.meshing.edge_length = edge_mm;
+        const imaging::Volume labels = shapes::organ_labels({});
+        PreparedModel in_turn = prepare(labels, options);
+        prepare_loads(in_turn);
+        const PreparedModel at_once = prepare_for_loads(labels, options);
+        EXPECT_EQ(at_once.model.mesh.nodes, in_turn.model.mesh.nodes);
+        EXPECT_EQ(at_once.model.mesh.tets, in_turn.model.mesh.tets);
+        ASSERT_EQ(at_once.coarse != nullptr, in_turn.coarse != nullptr) << edge_mm;
+        EXPECT_EQ(at_once.coarse != nullptr, edge_mm < 5);
+        if (!at_once.coarse) continue;
+        EXPECT_EQ(at_once.coarse->model.mesh.nodes, in_turn.coarse->model.mesh.nodes);
+        EXPECT_EQ(at_once.times.back().stage, "coarse model");
+    }
+    PrepareOptions held;
+    held.meshing.edge_length = 3.6;
+    held.anchors = {2};
+    EXPECT_FALSE(prepare_for_loads(shapes::organ_labels({}), held).coarse);
+}
+
 }  // namespace
 }  // namespace tissuewarp::registration

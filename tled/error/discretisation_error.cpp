@@ -7,6 +7,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <optional>
 
 namespace tissuewarp::tled {
 
@@ -97,10 +98,15 @@ DiscretisationEstimate discretisation_error(const Model& model, const RestStiffn
     const detail::BubbleConditions bubbles =
         bubble_conditions(space, rest.volume, model.mesh, conditions, displacement, loads);
     const auto step = [&](detail::Moduli moduli) {
-        const detail::HierarchicalTissue tissue = hierarchical_tissue(space, rest, averaged, displacement, moduli);
-        Matrix3Xd residual = detail::residual(tissue, model_pressure(model, rest, jacobian));
-        residual.rightCols(space.edge_count()) += bubbles.force;
-        return detail::Enrichment(tissue, bubbles, conditions, stiffness).solve(std::move(residual), options);
+        std::optional<detail::Enrichment> enrichment;
+        Matrix3Xd residual;
+        {  // the tissue, which takes some 800 bytes an element, is gone while the system is solved
+            const detail::HierarchicalTissue tissue = hierarchical_tissue(space, rest, averaged, displacement, moduli);
+            residual = detail::residual(tissue, model_pressure(model, rest, jacobian));
+            residual.rightCols(space.edge_count()) += bubbles.force;
+            enrichment.emplace(tissue, bubbles, conditions, stiffness);
+        }
+        return enrichment->solve(std::move(residual), options);
     };
     detail::Enrichment::Solution found = step(detail::Moduli::Exact);
     if (!found.failure.empty()) found = step(detail::Moduli::PositivePart);
