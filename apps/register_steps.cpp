@@ -15,11 +15,14 @@
 #include "registration/evaluation/curve_residual.hpp"
 #include "registration/field.hpp"
 #include "registration/io/curves.hpp"
+#include "registration/resection/gap.hpp"
 #include "registration/stretch/stretched_update.hpp"
 #include "registration/warp.hpp"
 
 #include <fmt/format.h>
 #include <tbb/task_group.h>
+
+#include <limits>
 
 namespace tissuewarp::apps {
 
@@ -49,8 +52,37 @@ void register_to(RegistrationRun& run, const Intraoperative& seen, Observer& obs
     if (tissue.free_stretch > 0)
         observer.note(
             "the organ is not stretched as a whole before its tissue is strained: that takes fixed labels and "
-            "nothing else, without anchors and rigid neighbours");
+            "nothing else, without anchors, rigid neighbours and resected tissue");
     run.result = update(*run.prepared, seen, update_options(run), observer);
+}
+
+/// Coordinates that are not a number where the tissue of a point is gone.
+void mark_gone(const RegistrationRun& run, const Eigen::Matrix3Xd& places, Eigen::Matrix3Xd& carried) {
+    const std::vector<bool> gone = points_gone(run.result.deformation, run.prepared->resected, places);
+    for (Eigen::Index p = 0; p < carried.cols(); ++p)
+        if (gone[static_cast<std::size_t>(p)]) carried.col(p).setConstant(std::numeric_limits<double>::quiet_NaN());
+}
+
+void note_points_gone(const Eigen::Matrix3Xd& carried, const char* what, ProgressLine& progress) {
+    const Eigen::Index left = carried.array().isFinite().colwise().all().count();
+    if (left == carried.cols()) return;
+    progress.note(fmt::format("{} of {} {} lay in resected tissue: they have no place and are not scored",
+                              carried.cols() - left, carried.cols(), what));
+}
+
+/// A hole in what was warped, and no place for points of what is gone.
+void leave_out_what_is_gone(RegistrationRun& run, ProgressLine& progress) {
+    const imaging::Volume& resected = run.prepared->resected;
+    Products& products = run.products;
+    if (run.options.find_resected) products.gap = imaging::Volume(products.fixed_to_moving.geometry, CV_8UC1);
+    if (resected.empty()) return;
+    products.gap = gap_after(run.result.deformation, resected, products.fixed_to_moving);
+    if (!products.warped.empty()) leave_gap(products.warped, products.gap, gap_value);
+    leave_gap(products.warped_labels, products.gap);
+    if (run.inputs.landmarks) mark_gone(run, run.inputs.landmarks->moving, products.landmarks);
+    if (run.inputs.points) mark_gone(run, *run.inputs.points, products.points);
+    note_points_gone(products.landmarks, "landmarks", progress);
+    note_points_gone(products.points, "points", progress);
 }
 
 /// Where no fixed image gives a grid: the moving one, carried along by the rigid alignment.
@@ -125,8 +157,7 @@ CurveDistances curve_distances(const RegistrationRun& run) {
 
 /// The field that is written, where the organ is: tissue never folds.
 void doubt_field(RegistrationRun& run) {
-    const imaging::Volume organ =
-        imaging::mask_of_all(imaging::without_labels(run.inputs.moving_labels, run.options.rigid_neighbours));
+    const imaging::Volume organ = imaging::mask_of_all(organ_of(run.inputs.moving_labels, run.options));
     run.scores.organ = field_jacobians(run.products.moving_to_fixed, &organ);
     if (auto doubt = doubt_of_folds(run.scores.organ)) run.result.doubts.push_back(std::move(*doubt));
 }
@@ -145,14 +176,11 @@ void require_no_doubts(const RegistrationRun& run) {
 Scores score(const RegistrationRun& run) {
     Scores scores;
     scores.organ = run.scores.organ;
-    const auto without_neighbours = [&](const imaging::Volume& labels) {
-        return imaging::without_labels(labels, run.options.rigid_neighbours);
-    };
-    const imaging::Volume moving = without_neighbours(run.inputs.moving_labels);
+    const imaging::Volume moving = organ_of(run.inputs.moving_labels, run.options);
     if (!run.inputs.fixed_labels.empty()) {
-        const imaging::Volume fixed = without_neighbours(run.inputs.fixed_labels);
+        const imaging::Volume fixed = organ_of(run.inputs.fixed_labels, run.options);
         scores.before = overlap(imaging::resample(moving, fixed.geometry, imaging::Interpolation::Nearest), fixed);
-        scores.after = overlap(without_neighbours(run.products.warped_labels), fixed);
+        scores.after = overlap(organ_of(run.products.warped_labels, run.options), fixed);
     }
     scores.mesh = mesh_jacobians(run.result.deformation);
     scores.grid = field_jacobians(run.products.moving_to_fixed);
@@ -181,6 +209,8 @@ void print_plan(const RegistrationInputs& inputs, const RegisterOptions& options
                fmt::join(imaging::labels_in(inputs.moving_labels), ", "));
     if (!options.anchors.empty()) fmt::print("stay          {}\n", fmt::join(options.anchors, ", "));
     if (!options.rigid_neighbours.empty()) fmt::print("rigid         {}\n", fmt::join(options.rigid_neighbours, ", "));
+    if (options.find_resected) fmt::print("gone          sought in what was seen\n");
+    if (!options.resected.empty()) fmt::print("gone          {}\n", fmt::join(options.resected, ", "));
     fmt::print("would {}, {}, match in {} rounds on device '{}', and write to '{}':\n", mesh,
                options.no_align ? "not align" : "align rigidly", options.rounds, options.device.name,
                options.output.string());
@@ -202,6 +232,10 @@ void require_inputs_stay(const RegistrationInputs& inputs, const std::filesystem
     }
 }
 
+UpdateResult first_update(const RegistrationRun& run, const PreparedModel& model, Observer& observer) {
+    return update(model, seen(run.inputs, run.options), update_options(run), observer);
+}
+
 void append(std::vector<StageTime>& times, const std::vector<StageTime>& more) {
     times.insert(times.end(), more.begin(), more.end());
 }
@@ -217,6 +251,7 @@ void register_and_write(RegistrationRun& run, OutputFolder& output, StageClock& 
     make_fields(run, progress);
     run.times.push_back(clock.lap("fields"));
     warp_everything(run);
+    leave_out_what_is_gone(run, progress);
     run.times.push_back(clock.lap("warp"));
     run.intraoperative_seconds = clock.total() - ready;
     if (!options.no_error_estimate) {
@@ -225,6 +260,11 @@ void register_and_write(RegistrationRun& run, OutputFolder& output, StageClock& 
     }
     if (run.dial) doubt_dial(run);
     doubt_field(run);
+    if (!run.products.gap.empty() && !run.inputs.fixed_labels.empty())
+        if (auto doubt = doubt_of_gap(run.products.gap, run.inputs.fixed_labels))
+            run.result.doubts.push_back(std::move(*doubt));
+    if (run.resection)
+        for (Doubt& doubt : doubts_of(*run.resection, run.products.gap)) run.result.doubts.push_back(std::move(doubt));
     for (Doubt& doubt : run.result.doubts) doubt.text = imaging::with_label_names(doubt.text, run.inputs.label_names);
 
     progress.begin("writing and scoring", 0.65, 0.88);
