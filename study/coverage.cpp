@@ -10,6 +10,7 @@
 #include "registration/update.hpp"
 
 #include <chrono>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -24,6 +25,12 @@ using registration::PreparedModel;
 bool is_image(Evidence evidence) {
     return evidence >= Evidence::Image;
 }
+
+/// What a registration without resected tissue leaves open.
+struct Hole {
+    double dice = 0;  ///< with the true cavity
+    int doubts = 0;   ///< of what was found to be gone
+};
 
 /// A phantom, its images once they are needed, and models made of it.
 class Patient {
@@ -90,27 +97,32 @@ public:
     const PreparedModel& without_what_is_gone(Evidence evidence, const registration::Deformation& first,
                                               const imaging::Volume& seen, Observer& observer) {
         const PreparedModel& whole = prepared(evidence, observer);
-        const auto found = registration::find_resection(whole, first, images().moving, seen, observer);
-        if (found.gone_ml == 0) return whole;
+        found_ = registration::find_resection(whole, first, images().moving, seen, observer);
+        if (found_->gone_ml == 0) return whole;
         imaging::Volume labels = labels_.clone();
         const int gone = imaging::labels_in(labels).back() + 1;
-        labels.voxels.setTo(gone, found.gone.voxels);
+        labels.voxels.setTo(gone, found_->gone.voxels);
         without_found_ = made_of(labels, {gone}, evidence, observer);
         registration::prepare_image(*without_found_, images().moving, {}, observer);
         return *without_found_;
     }
 
-    /// Dice of the hole that a registration by an image leaves with the true cavity; -1 where there is none.
-    double cavity_dice(Evidence evidence, const PreparedModel& prepared, const registration::Deformation& deformation) {
-        if (phantom_.resected.empty() || !is_image(evidence) || evidence == Evidence::Ultrasound) return -1;
-        if (prepared.resected.empty()) return 0;
+    /// The hole that a registration by an image leaves; nothing where none is to be.
+    std::optional<Hole> hole(Evidence evidence, const PreparedModel& prepared,
+                             const registration::Deformation& deformation) {
+        if (phantom_.resected.empty() || !is_image(evidence) || evidence == Evidence::Ultrasound) return std::nullopt;
         const imaging::Volume& truth = images().cavity;
-        const imaging::Volume hole =
-            gap_after(deformation, prepared.resected, displacement_fixed_to_moving(deformation, truth.geometry));
-        const auto count = [](const cv::Mat& mask) { return double(cv::countNonZero(mask.reshape(1, 1))); };
-        cv::Mat both;
-        cv::bitwise_and(imaging::mask_of_all(hole).voxels, imaging::mask_of_all(truth).voxels, both);
-        return 2 * count(both) / (count(hole.voxels) + count(truth.voxels));
+        Hole result{0, 0};
+        imaging::Volume gap(truth.geometry, CV_8UC1);
+        if (!prepared.resected.empty()) {
+            gap = gap_after(deformation, prepared.resected, displacement_fixed_to_moving(deformation, truth.geometry));
+            const auto count = [](const cv::Mat& mask) { return double(cv::countNonZero(mask.reshape(1, 1))); };
+            cv::Mat both;
+            cv::bitwise_and(imaging::mask_of_all(gap).voxels, imaging::mask_of_all(truth).voxels, both);
+            result.dice = 2 * count(both) / (count(gap.voxels) + count(truth.voxels));
+        }
+        if (found_) result.doubts = count_of_severe(doubts_of(*found_, gap));
+        return result;
     }
 
     /// Of a partial image or ultrasound: whether it shows where the target is. Of everything else yes.
@@ -148,6 +160,7 @@ private:
     std::optional<PhantomImages> images_;
     std::optional<PhantomUltrasound> ultrasound_;
     std::optional<PreparedModel> for_labels_, for_others_, for_ultrasound_, without_found_;
+    std::optional<registration::FoundResection> found_;
 };
 
 std::vector<CoverageRow> rows_of(const Phantom& phantom, Patient& patient, Evidence evidence,
@@ -162,13 +175,14 @@ std::vector<CoverageRow> rows_of(const Phantom& phantom, Patient& patient, Evide
     const registration::Uncertainty uncertainty =
         registration::uncertainty(prepared, result, options.uncertainty, observer);
     const auto estimates = uncertainty.at(phantom.targets.moving);
-    const int doubts = count_of_severe(result.doubts) +
-                       count_of_severe(doubts_of(uncertainty, options.update.equilibrium.tolerance_mm));
     const Eigen::Matrix3Xd is = result.deformation.placement.inverse() * phantom.targets.fixed;
     const meshing::PointLocator locator(prepared.model.mesh);
     const Eigen::MatrixXd& nodal = result.deformation.displacement;
     const double z = uncertainty.held_out() ? uncertainty.held_out()->z : 1;
-    const double dice = patient.cavity_dice(evidence, prepared, result.deformation);
+    const std::optional<Hole> hole = patient.hole(evidence, prepared, result.deformation);
+    const int doubts = count_of_severe(result.doubts) +
+                       count_of_severe(doubts_of(uncertainty, options.update.equilibrium.tolerance_mm)) +
+                       (hole ? hole->doubts : 0);
     std::vector<CoverageRow> rows;
     for (std::size_t k = 0; k < estimates.size(); ++k) {
         const auto column = static_cast<Eigen::Index>(k);
@@ -177,7 +191,7 @@ std::vector<CoverageRow> rows_of(const Phantom& phantom, Patient& patient, Evide
         if (!estimates[k] || !place) continue;  // in the organ, out of its mesh
         const Eigen::Vector3d u = meshing::interpolate(prepared.model.mesh, nodal, *place);
         rows.push_back({phantom.seed, evidence, static_cast<int>(k), X + u - is.col(column), z, doubts, u.norm(),
-                        patient.in_view(evidence, column), *estimates[k], dice});
+                        patient.in_view(evidence, column), *estimates[k], hole ? hole->dice : -1});
     }
     return rows;
 }

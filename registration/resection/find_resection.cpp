@@ -187,23 +187,24 @@ std::vector<Volume> pieces_of(const Volume& mask, double least_ml) {
     return pieces;
 }
 
-/// A piece of a core up to its wall: halfway between its grey and that of what is around it.
+/// A piece of a core up to its wall: halfway between its grey and that of the organ about it.
 Volume up_to_wall(const Look& look, const Volume& piece) {
     constexpr CavityOptions options = cavity_options;
-    constexpr double within_deviations = 4;
+    constexpr double within_deviations = 4, of_normal = 1.4826;
     const std::vector<float> inside = values_in(look.fixed, piece);
     const double grey = median(inside);
     std::vector<float> off = inside;
     for (float& value : off) value = std::abs(value - float(grey));
-    const double deviation = 1.4826 * median(off);
     const Volume near = imaging::dilate(piece, options.reach_mm);
+    Volume around = imaging::dilate(near, options.reach_mm);
+    around.voxels &= ~near.voxels & look.organ.voxels;
+    const double halfway = 0.5 * std::abs(median(values_in(look.fixed, around)) - grey),
+                 most = std::max({within_deviations * of_normal * median(off), look.tissue_deviation, halfway});
     Volume like(piece.geometry, CV_8UC1);
-    for (std::int64_t n = 0; n < piece.geometry.voxel_count(); ++n) {
-        const double apart = std::abs(look.fixed.data<float>()[n] - grey);
+    for (std::int64_t n = 0; n < piece.geometry.voxel_count(); ++n)
         like.data<std::uint8_t>()[n] =
-            near.data<std::uint8_t>()[n] &&
-            (piece.data<std::uint8_t>()[n] || apart < std::max(within_deviations * deviation, look.tissue_deviation));
-    }
+            piece.data<std::uint8_t>()[n] ||
+            (near.data<std::uint8_t>()[n] && std::abs(look.fixed.data<float>()[n] - grey) < most);
     return imaging::without_holes(imaging::largest_component(imaging::open(like, options.opening_mm)));
 }
 

@@ -15,11 +15,11 @@ namespace tissuewarp::registration {
 /// (docs/decisions/resection.md).
 struct CavityOptions {
     double grid_mm = 1.5;            ///< spacing at which the images are looked at, at least
-    double window_mm = 3;            ///< half the edge of the box in which an image's deviation is measured
+    double window_mm = 2;            ///< half the edge of the box in which an image's deviation is measured
     double most_deviation = 0.4;     ///< of the cavity over the median of the organ's tissue …
     double least_counterpart = 0.5;  ///< … and of the moving image there, likewise, or else …
     double least_difference = 3;  ///< … deviations of the fixed image from what its grey is where the moving one's is
-    double least_core_ml = 1;     ///< smaller pieces are no cavity
+    double least_core_ml = 0.5;     ///< smaller pieces are no cavity
     double reach_mm = 5;          ///< from what looks so to the wall, which boxes must not reach
     double opening_mm = 1.5;      ///< radius of the ball that fits into the cavity everywhere
     double least_ml = 3;          ///< less tissue without a counterpart is not said to be resected
