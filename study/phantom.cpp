@@ -109,7 +109,7 @@ void add_vessels_and_images(Phantom& phantom, const detail::TrueTissue& tissue, 
     };
 }
 
-/// The tissue of a truth, which both share; without its labels.
+/// The tissue of a truth, which both share.
 detail::TrueTissue tissue_of(const std::shared_ptr<const detail::Truth>& truth, const detail::OrganShape& shape,
                              const Eigen::Isometry3d& placement) {
     const auto& mesh = truth->mesh.quadratic;
@@ -148,11 +148,11 @@ Phantom resection_phantom(std::uint64_t seed, const PhantomOptions& options, Obs
     const double seen_share = random.uniform(least_seen, most_seen), grey = random.uniform(least_grey, most_grey);
 
     observer.checkpoint("Truth", 0);
-    const auto truth =
-        std::make_shared<const detail::Truth>(gone ? detail::resected_truth(organ, elements, motion_mm, observer)
-                                                   : detail::unresected_truth(organ, elements, motion_mm, observer));
+    detail::ResectionMeshes meshes = detail::resection_meshes(organ, elements, observer);
+    const auto truth = std::make_shared<const detail::Truth>(
+        gone ? detail::resected_truth(organ, std::move(meshes.resected), motion_mm, observer)
+             : detail::unresected_truth(organ, std::move(meshes.whole), motion_mm, observer));
     detail::TrueTissue tissue = tissue_of(truth, shape, placement);
-    tissue.label = [at = organ.shape](const Vector3d& X) { return at.label(X); };
     if (gone) tissue.cavity_grey = organ.air ? 0 : grey;
 
     observer.checkpoint("Drawing", 0.8);
@@ -166,7 +166,12 @@ Phantom resection_phantom(std::uint64_t seed, const PhantomOptions& options, Obs
                 *voxel++ = organ.shape.label(grid.point({double(i), double(j), double(k)}));
     if (gone) phantom.resected = {2};
     detail::Random of_places_alone(derived(seed, of_places));  // the same in the whole organ
-    phantom.fixed_labels = detail::drawn_labels(tissue, options.voxel_mm, options.boundary_deviation_mm, random);
+    detail::TrueTissue mapped = tissue;
+    mapped.label = [at = organ.shape, gone](const Vector3d& X) {  // the wall of elements lies off the surface a little
+        const int label = at.label(X), left = at.organ().label(X) == 2 ? 3 : 1;
+        return gone && label == 2 ? left : label;
+    };
+    phantom.fixed_labels = detail::drawn_labels(mapped, options.voxel_mm, options.boundary_deviation_mm, random);
     phantom.surface = detail::seen_surface(tissue, seen_share, options.point_deviation_mm, random);
     detail::TrueTissue left = tissue;
     left.label = [at = organ.shape](const Vector3d& X) { return at.cavity_distance(X) > 1 ? at.label(X) : 0; };

@@ -190,14 +190,20 @@ Truth solved(const ResectedOrgan& organ, TruthMesh mesh, const Loading& loading,
 
 }  // namespace
 
-Truth resected_truth(const ResectedOrgan& organ, int elements, double motion_mm, Observer& observer) {
-    TruthMesh mesh = mesh_without(organ.shape, elements, observer);
+ResectionMeshes resection_meshes(const ResectedOrgan& organ, int elements, Observer& observer) {
+    ResectionMeshes meshes{mesh_without(organ.shape, elements, observer),
+                           truth_mesh(organ.shape.organ(), elements, observer)};
+    (void)elements_of(meshes.resected, organ.tissue);
+    (void)elements_of(meshes.whole, organ.tissue);
+    return meshes;
+}
+
+Truth resected_truth(const ResectedOrgan& organ, TruthMesh mesh, double motion_mm, Observer& observer) {
     Eigen::Matrix3Xd forces = relief(organ.shape, mesh, organ.relief_kpa);
     return solved(organ, std::move(mesh), {organ.loads, std::move(forces)}, motion_mm, observer);
 }
 
-Truth unresected_truth(const ResectedOrgan& organ, int elements, double motion_mm, Observer& observer) {
-    TruthMesh mesh = truth_mesh(organ.shape.organ(), elements, observer);
+Truth unresected_truth(const ResectedOrgan& organ, TruthMesh mesh, double motion_mm, Observer& observer) {
     Eigen::Matrix3Xd none = Eigen::Matrix3Xd::Zero(3, mesh.quadratic.node_count());
     return solved(organ, std::move(mesh), {organ.loads, std::move(none)}, motion_mm, observer);
 }

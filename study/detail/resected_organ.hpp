@@ -52,9 +52,16 @@ struct ResectedOrgan {
 };
 ResectedOrgan random_resection(Random& random);
 
-/// Equilibrium without what is gone, and of the whole organ, of about so many elements on a mesh of its own, under
-/// loads that linear elasticity would move by no more than `motion_mm`. Throw as equilibrium().
-Truth resected_truth(const ResectedOrgan& organ, int elements, double motion_mm, Observer& observer);
-Truth unresected_truth(const ResectedOrgan& organ, int elements, double motion_mm, Observer& observer);
+/// The organ without what is gone and the whole of it, each on a mesh of its own of about so many elements. Throws
+/// InvalidInput where a curved element of either is turned inside out: a patient has both or none.
+struct ResectionMeshes {
+    TruthMesh resected, whole;
+};
+ResectionMeshes resection_meshes(const ResectedOrgan& organ, int elements, Observer& observer);
+
+/// Equilibrium under loads that linear elasticity would move by no more than `motion_mm`; without what is gone also
+/// under what the wall lacks. Throw as equilibrium().
+Truth resected_truth(const ResectedOrgan& organ, TruthMesh mesh, double motion_mm, Observer& observer);
+Truth unresected_truth(const ResectedOrgan& organ, TruthMesh mesh, double motion_mm, Observer& observer);
 
 }  // namespace tissuewarp::study::detail

@@ -1,6 +1,5 @@
 #include "study/detail/texture.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 namespace tissuewarp::study::detail {
@@ -12,7 +11,7 @@ Texture::Texture(Random& random) : one_(1, 12, random), other_(1, 12, random) {
 
 double Texture::operator()(const Eigen::Vector3d& point, int label) const {
     constexpr double vessel_depth = 40;
-    double value = levels_[std::size_t(std::min(label, 2))];
+    double value = levels_[std::size_t(label)];
     for (const SmoothValues& octave : octaves_) value += octave(point);
     return value + vessel_depth * vessel(point);
 }

@@ -12,8 +12,8 @@
 
 namespace tissuewarp::study::detail {
 
-/// A grey value as a function of where tissue was at rest, between 20 and 200 or so: a level for each label (2 and what
-/// comes after it look alike), structure of 3 to 24 mm, and vessels.
+/// A grey value as a function of where tissue was at rest, between 20 and 200 or so: a level for each label, structure
+/// of 3 to 24 mm, and vessels.
 class Texture {
 public:
     explicit Texture(Random& random);

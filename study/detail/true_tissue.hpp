@@ -11,8 +11,7 @@ namespace tissuewarp::study::detail {
 struct TrueTissue {
     using Map = std::function<std::optional<Eigen::Vector3d>(const Eigen::Vector3d&)>;
 
-    /// At rest: 0 outside, 1 organ, 2 inclusion; where the inclusion is resected, 3 what is left of it.
-    std::function<int(const Eigen::Vector3d&)> label;
+    std::function<int(const Eigen::Vector3d&)> label;              ///< at rest: 0 outside, 1 organ, 2 inclusion
     std::function<double(const Eigen::Vector3d&)> outer_distance;  ///< at rest, about mm, negative inside
     Map forward, backward;                                         ///< moving → fixed frame and back; of tissue alone
     Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();   ///< moving → fixed, of what surrounds the organ
