@@ -99,6 +99,7 @@ void write_bids_dataset(const RegisterOptions& options) {
     std::string ignored;
     RegisterOptions all = options;
     all.write = {"all"};
+    if (all.resected.empty()) all.resected = {1};
     for (const std::string& name : output_names(all))
         if (!is_bids_output(name)) ignored += name + "\n";
     if (!fs::exists(root / ".bidsignore")) write_file(ignored, root / ".bidsignore");

@@ -33,7 +33,7 @@ DialChoice dial_choice(const RegistrationInputs& inputs, const RegisterOptions& 
     const imaging::Geometry& output = inputs.fixed_grid() ? *inputs.fixed_grid() : inputs.moving_grid();
     DialCase what;
     what.kind = inputs.fixed_labels.empty() ? DataKind::Partial : DataKind::Labels;
-    what.organ_mm = organ_size(imaging::without_labels(inputs.moving_labels, options.rigid_neighbours));
+    what.organ_mm = organ_size(organ_of(inputs.moving_labels, options));
     what.moving_megavoxels = megavoxels(inputs.moving_grid());
     what.output_megavoxels = megavoxels(output);
     if (!inputs.fixed_labels.empty()) what.fixed_label_megavoxels = megavoxels(inputs.fixed_labels.geometry);

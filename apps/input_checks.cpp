@@ -78,11 +78,12 @@ void require_known_surroundings(const Volume& moving_labels, const PreoperativeO
     registration::PrepareOptions named;
     named.anchors = options.anchors;
     named.rigid_neighbours = options.rigid_neighbours;
+    named.resected = options.resected;
     try {
         registration::require_surroundings(moving_labels, named);
     } catch (const InvalidInput& problem) {
-        throw InvalidInput(
-            fmt::format("'{}', --anchor and --rigid-neighbour: {}", organ_file(options).string(), problem.what()));
+        throw InvalidInput(fmt::format("'{}', --anchor, --rigid-neighbour and --resected: {}",
+                                       organ_file(options).string(), problem.what()));
     }
 }
 
@@ -98,6 +99,12 @@ void validate_fixed_labels(RegistrationInputs& inputs, const RegisterOptions& op
 }
 
 }  // namespace
+
+Volume organ_of(const Volume& labels, const PreoperativeOptions& options) {
+    std::vector<int> others = options.rigid_neighbours;
+    others.insert(others.end(), options.resected.begin(), options.resected.end());
+    return imaging::without_labels(labels, others);
+}
 
 void require_same_numbers(const imaging::LabelNames& names, const fs::path& path,
                           const imaging::LabelNames& other_names, const fs::path& other_path) {
@@ -171,7 +178,7 @@ void validate_preoperative(RegistrationInputs& inputs, const PreoperativeOptions
     require_millimetres(inputs.moving_labels.geometry, organ_file(options));
     imaging::require_labels(inputs.moving_labels, {}, organ_file(options).string().c_str());
     require_known_surroundings(inputs.moving_labels, options);
-    const Volume organ = imaging::without_labels(inputs.moving_labels, options.rigid_neighbours);
+    const Volume organ = organ_of(inputs.moving_labels, options);
     require_labels_of_lengths(options.label_edge_length, organ, organ_file(options));
     require_labels_of_tissues(options.label_tissue, organ, organ_file(options));
     if (!options.materials.empty()) require_materials(inputs.materials, imaging::labels_in(organ), options.materials);

@@ -67,6 +67,9 @@ void read_intraoperative(RegistrationInputs& inputs, const IntraoperativeOptions
 void validate_preoperative(RegistrationInputs& inputs, const PreoperativeOptions& options, bool resample_labels);
 void validate_intraoperative(RegistrationInputs& inputs, const RegisterOptions& options);
 
+/// A label map without rigid neighbours and what is resected, which are not registered.
+imaging::Volume organ_of(const imaging::Volume& labels, const PreoperativeOptions& options);
+
 /// Throws InvalidInput unless both lie on one grid; says how far apart they are, in voxels.
 void require_same_grid(const imaging::Geometry& image, const imaging::Geometry& labels, const std::string& image_name,
                        const std::string& labels_name, const std::string& remedy);

@@ -12,7 +12,7 @@ using namespace registration;
 double chosen_edge_length(const PreoperativeOptions& options, const RegistrationInputs& inputs, bool for_labels) {
     if (inputs.moving_mesh) return meshing::quality(*inputs.moving_mesh).edge_mm.median;
     if (options.edge_length > 0) return options.edge_length;
-    const imaging::Volume organ = imaging::without_labels(inputs.moving_labels, options.rigid_neighbours);
+    const imaging::Volume organ = organ_of(inputs.moving_labels, options);
     return for_labels ? suggested_edge_length(organ) : suggested_edge_length_without_labels(organ);
 }
 
@@ -32,6 +32,7 @@ PrepareOptions prepare_options(const PreoperativeOptions& options, const Registr
     made.data_stiffness = options.data_stiffness;
     made.anchors = options.anchors;
     made.rigid_neighbours = options.rigid_neighbours;
+    made.resected = options.resected;
     return made;
 }
 

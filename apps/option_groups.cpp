@@ -16,7 +16,7 @@ HelpLayout layout_of_register() {
          {"Where the organ lies", {"--no-align", "--initial-transform", "--anchor", "--rigid-neighbour"}},
          {"Tissue",
           {"--materials", "--tissue", "--label-tissue", "--default-youngs-modulus", "--default-poissons-ratio",
-           "--element"}},
+           "--element", "--resected"}},
          {"Accuracy and time",
           {"--accuracy", "--time-budget", "--edge-length", "--label-edge-length", "--rounds", "--tolerance", "--fade",
            "--no-error-estimate", "--device", "--threads"}},

@@ -61,9 +61,9 @@ struct PreoperativeOptions {
     std::map<int, std::string> label_tissue;  ///< of single labels
     double default_youngs_modulus = 3.0;      ///< kPa
     double default_poissons_ratio = 0.45;
-    std::string element = "auto";                ///< "auto", "t4" or "averaged-pressure"
-    std::vector<int> anchors, rigid_neighbours;  ///< labels of the preoperative map
-    double data_stiffness = 3.0;                 ///< kPa/mm
+    std::string element = "auto";                          ///< "auto", "t4" or "averaged-pressure"
+    std::vector<int> anchors, rigid_neighbours, resected;  ///< labels of the preoperative map
+    double data_stiffness = 3.0;                           ///< kPa/mm
 };
 
 /// What is seen during the operation, how the model is registered to it, and what is told of the result.
@@ -94,6 +94,7 @@ struct RegisterOptions : PreoperativeOptions, IntraoperativeOptions {
     std::filesystem::path output;
     std::optional<double> accuracy, time_budget;  ///< mm; s: they choose the mesh
     bool resample_labels = false;
+    bool find_resected = false;  ///< what is gone is sought in what was seen
     bool dry_run = false;
     std::string bids;                ///< subject: results in BIDS' folders under its names; `output` is the innermost
     std::vector<std::string> write;  ///< words of output_names.hpp: files beside the usual ones

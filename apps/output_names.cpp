@@ -52,6 +52,7 @@ std::vector<std::string> output_names(const RegisterOptions& options) {
     for (const char* name :
          {"warped_labels.nii.gz", moving_to_fixed_name, fixed_to_moving_name, transform_name, "mesh.vtu", "record.h5"})
         names.emplace_back(name);
+    if (!options.resected.empty() || options.find_resected) names.emplace_back(gap_name);
     if (!options.no_error_estimate)
         for (const char* name : {"uncertainty.nii.gz", "uncertainty_trust.nii.gz"}) names.emplace_back(name);
     if (options.landmarks.given()) names.emplace_back("warped_landmarks.csv");
@@ -70,6 +71,7 @@ std::string surface_name(const RegisterOptions& options) {
 bool is_register_output(const std::string& name) {
     RegisterOptions all;
     all.moving = all.landmarks.csv = all.points = all.surface = "given";
+    all.resected = {1};
     const std::filesystem::path path(name);
     for (const OptionalOutput& output : optional_outputs)
         if (name == output.file) return true;

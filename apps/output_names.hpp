@@ -11,6 +11,7 @@ namespace tissuewarp::apps {
 
 inline constexpr const char* moving_to_fixed_name = "displacement_moving_to_fixed.nii.gz";
 inline constexpr const char* fixed_to_moving_name = "displacement_fixed_to_moving.nii.gz";
+inline constexpr const char* gap_name = "gap.nii.gz";
 inline constexpr const char* transform_name = "transform.h5";
 
 /// Files that are written when --write names them.

@@ -5,6 +5,7 @@
 #include "apps/output_names.hpp"
 #include "apps/register_dicom.hpp"
 #include "apps/register_steps.hpp"
+#include "apps/resection_search.hpp"
 #include "apps/verbs.hpp"
 #include "apps/versions.hpp"
 
@@ -32,7 +33,8 @@ std::string mesh_plan(const RegistrationRun& run) {
 
 }  // namespace
 
-void run_register(const RegisterOptions& options) {
+void run_register(const RegisterOptions& given) {
+    RegisterOptions options = given;  // what is gone may be found
     StageClock clock;
     ProgressLine progress(options.common);
     RegistrationRun run(options, utc_now());
@@ -58,7 +60,12 @@ void run_register(const RegisterOptions& options) {
         run.dial = dial_choice(run.inputs, options);
         progress.note(run.dial->reason);
     }
-    progress.begin("preparing the model", 0.02, 0.20);
+    if (options.find_resected) {
+        progress.begin("looking for what is gone", 0.02, 0.10);
+        take_out_what_is_gone(run, options, edge_length(run), progress);
+        run.times.push_back(clock.lap("resection"));
+    }
+    progress.begin("preparing the model", options.find_resected ? 0.10 : 0.02, 0.20);
     const auto make = looks_for_loads(options) ? made_model_for_loads : made_model;
     run.prepared = std::make_unique<registration::PreparedModel>(make(options, run.inputs, edge_length(run), progress));
     if (options.match_image) add_images(*run.prepared, run.inputs, progress);

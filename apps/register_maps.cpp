@@ -40,6 +40,7 @@ std::vector<MarkupPoint> markups(const RegistrationRun& run, const Eigen::Matrix
     if (run.products.uncertainty) estimates = run.products.uncertainty->at(places);
     std::vector<MarkupPoint> points;
     for (Eigen::Index p = 0; p < carried.cols(); ++p) {
+        if (!carried.col(p).allFinite()) continue;  // its tissue is gone
         const std::string text = estimates.empty() ? "" : estimate_text(estimates[static_cast<std::size_t>(p)]);
         points.push_back({std::to_string(p + 1), text, carried.col(p)});
     }
@@ -85,9 +86,9 @@ void write_organ(const RegistrationRun& run, const std::filesystem::path& path) 
 void write_landmark_markups(const RegistrationRun& run, const std::filesystem::path& path) {
     const registration::Landmarks& landmarks = *run.inputs.landmarks;
     std::vector<MarkupPoint> points = markups(run, landmarks.moving, run.products.landmarks);
-    for (std::size_t p = 0; p < points.size(); ++p) {
-        const double off = (points[p].position - landmarks.fixed.col(static_cast<Eigen::Index>(p))).norm();
-        std::string& text = points[p].description;
+    for (MarkupPoint& point : points) {
+        const double off = (point.position - landmarks.fixed.col(std::stoi(point.label) - 1)).norm();
+        std::string& text = point.description;
         text = fmt::format("{:.2f} mm from its place{}{}", off, text.empty() ? "" : "; ", text);
     }
     registration::write_slicer_markups(points, path);

@@ -120,6 +120,17 @@ std::string estimate_text(const registration::UncertaintySummary& s) {
                       100 * s.unknown_share);
 }
 
+double millilitres(const imaging::Volume& mask) {
+    return mask.empty() ? 0 : cv::countNonZero(mask.voxels.reshape(1, 1)) * mask.geometry.voxel_volume() / 1000;
+}
+
+std::string resected_text(const RegistrationRun& run) {
+    if (run.prepared->resected.empty()) return "resected: nothing was found to be\n";
+    return fmt::format("resected: {:.1f} ml of labels {}; the hole of {:.1f} ml is in {}\n",
+                       millilitres(run.prepared->resected), fmt::join(run.prepared->options.resected, ", "),
+                       millilitres(run.products.gap), gap_name);
+}
+
 /// Puts files into the output folder, under the names that they have there. Copies write for the same run.
 class Writer {
 public:
@@ -211,6 +222,7 @@ void start_writing_warped(const RegistrationRun& run, const OutputFolder& output
         if (!products.warped.empty())
             writer.start("warped.nii.gz", [&](auto& path) { write_volume(products.warped, path); });
         writer.start("warped_labels.nii.gz", [&](auto& path) { write_volume(compact(products.warped_labels), path); });
+        if (!products.gap.empty()) writer.start(gap_name, [&](auto& path) { write_volume(products.gap, path); });
         writer.start("mesh.vtu", [&](auto& path) { write_mesh(run.result.deformation, path); });
         if (products.surface)
             writer.start(surface_name(run.options),
@@ -293,6 +305,7 @@ std::string summary_text(const RegistrationRun& run, double total_seconds) {
                             fit->deepest_mm);
     if (const auto& fit = run.result.anchors)
         text += fmt::format("anchors: {} nodes, moved by at most {:.2f} mm\n", fit->nodes, fit->largest_mm);
+    if (!run.products.gap.empty()) text += resected_text(run);
     text += fmt::format("from data at hand to warped image: {:.2f} s\n", run.intraoperative_seconds);
     if (run.dial) text += "chosen: " + run.dial->reason + "\n";
     if (const auto& error = run.products.uncertainty) text += estimate_text(registration::summarise(*error));

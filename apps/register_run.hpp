@@ -4,6 +4,7 @@
 #include "apps/inputs.hpp"
 #include "meshing/quality.hpp"
 #include "registration/dial/dial.hpp"
+#include "registration/resection/find_resection.hpp"
 #include "registration/stretch/stretched_update.hpp"
 #include "registration/uncertainty.hpp"
 #include "registration/update.hpp"
@@ -14,11 +15,16 @@
 
 namespace tissuewarp::apps {
 
+/// What a warped image holds where tissue is gone.
+inline constexpr double gap_value = 0;
+
 /// Results on grids and at points.
 struct Products {
     imaging::Volume moving_to_fixed, fixed_to_moving;  ///< displacement fields, mm, LPS
     imaging::Volume warped, warped_labels;             ///< on the output grid; warped is empty without --moving
-    Eigen::Matrix3Xd landmarks, points;                ///< where moving landmarks and points went, mm, LPS
+    imaging::Volume gap;                               ///< there, uint8: where tissue is gone; empty without --resected
+    Eigen::Matrix3Xd landmarks, points;                ///< where moving landmarks and points went, mm, LPS; NaN where
+                                                       ///< their tissue is gone
     std::optional<registration::Uncertainty> uncertainty;
     registration::UncertaintyVolumes uncertainty_volumes;  ///< on the output grid
     std::optional<meshing::SurfaceMesh> surface;
@@ -47,6 +53,7 @@ struct RegistrationRun {
     std::unique_ptr<registration::PreparedModel> prepared;
     registration::UpdateResult result;
     std::optional<registration::StretchedUpdate> stretched;  ///< where `result` began from a stretch
+    std::optional<registration::FoundResection> resection;   ///< where what is gone was sought
     std::optional<registration::DialChoice> dial;            ///< where an accuracy or a time was asked for
     double intraoperative_seconds = 0;                       ///< from data and model at hand to the warped image
     Products products;

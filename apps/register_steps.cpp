@@ -16,6 +16,7 @@
 #include "registration/evaluation/curve_residual.hpp"
 #include "registration/field.hpp"
 #include "registration/io/curves.hpp"
+#include "registration/resection/gap.hpp"
 #include "registration/rigid_surroundings.hpp"
 #include "registration/stretch/stretched_update.hpp"
 #include "registration/warp.hpp"
@@ -24,6 +25,8 @@
 #include <malloc.h>
 #include <tbb/parallel_invoke.h>
 #include <tbb/task_arena.h>
+
+#include <limits>
 
 namespace tissuewarp::apps {
 
@@ -53,8 +56,37 @@ void register_to(RegistrationRun& run, const Intraoperative& seen, Observer& obs
     if (tissue.free_stretch > 0)
         observer.note(
             "the organ is not stretched as a whole before its tissue is strained: that takes fixed labels and "
-            "nothing else, without anchors and rigid neighbours");
+            "nothing else, without anchors, rigid neighbours and resected tissue");
     run.result = update(*run.prepared, seen, update_options(run), observer);
+}
+
+/// Coordinates that are not a number where the tissue of a point is gone.
+void mark_gone(const RegistrationRun& run, const Eigen::Matrix3Xd& places, Eigen::Matrix3Xd& carried) {
+    const std::vector<bool> gone = points_gone(run.result.deformation, run.prepared->resected, places);
+    for (Eigen::Index p = 0; p < carried.cols(); ++p)
+        if (gone[static_cast<std::size_t>(p)]) carried.col(p).setConstant(std::numeric_limits<double>::quiet_NaN());
+}
+
+void note_points_gone(const Eigen::Matrix3Xd& carried, const char* what, ProgressLine& progress) {
+    const Eigen::Index left = carried.array().isFinite().colwise().all().count();
+    if (left == carried.cols()) return;
+    progress.note(fmt::format("{} of {} {} lay in resected tissue: they have no place and are not scored",
+                              carried.cols() - left, carried.cols(), what));
+}
+
+/// A hole in what was warped, and no place for points of what is gone.
+void leave_out_what_is_gone(RegistrationRun& run, ProgressLine& progress) {
+    const imaging::Volume& resected = run.prepared->resected;
+    Products& products = run.products;
+    if (run.options.find_resected) products.gap = imaging::Volume(products.fixed_to_moving.geometry, CV_8UC1);
+    if (resected.empty()) return;
+    products.gap = gap_after(run.result.deformation, resected, products.fixed_to_moving);
+    if (!products.warped.empty()) leave_gap(products.warped, products.gap, gap_value);
+    leave_gap(products.warped_labels, products.gap);
+    if (run.inputs.landmarks) mark_gone(run, run.inputs.landmarks->moving, products.landmarks);
+    if (run.inputs.points) mark_gone(run, *run.inputs.points, products.points);
+    note_points_gone(products.landmarks, "landmarks", progress);
+    note_points_gone(products.points, "points", progress);
 }
 
 /// Where no fixed image gives a grid: the moving one, carried along by the rigid alignment.
@@ -141,22 +173,19 @@ void require_no_doubts(const RegistrationRun& run) {
         fmt::join(codes, ", "), (run.options.output / "report.json").string()));
 }
 
-imaging::Volume without_neighbours(const RegistrationRun& run, const imaging::Volume& labels) {
-    return imaging::without_labels(labels, run.options.rigid_neighbours);
-}
-
 /// How well labels agree, and points.
 void score_warped(RegistrationRun& run) {
     Scores& scores = run.scores;
+    const auto organ = [&](const imaging::Volume& labels) { return organ_of(labels, run.options); };
     if (!run.inputs.fixed_labels.empty()) {
-        const imaging::Volume fixed = without_neighbours(run, run.inputs.fixed_labels);
+        const imaging::Volume fixed = organ(run.inputs.fixed_labels);
         tbb::parallel_invoke(
             [&] {
-                const imaging::Volume moving = without_neighbours(run, run.inputs.moving_labels);
+                const imaging::Volume moving = organ(run.inputs.moving_labels);
                 scores.before =
                     overlap(imaging::resample(moving, fixed.geometry, imaging::Interpolation::Nearest), fixed);
             },
-            [&] { scores.after = overlap(without_neighbours(run, run.products.warped_labels), fixed); });
+            [&] { scores.after = overlap(organ(run.products.warped_labels), fixed); });
     }
     scores.mesh = mesh_jacobians(run.result.deformation);
     if (run.inputs.landmarks) scores.target_error = target_error(*run.inputs.landmarks, run.products.landmarks);
@@ -165,9 +194,19 @@ void score_warped(RegistrationRun& run) {
 
 /// The field that is written, everywhere and where the organ is.
 void score_forward_field(RegistrationRun& run) {
-    const imaging::Volume organ = imaging::mask_of_all(without_neighbours(run, run.inputs.moving_labels));
+    const imaging::Volume organ = imaging::mask_of_all(organ_of(run.inputs.moving_labels, run.options));
     run.scores.organ = field_jacobians(run.products.moving_to_fixed, &organ);
     run.scores.grid = field_jacobians(run.products.moving_to_fixed);
+}
+
+/// What the scores and what is gone say against the result.
+void doubt_scores(RegistrationRun& run) {
+    std::vector<Doubt>& doubts = run.result.doubts;
+    if (auto doubt = doubt_of_folds(run.scores.organ)) doubts.push_back(std::move(*doubt));
+    if (!run.products.gap.empty() && !run.inputs.fixed_labels.empty())
+        if (auto doubt = doubt_of_gap(run.products.gap, run.inputs.fixed_labels)) doubts.push_back(std::move(*doubt));
+    if (!run.resection) return;
+    for (Doubt& doubt : doubts_of(*run.resection, run.products.gap)) doubts.push_back(std::move(doubt));
 }
 
 /// The codes of doubts in one line; "none" where there are none.
@@ -190,6 +229,8 @@ void print_plan(const RegistrationInputs& inputs, const RegisterOptions& options
                fmt::join(imaging::labels_in(inputs.moving_labels), ", "));
     if (!options.anchors.empty()) fmt::print("stay          {}\n", fmt::join(options.anchors, ", "));
     if (!options.rigid_neighbours.empty()) fmt::print("rigid         {}\n", fmt::join(options.rigid_neighbours, ", "));
+    if (options.find_resected) fmt::print("gone          sought in what was seen\n");
+    if (!options.resected.empty()) fmt::print("gone          {}\n", fmt::join(options.resected, ", "));
     fmt::print("would {}, {}, match in {} rounds on device '{}', and write to '{}':\n", mesh,
                options.no_align ? "not align" : "align rigidly", options.rounds, options.device.name,
                options.output.string());
@@ -211,6 +252,10 @@ void require_inputs_stay(const RegistrationInputs& inputs, const std::filesystem
     }
 }
 
+UpdateResult first_update(const RegistrationRun& run, const PreparedModel& model, Observer& observer) {
+    return update(model, seen(run.inputs, run.options), update_options(run), observer);
+}
+
 void append(std::vector<StageTime>& times, const std::vector<StageTime>& more) {
     times.insert(times.end(), more.begin(), more.end());
 }
@@ -226,6 +271,7 @@ void register_and_write(RegistrationRun& run, OutputFolder& output, StageClock& 
     make_backward_field(run, progress);
     run.times.push_back(clock.lap("fields"));
     warp_everything(run);
+    leave_out_what_is_gone(run, progress);
     run.times.push_back(clock.lap("warp"));
     run.intraoperative_seconds = clock.total() - ready;
 
@@ -254,7 +300,7 @@ void register_and_write(RegistrationRun& run, OutputFolder& output, StageClock& 
     forward_scored.group.wait();
     run.times.push_back(clock.lap("score"));
     if (run.dial) doubt_dial(run);
-    if (auto doubt = doubt_of_folds(run.scores.organ)) run.result.doubts.push_back(std::move(*doubt));
+    doubt_scores(run);
     for (Doubt& doubt : run.result.doubts) doubt.text = imaging::with_label_names(doubt.text, run.inputs.label_names);
     start_writing_estimates(run, output, writing);
     writing.wait();

@@ -16,6 +16,10 @@ void require_inputs_stay(const RegistrationInputs& inputs, const std::filesystem
 /// Registers run.prepared to what run.inputs hold, judges the result and writes it. Throws what the verbs throw.
 void register_and_write(RegistrationRun& run, OutputFolder& output, StageClock& clock, ProgressLine& progress);
 
+/// A registration to all that was seen, of a model that is not that of the run.
+registration::UpdateResult first_update(const RegistrationRun& run, const registration::PreparedModel& model,
+                                        Observer& observer);
+
 void append(std::vector<registration::StageTime>& times, const std::vector<registration::StageTime>& more);
 
 }  // namespace tissuewarp::apps

@@ -30,6 +30,8 @@ void require_organ(const PreoperativeOptions& o) {
             throw InvalidInput("--moving-mesh is taken as it is; leave out --edge-length and --label-edge-length");
         if (!o.rigid_neighbours.empty())
             throw InvalidInput("--rigid-neighbour is not meshed, and --moving-mesh is; give --moving-labels instead");
+        if (!o.resected.empty())
+            throw InvalidInput("--resected is not meshed, and --moving-mesh is; give --moving-labels instead");
     }
     if (o.moving.empty() && o.moving_labels.empty() && o.moving_surface.empty() && o.moving_mesh.empty())
         throw InvalidInput(
@@ -37,6 +39,18 @@ void require_organ(const PreoperativeOptions& o) {
             "(docs/which-data.md)");
     if (!o.anchors.empty()) refuse_without_labels(o, "--anchor");
     if (!o.rigid_neighbours.empty()) refuse_without_labels(o, "--rigid-neighbour");
+    if (!o.resected.empty()) refuse_without_labels(o, "--resected");
+}
+
+void require_where_to_find_resection(const RegisterOptions& o) {
+    if (!o.find_resected) return;
+    if (!o.match_image && o.fixed_labels.empty())
+        throw InvalidInput(
+            "--resected auto looks for what is gone in an image or labels; give --match-image or --fixed-labels, or "
+            "name "
+            "labels");
+    if (!o.moving_mesh.empty())
+        throw InvalidInput("--resected auto meshes the organ anew, and --moving-mesh is; give --moving-labels instead");
 }
 
 void require_pairs(const RegisterOptions& o) {

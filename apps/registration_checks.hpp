@@ -11,6 +11,8 @@ void require_data(IntraoperativeOptions& o);
 void require_organ(const PreoperativeOptions& o);
 /// `option` speaks of labels.
 void refuse_without_labels(const PreoperativeOptions& o, const char* option);
+/// What is gone is sought in an image or labels, and the model is then meshed without it.
+void require_where_to_find_resection(const RegisterOptions& o);
 /// Contrasts are matched pair by pair, and only where images are matched.
 void require_pairs(const RegisterOptions& o);
 void require_contrasts_matched(const RegisterOptions& o);

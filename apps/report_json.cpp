@@ -219,6 +219,21 @@ json to_json(const registration::UncertaintySummary& s) {
             {"beyond_10_mm_share", number(s.failed_share)}};
 }
 
+/// What is gone, before and after.
+json resected(const RegistrationRun& run) {
+    const auto millilitres = [](const imaging::Volume& mask) {
+        return mask.empty() ? 0.0 : cv::countNonZero(mask.voxels.reshape(1, 1)) * mask.geometry.voxel_volume() / 1000;
+    };
+    json object{{"labels", run.prepared->options.resected},
+                {"volume_ml", number(millilitres(run.prepared->resected))},
+                {"gap_ml", number(millilitres(run.products.gap))},
+                {"value", gap_value}};
+    if (run.resection)
+        object["found"] = {{"cavity_ml", number(run.resection->cavity_ml)},
+                           {"deviation", number(run.resection->deviation)}};
+    return object;
+}
+
 /// What was asked for, chosen and expected.
 json dial(const RegistrationRun& run) {
     const registration::DialChoice& choice = *run.dial;
@@ -348,6 +363,7 @@ json report_json(const RegistrationRun& run, double total_seconds) {
                              {"after", to_json(scores.after, run.inputs.label_names)}};
     if (run.inputs.foreground) report["foreground"] = foreground(*run.inputs.foreground);
     if (run.inputs.start) report["initial_transform"] = start(*run.inputs.start);
+    if (!run.products.gap.empty()) report["resected"] = resected(run);
     add_fits(report, run.result);
     if (run.products.uncertainty) {
         report["error_estimate"] = to_json(registration::summarise(*run.products.uncertainty));

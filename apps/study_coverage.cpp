@@ -26,7 +26,8 @@ namespace {
 std::pair<study::Family, std::vector<std::string>> family_of(std::vector<std::string> problems) {
     using study::Family;
     for (const auto& [name, family] :
-         {std::pair{"bent:", Family::Bent}, std::pair{"organ:", Family::Labelled}, std::pair{"found:", Family::Found}})
+         {std::pair{"bent:", Family::Bent}, std::pair{"organ:", Family::Labelled}, std::pair{"found:", Family::Found},
+          std::pair{"resected:", Family::Resected}, std::pair{"unresected:", Family::Unresected}})
         if (problems.size() == 1 && problems.front().starts_with(name)) {
             problems.front().replace(0, std::string(name).size(), "phantom:");
             return {family, std::move(problems)};
@@ -44,6 +45,15 @@ void take_ultrasound(std::vector<std::string>& problems, study::CoverageOptions&
     plan.evidence = {study::Evidence::Ultrasound};
 }
 
+/// "sought:7-9": patients as "resected:7-9", of whom nobody tells what is gone.
+void take_sought(std::vector<std::string>& problems, study::CoverageOptions& plan) {
+    constexpr std::string_view name = "sought:";
+    if (problems.size() != 1 || !problems.front().starts_with(name)) return;
+    problems.front().replace(0, name.size(), "resected:");
+    plan.seek_resected = true;
+    plan.evidence = {study::Evidence::Image};
+}
+
 study::Evidence evidence_of(const std::string& name) {
     std::vector<std::string> names;
     for (const study::Evidence each : study::all_evidence) {
@@ -58,6 +68,7 @@ study::CoverageOptions plan_of(const StudyOptions& options, Observer& observer) 
     plan.update = on_device(options.device);
     std::vector<std::string> wanted = options.problems;
     take_ultrasound(wanted, plan);
+    take_sought(wanted, plan);
     const auto [family, problems] = family_of(std::move(wanted));
     plan.phantom.family = family;
     std::tie(plan.first_seed, plan.last_seed) = phantom_seeds(problems, {plan.first_seed, plan.last_seed});

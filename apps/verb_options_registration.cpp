@@ -76,6 +76,11 @@ void declare_model(Verb& verb, PreoperativeOptions& o, RegistrationTexts& texts)
     verb.list("--rigid-neighbour", texts.rigid_neighbours, "LABEL",
               "Labels of bone and the like: not meshed, and the organ slides along them without entering")
         ->delimiter(',');
+    verb.list(
+            "--resected", texts.resected, "LABEL",
+            "Labels of tissue that is gone by the time of the operation: a hole is left there; auto (register): sought "
+            "in what was seen")
+        ->delimiter(',');
     verb.number("--data-stiffness", o.data_stiffness, "KPA/MM", 1e-6, 1e6,
                 "Pull of the matched boundary per area (kPa/mm)");
 }
@@ -165,12 +170,17 @@ void enter_bids_folder(RegisterOptions& o) {
     if (!o.moving.empty()) bids_suffix(o.moving);
 }
 
+bool is_auto(const std::vector<std::string>& labels) {
+    return labels == std::vector<std::string>{"auto"};
+}
+
 void take_texts(PreoperativeOptions& o, const RegistrationTexts& texts) {
     o.label_edge_length = label_lengths(texts.label_lengths);
     o.label_tissue = label_tissues(texts.tissues);
     require_one_tissue(o);
     o.anchors = label_list("--anchor", texts.anchors);
     o.rigid_neighbours = label_list("--rigid-neighbour", texts.rigid_neighbours);
+    if (!is_auto(texts.resected)) o.resected = label_list("--resected", texts.resected);
 }
 
 }  // namespace
@@ -235,12 +245,14 @@ void declare_serve(Verb& verb, ServeOptions& o) {
 
 void complete_register(RegisterOptions& o, const RegistrationTexts& texts) {
     take_texts(o, texts);
+    o.find_resected = is_auto(texts.resected);
     o.accuracy = quantity("--accuracy", texts.accuracy, {{"mm", 1.0}});
     o.time_budget = quantity("--time-budget", texts.time_budget, {{"s", 1.0}, {"ms", 1e-3}});
     require_data(o);
     if (o.match_image && o.moving.empty())
         throw InvalidInput("matching the fixed image takes the moving one; give --moving");
     require_organ(o);
+    require_where_to_find_resection(o);
     if (!o.fixed_labels.empty()) refuse_without_labels(o, "--fixed-labels");
     if (!o.moving_mesh.empty() && (o.accuracy || o.time_budget))
         throw InvalidInput("--moving-mesh is taken as it is; leave out --accuracy and --time-budget");
@@ -254,6 +266,9 @@ void complete_register(RegisterOptions& o, const RegistrationTexts& texts) {
 }
 
 void complete_prepare(PrepareModelOptions& o, const RegistrationTexts& texts) {
+    if (is_auto(texts.resected))
+        throw InvalidInput(
+            "--resected auto seeks what is gone in what is seen during the operation; give it to register");
     take_texts(o.preoperative, texts);
     require_organ(o.preoperative);
     if (!o.preoperative.moving_mesh.empty() && o.for_labels)

@@ -16,6 +16,7 @@
 #include "meshing/mesh_io.hpp"
 #include "registration/field.hpp"
 #include "registration/io/slicer_markups.hpp"
+#include "registration/resection/gap.hpp"
 
 #include <fmt/format.h>
 
@@ -53,8 +54,11 @@ void warp_volume(const WarpOptions& options, const std::optional<WarpMotion>& mo
     } else {
         field = displacement(options, imaging::FieldType::Resampling, observer);
     }
-    const Volume warped = options.labels ? registration::warp_labels(image, field)
-                                         : registration::warp_image(image, field, options.outside);
+    Volume warped = options.labels ? registration::warp_labels(image, field)
+                                   : registration::warp_image(image, field, options.outside);
+    if (motion && !motion->resected.empty())
+        registration::leave_gap(warped, registration::gap_after(motion->deformation, motion->resected, field),
+                                options.labels ? 0 : options.outside);
     const SilencedStandardError silenced;
     imaging::write_volume(warped, options.output);
 }

@@ -5,6 +5,7 @@
 #include "meshing/point_location.hpp"
 #include "registration/field/mesh_labels.hpp"
 #include "registration/record.hpp"
+#include "registration/resection/gap.hpp"
 #include "simulation/series_frame.hpp"
 
 #include <fmt/format.h>
@@ -17,13 +18,14 @@ std::optional<WarpMotion> read_motion(const WarpOptions& options, Observer& obse
     if (file_kind(options.displacement) == FileKind::Record) {
         simulation::SeriesFrame frame = simulation::read_frame(options.displacement, options.frame);
         observer.note(fmt::format("'{}': frame {}, at {:g} s", options.displacement.string(), frame.index, frame.time));
-        return WarpMotion{{std::move(frame.mesh), std::move(frame.displacement)}, std::move(frame.gone)};
+        return WarpMotion{{std::move(frame.mesh), std::move(frame.displacement)}, std::move(frame.gone), {}};
     }
     if (options.frame >= 0)
         throw InvalidInput(
             "--frame is of a scene; give --displacement displacement.h5 as tissuewarp simulate wrote it");
     if (options.record.empty()) return std::nullopt;
-    return WarpMotion{registration::read_record(options.record).deformation, {}};
+    registration::Record record = registration::read_record(options.record);
+    return WarpMotion{std::move(record.deformation), {}, std::move(record.resected)};
 }
 
 void take_out(imaging::Volume& image, const WarpMotion& motion, double outside, const std::filesystem::path& path) {
@@ -41,6 +43,7 @@ void take_out(imaging::Volume& image, const WarpMotion& motion, double outside, 
 }
 
 std::vector<bool> points_gone(const Eigen::Matrix3Xd& points, const WarpMotion& motion) {
+    if (!motion.resected.empty()) return registration::points_gone(motion.deformation, motion.resected, points);
     std::vector<bool> gone(static_cast<std::size_t>(points.cols()), false);
     if (motion.gone.tet_count() == 0) return gone;
     const meshing::PointLocator taken(motion.gone), left(motion.deformation.mesh);

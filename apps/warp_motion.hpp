@@ -12,7 +12,8 @@ namespace tissuewarp::apps {
 
 struct WarpMotion {
     registration::Deformation deformation;  ///< a scene's has no placement
-    meshing::TetMesh gone;                  ///< tissue at rest that a resection took out; often without tetrahedra
+    meshing::TetMesh gone;                  ///< tissue at rest that a scene's resection took out; often no tetrahedra
+    imaging::Volume resected;               ///< the same of a registration as a label map; often empty
 };
 
 /// Nothing where a displacement field on a grid was given. Throws InvalidInput where neither was, and for --frame

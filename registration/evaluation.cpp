@@ -32,6 +32,7 @@ TargetError target_error(const Landmarks& landmarks, const Eigen::Matrix3Xd& map
                            " mapped points; their numbers must agree");
     std::vector<double> before, after, moved_before, moved_after;
     for (Eigen::Index p = 0; p < mapped.cols(); ++p) {
+        if (!mapped.col(p).allFinite()) continue;
         before.push_back((landmarks.moving.col(p) - landmarks.fixed.col(p)).norm());
         after.push_back((mapped.col(p) - landmarks.fixed.col(p)).norm());
         if (before.back() <= moved_mm) continue;

@@ -10,7 +10,9 @@
 
 #include "imaging/labels.hpp"
 #include "registration/boundary/surroundings.hpp"
+#include "registration/matching/image_mask.hpp"
 #include "registration/matching/image_matching.hpp"
+#include "registration/resection/cavity_wall.hpp"
 
 #include <tbb/task_arena.h>
 #include <tbb/task_group.h>
@@ -60,12 +62,14 @@ PreparedModel of_mesh(meshing::TetMesh mesh, const imaging::Volume& moving_label
                       Observer& observer) {
     Stopwatch stopwatch;
     std::vector<StageTime> times;
-    imaging::Volume organ = imaging::without_labels(moving_labels, options.rigid_neighbours);
+    imaging::Volume organ = imaging::without_labels(moving_labels, detail::not_meshed(options));
+    imaging::Volume resected = detail::labels_alone(moving_labels, options.resected);
     std::optional<RigidNeighbours> neighbours = detail::rigid_neighbours(moving_labels, options.rigid_neighbours);
     tled::Model model = model_of(std::move(mesh), options);
     tled::RestState rest = tled::rest_state(model);
     Interfaces interfaces(model.mesh);
     measure_offsets(interfaces, model.mesh, LabelBoundaryField(organ, interfaces.thickness(model.mesh)));
+    if (!resected.empty()) detail::mark_cavity_wall(interfaces, model.mesh, resected);
     times.push_back({"rest state", stopwatch.lap()});
     observer.checkpoint("rest stiffness", 0.0);
     const auto springs = label_conditions(interfaces, options, rest.node_count);
@@ -82,7 +86,8 @@ PreparedModel of_mesh(meshing::TetMesh mesh, const imaging::Volume& moving_label
             nullptr,
             std::move(neighbours),
             nullptr,
-            {}};
+            {},
+            std::move(resected)};
 }
 
 PrepareOptions with_edge_length(PrepareOptions options, const imaging::Volume& organ) {
@@ -147,7 +152,7 @@ double suggested_edge_length_without_labels(const imaging::Volume& labels) {
 
 PreparedModel prepare(const imaging::Volume& moving_labels, const PrepareOptions& given, Observer& observer) {
     require_surroundings(moving_labels, given);
-    const imaging::Volume organ = imaging::without_labels(moving_labels, given.rigid_neighbours);
+    const imaging::Volume organ = imaging::without_labels(moving_labels, detail::not_meshed(given));
     const PrepareOptions options = with_edge_length(given, organ);
     Stopwatch stopwatch;
     meshing::TetMesh mesh = meshing::mesh_labels(organ, options.meshing, observer);
@@ -175,9 +180,11 @@ PreparedModel with_materials(PreparedModel prepared, const tled::MaterialTable& 
 
 namespace {
 
-std::shared_ptr<const ImageModel> image_model(PreparedModel& prepared, const imaging::Volume& moving,
+std::shared_ptr<const ImageModel> image_model(PreparedModel& prepared, const imaging::Volume& given,
                                               const ImageModelOptions& options, Observer& observer) {
     Stopwatch stopwatch;
+    const imaging::Volume moving =
+        prepared.resected.empty() ? given : without_unmatched(given, detail::all_but(prepared.resected));
     observer.checkpoint("feature points", 0.0);
     const FeaturePoints features =
         select_feature_points(moving, imaging::mask_of_all(prepared.labels), options.features);
@@ -210,7 +217,7 @@ void prepare_loads(PreparedModel& prepared, Observer& observer) {
 
 PreparedModel prepare_for_loads(const imaging::Volume& moving_labels, const PrepareOptions& given, Observer& observer) {
     require_surroundings(moving_labels, given);
-    const imaging::Volume organ = imaging::without_labels(moving_labels, given.rigid_neighbours);
+    const imaging::Volume organ = imaging::without_labels(moving_labels, detail::not_meshed(given));
     const PrepareOptions options = with_edge_length(given, organ);
     ModelBeside coarse(observer);
     if (detail::loads_will_take_coarse_model(organ, options))

@@ -68,10 +68,11 @@ struct PrepareOptions {
     std::vector<int> anchors;           ///< labels of tissue that stays where the rigid placement has it
     std::vector<int> rigid_neighbours;  ///< labels of bodies that move with the placement and are not meshed; the
                                         ///< organ slides along them and comes off, but does not enter them
+    std::vector<int> resected;  ///< labels of tissue that is gone by the time of the operation: not meshed, not matched
 };
 
-/// Throws InvalidInput, naming the label and those present, unless the map holds every anchor and rigid neighbour, none
-/// is both or 0, and something else is left to register.
+/// Throws InvalidInput, naming the label and those present, unless the map holds every anchor, rigid neighbour and
+/// resected label, none is two of these or 0, and something else is left to register.
 void require_surroundings(const imaging::Volume& moving_labels, const PrepareOptions& options);
 
 /// What the preoperative image shows of the tissue, to be found again in a bare intraoperative volume.
@@ -86,7 +87,7 @@ struct RigidNeighbours {
 /// Everything that does not depend on intraoperative data.
 struct PreparedModel {
     tled::Model model;       ///< mesh in LPS mm of the preoperative image
-    imaging::Volume labels;  ///< the preoperative label map it came from, without rigid neighbours
+    imaging::Volume labels;  ///< the preoperative label map it came from, without rigid neighbours and what is gone
     PrepareOptions options;
     Interfaces interfaces;
     tled::RestState rest;
@@ -96,6 +97,7 @@ struct PreparedModel {
     std::optional<RigidNeighbours> neighbours;
     std::unique_ptr<PreparedModel> coarse;                     ///< of the same organ, see prepare_loads
     std::vector<std::shared_ptr<const ImageModel>> contrasts;  ///< see prepare_contrast
+    imaging::Volume resected = {};                             ///< labels of what is gone alone; empty where nothing is
 };
 
 /// Label map → mesh → rest state → rest stiffness, its pattern analysed. Throws InvalidInput, Cancelled.
@@ -111,7 +113,7 @@ PreparedModel prepare(meshing::TetMesh mesh, const imaging::Volume& moving_label
 PreparedModel with_materials(PreparedModel prepared, const tled::MaterialTable& materials);
 
 /// Adds what registering to a bare intraoperative volume takes: blocks of the preoperative image about feature points
-/// in and near the labels. Throws InvalidInput, Cancelled.
+/// in and near the labels, without what is gone. Throws InvalidInput, Cancelled.
 void prepare_image(PreparedModel& prepared, const imaging::Volume& moving, const ImageModelOptions& options = {},
                    Observer& observer = silent_observer());
 

@@ -15,7 +15,14 @@ namespace tissuewarp::registration {
 namespace {
 
 constexpr const char* format = "tissuewarp registration record";
-constexpr int version = 2, oldest_version = 1;
+constexpr int version = 3, oldest_version = 1;
+constexpr const char* resected = "resected";  // absent where no tissue is gone
+
+/// The version to write: older programs would leave no gap, and read everything else.
+int version_of(const PreparedModel& prepared) {
+    constexpr int before_resection = 2;
+    return prepared.resected.empty() ? before_resection : version;
+}
 
 /// det F of every tetrahedron; the placement is rigid and has no part in it.
 Eigen::VectorXd jacobians(const Deformation& deformation) {
@@ -155,9 +162,10 @@ void write_record(const PreparedModel& prepared, const UpdateResult& result, con
     if (deformation.mesh.tets != prepared.model.mesh.tets || deformation.mesh.nodes != prepared.model.mesh.nodes)
         throw InvalidInput("the result's mesh is not the prepared model's; pass the model that was updated");
     AtomicFile target(path);
-    Hdf5Output file(target.path(), format, version);
+    Hdf5Output file(target.path(), format, version_of(prepared));
     detail::write_model(file, prepared.model);
     detail::write_grid(file, "moving_grid", prepared.labels.geometry);
+    if (!prepared.resected.empty()) detail::write_label_map(file, resected, prepared.resected);
     write_result(file, result);
     detail::write_stages(file, "stages/prepare", prepared.times);
     detail::write_stages(file, "stages/update", result.times);
@@ -182,6 +190,7 @@ Record read_checked(const std::filesystem::path& path) {
     require_consistent(record.deformation);
     record.jacobian = file.vector<double>("jacobian", record.deformation.mesh.tet_count());
     record.moving_grid = detail::read_grid(file, "moving_grid");
+    if (file.holds(resected)) record.resected = detail::read_label_map(file, resected);
     const std::vector<std::string> names = file.texts("provenance/name"), values = file.texts("provenance/value");
     if (names.size() != values.size())
         throw InvalidInput("'" + path.string() + "' holds " + std::to_string(names.size()) +

@@ -30,6 +30,7 @@ struct Record {
     tled::Element element = tled::Element::AveragedPressureT4;
     Eigen::VectorXd jacobian;       ///< det F of every tetrahedron
     imaging::Geometry moving_grid;  ///< of the preoperative label map
+    imaging::Volume resected;       ///< labels of tissue that is gone, int32, moving frame; empty where none is
     std::map<std::string, std::string> provenance;
     std::string parameters_toml;
 };

@@ -2,6 +2,7 @@
 
 #include "meshing/tet_mesh.hpp"
 #include "registration/field.hpp"
+#include "registration/resection/gap.hpp"
 #include "registration/rigid_surroundings.hpp"
 #include "registration/warp.hpp"
 #include "server/crc64.hpp"
@@ -127,6 +128,8 @@ Products Computer::compute(const Job& job, Observer& observer) {
         if (wanted("warped")) {
             if (patient_.image.empty()) throw InvalidInput("the patient was prepared without an image to warp");
             products.warped = warp_image(patient_.image, products.field);
+            if (const imaging::Volume& resected = patient_.model->resected; !resected.empty())
+                leave_gap(products.warped, gap_after(deformation, resected, products.field));
         }
         if (!wanted("field")) products.field = {};
     }

@@ -2,11 +2,18 @@
 
 #include "core/cancel_only.hpp"
 #include "core/errors.hpp"
+#include "imaging/labels.hpp"
 #include "meshing/point_location.hpp"
+#include "registration/field.hpp"
+#include "registration/resection/find_resection.hpp"
+#include "registration/resection/gap.hpp"
 #include "registration/update.hpp"
 
 #include <chrono>
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace tissuewarp::study {
 
@@ -19,10 +26,21 @@ bool is_image(Evidence evidence) {
     return evidence >= Evidence::Image;
 }
 
+/// What a registration without resected tissue leaves open.
+struct Hole {
+    double dice = 0;  ///< with the true cavity
+    int doubts = 0;   ///< of what was found to be gone
+};
+
 /// A phantom, its images once they are needed, and models made of it.
 class Patient {
 public:
-    explicit Patient(const Phantom& phantom) : phantom_(phantom) {}
+    Patient(const Phantom& phantom, bool seeks_resected)
+        : phantom_(phantom), labels_(phantom.moving_labels), resected_(phantom.resected) {
+        if (!seeks_resected) return;
+        labels_ = imaging::mask_of_all(labels_).as(CV_32S);  // tumour and organ alike
+        resected_.clear();
+    }
 
     registration::Intraoperative seen(Evidence evidence) {
         registration::Intraoperative seen;
@@ -67,18 +85,44 @@ public:
         std::optional<PreparedModel>& model = evidence == Evidence::Labels       ? for_labels_
                                               : evidence == Evidence::Ultrasound ? for_ultrasound_
                                                                                  : for_others_;
-        if (!model) {
-            registration::PrepareOptions options;
-            options.meshing.edge_length =
-                evidence == Evidence::Labels
-                    ? registration::suggested_edge_length(phantom_.moving_labels)
-                    : registration::suggested_edge_length_without_labels(phantom_.moving_labels);
-            model = registration::prepare(phantom_.moving_labels, options, observer);
-        }
+        if (!model) model = made_of(labels_, resected_, evidence, observer);
         if (is_image(evidence) && !model->image)
             registration::prepare_image(
                 *model, evidence == Evidence::Ultrasound ? ultrasound().moving : images().moving, {}, observer);
         return *model;
+    }
+
+    /// The same without what the image does not show, where a model of all tissue was registered to it first; that
+    /// model where everything is shown.
+    const PreparedModel& without_what_is_gone(Evidence evidence, const registration::Deformation& first,
+                                              const imaging::Volume& seen, Observer& observer) {
+        const PreparedModel& whole = prepared(evidence, observer);
+        found_ = registration::find_resection(whole, first, images().moving, seen, observer);
+        if (found_->gone_ml == 0) return whole;
+        imaging::Volume labels = labels_.clone();
+        const int gone = imaging::labels_in(labels).back() + 1;
+        labels.voxels.setTo(gone, found_->gone.voxels);
+        without_found_ = made_of(labels, {gone}, evidence, observer);
+        registration::prepare_image(*without_found_, images().moving, {}, observer);
+        return *without_found_;
+    }
+
+    /// The hole that a registration by an image leaves; nothing where none is to be.
+    std::optional<Hole> hole(Evidence evidence, const PreparedModel& prepared,
+                             const registration::Deformation& deformation) {
+        if (phantom_.resected.empty() || !is_image(evidence) || evidence == Evidence::Ultrasound) return std::nullopt;
+        const imaging::Volume& truth = images().cavity;
+        Hole result{0, 0};
+        imaging::Volume gap(truth.geometry, CV_8UC1);
+        if (!prepared.resected.empty()) {
+            gap = gap_after(deformation, prepared.resected, displacement_fixed_to_moving(deformation, truth.geometry));
+            const auto count = [](const cv::Mat& mask) { return double(cv::countNonZero(mask.reshape(1, 1))); };
+            cv::Mat both;
+            cv::bitwise_and(imaging::mask_of_all(gap).voxels, imaging::mask_of_all(truth).voxels, both);
+            result.dice = 2 * count(both) / (count(gap.voxels) + count(truth.voxels));
+        }
+        if (found_) result.doubts = count_of_severe(doubts_of(*found_, gap));
+        return result;
     }
 
     /// Of a partial image or ultrasound: whether it shows where the target is. Of everything else yes.
@@ -89,6 +133,17 @@ public:
     }
 
 private:
+    static PreparedModel made_of(const imaging::Volume& labels, std::vector<int> resected, Evidence evidence,
+                                 Observer& observer) {
+        registration::PrepareOptions options;
+        const imaging::Volume organ = imaging::without_labels(labels, resected);
+        options.resected = std::move(resected);
+        options.meshing.edge_length = evidence == Evidence::Labels
+                                          ? registration::suggested_edge_length(organ)
+                                          : registration::suggested_edge_length_without_labels(organ);
+        return registration::prepare(labels, options, observer);
+    }
+
     const PhantomImages& images() {
         if (!images_) images_ = phantom_.images();
         return *images_;
@@ -100,24 +155,34 @@ private:
     }
 
     const Phantom& phantom_;
+    imaging::Volume labels_;  // what is known of the organ before
+    std::vector<int> resected_;
     std::optional<PhantomImages> images_;
     std::optional<PhantomUltrasound> ultrasound_;
-    std::optional<PreparedModel> for_labels_, for_others_, for_ultrasound_;
+    std::optional<PreparedModel> for_labels_, for_others_, for_ultrasound_, without_found_;
+    std::optional<registration::FoundResection> found_;
 };
 
 std::vector<CoverageRow> rows_of(const Phantom& phantom, Patient& patient, Evidence evidence,
                                  const CoverageOptions& options, Observer& observer) {
-    const PreparedModel& prepared = patient.prepared(evidence, observer);
-    const auto result = registration::update(prepared, patient.seen(evidence), options.update, observer);
+    const PreparedModel& whole = patient.prepared(evidence, observer);
+    const registration::Intraoperative seen = patient.seen(evidence);
+    auto result = registration::update(whole, seen, options.update, observer);
+    const bool seeks = options.seek_resected && seen.image;
+    const PreparedModel& prepared =
+        seeks ? patient.without_what_is_gone(evidence, result.deformation, *seen.image, observer) : whole;
+    if (&prepared != &whole) result = registration::update(prepared, seen, options.update, observer);
     const registration::Uncertainty uncertainty =
         registration::uncertainty(prepared, result, options.uncertainty, observer);
     const auto estimates = uncertainty.at(phantom.targets.moving);
-    const int doubts = count_of_severe(result.doubts) +
-                       count_of_severe(doubts_of(uncertainty, options.update.equilibrium.tolerance_mm));
     const Eigen::Matrix3Xd is = result.deformation.placement.inverse() * phantom.targets.fixed;
     const meshing::PointLocator locator(prepared.model.mesh);
     const Eigen::MatrixXd& nodal = result.deformation.displacement;
     const double z = uncertainty.held_out() ? uncertainty.held_out()->z : 1;
+    const std::optional<Hole> hole = patient.hole(evidence, prepared, result.deformation);
+    const int doubts = count_of_severe(result.doubts) +
+                       count_of_severe(doubts_of(uncertainty, options.update.equilibrium.tolerance_mm)) +
+                       (hole ? hole->doubts : 0);
     std::vector<CoverageRow> rows;
     for (std::size_t k = 0; k < estimates.size(); ++k) {
         const auto column = static_cast<Eigen::Index>(k);
@@ -126,7 +191,7 @@ std::vector<CoverageRow> rows_of(const Phantom& phantom, Patient& patient, Evide
         if (!estimates[k] || !place) continue;  // in the organ, out of its mesh
         const Eigen::Vector3d u = meshing::interpolate(prepared.model.mesh, nodal, *place);
         rows.push_back({phantom.seed, evidence, static_cast<int>(k), X + u - is.col(column), z, doubts, u.norm(),
-                        patient.in_view(evidence, column), *estimates[k]});
+                        patient.in_view(evidence, column), *estimates[k], hole ? hole->dice : -1});
     }
     return rows;
 }
@@ -175,7 +240,7 @@ const char* name_of(Evidence evidence) {
 
 std::vector<CoverageRow> measured_coverage(const Phantom& phantom, const CoverageOptions& options, Observer& observer) {
     std::vector<CoverageRow> rows;
-    Patient patient(phantom);
+    Patient patient(phantom, options.seek_resected);
     for (const Evidence evidence : options.evidence) {
         try {
             const auto here = rows_of(phantom, patient, evidence, options, observer);

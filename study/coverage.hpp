@@ -41,6 +41,7 @@ struct CoverageOptions {
     std::uint64_t first_seed = 1001, last_seed = 1120;
     std::vector<Evidence> evidence{all_evidence.begin(), all_evidence.end() - 1};  ///< without ultrasound
     PhantomOptions phantom;
+    bool seek_resected = false;  ///< what is gone is not told but found in images (registration/resection)
     registration::UpdateOptions update;
     registration::UncertaintyOptions uncertainty;
 };
@@ -56,6 +57,7 @@ struct CoverageRow {
     double moved_mm = 0;    ///< elastic displacement that the registration gave it
     bool in_view = true;    ///< where it truly is lies in what was seen
     registration::ErrorEstimate estimate;
+    double cavity_dice = -1;  ///< of the registration, by images: of its hole with the true cavity; -1 without one
 };
 
 /// Registers the phantoms of the seeds to each kind of evidence. Each seed's rows are kept in

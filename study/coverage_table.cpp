@@ -12,7 +12,8 @@ constexpr const char* header =
     "seed,evidence,target,held_out_z,doubts,error_x,error_y,error_z,moved,in_view,algebraic,discretisation,data,"
     "deviation,"
     "interval,trust,"
-    "xx,yy,zz,xy,yz,zx";
+    "xx,yy,zz,xy,yz,zx,"
+    "cavity_dice";
 
 CoverageRow parsed(detail::TableLine& line) {
     CoverageRow row;
@@ -34,6 +35,7 @@ CoverageRow parsed(detail::TableLine& line) {
     Eigen::Matrix3d& c = e.covariance;
     for (double* value : {&c(0, 0), &c(1, 1), &c(2, 2), &c(0, 1), &c(1, 2), &c(0, 2)}) *value = line.number();
     c.triangularView<Eigen::StrictlyLower>() = c.transpose();
+    row.cavity_dice = line.number();
     return row;
 }
 
@@ -53,6 +55,7 @@ void write_coverage(const std::filesystem::path& path, const std::vector<Coverag
             out << ',' << value;
         out << ',' << static_cast<int>(e.trust);
         for (const double value : {c(0, 0), c(1, 1), c(2, 2), c(0, 1), c(1, 2), c(0, 2)}) out << ',' << value;
+        out << ',' << row.cavity_dice;
         out << '\n';
     }
     write_file(out.str(), path);

@@ -11,6 +11,7 @@
 #include "study/detail/random.hpp"
 #include "study/detail/random_loads.hpp"
 #include "study/detail/random_tissue.hpp"
+#include "study/detail/resected_organ.hpp"
 #include "study/detail/truth.hpp"
 #include "study/detail/ultrasound_phantom.hpp"
 
@@ -132,6 +133,56 @@ detail::TrueTissue tissue_of(const std::shared_ptr<const detail::Truth>& truth, 
     return tissue;
 }
 
+/// A patient with a tumour, of whom all or what a resection leaves is deformed.
+Phantom resection_phantom(std::uint64_t seed, const PhantomOptions& options, Observer& observer) {
+    constexpr int elements = 3500;
+    constexpr double strain = 0.12, most_grey = 180, least_grey = 20;
+    constexpr std::uint64_t of_places = 111;
+    const bool gone = options.family == Family::Resected;
+    detail::Random random(seed);
+    const detail::ResectedOrgan organ = detail::random_resection(random);
+    const detail::OrganShape& shape = organ.shape.organ();
+    const double motion_mm = random.uniform(3, std::min(15.0, strain * shape.length()));
+    const Eigen::Isometry3d placement =
+        random_motion(shape.centre(), options.misplacement.value_or(solved_motion), random);
+    const double seen_share = random.uniform(least_seen, most_seen), grey = random.uniform(least_grey, most_grey);
+
+    observer.checkpoint("Truth", 0);
+    detail::ResectionMeshes meshes = detail::resection_meshes(organ, elements, observer);
+    const auto truth = std::make_shared<const detail::Truth>(
+        gone ? detail::resected_truth(organ, std::move(meshes.resected), motion_mm, observer)
+             : detail::unresected_truth(organ, std::move(meshes.whole), motion_mm, observer));
+    detail::TrueTissue tissue = tissue_of(truth, shape, placement);
+    if (gone) tissue.cavity_grey = organ.air ? 0 : grey;
+
+    observer.checkpoint("Drawing", 0.8);
+    Phantom phantom;
+    phantom.moving_labels = detail::draw(shape, options.voxel_mm);
+    auto* voxel = phantom.moving_labels.data<std::int32_t>();
+    const auto& grid = phantom.moving_labels.geometry;
+    for (int k = 0; k < grid.size[2]; ++k)
+        for (int j = 0; j < grid.size[1]; ++j)
+            for (int i = 0; i < grid.size[0]; ++i)
+                *voxel++ = organ.shape.label(grid.point({double(i), double(j), double(k)}));
+    if (gone) phantom.resected = {2};
+    detail::Random of_places_alone(derived(seed, of_places));  // the same in the whole organ
+    detail::TrueTissue mapped = tissue;
+    mapped.label = [at = organ.shape, gone](const Vector3d& X) {  // the wall of elements lies off the surface a little
+        const int label = at.label(X), left = at.organ().label(X) == 2 ? 3 : 1;
+        return gone && label == 2 ? left : label;
+    };
+    phantom.fixed_labels = detail::drawn_labels(mapped, options.voxel_mm, options.boundary_deviation_mm, random);
+    phantom.surface = detail::seen_surface(tissue, seen_share, options.point_deviation_mm, random);
+    detail::TrueTissue left = tissue;
+    left.label = [at = organ.shape](const Vector3d& X) { return at.cavity_distance(X) > 1 ? at.label(X) : 0; };
+    phantom.targets = detail::places(left, options.targets, target_depth_mm, of_places_alone);
+    phantom.points = detail::found_again(detail::places(left, more_pairs, pair_depth_mm, random),
+                                         options.point_deviation_mm, random);
+    phantom.story = told({shape, organ.tissue, organ.loads}, *truth, seen_share, more_pairs) + organ.words;
+    add_vessels_and_images(phantom, tissue, seed, options);
+    return phantom;
+}
+
 Phantom solved_phantom(std::uint64_t seed, const PhantomOptions& options, Observer& observer) {
     constexpr int least_elements = 2500, most_elements = 4000;
     constexpr double strain = 0.12;  // largest motion over the organ's length, at most
@@ -216,6 +267,8 @@ Phantom bent_phantom(detail::TrueTissue tissue, imaging::Volume moving_labels, c
 
 Phantom drawn_phantom(std::uint64_t seed, const PhantomOptions& options, Observer& observer) {
     if (options.family == Family::Solved) return solved_phantom(seed, options, observer);
+    if (options.family == Family::Resected || options.family == Family::Unresected)
+        return resection_phantom(seed, options, observer);
     detail::Random random(seed);
     detail::TrueTissue tissue;
     const auto of_shape = [&](auto shape) {

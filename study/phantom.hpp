@@ -22,7 +22,9 @@ enum class Family {
                ///< own
     Bent,      ///< drawn organs; a smooth map that conserves volume and solves no equation
     Labelled,  ///< organs of a real label map; such a map
-    Found      ///< organs of a real label map; a motion that another program found between images
+    Found,     ///< organs of a real label map; a motion that another program found between images
+    Resected,  ///< drawn organs without a tumour of 10 to 60 ml, whose cavity collapses; as Solved
+    Unresected  ///< the same organs and places, the tumour in them, under the same loads from outside
 };
 
 /// How far the organ as a whole is from where the headers put it, at most; along and about any axis.
@@ -56,6 +58,7 @@ struct PhantomImages {
     imaging::Volume other_contrast;  ///< dark where the moving one is bright, with a little noise
     imaging::Volume degraded;        ///< of other contrast, with slices three voxels thick and much noise
     Ball view;                       ///< fixed frame; holds 35 to 70 % of the organ
+    imaging::Volume cavity;          ///< uint8, grid of `fixed`: where nothing is left in the organ; empty if whole
 };
 
 /// An image before, and ultrasound during the operation.
@@ -69,7 +72,9 @@ struct PhantomUltrasound {
 struct Phantom {
     std::uint64_t seed = 0;
     std::string story;                              ///< shape, tissue, what moves it, one line
-    imaging::Volume moving_labels;                  ///< 0 outside, 1 organ, 2 inclusion; moving frame
+    imaging::Volume moving_labels;                  ///< 0 outside, 1 organ, 2 inclusion; moving frame. Of a tumour
+                                                    ///< that is resected in part 2 is what is gone, 3 what is left
+    std::vector<int> resected;                      ///< of them, those whose tissue is gone
     imaging::Volume fixed_labels;                   ///< the same drawn anew in the fixed frame, with boundary noise
     registration::SurfacePoints surface;            ///< of a part of the organ's surface, fixed frame
     registration::PointPairs points;                ///< a few places in the organ

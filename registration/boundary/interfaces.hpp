@@ -17,7 +17,8 @@ struct InterfaceNode {
     int inner = 0, outer = 0;                          ///< labels; 0 is the outside
     double area = 0;                                   ///< a third of the adjacent interface triangles, mm²
     Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< unit, rest configuration, from inner to outer
-    double offset = 0;  ///< mm along the normal from the node to the moving label boundary
+    double offset = 0;       ///< mm along the normal from the node to the moving label boundary
+    bool at_cavity = false;  ///< what was beyond it is gone: nothing around the organ holds it
 };
 
 /// Interface triangles of a mesh gathered at nodes, and recomputed normals for a deformed state.

@@ -1,5 +1,5 @@
 #pragma once
-/// Labels of a preoperative map that are no tissue to deform, or tissue that stays.
+/// Labels of a preoperative map that are no tissue to deform, tissue that stays, or tissue that is gone.
 
 #include "registration/intraoperative.hpp"
 #include "registration/prepare.hpp"
@@ -18,7 +18,13 @@ struct NeighbourOptions {
 /// The bodies of these labels, none where no label is given. Precondition: require_surroundings.
 std::optional<RigidNeighbours> rigid_neighbours(const imaging::Volume& map, const std::vector<int>& labels);
 
-/// Both kinds of labels in one map again, as `prepare` takes it.
+/// Rigid neighbours, and what is gone.
+std::vector<int> not_meshed(const PrepareOptions& options);
+
+/// The map without all labels but these, int32; empty where no label is given.
+imaging::Volume labels_alone(const imaging::Volume& map, const std::vector<int>& labels);
+
+/// All kinds of labels in one map again, as `prepare` takes it.
 imaging::Volume with_neighbours(const PreparedModel& prepared);
 
 /// What was seen with the rigid neighbours taken out of its labels, if it has any: they are background there as they

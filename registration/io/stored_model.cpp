@@ -124,6 +124,28 @@ imaging::Geometry read_grid(const Hdf5Input& file, const std::string& group) {
     return grid;
 }
 
+namespace {
+
+std::vector<hsize_t> voxel_shape(const imaging::Geometry& grid) {
+    return {static_cast<hsize_t>(grid.size[2]), static_cast<hsize_t>(grid.size[1]), static_cast<hsize_t>(grid.size[0])};
+}
+
+}  // namespace
+
+void write_label_map(Hdf5Output& file, const std::string& group, const imaging::Volume& labels) {
+    const imaging::Volume integers = labels.as(CV_32S);
+    write_grid(file, group + "/grid", labels.geometry);
+    file.array<int>(group + "/voxels", integers.data<int>(), voxel_shape(labels.geometry), "1");
+}
+
+imaging::Volume read_label_map(const Hdf5Input& file, const std::string& group) {
+    const imaging::Geometry grid = read_grid(file, group + "/grid");
+    file.require_shape(group + "/voxels", voxel_shape(grid));
+    imaging::Volume labels(grid, CV_32SC1);
+    file.array<int>(group + "/voxels", labels.data<int>(), voxel_shape(grid));
+    return labels;
+}
+
 void write_stages(Hdf5Output& file, const std::string& group, const std::vector<StageTime>& times) {
     std::vector<std::string> names;
     Eigen::VectorXd seconds(static_cast<Eigen::Index>(times.size()));

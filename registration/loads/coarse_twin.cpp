@@ -18,6 +18,7 @@ PrepareOptions coarse_options(PrepareOptions options, double edge_length) {
     options.meshing.label_edge_length.clear();
     options.anchors.clear();  // among the springs
     options.rigid_neighbours.clear();
+    options.resected.clear();  // not in the model's labels
     return options;
 }
 

@@ -69,7 +69,7 @@ Patient read_checked(const std::filesystem::path& path, Observer& observer) {
 void write_patient(const PreparedModel& prepared, const imaging::Volume& image, const std::string& facts,
                    const std::filesystem::path& path) {
     AtomicFile target(path);
-    Hdf5Output file(target.path(), detail::prepared_format, detail::prepared_version);
+    Hdf5Output file(target.path(), detail::prepared_format, detail::version_of(prepared));
     detail::write_prepared_parts(file, prepared);
     if (!image.empty()) write_image(file, image);
     file.texts(facts_name, {facts});

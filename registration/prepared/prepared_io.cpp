@@ -14,6 +14,7 @@ namespace tissuewarp::registration {
 
 namespace {
 
+constexpr const char* moving_labels = "moving_labels";
 constexpr const char* coarse_mesh = "coarse_mesh";  // absent without a coarse model; since version 3
 constexpr const char* image = "image";              // absent without an image model; since version 4
 
@@ -24,22 +25,6 @@ std::string contrast_group(std::size_t number) {
 
 std::vector<hsize_t> voxel_shape(const imaging::Geometry& grid) {
     return {static_cast<hsize_t>(grid.size[2]), static_cast<hsize_t>(grid.size[1]), static_cast<hsize_t>(grid.size[0])};
-}
-
-void write_labels(Hdf5Output& file, const imaging::Volume& labels) {
-    if (labels.empty() || labels.channels() != 1)
-        throw InvalidInput("the prepared model holds no label map of one component");
-    const imaging::Volume integers = labels.as(CV_32S);
-    detail::write_grid(file, "moving_labels/grid", labels.geometry);
-    file.array<int>("moving_labels/voxels", integers.data<int>(), voxel_shape(labels.geometry), "1");
-}
-
-imaging::Volume read_label_map(const Hdf5Input& file) {
-    const imaging::Geometry grid = detail::read_grid(file, "moving_labels/grid");
-    file.require_shape("moving_labels/voxels", voxel_shape(grid));
-    imaging::Volume labels(grid, CV_32SC1);
-    file.array<int>("moving_labels/voxels", labels.data<int>(), voxel_shape(grid));
-    return labels;
 }
 
 void write_list(Hdf5Output& file, const std::string& name, const std::vector<int>& list) {
@@ -134,13 +119,17 @@ ImageModel read_image(const Hdf5Input& file, const std::string& group) {
 
 void detail::write_prepared_parts(Hdf5Output& file, const PreparedModel& prepared) {
     detail::write_model(file, prepared.model);
-    write_labels(file, detail::with_neighbours(prepared));
+    const imaging::Volume labels = detail::with_neighbours(prepared);
+    if (labels.empty() || labels.channels() != 1)
+        throw InvalidInput("the prepared model holds no label map of one component");
+    detail::write_label_map(file, moving_labels, labels);
     write_meshing(file, prepared.options.meshing);
     detail::write_materials(file, "options/default_material", {{0, prepared.options.default_material}});
     file.scalar<double>("options/data_stiffness", prepared.options.data_stiffness, "kPa/mm");
     file.scalar<double>("options/tangential_ratio", prepared.options.tangential_ratio, "1");
     write_list(file, "options/anchors", prepared.options.anchors);
     write_list(file, "options/rigid_neighbours", prepared.options.rigid_neighbours);
+    if (!prepared.resected.empty()) write_list(file, "options/resected", prepared.options.resected);
     if (prepared.coarse) detail::write_mesh(file, coarse_mesh, prepared.coarse->model.mesh);
     if (prepared.image) write_image(file, image, *prepared.image);
     for (std::size_t n = 0; n < prepared.contrasts.size(); ++n)
@@ -160,9 +149,11 @@ PreparedModel detail::read_prepared_parts(const Hdf5Input& file, const std::file
     options.tangential_ratio = file.scalar<double>("options/tangential_ratio");
     options.anchors = read_list(file, "options/anchors");
     options.rigid_neighbours = read_list(file, "options/rigid_neighbours");
+    options.resected = read_list(file, "options/resected");
     if (!(options.data_stiffness > 0) || !(options.tangential_ratio > 0))
         throw InvalidInput("'" + path.string() + "': the stiffness of the data must be positive");
-    PreparedModel prepared = prepare(std::move(model.mesh), read_label_map(file), options, observer);
+    PreparedModel prepared =
+        prepare(std::move(model.mesh), detail::read_label_map(file, moving_labels), options, observer);
     if (file.holds(image)) prepared.image = std::make_shared<const ImageModel>(read_image(file, image));
     for (std::size_t n = 0; prepared.image && file.holds(contrast_group(n)); ++n)
         prepared.contrasts.push_back(std::make_shared<const ImageModel>(read_image(file, contrast_group(n))));
@@ -172,7 +163,7 @@ PreparedModel detail::read_prepared_parts(const Hdf5Input& file, const std::file
 
 void write_prepared(const PreparedModel& prepared, const std::filesystem::path& path) {
     AtomicFile target(path);
-    Hdf5Output file(target.path(), detail::prepared_format, detail::prepared_version);
+    Hdf5Output file(target.path(), detail::prepared_format, detail::version_of(prepared));
     detail::write_prepared_parts(file, prepared);
     file.close();
     target.commit();

@@ -10,7 +10,12 @@ namespace tissuewarp::registration::detail {
 
 /// Of files that hold a prepared model.
 inline constexpr const char* prepared_format = "tissuewarp prepared model";
-inline constexpr int prepared_version = 6, oldest_prepared_version = 1;
+inline constexpr int prepared_version = 7, oldest_prepared_version = 1;
+/// The version to write: older programs would take what is gone for tissue, and read everything else.
+inline int version_of(const PreparedModel& prepared) {
+    constexpr int before_resection = 6;
+    return prepared.resected.empty() ? before_resection : prepared_version;
+}
 
 void write_prepared_parts(Hdf5Output& file, const PreparedModel& prepared);
 /// Rest state and factor are made anew. `path` names the file in messages. Throws InvalidInput, Cancelled.

@@ -21,7 +21,7 @@ std::vector<tled::Spring> ground_springs(const PreparedModel& prepared, double e
                                          const std::function<ExpectedMotion(const InterfaceNode&)>& expected) {
     std::vector<tled::Spring> springs;
     for (const InterfaceNode& node : prepared.interfaces.nodes()) {
-        if (node.outer != 0) continue;
+        if (node.outer != 0 || node.at_cavity) continue;
         const ExpectedMotion motion = expected(node);
         const Eigen::Matrix3d across = node.normal * node.normal.transpose(),
                               along = Eigen::Matrix3d::Identity() - across,

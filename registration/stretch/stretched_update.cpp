@@ -1,6 +1,7 @@
 #include "registration/stretch/stretched_update.hpp"
 
 #include "core/stopwatch.hpp"
+#include "registration/boundary/surroundings.hpp"
 #include "registration/pose/start_pose.hpp"
 #include "registration/stretch/free_stretch.hpp"
 #include "registration/stretch/strain_free.hpp"
@@ -24,7 +25,7 @@ void add_share_of(const Eigen::Matrix3Xd& displacement, NodalErrors& nodal) {
 
 bool stretches_freely(const PreparedModel& prepared, const Intraoperative& seen, const Tissue& tissue) {
     return tissue.free_stretch > 0 && seen.labels && !seen.image && !seen.surface && !seen.points && !seen.curves &&
-           prepared.options.anchors.empty() && prepared.options.rigid_neighbours.empty();
+           prepared.options.anchors.empty() && detail::not_meshed(prepared.options).empty();
 }
 
 StretchedUpdate update_stretched(const PreparedModel& prepared, const Intraoperative& seen, const Tissue& tissue,

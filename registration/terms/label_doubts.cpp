@@ -67,7 +67,8 @@ std::string name_of_label(int label) {
 }
 
 /// Labels that one of the maps lacks.
-void doubt_vanished(const Counts& moving, const Counts& fixed, std::vector<Doubt>& doubts) {
+void doubt_vanished(const Counts& moving, const Counts& fixed, const std::vector<int>& resected,
+                    std::vector<Doubt>& doubts) {
     const auto doubt = [&](int label, std::int64_t voxels, const char* text, const char* remedy) {
         doubts.push_back({"label.vanished", double(voxels), 0, name_of_label(label) + text, remedy,
                           voxels < limits.fewest_voxels ? Severity::Notice : Severity::Doubt});
@@ -79,7 +80,11 @@ void doubt_vanished(const Counts& moving, const Counts& fixed, std::vector<Doubt
                   "fixed labels pulls at the others",
                   "segment it in both, or merge it with what is around it; check the label tables");
     for (const auto& [label, voxels] : fixed)
-        if (!moving.contains(label))
+        if (std::find(resected.begin(), resected.end(), label) != resected.end())
+            doubt(label, voxels,
+                  " is said to be resected, and the fixed labels show it: what is left of it does not move",
+                  "give what is left a number of its own in both maps");
+        else if (!moving.contains(label))
             doubt(label, voxels, " is in the fixed labels only: no tissue belongs there",
                   "segment it in both, or leave it out; check the label tables");
 }
@@ -126,7 +131,8 @@ constexpr const char* exchange_remedy = "give the same tissue the same number in
 class LabelFits {
 public:
     LabelFits(const PreparedModel& prepared, const Volume& fixed, const UpdateResult& result)
-        : moving_(prepared.labels.as(CV_32S)),
+        : resected_(prepared.options.resected),
+          moving_(prepared.labels.as(CV_32S)),
           fixed_(fixed.as(CV_32S)),
           in_moving_(voxels_of(moving_)),
           in_fixed_(voxels_of(fixed_)),
@@ -137,7 +143,7 @@ public:
 
     [[nodiscard]] std::vector<Doubt> doubts(const UpdateResult& result) const {
         std::vector<Doubt> doubts;
-        doubt_vanished(in_moving_, in_fixed_, doubts);
+        doubt_vanished(in_moving_, in_fixed_, resected_, doubts);
         for (const auto& [label, fit] : after_)
             if (label != 0 && is_in_both(label)) doubt_fit(label, fit, doubts);
         doubt_worse(result, doubts);
@@ -156,6 +162,7 @@ public:
     [[nodiscard]] const Volume& fixed() const { return fixed_; }
 
 private:
+    std::vector<int> resected_;  // labels that are in no model
     Volume moving_, fixed_;
     Counts in_moving_, in_fixed_;
     Volume coarse_, shown_;  // fixed labels and those of the model, on one grid

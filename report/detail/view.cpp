@@ -275,6 +275,11 @@ json data_view(const json& report) {
                         number(at(curves, "residual_mm"), 2) + " mm beside them (root mean square); half of all were " +
                         number(at(curves, "to_lines", "before", "median"), 2) + " mm away or more before, and " +
                         number(at(curves, "to_lines", "after", "median"), 2) + " mm after.");
+    if (const json& resected = at(report, "resected"); resected.is_object())
+        lines.push_back("Resected tissue: " + number(at(resected, "volume_ml"), 1) +
+                        " ml of the preoperative labels are not in the model. The hole of " +
+                        number(at(resected, "gap_ml"), 1) +
+                        " ml that it leaves is in gap.nii.gz; the displacement means nothing there.");
     return lines;
 }
 

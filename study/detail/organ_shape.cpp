@@ -50,10 +50,10 @@ Vector3d projected(const Function& f, Vector3d x) {
 
 }  // namespace
 
-OrganShape::OrganShape(Random& random) {
+OrganShape::OrganShape(Random& random, const OrganRange& range) {
     const Proportions& like = proportions()[static_cast<std::size_t>(random.index(3))];
     kind_ = like.kind;
-    length_ = random.uniform(60, 150);
+    length_ = random.uniform(range.least_length, range.most_length);
     for (int axis = 0; axis < 3; ++axis) axes_[axis] = 0.5 * length_ * like.axes[axis] * random.uniform(0.9, 1.1);
     bend_ = random.uniform(-like.bend, like.bend);
     frame_ = random.rotation();
@@ -64,14 +64,15 @@ OrganShape::OrganShape(Random& random) {
         const double height = random.uniform(-like.height, like.height);
         bumps_.push_back({direction, height, random.uniform(2, 6)});
     }
-    place_inclusion(random);
+    place_inclusion(random, range.inclusion_radius);
 }
 
-void OrganShape::place_inclusion(Random& random) {
+void OrganShape::place_inclusion(Random& random, std::optional<double> radius_mm) {
     inclusion_frame_ = random.rotation();
     constexpr double margin_mm = 4;
     for (int attempt = 0;; ++attempt) {
-        const double radius = std::max(0.5 * length_ * random.uniform(0.1, 0.25), 6.0) * std::pow(0.97, attempt);
+        const double of_length = std::max(0.5 * length_ * random.uniform(0.1, 0.25), 6.0),
+                     radius = radius_mm.value_or(of_length) * std::pow(0.97, attempt);
         for (int axis = 0; axis < 3; ++axis) inclusion_axes_[axis] = radius * random.uniform(0.8, 1.2);
         inclusion_centre_ = centre_ + frame_ * (random.uniform(0, 0.7) * random.direction().cwiseProduct(axes_));
         bool within = true;

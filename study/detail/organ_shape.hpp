@@ -7,16 +7,24 @@
 
 #include <Eigen/Core>
 
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace tissuewarp::study::detail {
 
+/// How large a random organ and its inclusion are, mm.
+struct OrganRange {
+    double least_length = 60, most_length = 150;
+    std::optional<double> inclusion_radius =
+        {};  ///< at first; none: a twentieth to an eighth of the length, at least 6
+};
+
 /// Where a smooth function is 0. Negative inside, about the distance near the surface, mm.
 class OrganShape {
 public:
-    /// An organ of 60 to 150 mm with the proportions of a brain, a liver or a kidney.
-    explicit OrganShape(Random& random);
+    /// An organ with the proportions of a brain, a liver or a kidney.
+    explicit OrganShape(Random& random, const OrganRange& range = {});
 
     /// 0 outside, 1 organ, 2 inclusion, at a point (LPS mm).
     [[nodiscard]] int label(const Eigen::Vector3d& point) const;
@@ -32,8 +40,10 @@ public:
     [[nodiscard]] Eigen::Vector3d surface_point(const Eigen::Vector3d& direction) const;
 
     [[nodiscard]] const Eigen::Vector3d& centre() const { return centre_; }
-    [[nodiscard]] double length() const { return length_; }                           ///< mm, along the longest axis
-    [[nodiscard]] double inclusion_radius() const { return inclusion_axes_.mean(); }  ///< mm
+    [[nodiscard]] double length() const { return length_; }  ///< mm, along the longest axis
+    [[nodiscard]] const Eigen::Vector3d& inclusion_centre() const { return inclusion_centre_; }
+    [[nodiscard]] double inclusion_volume() const { return 4.0 / 3 * EIGEN_PI * inclusion_axes_.prod(); }  ///< mm³
+    [[nodiscard]] double inclusion_radius() const { return inclusion_axes_.mean(); }                       ///< mm
     [[nodiscard]] const std::string& kind() const { return kind_; }
 
     /// Radius (mm) of a ball about the centre that holds the organ.
@@ -45,7 +55,7 @@ private:
         double height, sharpness;
     };
 
-    void place_inclusion(Random& random);
+    void place_inclusion(Random& random, std::optional<double> radius_mm);
     [[nodiscard]] double level(const Eigen::Vector3d& point) const;
     [[nodiscard]] double inclusion_level(const Eigen::Vector3d& point) const;
 

@@ -1,6 +1,7 @@
 #include "study/detail/phantom_image.hpp"
 
 #include "imaging/filters.hpp"
+#include "imaging/labels.hpp"
 #include "study/detail/phantom_data.hpp"
 #include "study/detail/texture.hpp"
 
@@ -65,6 +66,16 @@ Ball view_of(const Eigen::Matrix3Xd& tissue, const Vector3d& middle, double shar
     return {middle, distances[std::size_t(rank)]};
 }
 
+/// uint8: voxels that hold no tissue and are not connected to what is around it.
+imaging::Volume enclosed_by(const TrueTissue& tissue, const imaging::Geometry& grid) {
+    const imaging::Volume without =
+        filled(grid, [&](const Vector3d& x) { return tissue.backward(x) ? 0.0 : 1.0; }).as(CV_8U);
+    const imaging::Volume pieces = imaging::connected_components(without);
+    imaging::Volume enclosed(grid, CV_8UC1);
+    enclosed.voxels = pieces.voxels > 1;  // the largest is what is around the organ
+    return enclosed;
+}
+
 }  // namespace
 
 PhantomImages drawn_images(const TrueTissue& tissue, Random& random) {
@@ -83,12 +94,16 @@ PhantomImages drawn_images(const TrueTissue& tissue, Random& random) {
         return label > 0 ? organ(X, label) : around(X, 0);
     });
     const Eigen::Isometry3d back = tissue.placement.inverse();
-    const imaging::Volume fixed = filled(random_grid(after, fixed_axes, voxel_mm, random), [&](const Vector3d& x) {
+    imaging::Volume fixed = filled(random_grid(after, fixed_axes, voxel_mm, random), [&](const Vector3d& x) {
         const auto X = tissue.backward(x);
         const int label = X ? tissue.label(*X) : 0;
         return (1 + bias(x)) * (label > 0 ? organ(*X, label) : around(back * x, 0));
     });
     PhantomImages images;
+    if (tissue.cavity_grey) {
+        images.cavity = enclosed_by(tissue, fixed.geometry);
+        fixed.voxels.setTo(*tissue.cavity_grey, images.cavity.voxels);
+    }
     const Eigen::Matrix3Xd inside = places(tissue, 2000, 0, random).fixed;
     images.view = view_of(inside, after.col(random.index(int(after.cols()))), random.uniform(least_share, most_share));
     images.moving = noisy(moving, noise, random);

@@ -21,12 +21,6 @@ Eigen::VectorXd nodal_areas(const tled::QuadraticMesh& mesh, const std::vector<m
     return areas.row(0).transpose().cwiseMax(0);
 }
 
-std::vector<meshing::InterfaceFace> outer_faces(const meshing::TetMesh& mesh) {
-    std::vector<meshing::InterfaceFace> faces = meshing::interface_faces(mesh);
-    std::erase_if(faces, [](const meshing::InterfaceFace& face) { return face.outer != 0; });
-    return faces;
-}
-
 void lay_bed(const Bed& bed, const tled::QuadraticMesh& mesh, const Eigen::VectorXd& areas,
              std::vector<tled::Spring>& springs) {
     for (int node = 0; node < mesh.node_count(); ++node) {
@@ -39,6 +33,12 @@ void lay_bed(const Bed& bed, const tled::QuadraticMesh& mesh, const Eigen::Vecto
 }
 
 }  // namespace
+
+std::vector<meshing::InterfaceFace> outer_faces(const meshing::TetMesh& mesh) {
+    std::vector<meshing::InterfaceFace> faces = meshing::interface_faces(mesh);
+    std::erase_if(faces, [](const meshing::InterfaceFace& face) { return face.outer != 0; });
+    return faces;
+}
 
 double Cap::weight(const Vector3d& point) const {
     const double r = (point - middle).norm() / radius_mm;
@@ -88,7 +88,12 @@ RandomLoads scaled(RandomLoads loads, double factor) {
 
 tled::NodalConditions conditions_on(const tled::QuadraticMesh& mesh, const meshing::TetMesh& corners,
                                     const OrganShape& shape, const RandomLoads& loads) {
-    const std::vector<meshing::InterfaceFace> faces = outer_faces(corners);
+    return conditions_on(mesh, corners, outer_faces(corners), shape, loads);
+}
+
+tled::NodalConditions conditions_on(const tled::QuadraticMesh& mesh, const meshing::TetMesh& corners,
+                                    const std::vector<meshing::InterfaceFace>& faces, const OrganShape& shape,
+                                    const RandomLoads& loads) {
     const Eigen::VectorXd areas = nodal_areas(mesh, faces);
     tled::Conditions conditions;
     conditions.external_force = tled::body_load(mesh, loads.body_force);

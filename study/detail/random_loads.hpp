@@ -47,8 +47,15 @@ RandomLoads random_loads(const OrganShape& shape, double youngs_modulus_kpa, Ran
 /// The loads times a factor; what is held stays held.
 RandomLoads scaled(RandomLoads loads, double factor);
 
+/// Faces of a mesh to the outside.
+std::vector<meshing::InterfaceFace> outer_faces(const meshing::TetMesh& mesh);
+
 /// On a mesh: springs with the consistent areas of its nodes, and nodal forces.
 tled::NodalConditions conditions_on(const tled::QuadraticMesh& mesh, const meshing::TetMesh& corners,
                                     const OrganShape& shape, const RandomLoads& loads);
+/// The same on these of the outer faces.
+tled::NodalConditions conditions_on(const tled::QuadraticMesh& mesh, const meshing::TetMesh& corners,
+                                    const std::vector<meshing::InterfaceFace>& faces, const OrganShape& shape,
+                                    const RandomLoads& loads);
 
 }  // namespace tissuewarp::study::detail

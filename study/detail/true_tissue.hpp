@@ -16,7 +16,8 @@ struct TrueTissue {
     Map forward, backward;                                         ///< moving → fixed frame and back; of tissue alone
     Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();   ///< moving → fixed, of what surrounds the organ
     Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-    double reach = 0, length = 0;  ///< mm: of a ball about the centre that holds the organ; of the organ
+    double reach = 0, length = 0;            ///< mm: of a ball about the centre that holds the organ; of the organ
+    std::optional<double> cavity_grey = {};  ///< of what fills the hole of resected tissue, in images; none: no hole
 };
 
 }  // namespace tissuewarp::study::detail

@@ -26,6 +26,8 @@ double volume(const imaging::Volume& labels) {
            labels.geometry.voxel_volume();
 }
 
+}  // namespace
+
 tled::QuadraticTetrahedra elements_of(const TruthMesh& mesh, const RandomTissue& tissue) {
     constexpr double locks_from = 0.475;
     const auto pressure =
@@ -33,7 +35,13 @@ tled::QuadraticTetrahedra elements_of(const TruthMesh& mesh, const RandomTissue&
     return {mesh.quadratic, tissue.materials, {tled::Quadrature::Points4, pressure}};
 }
 
-}  // namespace
+double bearable_jacobians(const tled::QuadraticTetrahedra& energy, const Matrix3Xd& displacement) {
+    const Eigen::VectorXd jacobians = energy.jacobians(displacement);
+    if (jacobians.minCoeff() < least_jacobian || jacobians.maxCoeff() > largest_jacobian)
+        throw SolverFailure("the truth has det F from " + std::to_string(jacobians.minCoeff()) + " to " +
+                            std::to_string(jacobians.maxCoeff()) + ", which tissue does not survive");
+    return jacobians.minCoeff();
+}
 
 TruthMesh truth_mesh(const OrganShape& shape, int elements, Observer& observer) {
     const imaging::Volume labels = draw(shape, 0.02 * shape.length());
@@ -70,11 +78,7 @@ Truth equilibrium(const RandomOrgan& organ, TruthMesh mesh, Observer& observer) 
     Truth truth;
     truth.displacement = tled::newton_equilibrium(energy, conditions, {.tolerance_mm = 1e-5}, observer).displacement;
     truth.mesh = std::move(mesh);
-    const Eigen::VectorXd jacobians = energy.jacobians(truth.displacement);
-    truth.min_jacobian = jacobians.minCoeff();
-    if (truth.min_jacobian < least_jacobian || jacobians.maxCoeff() > largest_jacobian)
-        throw SolverFailure("the truth has det F from " + std::to_string(truth.min_jacobian) + " to " +
-                            std::to_string(jacobians.maxCoeff()) + ", which tissue does not survive");
+    truth.min_jacobian = bearable_jacobians(energy, truth.displacement);
     return truth;
 }
 

@@ -28,6 +28,11 @@ struct RandomOrgan {
 };
 RandomOrgan random_organ(Random& random);
 
+tled::QuadraticTetrahedra elements_of(const TruthMesh& mesh, const RandomTissue& tissue);
+
+/// The smallest det F. Throws SolverFailure where tissue is crushed or torn apart (out of 0.3 … 3).
+double bearable_jacobians(const tled::QuadraticTetrahedra& energy, const Eigen::Matrix3Xd& displacement);
+
 /// The organ's loads scaled so that linear elasticity would move no node by more than `motion_mm`.
 RandomLoads sized_loads(const RandomOrgan& organ, const TruthMesh& mesh, double motion_mm);
 

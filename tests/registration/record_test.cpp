@@ -319,8 +319,8 @@ TEST_F(Records, OfForeignFormatsAreRefused) {
 
 TEST_F(Records, OfANewerVersionAreRefused) {
     write();
-    set_version(3);
-    EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr("format version 3")));
+    set_version(4);
+    EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr("format version 4")));
 }
 
 TEST_F(Records, WithNodeIndicesOutOfRangeAreRefused) {
