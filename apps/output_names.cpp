@@ -46,6 +46,10 @@ bool writes(const RegisterOptions& options, const OptionalOutput& output) {
     return true;
 }
 
+bool writes_cavity(const RegisterOptions& options) {
+    return options.find_resected && options.match_image && options.fixed_labels.empty();
+}
+
 std::vector<std::string> output_names(const RegisterOptions& options) {
     std::vector<std::string> names;
     if (!options.moving.empty()) names.emplace_back("warped.nii.gz");
@@ -53,6 +57,7 @@ std::vector<std::string> output_names(const RegisterOptions& options) {
          {"warped_labels.nii.gz", moving_to_fixed_name, fixed_to_moving_name, transform_name, "mesh.vtu", "record.h5"})
         names.emplace_back(name);
     if (!options.resected.empty() || options.find_resected) names.emplace_back(gap_name);
+    if (writes_cavity(options)) names.emplace_back(cavity_name);
     if (!options.no_error_estimate)
         for (const char* name : {"uncertainty.nii.gz", "uncertainty_trust.nii.gz"}) names.emplace_back(name);
     if (options.landmarks.given()) names.emplace_back("warped_landmarks.csv");
@@ -72,6 +77,7 @@ bool is_register_output(const std::string& name) {
     RegisterOptions all;
     all.moving = all.landmarks.csv = all.points = all.surface = "given";
     all.resected = {1};
+    all.find_resected = all.match_image = true;
     const std::filesystem::path path(name);
     for (const OptionalOutput& output : optional_outputs)
         if (name == output.file) return true;

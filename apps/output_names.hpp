@@ -12,6 +12,7 @@ namespace tissuewarp::apps {
 inline constexpr const char* moving_to_fixed_name = "displacement_moving_to_fixed.nii.gz";
 inline constexpr const char* fixed_to_moving_name = "displacement_fixed_to_moving.nii.gz";
 inline constexpr const char* gap_name = "gap.nii.gz";
+inline constexpr const char* cavity_name = "cavity.nii.gz";
 inline constexpr const char* transform_name = "transform.h5";
 
 /// Files that are written when --write names them.
@@ -38,6 +39,9 @@ std::vector<std::string> words_of_write();
 
 /// Whether --write asks for a file of `optional_outputs` that these inputs can give.
 bool writes(const RegisterOptions& options, const OptionalOutput& output);
+
+/// Whether what is gone is sought in an image alone.
+bool writes_cavity(const RegisterOptions& options);
 
 /// Names of the files in the output folder.
 std::vector<std::string> output_names(const RegisterOptions& options);

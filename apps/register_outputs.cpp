@@ -223,6 +223,8 @@ void start_writing_warped(const RegistrationRun& run, const OutputFolder& output
             writer.start("warped.nii.gz", [&](auto& path) { write_volume(products.warped, path); });
         writer.start("warped_labels.nii.gz", [&](auto& path) { write_volume(compact(products.warped_labels), path); });
         if (!products.gap.empty()) writer.start(gap_name, [&](auto& path) { write_volume(products.gap, path); });
+        if (writes_cavity(run.options))
+            writer.start(cavity_name, [&](auto& path) { write_volume(run.resection->cavity, path); });
         writer.start("mesh.vtu", [&](auto& path) { write_mesh(run.result.deformation, path); });
         if (products.surface)
             writer.start(surface_name(run.options),

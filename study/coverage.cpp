@@ -28,7 +28,7 @@ bool is_image(Evidence evidence) {
 
 /// What a registration without resected tissue leaves open.
 struct Hole {
-    double dice = 0;  ///< with the true cavity
+    double dice = 0;  ///< of the hole or the found cavity with the true cavity
     int doubts = 0;   ///< of what was found to be gone
 };
 
@@ -107,22 +107,21 @@ public:
         return *without_found_;
     }
 
-    /// The hole that a registration by an image leaves; nothing where none is to be.
+    /// The hole that a registration by an image leaves, or the cavity that was found in it; nothing where none is to
+    /// be.
     std::optional<Hole> hole(Evidence evidence, const PreparedModel& prepared,
                              const registration::Deformation& deformation) {
         if (phantom_.resected.empty() || !is_image(evidence) || evidence == Evidence::Ultrasound) return std::nullopt;
         const imaging::Volume& truth = images().cavity;
-        Hole result{0, 0};
         imaging::Volume gap(truth.geometry, CV_8UC1);
-        if (!prepared.resected.empty()) {
+        if (!prepared.resected.empty())
             gap = gap_after(deformation, prepared.resected, displacement_fixed_to_moving(deformation, truth.geometry));
-            const auto count = [](const cv::Mat& mask) { return double(cv::countNonZero(mask.reshape(1, 1))); };
-            cv::Mat both;
-            cv::bitwise_and(imaging::mask_of_all(gap).voxels, imaging::mask_of_all(truth).voxels, both);
-            result.dice = 2 * count(both) / (count(gap.voxels) + count(truth.voxels));
-        }
-        if (found_) result.doubts = count_of_severe(doubts_of(*found_, gap));
-        return result;
+        const imaging::Volume told = imaging::mask_of_all(found_ ? found_->cavity : gap);
+        const auto count = [](const cv::Mat& mask) { return double(cv::countNonZero(mask.reshape(1, 1))); };
+        cv::Mat both;
+        cv::bitwise_and(told.voxels, imaging::mask_of_all(truth).voxels, both);
+        return Hole{2 * count(both) / (count(told.voxels) + count(truth.voxels)),
+                    found_ ? count_of_severe(doubts_of(*found_, gap)) : 0};
     }
 
     /// Of a partial image or ultrasound: whether it shows where the target is. Of everything else yes.

@@ -57,7 +57,7 @@ struct CoverageRow {
     double moved_mm = 0;    ///< elastic displacement that the registration gave it
     bool in_view = true;    ///< where it truly is lies in what was seen
     registration::ErrorEstimate estimate;
-    double cavity_dice = -1;  ///< of the registration, by images: of its hole with the true cavity; -1 without one
+    double cavity_dice = -1;  ///< of the registration, by images: of its hole, or the cavity found, with the true one; -1: none
 };
 
 /// Registers the phantoms of the seeds to each kind of evidence. Each seed's rows are kept in

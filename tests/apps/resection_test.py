@@ -138,6 +138,7 @@ class ResectionsOfAPatient(PhantomTest):
         report, gap = self.register("--resected", "auto", "--rounds", 2, fixed_labels=None)
         self.assertIn("resected.not_found", [doubt["code"] for doubt in report["doubts"]])
         self.assertEqual((report["resected"]["labels"], gap.max()), ([], 0))
+        self.assertEqual(voxels(self.phantom.output / "cavity.nii.gz").max(), 0)
 
     def test_tissue_that_is_still_there_is_doubted(self):
         report, _ = self.register("--resected", "2")
