@@ -55,7 +55,7 @@ class Mesh:
 class PrepareOptions:
     def __init__(self, edge_length: float, label_edge_length: Dict[int, float],
                  materials: Dict[int, Tuple[float, float]], default_material: Tuple[float, float], anchors: List[int],
-                 rigid_neighbours: List[int]) -> None: ...
+                 rigid_neighbours: List[int], resected: List[int]) -> None: ...
 
 class PreparedModel:
     @property
