@@ -17,12 +17,20 @@ double strain_energy_unit(const PreparedModel& prepared, const TissuePrior& tiss
     return modulus * tissue.expected_strain * tissue.expected_strain * std::pow(tissue.strain_length_mm, 3);
 }
 
+namespace {
+
+/// Of the wall of a cavity: free, and still a piece of tissue that nothing else holds stays somewhere. As surfaces in
+/// view (ImageOptions::expected_motion_mm).
+constexpr double cavity_wall_motion_mm = 100;
+
+}  // namespace
+
 std::vector<tled::Spring> ground_springs(const PreparedModel& prepared, double energy,
                                          const std::function<ExpectedMotion(const InterfaceNode&)>& expected) {
     std::vector<tled::Spring> springs;
     for (const InterfaceNode& node : prepared.interfaces.nodes()) {
-        if (node.outer != 0 || node.at_cavity) continue;
-        const ExpectedMotion motion = expected(node);
+        if (node.outer != 0) continue;
+        const ExpectedMotion motion = node.at_cavity ? ExpectedMotion(cavity_wall_motion_mm) : expected(node);
         const Eigen::Matrix3d across = node.normal * node.normal.transpose(),
                               along = Eigen::Matrix3d::Identity() - across,
                               information = across / (motion.across_mm * motion.across_mm) +

@@ -26,9 +26,9 @@ struct ExpectedMotion {
     ExpectedMotion(double across, double along) : across_mm(across), along_mm(along) {}
 };
 
-/// Weak springs from every node of the outer surface, but the wall of a cavity, to where the rigid placement has it:
-/// the prior that it moved as far as `expected` says of it. `energy` is the strain energy (mN mm) that weighs as much
-/// as one standard deviation.
+/// Weak springs from every node of the outer surface to where the rigid placement has it: the prior that it moved as
+/// far as `expected` says of it, the wall of a cavity as far as it likes. `energy` is the strain energy (mN mm) that
+/// weighs as much as one standard deviation.
 std::vector<tled::Spring> ground_springs(const PreparedModel& prepared, double energy,
                                          const std::function<ExpectedMotion(const InterfaceNode&)>& expected);
 
