@@ -4,6 +4,7 @@
 #include "python/core/bindings.hpp"
 #include "python/core/observer.hpp"
 #include "registration/field/inverse_transform.hpp"
+#include "registration/matching/image_matching.hpp"
 #include "registration/rigid_surroundings.hpp"
 #include "registration/uncertainty.hpp"
 #include "registration/warp.hpp"
