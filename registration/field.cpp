@@ -37,13 +37,13 @@ void require_usable(const Deformation& deformation, const FieldOptions& options)
             throw InvalidInput("deformation: the displacement of node " + std::to_string(n) + " is not finite");
     if (!deformation.placement.matrix().allFinite())
         throw InvalidInput("deformation: the placement is not finite; give a rigid motion");
+    if (!(options.fade_mm >= 1.0 && options.fade_mm <= 1e4))
+        throw InvalidInput("fade distance " + std::to_string(options.fade_mm) + " mm; give one from 1 to 10000 mm");
     if (!deformation.surroundings) return;
     if (!deformation.surroundings->motion.matrix().allFinite())
         throw InvalidInput("deformation: the motion of the surroundings is not finite; give a rigid motion");
     if (deformation.surroundings->rigid.voxels.type() != CV_8UC1)
         throw InvalidInput("deformation: the mask of rigid surroundings must be of uint8; give rigid_surroundings()");
-    if (!(options.fade_mm >= 1.0 && options.fade_mm <= 1e4))
-        throw InvalidInput("fade distance " + std::to_string(options.fade_mm) + " mm; give one from 1 to 10000 mm");
 }
 
 Volume rigid_mask(const Deformation& deformation) {

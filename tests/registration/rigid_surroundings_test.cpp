@@ -1,5 +1,6 @@
 #include "registration/rigid_surroundings.hpp"
 
+#include "core/errors.hpp"
 #include "imaging/sampling.hpp"
 #include "meshing/point_location.hpp"
 #include "registration/evaluation.hpp"
@@ -116,7 +117,7 @@ TEST(RigidSurroundings, BoneThatStayedIsHeldInBothFieldsWhichDoNotFold) {
     int returned = 0;
     for_each_voxel(backward, [&](const Eigen::Vector3d& index, std::int64_t n) {
         const Eigen::Vector3d y = placed.point(index), z = motion.inverse() * y;
-        if (!imaging::nearest_value<std::uint8_t>(rigid, z)) return;
+        if (!imaging::nearest_value<std::uint8_t>(rigid, z) || z.norm() < bone_from) return;
         ++returned;
         ASSERT_LT((vector_at(backward, n) - (z - y)).norm(), 1e-4) << y.transpose();
     });
@@ -167,6 +168,14 @@ TEST(RigidSurroundings, ImagesOfSeveralComponentsLeaveWhatIsKnown) {
     const auto same = rigid_surroundings(deformation, vectors, vectors);
     ASSERT_TRUE(same);
     EXPECT_EQ(same->rigid.voxels.data, deformation.surroundings->rigid.voxels.data);
+}
+
+TEST(RigidSurroundings, FieldsRefuseWhatIsNone) {
+    Deformation deformation = sagged();
+    deformation.surroundings = {test::motion(1, {1, 0, 0}, {0, std::nan(""), 0}), Volume(grid, CV_8UC1)};
+    EXPECT_THROW(displacement_moving_to_fixed(deformation, grid), InvalidInput);
+    deformation.surroundings = {of_bone, Volume(grid, CV_32FC1)};
+    EXPECT_THROW(displacement_fixed_to_moving(deformation, grid), InvalidInput);
 }
 
 }  // namespace
