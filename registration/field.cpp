@@ -4,7 +4,6 @@
 #include "meshing/point_location.hpp"
 #include "registration/field/continuation.hpp"
 #include "registration/field/growth.hpp"
-#include "registration/field/mesh_labels.hpp"
 #include "registration/field/rasterisation.hpp"
 #include "registration/field/row_inverse.hpp"
 #include "registration/field/uninitialised.hpp"
@@ -193,17 +192,19 @@ Volume displacement_fixed_to_moving(const Deformation& given, const Geometry& fi
     observer.checkpoint(stage, 0.15);
     const meshing::BoundarySurface boundary = meshing::boundary_surface(mesh);
     std::optional<detail::Continuation> forward;
-    if (!raster.full())
-        forward.emplace(mesh.nodes, mesh.tets, boundary, deformation.displacement, options.fade_mm,
-                        rigid_mask(deformation));
     detail::LazyContinuation backward([&] {
         return detail::Continuation(deformed, mesh.tets, boundary, inverse, options.fade_mm, rigid_mask(deformation));
     });
-    observer.checkpoint(stage, 0.6);
-    const imaging::MaskLookup organ(
-        deformation.surroundings ? mask_of_mesh(mesh, deformation.surroundings->rigid.geometry) : Volume());
-    complete(raster, fixed_grid, Eigen::Matrix3d::Identity(), to_moving.linear() - Eigen::Matrix3d::Identity(),
-             to_moving.translation(), [&] { return detail::RowInverse(*forward, backward, organ); });
+    const Eigen::Matrix3d identity = Eigen::Matrix3d::Identity(), linear = to_moving.linear() - identity;
+    if (deformation.surroundings) {  // tissue parts from them: the forward field leaves gaps, where it has no inverse
+        complete(raster, fixed_grid, identity, linear, to_moving.translation(),
+                 [&] { return [&](int, const Eigen::Vector3d& z) { return backward(z); }; });
+    } else {
+        if (!raster.full()) forward.emplace(mesh.nodes, mesh.tets, boundary, deformation.displacement, options.fade_mm);
+        observer.checkpoint(stage, 0.6);
+        complete(raster, fixed_grid, identity, linear, to_moving.translation(),
+                 [&] { return detail::RowInverse(*forward, backward); });
+    }
     observer.progress(stage, 1.0);
     return raster.values;
 }

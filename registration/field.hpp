@@ -6,7 +6,9 @@
 /// coordinates. Outside the mesh both continue it: equal to the field on the surface, and from there smoothly
 /// (harmonically where it is gentle, with less slope where that would fold) into the rigid placement, reached `fade_mm`
 /// away from the organ. There the backward field inverts the forward one numerically, to about 0.01 mm where the field
-/// does not fold.
+/// does not fold. Where the surroundings' motion is known (Deformation::surroundings) that motion takes the place of
+/// the placement, rigid ones move by it but for 2.5 mm at their edges, and the backward field is continued on its own: tissue that parts from
+/// bone leaves places to which no preoperative point comes.
 
 #include "core/observer.hpp"
 #include "imaging/volume.hpp"

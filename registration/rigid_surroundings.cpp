@@ -29,18 +29,19 @@ struct SurroundingsOptions {
     double least_structure = 1;    ///< of what such a step leaves over what no motion leaves, beyond that
     double noise_share = 2e-3;     ///< of the image's variance, that no comparison is taken to be more exact than
     double gain = 1.4;             ///< what the continued displacement must leave over what no motion leaves
+    double layer_mm = 2.5;         ///< around the organ, that is never rigid
     double nearest_mm = 0.3;       ///< motions below it are none
     double negligible_mm = 0.05;   ///< continued displacements below it are not looked at
 };
 constexpr SurroundingsOptions choice;
 
-/// A mask without what the organ covers, before or after it deformed.
+/// A mask without what the organ covers, before or after it deformed, and a layer around it that may open or close.
 Volume beside_organ(const Volume& mask, const Deformation& deformation) {
     const auto& mesh = deformation.mesh;
     Volume result = mask.clone();
     const meshing::TetMesh deformed{mesh.nodes + deformation.displacement, mesh.tets, mesh.labels};
     for (const meshing::TetMesh* organ : {&mesh, &deformed})
-        result.voxels.setTo(0, mask_of_mesh(*organ, mask.geometry).voxels);
+        result.voxels.setTo(0, imaging::dilate(mask_of_mesh(*organ, mask.geometry), choice.layer_mm).voxels);
     return result;
 }
 

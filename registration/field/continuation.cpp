@@ -370,12 +370,7 @@ Continuation::Continuation(Continuation&&) noexcept = default;
 Continuation& Continuation::operator=(Continuation&&) noexcept = default;
 
 Eigen::Vector3d Continuation::operator()(const Eigen::Vector3d& point) const {
-    if (rests(point)) return Eigen::Vector3d::Zero();
     return impl_->interpolated(point) + impl_->correction(point);
-}
-
-bool Continuation::rests(const Eigen::Vector3d& point) const {
-    return !impl_->rigid.empty() && impl_->rigid(point);
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -14,6 +14,7 @@ struct ContinuationOptions {
     double spacings_of_fade = 4.0;   ///< in the fade distance, at least
     double most_nodes = 1.2e6;       ///< larger organs get a coarser grid
     double stiffening = 0.2;         ///< |∇u| from which the continuation resists steeper gradients
+    double least_share = 0.01;       ///< of a value that would lead into rigid surroundings, that it is shortened by
     double blend_spacings = 1.25;    ///< thickness of the correcting layer at the surface, in grid spacings
     int coarsest_nodes = 16;         ///< along the shortest side of a grid that is not coarsened any more
     int coarsest_rounds = 20, rounds = 4, sweeps = 3;  ///< of weights, there and elsewhere; sweeps under each
@@ -29,7 +30,7 @@ struct ContinuationOptions {
 /// millimetres of the surface, so that the field is continuous there. In that layer and on the grid the continuation
 /// also approximates the field inside the mesh, which the inversion of a continued field needs close to the surface.
 ///
-/// Rigid surroundings are at rest: the grid's nodes in them hold zero, and so does every point in one of their voxels.
+/// Rigid surroundings are at rest: nodes of the grid in them hold zero.
 class Continuation {
 public:
     /// `nodes` 3 × N mm, positions of the mesh whose elements and outer boundary are given; `values` 3 × N, mm; `rigid`
@@ -43,8 +44,6 @@ public:
 
     /// The value at a point (mm, the frame of `nodes`). Thread-safe.
     [[nodiscard]] Eigen::Vector3d operator()(const Eigen::Vector3d& point) const;
-    /// Whether a point lies in rigid surroundings.
-    [[nodiscard]] bool rests(const Eigen::Vector3d& point) const;
 
 private:
     struct Impl;

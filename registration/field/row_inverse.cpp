@@ -42,14 +42,6 @@ Inverse inverted(const Continuation& forward, const Eigen::Vector3d& z, Eigen::V
     return {w - inverse_gradient * residual, true};  // the next step, not worth its evaluation
 }
 
-/// w such that z + w lies beside the organ, on the side to which tissue parted from z.
-Eigen::Vector3d out_of(const imaging::MaskLookup& organ, const Eigen::Vector3d& z, Eigen::Vector3d w) {
-    const Eigen::Vector3d step = row_inverse_options.clear_mm * w.normalized();
-    int steps = 0;
-    for (; steps < row_inverse_options.steps_out && organ(z + w); ++steps) w += step;
-    return steps > 0 ? Eigen::Vector3d(w + step) : w;
-}
-
 }  // namespace
 
 Eigen::Vector3d LazyContinuation::operator()(const Eigen::Vector3d& point) {
@@ -61,17 +53,11 @@ Eigen::Vector3d LazyContinuation::operator()(const Eigen::Vector3d& point) {
 Eigen::Vector3d RowInverse::operator()(int i, const Eigen::Vector3d& z) {
     constexpr double negligible = row_inverse_options.negligible_mm, exact = row_inverse_options.exact_mm;
     known_ = i == last_ + 1 ? std::min(known_ + 1, 2) : 0;
-    Inverse found{Eigen::Vector3d::Zero(), forward_.rests(z)};
-    if (!found.converged && known_ == 2) found = inverted(forward_, z, 2.0 * before_ - two_before_, negligible);
+    Inverse found{Eigen::Vector3d::Zero(), false};
+    if (known_ == 2) found = inverted(forward_, z, 2.0 * before_ - two_before_, negligible);
     if (!found.converged) found = inverted(forward_, z, Eigen::Vector3d::Zero(), exact);
-    if (!found.converged || organ_(z + found.w)) {
-        const Eigen::Vector3d continued = backward_(z);
-        found = inverted(forward_, z, continued, negligible);
-        if (!found.converged || organ_(z + found.w)) {  // nothing came here: tissue parted from what stayed
-            found.w = out_of(organ_, z, continued);
-            known_ = -1;
-        }
-    }
+    if (!found.converged) found = inverted(forward_, z, backward_(z), negligible);
+    if (!found.converged) known_ = -1;
     two_before_ = before_;
     before_ = found.w;
     last_ = i;

@@ -1,7 +1,6 @@
 #pragma once
 /// The inverse of a continued field along rows of voxels.
 
-#include "imaging/mask_lookup.hpp"
 #include "registration/field/continuation.hpp"
 
 #include <functional>
@@ -16,8 +15,6 @@ struct RowInverseOptions {
     double negligible_mm = 0.01;  ///< residual before a last step, along a row
     double exact_mm = 1e-3;       ///< the same from rest, which a row begins with
     int steps = 6, halvings = 3;  ///< at most
-    double clear_mm = 0.5;        ///< steps out of the organ
-    int steps_out = 6;            ///< of them, at most
 };
 inline constexpr RowInverseOptions row_inverse_options{};
 
@@ -36,13 +33,10 @@ private:
 
 /// w(z) = X − z with X + u(X) = z, u the continued forward field, at consecutive voxels of a row: where two are known
 /// the next is guessed from their line, which needs one evaluation in most places; at first, from rest; and where that
-/// leads nowhere, from the continued inverse, which few fields need. Where no X comes to z, since tissue parted from
-/// rigid surroundings, the continued inverse itself, which runs from the one to the other.
+/// leads nowhere, from the continued inverse, which few fields need.
 class RowInverse {
 public:
-    /// `organ`: where the tissue lay, so that nothing beside it now is taken from within it; or empty.
-    RowInverse(const Continuation& forward, LazyContinuation& backward, const imaging::MaskLookup& organ)
-        : forward_(forward), backward_(backward), organ_(organ) {}
+    RowInverse(const Continuation& forward, LazyContinuation& backward) : forward_(forward), backward_(backward) {}
 
     /// Voxel i of the row, which lies at z (mm, moving frame); calls come with ascending i.
     Eigen::Vector3d operator()(int i, const Eigen::Vector3d& z);
@@ -50,7 +44,6 @@ public:
 private:
     const Continuation& forward_;
     LazyContinuation& backward_;
-    const imaging::MaskLookup& organ_;
     Eigen::Vector3d before_ = Eigen::Vector3d::Zero(), two_before_ = Eigen::Vector3d::Zero();
     int last_ = -2, known_ = 0;
 };

@@ -4,6 +4,7 @@
 #include "imaging/sampling.hpp"
 #include "meshing/point_location.hpp"
 #include "registration/evaluation.hpp"
+#include "registration/evaluation/percentile.hpp"
 #include "registration/field/inverse_transform.hpp"
 #include "textured_phantom.hpp"
 
@@ -92,36 +93,36 @@ TEST(RigidSurroundings, BoneThatStayedIsHeldInBothFieldsWhichDoNotFold) {
     const Volume& rigid = deformation.surroundings->rigid;
     const Eigen::Isometry3d& motion = deformation.surroundings->motion;
     const Share held = held_bone(rigid);
-    EXPECT_LT(Eigen::AngleAxisd((motion.inverse() * of_bone).linear()).angle(), 0.001);
-    EXPECT_LT((motion.inverse() * of_bone).translation().norm(), 0.05);
+    const Eigen::Isometry3d off = motion.inverse() * of_bone;  // a tenth of a voxel at the bone
+    EXPECT_LT(Eigen::AngleAxisd(off.linear()).angle() * bone_to + off.translation().norm(), 0.2);
     ASSERT_GT(held.all, 300);
     EXPECT_GT(held.value(), 0.98);
 
     const Volume forward = displacement_moving_to_fixed(deformation, grid);
     const PointTransform at(deformation);
     const InversePointTransform back(deformation);
-    int still = 0;
+    std::vector<double> forward_off, backward_off;
     for_each_voxel(forward, [&](const Eigen::Vector3d& index, std::int64_t n) {
         const Eigen::Vector3d X = grid.point(index), y = motion * X;
         if (!imaging::nearest_value<std::uint8_t>(rigid, X)) return;
-        ++still;
-        ASSERT_LT((vector_at(forward, n) - (y - X)).norm(), 1e-4) << X.transpose();
-        ASSERT_LT((at(Eigen::Matrix3Xd(X)).col(0) - y).norm(), 1e-9);
-        ASSERT_LT((back(Eigen::Matrix3Xd(y)).col(0) - X).norm(), 1e-4);
+        const double beside = (vector_at(forward, n) - (y - X)).norm();
+        forward_off.push_back(beside);
+        ASSERT_NEAR((at(Eigen::Matrix3Xd(X)).col(0) - y).norm(), beside, 1e-4);
+        ASSERT_LT((at(back(Eigen::Matrix3Xd(y))).col(0) - y).norm(), 1e-4);
     });
-    EXPECT_GT(still, 1000);
+    ASSERT_GT(forward_off.size(), 1000U);
+    EXPECT_LT(detail::percentile(forward_off, 95), 0.1);
     EXPECT_EQ(field_jacobians(forward).folded, 0);
     const Geometry placed = fixed.geometry;
     const Volume backward = displacement_fixed_to_moving(deformation, placed);
     EXPECT_EQ(field_jacobians(backward).folded, 0);
-    int returned = 0;
     for_each_voxel(backward, [&](const Eigen::Vector3d& index, std::int64_t n) {
         const Eigen::Vector3d y = placed.point(index), z = motion.inverse() * y;
         if (!imaging::nearest_value<std::uint8_t>(rigid, z) || z.norm() < bone_from) return;
-        ++returned;
-        ASSERT_LT((vector_at(backward, n) - (z - y)).norm(), 1e-4) << y.transpose();
+        backward_off.push_back((vector_at(backward, n) - (z - y)).norm());
     });
-    EXPECT_GT(returned, 1000);
+    ASSERT_GT(backward_off.size(), 1000U);
+    EXPECT_LT(detail::percentile(backward_off, 95), 0.1);
 }
 
 TEST(RigidSurroundings, WhatMovedAlongWithTheOrganIsNotHeld) {
