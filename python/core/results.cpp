@@ -4,7 +4,6 @@
 #include "python/core/bindings.hpp"
 #include "python/core/observer.hpp"
 #include "registration/field/inverse_transform.hpp"
-#include "registration/matching/image_matching.hpp"
 #include "registration/rigid_surroundings.hpp"
 #include "registration/uncertainty.hpp"
 #include "registration/warp.hpp"
@@ -127,12 +126,10 @@ void bind_uncertainty(py::module_& module) {
 void bind_fields(py::module_& module) {
     module.def(
         "hold_surroundings",
-        [](UpdateResult& result, const PreparedModel& model, const imaging::Volume& fixed) {
-            if (model.image)
-                result.deformation.surroundings =
-                    registration::rigid_surroundings(result.deformation, model.image->image, fixed);
+        [](UpdateResult& result, const imaging::Volume& moving, const imaging::Volume& fixed) {
+            result.deformation.surroundings = registration::rigid_surroundings(result.deformation, moving, fixed);
         },
-        py::arg("result"), py::arg("model"), py::arg("fixed"), py::call_guard<py::gil_scoped_release>());
+        py::arg("result"), py::arg("moving"), py::arg("fixed"), py::call_guard<py::gil_scoped_release>());
     module.def(
         "field_moving_to_fixed",
         [](const UpdateResult& result, const imaging::Geometry& grid) {

@@ -130,8 +130,7 @@ class Updater:
         """
         seen = _core.Intraoperative()
         seen.labels = None if labels is None else labels_volume(labels, "labels")
-        fixed = None if image is None else as_image(image)._volume
-        seen.image = fixed
+        seen.image = None if image is None else as_image(image)._volume
         seen.contrasts = [as_image(contrast)._volume for contrast in contrasts]
         seen.surface = None if surface is None else surface._data
         seen.points = None if points is None else points._data
@@ -145,7 +144,7 @@ class Updater:
         finally:
             self._busy.release()
         shown = next((given for given in (grid, image, labels) if given is not None), None)
-        return Result(self._model._core, result, self._tolerance, None if shown is None else geometry_of(shown), fixed)
+        return Result(self._model._core, result, self._tolerance, None if shown is None else geometry_of(shown))
 
 
 

@@ -57,10 +57,8 @@ class Inverse:
 class Result:
     """A registration: moving is before the operation, fixed during it. Lengths are mm, frames LPS."""
 
-    def __init__(self, model, core, tolerance, grid, image=None):
+    def __init__(self, model, core, tolerance, grid):
         self._model, self._core, self._tolerance, self._grid = model, core, tolerance, grid
-        if image is not None:  # bone around the organ stays bone
-            _core.hold_surroundings(core, model, image)
         self._transform = self._uncertainty = self._kept = None
         self.inverse = Inverse(self)
 
@@ -117,6 +115,13 @@ class Result:
         points and meshes; resamplers take inverse.field(). `grid` None: that of the preoperative labels."""
         geometry = self._model.labels.geometry if grid is None else geometry_of(grid)
         return Image._of(_core.field_moving_to_fixed(self._core, geometry))
+
+    def hold_surroundings(self, moving, fixed) -> None:
+        """Bone stays bone: from now on fields, warp() and points outside the organ follow what the grey images before
+        (moving) and during the operation (fixed) both show to have moved as one rigid body around it."""
+        _core.hold_surroundings(self._core, as_image(moving)._volume, as_image(fixed)._volume)
+        self._transform = self._kept = None
+        self.inverse = Inverse(self)
 
     def warp(self, image, grid=None, interpolation: str = "linear", outside: float = 0.0) -> Image:
         """Carries a preoperative image into the operation.

@@ -56,6 +56,7 @@ class SameBits(unittest.TestCase):
         print(f"{len(mesh.tets)} tetrahedra: the same bits")
 
     def test_warped_image_and_labels(self):
+        self.result.hold_surroundings(load("preop"), load("intraop"))
         warped = self.result.warp(load("preop"))
         numpy.testing.assert_array_equal(warped.array.T, written("warped.nii.gz"))
         labels = self.result.warp(load("preop_labels"), interpolation="nearest")
