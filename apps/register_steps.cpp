@@ -17,8 +17,8 @@
 #include "registration/field.hpp"
 #include "registration/io/curves.hpp"
 #include "registration/resection/gap.hpp"
-#include "registration/rigid_surroundings.hpp"
 #include "registration/stretch/stretched_update.hpp"
+#include "registration/surroundings/rigid_surroundings.hpp"
 #include "registration/warp.hpp"
 
 #include <fmt/format.h>

@@ -6,7 +6,7 @@
 #include "registration/engine_choice.hpp"
 #include "registration/pose/start_pose.hpp"
 #include "registration/register.hpp"
-#include "registration/rigid_surroundings.hpp"
+#include "registration/surroundings/rigid_surroundings.hpp"
 
 #include <string>
 #include <utility>

@@ -3,7 +3,7 @@
 #include "meshing/tet_mesh.hpp"
 #include "registration/field.hpp"
 #include "registration/resection/gap.hpp"
-#include "registration/rigid_surroundings.hpp"
+#include "registration/surroundings/rigid_surroundings.hpp"
 #include "registration/warp.hpp"
 #include "server/crc64.hpp"
 

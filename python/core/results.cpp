@@ -4,7 +4,7 @@
 #include "python/core/bindings.hpp"
 #include "python/core/observer.hpp"
 #include "registration/field/inverse_transform.hpp"
-#include "registration/rigid_surroundings.hpp"
+#include "registration/surroundings/rigid_surroundings.hpp"
 #include "registration/uncertainty.hpp"
 #include "registration/warp.hpp"
 

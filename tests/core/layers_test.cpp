@@ -55,12 +55,14 @@ const std::map<std::string, std::set<std::string>> rooms_of_registration{
     {"springs", {}},
     {"evaluation", {"field", "io"}},
     {"field", {}},
+    {"resection", {"boundary", "field"}},
+    {"surroundings", {"field"}},
     {"matching", {"field", "springs"}},
     {"pose", {"io"}},
     {"loads", {"pose", "springs"}},
     {"terms", {"boundary", "evaluation", "io", "loads", "matching", "pose", "springs"}},
     {"uncertainty", {"field", "loads", "pose", "springs"}},
-    {"stretch", {"evaluation", "pose", "terms"}},
+    {"stretch", {"boundary", "evaluation", "pose", "terms"}},
     {"prepared", {"boundary", "io", "loads", "matching", "terms"}},
 };
 

@@ -1,4 +1,4 @@
-#include "registration/rigid_surroundings.hpp"
+#include "registration/surroundings/rigid_surroundings.hpp"
 
 #include "core/errors.hpp"
 #include "imaging/sampling.hpp"

@@ -1,4 +1,4 @@
-#include "registration/field/window_fit.hpp"
+#include "registration/surroundings/window_fit.hpp"
 
 #include "imaging/filters.hpp"
 

@@ -1,4 +1,4 @@
-#include "registration/rigid_surroundings.hpp"
+#include "registration/surroundings/rigid_surroundings.hpp"
 
 #include "imaging/filters.hpp"
 #include "imaging/mask_lookup.hpp"
@@ -6,7 +6,7 @@
 #include "imaging/sampling.hpp"
 #include "registration/field/continuation.hpp"
 #include "registration/field/mesh_labels.hpp"
-#include "registration/field/surroundings_motion.hpp"
+#include "registration/surroundings/surroundings_motion.hpp"
 
 #include <algorithm>
 #include <cmath>

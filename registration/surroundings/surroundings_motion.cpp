@@ -1,4 +1,4 @@
-#include "registration/field/surroundings_motion.hpp"
+#include "registration/surroundings/surroundings_motion.hpp"
 
 #include "imaging/places.hpp"
 #include "imaging/sampling.hpp"

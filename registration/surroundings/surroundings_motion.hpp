@@ -1,7 +1,7 @@
 #pragma once
 /// The rigid motion of what lies around the organ, from two images.
 
-#include "registration/field/window_fit.hpp"
+#include "registration/surroundings/window_fit.hpp"
 
 #include <Eigen/Geometry>
 
