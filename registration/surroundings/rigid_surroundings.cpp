@@ -30,8 +30,9 @@ struct SurroundingsOptions {
     double noise_share = 2e-3;     ///< of the image's variance, that no comparison is taken to be more exact than
     double gain = 1.4;             ///< what the continued displacement must leave over what no motion leaves
     double layer_mm = 2.5;         ///< around the organ, that is never rigid
-    double nearest_mm = 0.3;       ///< motions below it are none
-    double negligible_mm = 0.05;   ///< continued displacements below it are not looked at
+    double most_moved_mm = 8;  ///< of the organ against its surroundings, in the mean, that does not fold between them
+    double nearest_mm = 0.3;   ///< motions below it are none
+    double negligible_mm = 0.05;  ///< continued displacements below it are not looked at
 };
 constexpr SurroundingsOptions choice;
 
@@ -171,6 +172,12 @@ Geometry voxels_around(const Geometry& image, const Geometry& box) {
     return grid;
 }
 
+/// How far the organ moved against surroundings of a motion, root mean square over its nodes.
+double moved_against(const Deformation& deformation, const Eigen::Isometry3d& motion) {
+    const Eigen::Matrix3Xd between = deformation.deformed_nodes() - motion * deformation.mesh.nodes;
+    return std::sqrt(between.squaredNorm() / static_cast<double>(between.cols()));
+}
+
 bool is_usable(const Volume& image) {
     return image.channels() == 1 && *std::min_element(image.geometry.size.begin(), image.geometry.size.end()) >= 2;
 }
@@ -190,7 +197,7 @@ std::optional<Surroundings> rigid_surroundings(const Deformation& given, const V
     };
     const auto motion = detail::motion_of_surroundings(around(choice.motion_spacing_mm),
                                                        {given.placement, Eigen::Isometry3d::Identity()});
-    if (!motion) return given.surroundings;
+    if (!motion || moved_against(given, *motion) > choice.most_moved_mm) return given.surroundings;
     const Deformation deformation = given.with_placement(*motion);
     const detail::Outside outside = around(choice.spacing_mm);
     const auto& mesh = deformation.mesh;

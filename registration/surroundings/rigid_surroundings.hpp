@@ -15,8 +15,9 @@ namespace tissuewarp::registration {
 
 /// How the surroundings moved, with the voxels of the moving image's grid that are rigid; those of
 /// `deformation.surroundings` among them. None of them lies in the organ, before or after it deformed. Only what
-/// `deformation` has where an image has several components or fewer than two voxels along an axis, or where no rigid
-/// motion explains the surroundings. Throws InvalidInput where the deformation is not usable.
+/// `deformation` has where an image has several components or fewer than two voxels along an axis, where no rigid
+/// motion explains the surroundings, or where the organ moved against them by more than 8 mm in the mean. Throws
+/// InvalidInput where the deformation is not usable.
 std::optional<Surroundings> rigid_surroundings(const Deformation& deformation, const imaging::Volume& moving,
                                                const imaging::Volume& fixed, const FieldOptions& options = {});
 

@@ -172,6 +172,14 @@ TEST(RigidSurroundings, ImagesOfSeveralComponentsLeaveWhatIsKnown) {
     EXPECT_EQ(same->rigid.voxels.data, deformation.surroundings->rigid.voxels.data);
 }
 
+// A lung that breathes out moves by centimetres along its ribs: a field from the one to the other folds.
+TEST(RigidSurroundings, AnOrganThatMovedAwayAsAWholeIsNotBridged) {
+    Deformation away = sagged();
+    away.placement = of_bone * test::motion(0, {1, 0, 0}, {0, 10, 0});
+    const Volume moving = test::sampled(grid, head, 1.5, 2);
+    EXPECT_FALSE(rigid_surroundings(away, moving, seen_after(sagged(), 0)));
+}
+
 TEST(RigidSurroundings, FieldsRefuseWhatIsNone) {
     Deformation deformation = sagged();
     deformation.surroundings = {test::motion(1, {1, 0, 0}, {0, std::nan(""), 0}), Volume(grid, CV_8UC1)};
