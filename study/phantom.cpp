@@ -103,9 +103,9 @@ void add_vessels_and_images(Phantom& phantom, const detail::TrueTissue& tissue, 
         detail::Random of_its_own(derived(seed, of_images));
         return detail::drawn_images(tissue, of_its_own);
     };
-    phantom.ultrasound = [tissue, seed] {
+    phantom.ultrasound = [tissue, seed, echoes = options.echoes] {
         detail::Random of_its_own(derived(seed, of_ultrasound));
-        return detail::drawn_ultrasound(tissue, of_its_own);
+        return detail::drawn_ultrasound(tissue, echoes, of_its_own);
     };
 }
 

@@ -32,6 +32,14 @@ struct Misplacement {
     double most_deg = 0, most_mm = 0;
 };
 
+/// What ultrasound shows of what the first image shows too: drawn between these for each patient.
+struct EchoOptions {
+    double least_own = 0.25, most_own = 0.25;  ///< log amplitude of scatterers that the first image does not show
+    double least_shared = 1, most_shared = 1;  ///< of echoes from what it shows, over those of a clear sweep
+};
+/// As faint as real sweeps of a brain are: UltrasoundSearch explains 5 to 35 % of them.
+inline constexpr EchoOptions faint_echoes{0.3, 1.0, 0.2, 0.8};
+
 struct PhantomOptions {
     Family family = Family::Solved;
     imaging::Volume organs = {};               ///< label map whose organs are taken, where they are Labelled or Found
@@ -40,6 +48,7 @@ struct PhantomOptions {
     double boundary_deviation_mm = 0.5;        ///< of the boundaries drawn in the intraoperative map, smooth over 10 mm
     double point_deviation_mm = 0.7;           ///< of surface points and pairs, along each axis
     int targets = 150;                         ///< places all over the organ
+    EchoOptions echoes = {};                   ///< of ultrasound
     std::optional<Misplacement> misplacement = {};  ///< none: what the family has, 10 or 20 degrees and mm
 };
 

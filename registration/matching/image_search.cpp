@@ -26,7 +26,7 @@ ImageSearch::ImageSearch(const meshing::TetMesh& mesh, const ImageModel& moving,
 }
 
 bool ImageSearch::shows_echoes() const {
-    constexpr double most_found = 0.1;  // of the blocks that are expected to be seen
+    constexpr double most_found = 1.0 / 3;  // of the blocks that are expected to be seen (docs/decisions/ultrasound.md)
     if (!is_speckled(fixed_)) return false;
     const State by_headers{Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, mesh_.nodes.cols())};
     const Eigen::Matrix3Xd& points = moving_.blocks.points();

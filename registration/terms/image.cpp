@@ -181,9 +181,9 @@ Contribution ImageTerm::linearise(const RoundPlan& plan, const State& state, Obs
     result.matched = static_cast<int>(matches.size());
     result.mean_residual_mm = mean_residual(matches);
     const bool echoes = search_.similarity() == Similarity::LinearCombination;
-    const DatumKind kind = echoes ? ultrasound_kind
-                                  : image_kind(moving_.image.geometry, fixed_grid_,
-                                               search_.agreement().value_or(shared_errors.full_agreement));
+    const double agreement = search_.agreement().value_or(shared_errors.full_agreement);
+    const DatumKind kind =
+        echoes ? ultrasound_kind(agreement) : image_kind(moving_.image.geometry, fixed_grid_, agreement);
     result.springs = pulled_by(kind, lumped_springs(found_.shares, memory_.forces, state.displacement));
     for (PulledNode& pulled : result.springs)
         if (view_.distance(state.placement * (prepared_.model.mesh.nodes.col(pulled.spring.node) +

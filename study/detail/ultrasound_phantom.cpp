@@ -35,8 +35,11 @@ private:
 /// What both scanners see of tissue at rest.
 class Anatomy {
 public:
-    Anatomy(const TrueTissue& tissue, Random& random)
+    Anatomy(const TrueTissue& tissue, const EchoOptions& echoes, Random& random)
         : tissue_(tissue), organ_(random), around_(random), folds_(random), own_(1, 5, random) {
+        Random of_echoes = random;  // what is drawn besides changes no other draw
+        own_amplitude_ = of_echoes.uniform(echoes.least_own, echoes.most_own);
+        shared_ = std::exp(of_echoes.uniform(std::log(echoes.least_shared), std::log(echoes.most_shared)));
         for (double& level : scatter_) level = std::exp(random.uniform(-0.7, 0.7));
         for (double& slope : slope_) slope = random.uniform(-0.4, 0.4);
         boundary_ = random.uniform(0.5, 2);
@@ -53,15 +56,16 @@ public:
 
     /// Amplitude of the echo along a beam (unit vector in the frame at rest).
     double echo(const Vector3d& X, const Vector3d& beam) const {
-        constexpr double own = 0.25, sheet = 5, sheet_mm = 0.9, lumen = 0.7, per_grey = 0.05, step_mm = 0.75;
+        constexpr double sheet = 5, sheet_mm = 0.9, lumen = 0.7, per_grey = 0.05, step_mm = 0.75;
         const int label = tissue_.label(X);
         const double grey = shown(X);
         const std::size_t kind = std::size_t(label);
-        double scatter = scatter_[kind] * std::exp(own * own_(X) + slope_[kind] * (grey - 100) / 20);
+        double scatter =
+            scatter_[kind] * std::exp(own_amplitude_ * own_(X) + shared_ * slope_[kind] * (grey - 100) / 20);
         const double along = (shown(X + step_mm * beam) - shown(X - step_mm * beam)) / (2 * step_mm);
         double echo = per_grey * std::abs(along);
         if (label > 0) {
-            scatter *= 1 - lumen * organ_.vessel(X);
+            scatter *= 1 - shared_ * lumen * organ_.vessel(X);
             const Vector3d n = slope([&](const Vector3d& p) { return folds_.distance(p); }, X).normalized();
             const double d = folds_.distance(X), reach = Folds::reach(tissue_.outer_distance(X));
             echo += sheet * reach * bell(d, sheet_mm) * facing(n, beam);
@@ -70,7 +74,7 @@ public:
         if (std::abs(out) < 3)
             echo += boundary_ * bell(out, sheet_mm) *
                     facing(slope([&](const Vector3d& p) { return tissue_.outer_distance(p); }, X).normalized(), beam);
-        return scatter + echo;
+        return scatter + shared_ * echo;
     }
 
 private:
@@ -79,7 +83,7 @@ private:
     Folds folds_;
     SmoothValues own_;
     std::array<double, 3> scatter_{}, slope_{};
-    double boundary_ = 1;
+    double boundary_ = 1, own_amplitude_ = 0, shared_ = 1;
 
     /// Interfaces scatter all ways, and most back to where the beam came from.
     static double facing(const Vector3d& normal, const Vector3d& beam) {
@@ -118,10 +122,10 @@ imaging::Geometry grid_of(const Sweep& sweep, double voxel_mm) {
 
 }  // namespace
 
-PhantomUltrasound drawn_ultrasound(const TrueTissue& tissue, Random& random) {
+PhantomUltrasound drawn_ultrasound(const TrueTissue& tissue, const EchoOptions& options, Random& random) {
     constexpr double moving_voxel_mm = 1.25, fixed_voxel_mm = 0.8, noise = 3, most_turn_deg = 15;
     constexpr double distortion_mm = 0.3, distortion_length_mm = 25;
-    const Anatomy anatomy(tissue, random);
+    const Anatomy anatomy(tissue, options, random);
     const SmoothNoise distortion(distortion_mm, distortion_length_mm, random);
     const Eigen::Matrix3Xd after = surface_samples(tissue, 60, random);
     Eigen::Matrix3Xd before(3, after.cols());

@@ -11,6 +11,6 @@ namespace tissuewarp::study::detail {
 /// surfaces; weaker where the beam grazes them, or of what the other image shows as a gradient along the beam) and of
 /// scatterers, whose density depends on the tissue in another way than the other image's grey value, and partly on
 /// something else.
-PhantomUltrasound drawn_ultrasound(const TrueTissue& tissue, Random& random);
+PhantomUltrasound drawn_ultrasound(const TrueTissue& tissue, const EchoOptions& options, Random& random);
 
 }  // namespace tissuewarp::study::detail

@@ -2,6 +2,7 @@
 #include "registration/matching/ultrasound/echo_costs.hpp"
 #include "registration/matching/ultrasound/speckle.hpp"
 #include "registration/matching/ultrasound/ultrasound_search.hpp"
+#include "registration/terms/datum_kind.hpp"
 #include "registration/terms/image.hpp"
 #include "registration/update.hpp"
 #include "tests/registration/doubt_codes.hpp"
@@ -140,6 +141,12 @@ TEST(UltrasoundDoubts, AreOfEchoesThatNothingExplainsAndOfPosesThatFitAsWell) {
     pose.rival_support = 45;
     EXPECT_EQ(codes(detail::doubts_of_echoes(0.01, pose, "image")),
               (std::vector<std::string>{"image.echoes_unexplained", "image.two_poses"}));
+}
+
+TEST(UltrasoundKind, SharesLargerErrorsWhereLessIsExplained) {
+    EXPECT_DOUBLE_EQ(detail::ultrasound_kind(0.9).shared_mm, detail::ultrasound_kind(0.3).shared_mm);
+    EXPECT_NEAR(detail::ultrasound_kind(0.3 / 4).shared_mm, 2 * detail::ultrasound_kind(0.3).shared_mm, 1e-12);
+    EXPECT_DOUBLE_EQ(detail::ultrasound_kind(-1).shared_mm, detail::ultrasound_kind(0.01).shared_mm);
 }
 
 TEST(UltrasoundUpdate, DoubtsEchoesOfSomethingElse) {

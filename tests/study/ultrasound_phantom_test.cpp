@@ -45,5 +45,16 @@ TEST(UltrasoundPhantom, IsMisplacedByNoMoreThanAsked) {
     EXPECT_LT(apart.maxCoeff(), 4 + 0.07 * 160);
 }
 
+TEST(UltrasoundPhantom, FaintEchoesAreOtherEchoesOfTheSameTissue) {
+    PhantomOptions faint = bent();
+    faint.echoes = {0.25, 0.25, 0.2, 0.2};
+    const Phantom phantom = random_phantom(11, bent()), fainter = random_phantom(11, faint);
+    EXPECT_EQ(phantom.targets.fixed, fainter.targets.fixed);
+    const PhantomUltrasound clear = phantom.ultrasound(), seen = fainter.ultrasound();
+    EXPECT_EQ(cv::norm(clear.moving.voxels, seen.moving.voxels, cv::NORM_INF), 0);
+    ASSERT_EQ(clear.fixed.voxels.total(), seen.fixed.voxels.total());
+    EXPECT_GT(cv::norm(clear.fixed.voxels, seen.fixed.voxels, cv::NORM_L1), double(clear.fixed.voxels.total()));
+}
+
 }  // namespace
 }  // namespace tissuewarp::study
