@@ -109,6 +109,18 @@ Volume led_into(const Volume& cavity, const Volume& labels, const Deformation& d
 
 }  // namespace
 
+ImageModelOptions image_of_first_look() {
+    ImageModelOptions options;
+    options.features.count = FirstLook().features;
+    return options;
+}
+
+UpdateOptions for_first_look(UpdateOptions options) {
+    options.image.dense_coarsening = FirstLook().dense_coarsening;
+    options.rematches = std::min(options.rematches, FirstLook().rounds);
+    return options;
+}
+
 FoundResection find_resection(const PreparedModel& whole, const Deformation& deformation, const Volume& moving,
                               const Volume& fixed, Observer& observer) {
     constexpr double margin_mm = 10;
