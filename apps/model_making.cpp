@@ -54,9 +54,11 @@ PreparedModel made_model_for_loads(const PreoperativeOptions& options, const Reg
     return model;
 }
 
-void add_images(PreparedModel& model, const RegistrationInputs& inputs, Observer& observer) {
-    prepare_image(model, inputs.moving_matched, {}, observer);
-    for (const imaging::Volume& contrast : inputs.moving_contrasts) prepare_contrast(model, contrast, {}, observer);
+void add_images(PreparedModel& model, const RegistrationInputs& inputs, Observer& observer,
+                const ImageModelOptions& options) {
+    prepare_image(model, inputs.moving_matched, options, observer);
+    for (const imaging::Volume& contrast : inputs.moving_contrasts)
+        prepare_contrast(model, contrast, options, observer);
 }
 
 }  // namespace tissuewarp::apps

@@ -18,6 +18,7 @@ registration::PreparedModel made_model_for_loads(const PreoperativeOptions& opti
                                                  double edge_length_mm, Observer& observer);
 
 /// What matching images takes: that of --moving, and the contrasts.
-void add_images(registration::PreparedModel& model, const RegistrationInputs& inputs, Observer& observer);
+void add_images(registration::PreparedModel& model, const RegistrationInputs& inputs, Observer& observer,
+                const registration::ImageModelOptions& options = {});
 
 }  // namespace tissuewarp::apps

@@ -253,7 +253,7 @@ void require_inputs_stay(const RegistrationInputs& inputs, const std::filesystem
 }
 
 UpdateResult first_update(const RegistrationRun& run, const PreparedModel& model, Observer& observer) {
-    return update(model, seen(run.inputs, run.options), update_options(run), observer);
+    return update(model, seen(run.inputs, run.options), for_first_look(update_options(run)), observer);
 }
 
 void append(std::vector<StageTime>& times, const std::vector<StageTime>& more) {

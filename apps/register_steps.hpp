@@ -16,7 +16,7 @@ void require_inputs_stay(const RegistrationInputs& inputs, const std::filesystem
 /// Registers run.prepared to what run.inputs hold, judges the result and writes it. Throws what the verbs throw.
 void register_and_write(RegistrationRun& run, OutputFolder& output, StageClock& clock, ProgressLine& progress);
 
-/// A registration to all that was seen, of a model that is not that of the run.
+/// A first look at all that was seen (FirstLook), with a model of all tissue.
 registration::UpdateResult first_update(const RegistrationRun& run, const registration::PreparedModel& model,
                                         Observer& observer);
 

@@ -29,8 +29,9 @@ std::vector<int> vanished(const RegistrationInputs& inputs, const RegisterOption
 }
 
 FoundResection found_in_image(const RegistrationRun& run, double edge_length_mm, ProgressLine& progress) {
-    registration::PreparedModel whole = made_model(run.options, run.inputs, edge_length_mm, progress);
-    add_images(whole, run.inputs, progress);
+    registration::PreparedModel whole =
+        made_model(run.options, run.inputs, registration::FirstLook().coarser * edge_length_mm, progress);
+    add_images(whole, run.inputs, progress, registration::image_of_first_look());
     const registration::UpdateResult first = first_update(run, whole, progress);
     return find_resection(whole, first.deformation, run.inputs.moving_matched, run.inputs.fixed_matched, progress);
 }

@@ -85,24 +85,25 @@ public:
         std::optional<PreparedModel>& model = evidence == Evidence::Labels       ? for_labels_
                                               : evidence == Evidence::Ultrasound ? for_ultrasound_
                                                                                  : for_others_;
-        if (!model) model = made_of(labels_, resected_, evidence, observer);
+        if (!model) model = made_of(labels_, resected_, evidence, 1, observer);
         if (is_image(evidence) && !model->image)
             registration::prepare_image(
                 *model, evidence == Evidence::Ultrasound ? ultrasound().moving : images().moving, {}, observer);
         return *model;
     }
 
-    /// The same without what the image does not show, where a model of all tissue was registered to it first; that
-    /// model where everything is shown.
-    const PreparedModel& without_what_is_gone(Evidence evidence, const registration::Deformation& first,
-                                              const imaging::Volume& seen, Observer& observer) {
-        const PreparedModel& whole = prepared(evidence, observer);
-        found_ = registration::find_resection(whole, first, images().moving, seen, observer);
-        if (found_->gone_ml == 0) return whole;
+    /// The same without what the image does not show, of which a first look tells; all of it where everything is shown.
+    const PreparedModel& without_what_is_gone(Evidence evidence, const registration::Intraoperative& seen,
+                                              const registration::UpdateOptions& options, Observer& observer) {
+        PreparedModel whole = made_of(labels_, resected_, evidence, registration::FirstLook().coarser, observer);
+        registration::prepare_image(whole, images().moving, registration::image_of_first_look(), observer);
+        const auto first = registration::update(whole, seen, registration::for_first_look(options), observer);
+        found_ = registration::find_resection(whole, first.deformation, images().moving, *seen.image, observer);
+        if (found_->gone_ml == 0) return prepared(evidence, observer);
         imaging::Volume labels = labels_.clone();
         const int gone = imaging::labels_in(labels).back() + 1;
         labels.voxels.setTo(gone, found_->gone.voxels);
-        without_found_ = made_of(labels, {gone}, evidence, observer);
+        without_found_ = made_of(labels, {gone}, evidence, 1, observer);
         registration::prepare_image(*without_found_, images().moving, {}, observer);
         return *without_found_;
     }
@@ -132,14 +133,15 @@ public:
     }
 
 private:
+    /// Its edges `coarser` times those that are suggested.
     static PreparedModel made_of(const imaging::Volume& labels, std::vector<int> resected, Evidence evidence,
-                                 Observer& observer) {
+                                 double coarser, Observer& observer) {
         registration::PrepareOptions options;
         const imaging::Volume organ = imaging::without_labels(labels, resected);
         options.resected = std::move(resected);
-        options.meshing.edge_length = evidence == Evidence::Labels
-                                          ? registration::suggested_edge_length(organ)
-                                          : registration::suggested_edge_length_without_labels(organ);
+        options.meshing.edge_length =
+            coarser * (evidence == Evidence::Labels ? registration::suggested_edge_length(organ)
+                                                    : registration::suggested_edge_length_without_labels(organ));
         return registration::prepare(labels, options, observer);
     }
 
@@ -164,13 +166,11 @@ private:
 
 std::vector<CoverageRow> rows_of(const Phantom& phantom, Patient& patient, Evidence evidence,
                                  const CoverageOptions& options, Observer& observer) {
-    const PreparedModel& whole = patient.prepared(evidence, observer);
     const registration::Intraoperative seen = patient.seen(evidence);
-    auto result = registration::update(whole, seen, options.update, observer);
     const bool seeks = options.seek_resected && seen.image;
-    const PreparedModel& prepared =
-        seeks ? patient.without_what_is_gone(evidence, result.deformation, *seen.image, observer) : whole;
-    if (&prepared != &whole) result = registration::update(prepared, seen, options.update, observer);
+    const PreparedModel& prepared = seeks ? patient.without_what_is_gone(evidence, seen, options.update, observer)
+                                          : patient.prepared(evidence, observer);
+    const auto result = registration::update(prepared, seen, options.update, observer);
     const registration::Uncertainty uncertainty =
         registration::uncertainty(prepared, result, options.uncertainty, observer);
     const auto estimates = uncertainty.at(phantom.targets.moving);

@@ -19,12 +19,26 @@ struct CavityOptions {
     double most_deviation = 0.4;     ///< of the cavity over the median of the organ's tissue …
     double least_counterpart = 0.5;  ///< … and of the moving image there, likewise, or else …
     double least_difference = 3;  ///< … deviations of the fixed image from what its grey is where the moving one's is
-    double least_core_ml = 0.5;     ///< smaller pieces are no cavity
+    double least_core_ml = 0.5;   ///< smaller pieces are no cavity
     double reach_mm = 5;          ///< from what looks so to the wall, which boxes must not reach
     double opening_mm = 1.5;      ///< radius of the ball that fits into the cavity everywhere
     double least_ml = 3;          ///< less tissue without a counterpart is not said to be resected
 };
 inline constexpr CavityOptions cavity_options{};
+
+/// The model of all tissue that is registered first only shows what is gone: coarse, by few places and few searches.
+/// Chosen on the phantoms 1 to 6 of `study coverage --problems sought:` (docs/decisions/resection.md).
+struct FirstLook {
+    double coarser = 1.5;  ///< its edges over those of the model that is registered then
+    int features = 1500;
+    std::vector<int> dense_coarsening{1};
+    int rounds = 4;
+};
+
+/// What it takes of the moving image.
+ImageModelOptions image_of_first_look();
+/// How it is registered, where a registration is done so.
+UpdateOptions for_first_look(UpdateOptions options);
 
 struct FoundResection {
     imaging::Volume gone;    ///< uint8, grid of the model's labels: labelled voxels whose tissue is gone

@@ -63,6 +63,8 @@ public:
 
     /// What the fixed image shows.
     [[nodiscard]] const FieldOfView& view() const { return view_; }
+    /// It is taken for ultrasound.
+    [[nodiscard]] bool shows_echoes() const { return search_.similarity() == Similarity::LinearCombination; }
 
     [[nodiscard]] Shows shows() const override { return Shows::Volume; }
     [[nodiscard]] PoseClaim pose_claim() const override { return PoseClaim::Search; }

@@ -3,6 +3,7 @@
 #include "imaging/labels.hpp"
 #include "registration/springs/ground_springs.hpp"
 #include "registration/terms/anchors.hpp"
+#include "registration/terms/cavity.hpp"
 #include "registration/terms/contact.hpp"
 #include "registration/terms/curves.hpp"
 #include "registration/terms/ground.hpp"
@@ -38,12 +39,16 @@ void require_usable(const PreparedModel& prepared, const Intraoperative& seen, s
         throw InvalidInput("the model got its image after its updater was made; make the updater after prepare_image");
 }
 
-/// One for the image and each of its contrasts, and what is expected of tissue by what the image has in view.
+/// One for the image and each of its contrasts, one for the wall of a cavity that no labels show, and what is expected
+/// of tissue by what the image has in view.
 void add_images(std::vector<std::unique_ptr<Term>>& terms, const PreparedModel& prepared, const Intraoperative& seen,
-                const ImageOptions& options, std::vector<ImageTools>& tools, double energy) {
+                const UpdateOptions& all, std::vector<ImageTools>& tools, double energy) {
+    const ImageOptions& options = all.image;
     auto image =
         std::make_unique<ImageTerm>(prepared, *prepared.image, *seen.image, "image", options, tools[0], energy);
     auto prior = std::make_unique<ViewPrior>(prepared, image->view(), options, energy);
+    if (!prepared.resected.empty() && !seen.labels && !image->shows_echoes())
+        terms.push_back(std::make_unique<CavityTerm>(prepared, *seen.image, image->view(), all));
     terms.push_back(std::move(image));
     for (std::size_t n = 0; n < seen.contrasts.size(); ++n)
         terms.push_back(std::make_unique<ImageTerm>(prepared, *prepared.contrasts[n], seen.contrasts[n],
@@ -139,7 +144,7 @@ Terms terms_of(const PreparedModel& prepared, const Intraoperative& seen, const 
     const double energy = strain_energy_unit(prepared, options.tissue);
     std::vector<std::unique_ptr<Term>> terms;
     if (seen.labels) terms.push_back(std::make_unique<LabelTerm>(prepared, *seen.labels, options));
-    if (seen.image) add_images(terms, prepared, seen, options.image, image_tools, energy);
+    if (seen.image) add_images(terms, prepared, seen, options, image_tools, energy);
     if (seen.surface)
         terms.push_back(
             std::make_unique<SurfaceTerm>(prepared, *seen.surface, options.surface, options.alignment, energy));

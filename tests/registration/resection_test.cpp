@@ -19,6 +19,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 
 namespace tissuewarp::registration {
@@ -203,13 +204,51 @@ TEST(Resection, IsFollowedInAnImage) {
     EXPECT_GT(result.min_jacobian, 0);
 }
 
+/// The cavity collapsed by 1000 mm³ · 4π/3: its radius fell from 12 to 9 mm, and incompressible tissue followed.
+Vector3d before_collapse(const Vector3d& y) {
+    const Vector3d from_middle = y - tumour_middle;
+    const double r = from_middle.norm();
+    return tumour_middle + std::cbrt(1 + 1000 / std::max(1e-9, r * r * r)) * from_middle;
+}
+
+/// The wall goes where the image shows it; where it shows none, to where the tissue behind it leaves it.
+TEST(Resection, OfACollapsedCavityFollowsItsWall) {
+    const PreparedModel model = with_image(prepare(labelled_ball(), without({tumour})));
+    const auto seen = [&](bool fluid) {
+        return sampled(
+            model.labels.geometry,
+            [&](const Vector3d& y) {
+                const Vector3d X = before_collapse(y);
+                return in_tumour(X) ? (fluid ? -2 : Texture()(y + Vector3d(50, 0, 0))) : Texture()(X);
+            },
+            0.05);
+    };
+    Volume truth(model.labels.geometry, CV_8UC1);
+    for_each_voxel(truth, [&](const Vector3d& index, std::int64_t n) {
+        truth.data<std::uint8_t>()[n] = in_tumour(before_collapse(truth.geometry.point(index)));
+    });
+    const auto agreement = [&](const UpdateResult& result) {
+        const Volume field = displacement_fixed_to_moving(result.deformation, truth.geometry);
+        return dice(gap_after(result.deformation, model.resected, field), truth);
+    };
+    const UpdateResult shown = update(model, {.image = seen(true)}, quick()),
+                       hidden = update(model, {.image = seen(false)}, quick());
+    EXPECT_GT(agreement(shown), 0.88);
+    EXPECT_LT(agreement(hidden), 0.85);
+    EXPECT_GT(shown.min_jacobian, 0.4);
+    EXPECT_THAT(codes(shown.doubts), ::testing::Not(::testing::Contains("resected.no_cavity")));
+    EXPECT_THAT(codes(hidden.doubts), ::testing::Contains("resected.no_cavity"));
+}
+
 /// Without being told; of air as of fluid, whose grey tissue has too.
 TEST(Resection, IsFoundInAnImage) {
-    const PreparedModel whole = with_image(prepare(labelled_ball(), without({})));
+    PrepareOptions coarse = without({});
+    coarse.meshing.edge_length *= FirstLook().coarser;
+    const PreparedModel whole = with_image(prepare(labelled_ball(), coarse));
     const Volume moving = sampled(whole.labels.geometry, Texture());
     for (const double grey : {-4.0, 0.2}) {
         const Volume seen = seen_with([grey](const Vector3d&) { return grey; });
-        const UpdateResult first = update(whole, {.image = seen}, quick());
+        const UpdateResult first = update(whole, {.image = seen}, for_first_look(quick()));
         const FoundResection found = find_resection(whole, first.deformation, moving, seen);
         EXPECT_GT(dice(found.cavity, true_cavity(seen.geometry)), 0.8);
         EXPECT_GT(dice(found.gone, imaging::mask_of(labelled_ball(), tumour)), 0.8);
