@@ -83,7 +83,7 @@ void ProgressLine::progress(std::string_view stage, double fraction) {
 }
 
 void ProgressLine::note(std::string_view message) {
-    notes_.emplace_back(message);
+    if (std::find(notes_.begin(), notes_.end(), message) == notes_.end()) notes_.emplace_back(message);
 }
 
 void ProgressLine::draw() {
