@@ -1,6 +1,7 @@
 #include "simulation/run.hpp"
 
 #include "core/errors.hpp"
+#include "simulation/coarse_start.hpp"
 #include "simulation/geometry.hpp"
 #include "simulation/limits.hpp"
 #include "simulation/loads.hpp"
@@ -163,7 +164,10 @@ private:
                                  .equilibrium
                            : tled::equilibrium_along_load_or_motion(
                                  engine, stiffness, conditions,
-                                 {.equilibrium = options, .first_parts = solve_.load_steps}, start, part);
+                                 {.equilibrium = options,
+                                  .first_parts = solve_.load_steps,
+                                  .coarse_start = [&] { return coarse_start(built_, time, part); }},
+                                 start, part);
             state_.displacement = found.displacement;
             from_rest_ = false;
             summary_.steps += found.force_evaluations;

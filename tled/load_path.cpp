@@ -1,6 +1,7 @@
 #include "tled/load_path.hpp"
 
 #include "tled/damped_motion.hpp"
+#include "tled/model/kinematics.hpp"
 #include "tled/statics/finite_rotations.hpp"
 #include "tled/stiffness/tangent_factor.hpp"
 
@@ -19,6 +20,10 @@ namespace tissuewarp::tled {
 using Eigen::Matrix3Xd;
 
 namespace {
+
+constexpr const char* may_be_of_several =
+    "on the way the tissue moved on faster than its load foretold: where it buckles or snaps through there are several "
+    "equilibria, of which this is a stable one";
 
 class LoadPath {
 public:
@@ -57,6 +62,10 @@ private:
     /// Whether the path leads to the whole load.
     bool follow() {
         double part = 1.0 / options_.first_parts;
+        if (part == 1 && coarse_start_pays() && asked_coarse_start().method == EquilibriumMethod::Newton) {
+            if (found_from_coarse_start()) return true;
+            if (goes_far(1)) part = moderate_part();
+        }
         while (now_.load < 1) {
             const double load = now_.load + part > 1 - 1e-9 ? 1 : now_.load + part;
             if (advance(load)) {
@@ -66,10 +75,9 @@ private:
                 if (part < options_.smallest_part || !leads_on()) return false;
             }
         }
+        if (led_too_far_) observer_.note(may_be_of_several);
         return true;
     }
-
-    static constexpr double most_of_moderate = 4;
 
     struct Point {
         double load;
@@ -99,7 +107,7 @@ private:
     }
 
     /// Of the load, what moves tissue by a moderate part of its size if it were linear; 1 where the size is not known.
-    [[nodiscard]] double moderate_part() {
+    [[nodiscard]] double first_part() {
         if (!from_rest_ || options_.equilibrium.rest == nullptr) return 1;
         if (!moderate_part_) {
             constexpr double of_diagonal = 0.2;
@@ -108,7 +116,45 @@ private:
                          linear = stiffness_.linear_solution(conditions_).colwise().norm().maxCoeff();
             moderate_part_ = std::max(of_diagonal * diagonal / linear, 2 * options_.smallest_part);
         }
-        return now_.load > 0 ? 1 : *moderate_part_;
+        return *moderate_part_;
+    }
+    /// The same of what has not begun.
+    [[nodiscard]] double moderate_part() { return now_.load > 0 ? 1 : first_part(); }
+
+    /// Where a linear answer is far beyond the tissue's size the methods that begin with it take longer to fail than a
+    /// path to arrive, or a coarser mesh to tell where it leads.
+    [[nodiscard]] bool goes_far(double load) {
+        constexpr double most_of_moderate = 4;
+        return from_rest_ && decides() && load > most_of_moderate * first_part();
+    }
+    [[nodiscard]] bool coarse_start_pays() {
+        constexpr double most_of_moderate = 2;
+        return options_.coarse_start && from_rest_ && decides() && engine_.processor() == Processor::Cpu &&
+               most_of_moderate * first_part() < 1;  // on a GPU K₀ is not factorised before it must
+    }
+
+    [[nodiscard]] const CoarseStart& asked_coarse_start() {
+        if (!coarse_start_)
+            coarse_start_ = options_.coarse_start().value_or(CoarseStart{{}, EquilibriumMethod::Automatic});
+        return *coarse_start_;
+    }
+
+    /// Under the whole load; not twice.
+    bool found_from_coarse_start() {
+        constexpr int most = 80;  // force evaluations: then a path is shorter
+        if (!options_.coarse_start || asked_coarse_start().displacement.size() == 0) return false;
+        EquilibriumOptions options = equilibrium_options();
+        options.method = EquilibriumMethod::Newton;
+        options.max_steps = most;
+        const Matrix3Xd start = rotations().like(coarse_start_->displacement, conditions_);
+        coarse_start_->displacement.resize(3, 0);
+        return found_equilibrium(1, conditions_, options, &start);
+    }
+
+    [[nodiscard]] const detail::FiniteRotations& rotations() {
+        if (!rotations_)
+            rotations_ = std::make_unique<detail::FiniteRotations>(*options_.equilibrium.rest, conditions_);
+        return *rotations_;
     }
 
     /// On through the last two equilibria, turned by finite angles; from the first only with the imposed displacements
@@ -120,8 +166,10 @@ private:
         step = partial.constrained.select(partial.imposed - now_.displacement, step);
         const RestState* rest = options_.equilibrium.rest;
         if (!before_ || rest == nullptr) return now_.displacement + step;
-        if (!rotations_) rotations_ = std::make_unique<detail::FiniteRotations>(*rest, conditions_);
-        return rotations_->moved(now_.displacement, step);
+        Matrix3Xd moved = rotations().moved(now_.displacement, step);
+        if (detail::element_jacobians(*rest, moved).minCoeff() > 0) return moved;
+        led_too_far_ = true;
+        return partial.constrained.select(partial.imposed, now_.displacement);
     }
 
     bool advance(double load) {
@@ -130,14 +178,16 @@ private:
         constexpr double loose = 10;  // of the tolerance, on the way
         options.on_the_way = load < 1;
         if (options.on_the_way) options.tolerance_mm *= loose;
-        if (result_.method == EquilibriumMethod::Newton) options.method = EquilibriumMethod::Newton;  // others failed
+        const bool others_failed = result_.method == EquilibriumMethod::Newton;
+        if (others_failed || (before_ && moderate_part_ && goes_far(1))) options.method = EquilibriumMethod::Newton;
         const bool first = from_rest_ && !before_ && now_.load == 0;
         if (first) options.last = EquilibriumMethod::Lbfgs;
         const Matrix3Xd prediction = predicted(load, partial);
         const Matrix3Xd* start = first ? nullptr : &prediction;
         if (found_equilibrium(load, partial, options, start)) return true;
-        // From a linear start far beyond the tissue's size Newton's method takes longer to fail than a path to arrive.
-        if (!first || !decides() || load > most_of_moderate * moderate_part()) return false;
+        if (!first || !decides()) return false;
+        if (load == 1 && found_from_coarse_start()) return true;
+        if (goes_far(load)) return false;
         options.method = EquilibriumMethod::Newton;
         return found_equilibrium(load, partial, options, start);
     }
@@ -216,7 +266,9 @@ private:
     Point now_;
     std::optional<Point> before_;
     std::optional<double> moderate_part_;
-    std::unique_ptr<detail::FiniteRotations> rotations_;  // made where a step is predicted
+    std::optional<CoarseStart> coarse_start_;  // by asked_coarse_start(), without displacement where there is none
+    bool led_too_far_ = false;                 // the line through the last two equilibria, once
+    std::unique_ptr<detail::FiniteRotations> rotations_;  // by rotations()
     std::unique_ptr<detail::TangentFactor> tangent_;
     std::string cause_;
     EquilibriumResult result_;

@@ -3,12 +3,23 @@
 
 #include "tled/equilibrium.hpp"
 
+#include <functional>
+#include <optional>
+
 namespace tissuewarp::tled {
+
+/// The equilibrium under the whole load on a coarser mesh, carried on to this one.
+struct CoarseStart {
+    Eigen::Matrix3Xd displacement;  ///< 3 × N, mm
+    EquilibriumMethod method;       ///< that found it: if not Newton's, it came at once, and here it may too
+};
 
 struct LoadPathOptions {
     EquilibriumOptions equilibrium{};
     int first_parts = 1;          ///< equal parts to try first
     double smallest_part = 1e-3;  ///< of the load, below which the path is given up
+    /// Asked once, where Newton's method may decide, before a path from rest begins; nothing: it goes without.
+    std::function<std::optional<CoarseStart>()> coarse_start{};
 };
 
 /// Equilibrium under the conditions by way of smaller loads: imposed displacements go from those of `start` (3 × N mm;

@@ -4,6 +4,7 @@
 
 #include "meshing/primitives.hpp"
 #include "tled/model.hpp"
+#include "tled/model/kinematics.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
@@ -11,6 +12,7 @@
 namespace tissuewarp::tled {
 namespace {
 
+using detail::element_jacobians;
 using Eigen::Matrix3d;
 using Eigen::Matrix3Xd;
 using Eigen::Vector3d;
@@ -103,6 +105,32 @@ TEST(FiniteRotations, BendARodWithoutDrawingItOut) {
         EXPECT_LT((place.col(n) - circle).norm(), 1.5);
         EXPECT_GT((rest.position.col(n) + bend.col(n) - circle).norm(), 30) << "straight on";
     }
+}
+
+// Bent as it is but for one end, which is to stay a little elsewhere, and for a node that was carried beyond its
+// neighbours.
+TEST(FiniteRotations, MendWhatAnotherDisplacementTurnsInsideOut) {
+    const RestState rest = rod();
+    NodalConditions conditions = held_at_the_end(rest);
+    const detail::FiniteRotations rotations(rest, conditions);
+    Matrix3Xd bent(3, rest.node_count);
+    for (int n = 0; n < rest.node_count; ++n) {
+        const double angle = 0.01 * rest.position(0, n), across = rest.position(2, n) - 5;
+        bent.col(n) =
+            Vector3d((100 - across) * std::sin(angle), rest.position(1, n), 105 - (100 - across) * std::cos(angle)) -
+            rest.position.col(n);
+    }
+    Matrix3Xd carried = bent;
+    carried.row(1).array() += 4;
+    int beyond = 0;
+    while ((rest.position.col(beyond) - Vector3d(50, 5, 5)).norm() > 2) ++beyond;
+    carried.col(beyond) += Vector3d(0, 7, 0);
+    ASSERT_LT(element_jacobians(rest, conditions.constrained.select(conditions.imposed, carried)).minCoeff(), 0);
+    const Matrix3Xd mended = rotations.like(carried, conditions);
+    EXPECT_GT(element_jacobians(rest, mended).minCoeff(), 0);
+    EXPECT_EQ(conditions.constrained.select(mended, 0.0), conditions.constrained.select(conditions.imposed, 0.0));
+    EXPECT_LT((mended - bent).colwise().norm().maxCoeff(), 8);
+    EXPECT_LT((rotations.like(bent, conditions) - bent).cwiseAbs().maxCoeff(), 1e-6) << "nothing is to be mended";
 }
 
 }  // namespace

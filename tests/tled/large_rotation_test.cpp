@@ -53,6 +53,32 @@ TEST_P(LargeRotations, ArriveWhereNewtonInSmallStepsDoes) {
     EXPECT_LT(largest_difference(engine->displacement(), truth), GetParam() + 1e-3);
 }
 
+// A start that is nearly right saves the path; one that is far off, or none, does not prevent it.
+TEST(LargeRotation, BeginsWithACoarseStart) {
+    const Rod rod;
+    const RestStiffness stiffness(rod.rest, rod.conditions);
+    const auto engine = make_cpu_engine(rod.rest, Scalar::Float32);
+    const Matrix3Xd truth =
+        newton_equilibrium(rod.rest, rod.conditions, {.tolerance_mm = 1e-8, .load_steps = 40}).displacement;
+    int asked = 0;
+    const auto evaluations_from = [&](const std::optional<CoarseStart>& start) {
+        asked = 0;
+        const auto found =
+            equilibrium_along_load(*engine, stiffness, rod.conditions,
+                                   {.equilibrium = {.tolerance_mm = 0.05, .rest = &rod.rest}, .coarse_start = [&] {
+                                        ++asked;
+                                        return start;
+                                    }});
+        EXPECT_EQ(asked, 1);
+        EXPECT_LT(largest_difference(found.displacement, truth), 0.05);
+        return found.force_evaluations;
+    };
+    const int from_near = evaluations_from(CoarseStart{0.95 * truth, EquilibriumMethod::Newton});
+    EXPECT_LT(3 * from_near, evaluations_from(std::nullopt));
+    evaluations_from(CoarseStart{-3 * truth, EquilibriumMethod::Newton});
+    evaluations_from(CoarseStart{0.95 * truth, EquilibriumMethod::Lbfgs});
+}
+
 // What the escalation is for: without it the same rod is refused.
 TEST(LargeRotation, IsRefusedWithoutNewton) {
     const Rod rod;

@@ -73,6 +73,8 @@ TEST(TangentFactor, OfStableTissuePreparesTissueThatBuckles) {
     const auto prepared = tangent.solve_at(made.conditions, there, made.aside);
     EXPECT_FALSE(prepared.positive);
     ASSERT_TRUE(prepared.x);
+    const Matrix3Xd along = detail::tangent_product(made.rest, made.conditions, there)(prepared.falling);
+    EXPECT_LT(prepared.falling.cwiseProduct(along).sum(), 0);
 
     ASSERT_TRUE(tangent.factorise(made.conditions, there));
     EXPECT_FALSE(tangent.stable());

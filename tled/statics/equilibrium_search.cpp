@@ -58,7 +58,7 @@ bool EquilibriumSearch::admissible(const Matrix3Xd& displacement) {
     if (!displacement.allFinite()) return false;
     engine.set_state(displacement, Matrix3Xd::Zero(3, displacement.cols()));
     smallest_ = engine.smallest_jacobian();
-    return smallest_.value > 0 || (engine.admits_inversion() && std::isfinite(smallest_.value));
+    return smallest_.value > 0 || (!upright_ && engine.admits_inversion() && std::isfinite(smallest_.value));
 }
 
 void EquilibriumSearch::require_evaluations(int count) {
@@ -116,7 +116,11 @@ void EquilibriumSearch::fail(const std::string& cause, const std::string& remedy
 }
 
 void EquilibriumSearch::fail_stalled() const {
-    constexpr double single_precision = 1e-8;
+    constexpr double single_precision = 1e-8, nearly_flat = 1e-3;
+    if (upright_ && smallest_.value < nearly_flat)
+        fail("tissue is about to turn inside out (" + place(smallest_) + ")",
+             "take neo-hookean-lnj in place of neo-hookean-stable, which admits that, smaller loads or a finer mesh "
+             "there");
     if (engine.precision() > single_precision)
         fail("the error stopped falling where float32 forces end (" + place(smallest_) + ")",
              "take a larger tolerance, or of a scene forces in float64");

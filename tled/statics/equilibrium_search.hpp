@@ -20,8 +20,10 @@ public:
     Eigen::Matrix3Xd begin(const Eigen::Matrix3Xd* start);
 
     /// Moves the engine there at rest; false when a displacement is not finite or a tetrahedron is inverted whose law
-    /// does not admit it.
+    /// does not admit it, or which keep_upright() forbade.
     [[nodiscard]] bool admissible(const Eigen::Matrix3Xd& displacement);
+    /// From now on whatever laws admit.
+    void keep_upright() { upright_ = true; }
     /// At the engine's state. Counted; throws when too many or not finite.
     [[nodiscard]] Eigen::Matrix3Xd residual();
     /// K₀⁻¹ r, mm: to first order the displacement still missing.
@@ -55,6 +57,7 @@ private:
     Eigen::Matrix3Xd good_;
     double good_error_mm_ = 0, first_error_mm_ = 0, correction_mm_ = 0;
     SmallestJacobian smallest_;  ///< of the state tried last
+    bool upright_ = false;
 };
 
 /// K₀ overestimates what it knows nothing about: soon after a linear start the true error was up to 1.5 times ‖K₀⁻¹

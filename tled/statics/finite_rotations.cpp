@@ -4,10 +4,13 @@
 #include "tled/model/kinematics.hpp"
 #include "tled/parallel/parallel.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include <atomic>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 namespace tissuewarp::tled::detail {
@@ -61,6 +64,19 @@ Matrix3d turned(const Matrix3d& gradient) {
     return angle > 0 ? Matrix3d(Eigen::AngleAxisd(angle, axis / angle).toRotationMatrix() * stretch) : stretch;
 }
 
+/// The nearest F whose principal stretches are `least` or more.
+Matrix3d stretched(const Matrix3d& F, double least) {
+    const Eigen::SelfAdjointEigenSolver<Matrix3d> C(F.transpose() * F);
+    Matrix3d from = C.eigenvectors(), to;
+    from.col(0) = from.col(1).cross(from.col(2));
+    to.col(2) = (F * from.col(2)).normalized();
+    const Vector3d second = F * from.col(1);
+    to.col(1) = second.norm() > 0 ? Vector3d(second.normalized()) : Vector3d(to.col(2).unitOrthogonal());
+    to.col(0) = to.col(1).cross(to.col(2));
+    const Vector3d stretch = (to.transpose() * F * from).diagonal();
+    return to * stretch.cwiseMax(least).asDiagonal() * from.transpose();
+}
+
 }  // namespace
 
 FiniteRotations::FiniteRotations(const RestState& rest, const NodalConditions& conditions)
@@ -89,12 +105,37 @@ Matrix3Xd FiniteRotations::moved(const Matrix3Xd& displacement, const Matrix3Xd&
         const Matrix3d change = deformation_gradient(rest_, increment, e) - Matrix3d::Identity();
         goal[static_cast<std::size_t>(e)] = turned(change * F.inverse()) * F;
     });
+    return fitted(displacement + increment, goal);
+}
+
+Matrix3Xd FiniteRotations::like(const Matrix3Xd& other, const NodalConditions& imposed) const {
+    constexpr int most_rounds = 50;
+    constexpr double least_stretch = 0.3, least_jacobian = 0.02;
+    std::vector<Matrix3d> goal(static_cast<std::size_t>(rest_.element_count())), push(goal.size(), Matrix3d::Zero());
+    const auto set_goals = [&](const Matrix3Xd& displacement) {
+        std::atomic<int> mended = 0;
+        parallel_for(0, rest_.element_count(), [&](int e) {
+            const auto each = static_cast<std::size_t>(e);
+            goal[each] = deformation_gradient(rest_, displacement, e);
+            if (goal[each].determinant() >= least_jacobian) return;
+            ++mended;
+            push[each] += stretched(goal[each], least_stretch) - goal[each];  // small ones among large ones gain weight
+            goal[each] += push[each];
+        });
+        return mended.load();
+    };
+    set_goals(other);
+    Matrix3Xd result = fitted(imposed.constrained.select(imposed.imposed, other), goal);
+    for (int round = 0; round < most_rounds && set_goals(result) > 0; ++round) result = fitted(std::move(result), goal);
+    return result;
+}
+
+Matrix3Xd FiniteRotations::fitted(Matrix3Xd moved, const std::vector<Matrix3d>& goal) const {
     Matrix3Xd pull = Matrix3Xd::Zero(3, rest_.node_count);
     for (int e = 0; e < rest_.element_count(); ++e)
         for (int a = 0; a < 4; ++a)
             pull.col(rest_.nodes(a, e)) +=
                 weight_[e] * (goal[static_cast<std::size_t>(e)] * shape_gradients(rest_, e).col(a));
-    Matrix3Xd moved = displacement + increment;
     const Matrix3Xd missing = pull - (rest_.position + moved) * laplacian_;
     for (int axis = 0; axis < 3; ++axis) {
         const Axis& each = axes_[static_cast<std::size_t>(axis)];

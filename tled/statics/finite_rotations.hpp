@@ -28,7 +28,17 @@ public:
     /// least squares with weights μ V.
     [[nodiscard]] Eigen::Matrix3Xd moved(const Eigen::Matrix3Xd& displacement, const Eigen::Matrix3Xd& increment) const;
 
+    /// The displacement with F as nearly as nodes allow that of `other` (3 × N, mm; of the same tissue, and not quite
+    /// under the same conditions), where the degrees of freedom that conditions constrain are as in `imposed`. What
+    /// stays inside out is pushed to the nearest F that is not, more and more (after Bouaziz, Martin, Liu, Kavan,
+    /// Pauly, ACM Trans. Graph. 33 (2014) 154), for a while.
+    [[nodiscard]] Eigen::Matrix3Xd like(const Eigen::Matrix3Xd& other, const NodalConditions& imposed) const;
+
 private:
+    /// A displacement brought to where its tetrahedra fit their goals for F best.
+    [[nodiscard]] Eigen::Matrix3Xd fitted(Eigen::Matrix3Xd displacement,
+                                          const std::vector<Eigen::Matrix3d>& goal) const;
+
     const RestState& rest_;
     Eigen::VectorXd weight_;                 ///< M, μ V
     Eigen::SparseMatrix<double> laplacian_;  ///< N × N, Σ μ V ∇N_a · ∇N_b

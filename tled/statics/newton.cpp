@@ -20,7 +20,8 @@ constexpr int most_iterations = 60;
 constexpr const char* of_several =
     "on the way to it the tissue was not stable: where it buckles or snaps through there are several equilibria, of "
     "which this is a stable one";
-constexpr int most_idle = 15;  // iterations without the correction falling by a tenth
+constexpr int most_saddles = 5, most_crawling = 3;  // iterations near one, by steps that hardly become shorter
+constexpr int most_idle = 15;                       // iterations without the correction falling by a tenth
 
 /// The start as it is, with the imposed displacements in place; from rest the linear-elastic solution turned by finite
 /// angles, or as far as no tetrahedron is turned inside out.
@@ -50,17 +51,37 @@ bool taken(EquilibriumSearch& search, const Matrix3Xd& u, const Matrix3Xd& next,
     return true;
 }
 
+/// From a saddle by a hundredth of the body's size along a direction in which energy falls, or as much of it as turns
+/// nothing inside out, to the side where the residual `r` leads; that is then the one there.
+bool left_saddle(EquilibriumSearch& search, Matrix3Xd& u, const Matrix3Xd& falling, Matrix3Xd& r) {
+    constexpr double of_diagonal = 0.01;
+    const Matrix3Xd& position = search.options.rest->position;
+    const double diagonal = (position.rowwise().maxCoeff() - position.rowwise().minCoeff()).norm();
+    Matrix3Xd step = of_diagonal * diagonal / largest_norm(falling) * falling;
+    if (dot(r, step) < 0) step = -step;
+    for (int trial = 0; trial < 8; ++trial, step *= 0.5)
+        if (search.admissible(u + step)) {
+            u += step;
+            r = search.residual();
+            return true;
+        }
+    return false;
+}
+
 }  // namespace
 
 EquilibriumResult newton(EquilibriumSearch& search, const Matrix3Xd* start, TangentFactor& tangent) {
     const NodalConditions& conditions = search.conditions;
     const FiniteRotations rotations(*search.options.rest, conditions);
+    search.keep_upright();  // elsewhere there is no tangent
     Matrix3Xd u = first_state(search, rotations, start);
     if (!search.admissible(u)) search.fail_stalled();
     Matrix3Xd r = search.residual();
     double least = 0;
     bool was_unstable = false;
     bool last = false;
+    int saddles = 0, crawling = 0;
+    double before = 0;
     for (int iteration = 0, idle = 0; iteration < most_iterations; ++iteration, ++idle) {
         TangentFactor::Prepared prepared;
         if (!last) prepared = tangent.solve_at(conditions, u, r);
@@ -75,10 +96,16 @@ EquilibriumResult newton(EquilibriumSearch& search, const Matrix3Xd* start, Tang
         const double correction = largest_norm(d);
         search.keep(u, correction);
         const bool near = correction <= search.options.tolerance_mm;
-        if (near && prepared.x && prepared.positive && search.options.on_the_way) return search.finish_with(d);
-        if (near && !prepared.x && tangent.stable()) {
-            if (start == nullptr && was_unstable) search.observer.note(of_several);
+        if (near && (prepared.x ? prepared.positive && search.options.on_the_way : tangent.stable())) {
+            if (saddles > 0 || (start == nullptr && was_unstable)) search.observer.note(of_several);
             return search.finish_with(d);
+        }
+        crawling = !prepared.positive && correction > 0.5 * before ? crawling + 1 : 0;
+        before = correction;
+        if (!prepared.positive && (near || crawling > most_crawling) && ++saddles < most_saddles &&
+            left_saddle(search, u, prepared.falling, r)) {
+            idle = crawling = 0;
+            continue;
         }
         if (near && prepared.x) {
             last = true;  // accepted by the factor where the tissue is alone, which also tells whether it is stable

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <string>
+#include <utility>
 
 namespace tissuewarp::tled::detail {
 
@@ -44,6 +45,7 @@ ConjugateGradients conjugate_gradients_within(int most_iterations, const Product
         rz = next;
         found.relative_residual = std::sqrt(rz / start);
     }
+    found.last = std::move(p);
     return found;
 }
 

@@ -13,6 +13,7 @@ struct ConjugateGradients {
     int iterations = 0;
     double relative_residual = 1.0;  ///< in the norm below
     bool positive = true;            ///< K along every direction that was taken
+    Eigen::Matrix3Xd last;           ///< of them: where K is not positive along one, this one
 };
 
 /// x (3 × N) with K x = force by products with K. The error is measured in the norm of the preconditioner, √(r·z),

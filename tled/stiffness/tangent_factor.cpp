@@ -72,11 +72,13 @@ TangentFactor::Prepared TangentFactor::solve_at(const NodalConditions& condition
             most, product, [&](const Matrix3Xd& f) { return solve(f); }, conditions.constrained.select(0.0, force),
             relative_tolerance);
         if (found.positive && found.relative_residual <= relative_tolerance) prepared.x = std::move(found.x);
-        return found.positive;
+        return found;
     };
-    prepared.positive = solved(tangent_product(rest_, conditions, displacement));
-    if (!prepared.positive)
-        solved(product_of(with_effects(positive_stiffness(rest_, displacement), rest_, conditions), conditions));
+    ConjugateGradients along_tangent = solved(tangent_product(rest_, conditions, displacement));
+    prepared.positive = along_tangent.positive;
+    if (prepared.positive) return prepared;
+    prepared.falling = std::move(along_tangent.last);
+    solved(product_of(with_effects(positive_stiffness(rest_, displacement), rest_, conditions), conditions));
     return prepared;
 }
 

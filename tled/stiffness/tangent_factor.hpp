@@ -41,6 +41,7 @@ public:
     struct Prepared {
         std::optional<Eigen::Matrix3Xd> x;  ///< none where it would take longer than a factor
         bool positive = true;               ///< K along every direction seen
+        Eigen::Matrix3Xd falling;           ///< a direction along which it is not
     };
     /// The same of the tangent at another displacement, to a few percent, by conjugate gradients, which the last factor
     /// prepares; of its positive part where it is not positive along them. Throws SolverFailure where det F ≤ 0.
