@@ -15,7 +15,7 @@ import nibabel
 import numpy
 
 from patient_test import prepared, surface_of
-from phantom import CENTRE_LPS, FIXED_AFFINE, PROGRAM, SIZE, Phantom, run
+from phantom import CENTRE_LPS, FIXED_AFFINE, MOVING_AFFINE, PROGRAM, SHIFT_LPS, SIZE, Phantom, lps_of_voxels, run, save
 from points_test import pairs_of, save_points
 
 sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "python"))
@@ -133,12 +133,11 @@ class Serving(unittest.TestCase):
         self.assertLess(furthest(self.client.newest("organ")["points"], deformed_nodes(verb / "record.h5")), 0.05)
         self.assert_same_doubts(answer, verb)
 
+    # Of bytes in the axes of the file: i runs along -L, j along -P.
+    grid = ("B", (SIZE,) * 3, (1, 1, 1), (FIXED_AFFINE[:3, 3] * [-1, -1, 1]).tolist(), ((-1, 0, 0), (0, -1, 0), (0, 0, 1)))
+
     def send_labels(self):
-        """In the axes of the file: i runs along -L, j along -P."""
-        voxels = self.phantom.fixed_labels_array.transpose(2, 1, 0).tobytes()
-        origin = FIXED_AFFINE[:3, 3] * [-1, -1, 1]
-        self.client.send_image("fixed_labels", voxels, "B", (SIZE,) * 3, (1, 1, 1), origin.tolist(),
-                               ((-1, 0, 0), (0, -1, 0), (0, 0, 1)))
+        self.client.send_image("fixed_labels", self.phantom.fixed_labels_array.transpose(2, 1, 0).tobytes(), *self.grid)
 
     def test_labels_and_the_field_as_an_image(self):
         self.send_labels()
@@ -156,6 +155,33 @@ class Serving(unittest.TestCase):
         expected = nibabel.load(verb / "warped.nii.gz").get_fdata()
         got = numpy.frombuffer(warped["voxels"], numpy.dtype(warped["kind"])).reshape((SIZE,) * 3).transpose(2, 1, 0)
         numpy.testing.assert_allclose(got, expected, atol=0.5)
+
+    def test_bone_around_the_organ_stays(self):
+        """Both images show the same structure around the organ, which moves by 2.7 mm."""
+        waves, phases = numpy.random.default_rng(3).normal(0, 0.5, (12, 3)), numpy.random.default_rng(4).uniform(0, 6, 12)
+
+        def with_bone(affine, grey):
+            places = lps_of_voxels(affine)
+            bone = numpy.linalg.norm(places - CENTRE_LPS - SHIFT_LPS / 2, axis=-1) > 19
+            structure = 128 + 12 * numpy.sin(places @ waves.T + phases).sum(axis=-1)
+            return numpy.where(bone, structure, grey).clip(0, 255).astype(numpy.uint8), bone
+
+        moving, _ = with_bone(MOVING_AFFINE, self.phantom.moving_array)
+        fixed, bone = with_bone(FIXED_AFFINE, self.phantom.fixed_array)
+        patient = prepared(self.phantom, name="bone.tw", moving=save(moving, MOVING_AFFINE, self.phantom.folder / "bone.nii.gz"))
+        server = Server(patient)
+        self.addCleanup(server.stop)
+        self.client.close()
+        self.client = server.client()
+        self.addCleanup(self.client.close)
+        self.send_labels()
+        self.client.send_image("fixed", fixed.transpose(2, 1, 0).tobytes(), *self.grid)
+        answer = self.client.update(send=["field"])
+        self.assertIn(answer["status"], ("ok", "doubted"), answer)
+        field = numpy.frombuffer(self.client.newest("field", "IMAGE")["voxels"], "<f4").reshape(SIZE, SIZE, SIZE, 3)
+        moved = numpy.linalg.norm(field.transpose(2, 1, 0, 3), axis=-1)
+        self.assertLess(numpy.percentile(moved[bone], 95), 0.05)  # its edge is soft
+        self.assertGreater(moved[self.phantom.fixed_labels_array > 0].mean(), 2)
 
     def test_debians_own_library(self):
         moving, fixed = lps_pairs(self.phantom)
