@@ -83,7 +83,9 @@ class HangingTissue(unittest.TestCase):
         self.require_within_tolerances(ELLIPSOID)
 
     def test_random_boxes(self):
-        for seed in range(1001, 1001 + int(os.environ.get("TISSUEWARP_HANGING_BOXES", "3"))):
+        slender = 1011  # of 200 mm, hangs by 500: a correction below 1 mm left it 1.2 mm off
+        boxes = int(os.environ.get("TISSUEWARP_HANGING_BOXES", "3"))
+        for seed in sorted({*range(1001, 1001 + boxes), slender}):
             with self.subTest(seed=seed):
                 self.require_within_tolerances(random_box(seed))
 

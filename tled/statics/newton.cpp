@@ -68,6 +68,25 @@ bool left_saddle(EquilibriumSearch& search, Matrix3Xd& u, const Matrix3Xd& falli
     return false;
 }
 
+/// Whether corrections that go on to shrink as the second did against the first leave no more than the tolerance.
+bool settles(const Matrix3Xd& first, const Matrix3Xd& second, double tolerance_mm) {
+    const double before = largest_norm(first), now = largest_norm(second), contraction = now / before;
+    return now == 0 || (now < before && now * contraction / (1 - contraction) <= tolerance_mm);
+}
+
+/// What the last factor misses after a correction of its own, `d`, which is then part of `u`: slender tissue far from
+/// rest may be off by more than that. The residual there is `r` then. Nothing where the correction turns tissue inside
+/// out.
+std::optional<Matrix3Xd> missing_after(EquilibriumSearch& search, const TangentFactor& tangent, Matrix3Xd& u,
+                                       Matrix3Xd& r, const Matrix3Xd& d) {
+    if (!search.admissible(u + d)) return std::nullopt;
+    u += d;
+    r = search.residual();
+    Matrix3Xd missing = tangent.solve(r);
+    search.keep(u, largest_norm(missing));
+    return missing;
+}
+
 }  // namespace
 
 EquilibriumResult newton(EquilibriumSearch& search, const Matrix3Xd* start, TangentFactor& tangent) {
@@ -81,6 +100,7 @@ EquilibriumResult newton(EquilibriumSearch& search, const Matrix3Xd* start, Tang
     bool was_unstable = false;
     bool last = false;
     int saddles = 0, crawling = 0;
+    int settled = 0;  // times in a row; where tissue was unstable once does not tell
     double before = 0;
     for (int iteration = 0, idle = 0; iteration < most_iterations; ++iteration, ++idle) {
         TangentFactor::Prepared prepared;
@@ -96,9 +116,17 @@ EquilibriumResult newton(EquilibriumSearch& search, const Matrix3Xd* start, Tang
         const double correction = largest_norm(d);
         search.keep(u, correction);
         const bool near = correction <= search.options.tolerance_mm;
+        if (!near) settled = 0;
         if (near && (prepared.x ? prepared.positive && search.options.on_the_way : tangent.stable())) {
-            if (saddles > 0 || (start == nullptr && was_unstable)) search.observer.note(of_several);
-            return search.finish_with(d);
+            const bool on_the_way = search.options.on_the_way;
+            const std::optional<Matrix3Xd> missing = on_the_way ? d : missing_after(search, tangent, u, r, d);
+            settled = missing && settles(d, *missing, search.options.tolerance_mm) ? settled + 1 : 0;
+            if (on_the_way || settled >= (was_unstable ? 2 : 1)) {
+                if (saddles > 0 || (start == nullptr && was_unstable)) search.observer.note(of_several);
+                return search.finish_with(*missing);
+            }
+            last = false;
+            if (missing) continue;
         }
         crawling = !prepared.positive && correction > 0.5 * before ? crawling + 1 : 0;
         before = correction;
