@@ -266,21 +266,29 @@ tled::Obstacle obstacle(const Contact& contact, const Matrix3Xd& tissue, double 
     return result;
 }
 
-int unseen_in_body(const Contact& contact, const tled::Obstacle& obstacle, const Matrix3Xd& places,
-                   const imaging::Volume* labels) {
+int passed_unseen(const Contact& contact, const tled::Obstacle& obstacle, const Matrix3Xd& rest,
+                  const Matrix3Xd& places, const imaging::Volume* labels) {
     const auto& [shift, rotation] = obstacle.placement;
-    const Matrix3Xd here = rotation.transpose() * (places.colwise() - shift);  // as seen from the body
+    const Matrix3Xd from = rotation.transpose() * (rest.colwise() - shift),  // as seen from the body
+        to = rotation.transpose() * (places.colwise() - shift);
     const DistanceGrid& grid = *obstacle.surface;
-    const Matrix3Xd index = grid.steps.inverse() * (here.colwise() - grid.origin);
-    std::vector<Vector3d> beyond;
+    const Matrix3Xd index = grid.steps.inverse() * (to.colwise() - grid.origin);
+    std::vector<Eigen::Index> beyond;
     for (Eigen::Index n = 0; n < index.cols(); ++n) {
         const auto x = index.col(n).array();
-        if ((x < 1).any() || (x > grid.size.cast<double>().array() - 2).any()) beyond.push_back(here.col(n));
+        if ((x < 1).any() || (x > grid.size.cast<double>().array() - 2).any()) beyond.push_back(n);
     }
     if (beyond.empty()) return 0;
-    const std::function<bool(const Vector3d&)> inside =
-        std::visit([&](const auto& body) { return inside_of(body, labels); }, contact.body);
-    return static_cast<int>(std::count_if(beyond.begin(), beyond.end(), inside));
+    const IsInside inside = std::visit([&](const auto& body) { return inside_of(body, labels); }, contact.body);
+    const bool endless = std::holds_alternative<HalfSpace>(contact.body) || std::holds_alternative<Ball>(contact.body);
+    const double spacing = grid.steps.colwise().norm().minCoeff();
+    return static_cast<int>(std::count_if(beyond.begin(), beyond.end(), [&](Eigen::Index n) {
+        const Vector3d way = to.col(n) - from.col(n);
+        const int steps = endless ? 1 : 1 + static_cast<int>(way.norm() / spacing);
+        for (int step = steps; step > 0; --step)
+            if (inside(from.col(n) + way * step / steps)) return true;
+        return false;
+    }));
 }
 
 double surface_reach(const DistanceGrid& grid, const RigidMotion& motion) {

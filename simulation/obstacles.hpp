@@ -19,10 +19,11 @@ namespace tissuewarp::simulation {
 tled::Obstacle obstacle(const Contact& contact, const Eigen::Matrix3Xd& tissue, double overlap,
                         const imaging::Volume* labels, Observer& observer);
 
-/// How many of the places (3 × N, mm) lie in the body but beyond its samples, where contact does not see them.
-/// `obstacle`: the body where it is now.
-int unseen_in_body(const Contact& contact, const tled::Obstacle& obstacle, const Eigen::Matrix3Xd& places,
-                   const imaging::Volume* labels);
+/// How many of the places (3 × N, mm) lie beyond the body's samples, where contact does not see them, and in the body,
+/// or, of labels and surfaces, so that it lies between them and where they are at rest (3 × N). `obstacle`: the body
+/// where it is now.
+int passed_unseen(const Contact& contact, const tled::Obstacle& obstacle, const Eigen::Matrix3Xd& rest,
+                  const Eigen::Matrix3Xd& places, const imaging::Volume* labels);
 
 /// How far the surface that a grid holds reaches from the axis of a motion, mm, by the samples of the cells that it
 /// goes through; 0 without a turn.

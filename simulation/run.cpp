@@ -86,18 +86,19 @@ private:
         observer_.checkpoint("simulation", time / solve_.duration);
     }
 
-    /// Bodies are sampled about where the tissue was expected: what went farther must not be in them.
+    /// Bodies are sampled about where the tissue was expected: what went farther must not be in them or beyond them.
     void require_seen_contacts(const Stage& stage, double time, const Matrix3Xd& displacement) const {
         if (!built_.effects.contact) return;
         const tled::RigidContact contact = *conditions_at(built_, stage, time).effects.contact;
-        const Matrix3Xd places = (stage.rest.position + displacement)(Eigen::all, contact.nodes);
+        const Matrix3Xd rest = stage.rest.position(Eigen::all, contact.nodes),
+                        places = rest + displacement(Eigen::all, contact.nodes);
         for (std::size_t c = 0; c < contact.obstacles.size(); ++c) {
             const int lost =
-                unseen_in_body(built_.scene.contacts[c], contact.obstacles[c], places, label_volume(built_.scene));
+                passed_unseen(built_.scene.contacts[c], contact.obstacles[c], rest, places, label_volume(built_.scene));
             if (lost > 0)
                 throw SolverFailure(
                     "at t = " + std::to_string(time) + " s: " + std::to_string(lost) +
-                    " nodes have passed into the body of contact " + std::to_string(c + 1) +
+                    " nodes have passed into or through the body of contact " + std::to_string(c + 1) +
                     " where it is not sampled, which is a quarter of the tissue's extent about it; hold "
                     "the tissue, or bring it nearer to the body");
         }

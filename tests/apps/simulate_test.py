@@ -106,7 +106,7 @@ frames = 8
         output = self.folder / "out"
         result = run("simulate", self.scene, "--output", output, "--device", "cpu", "--quiet")
         self.assertNotEqual(result.returncode, 0)
-        self.assertIn("passed into the body of contact 1", result.stderr)
+        self.assertIn("passed into or through the body of contact 1", result.stderr)
         self.assertFalse(output.exists())
 
     def test_files_of_a_run(self):

@@ -101,6 +101,21 @@ TEST(Obstacles, LabelsAreBodiesAndHollows) {
     EXPECT_THROW(made(ObstacleLabel{5}), InvalidInput) << "no volume";
 }
 
+// It ended 2.4 m below a body of labels once, which ends where its image does.
+TEST(Obstacles, WhatPassedThroughABodyIsNoticed) {
+    const imaging::Volume labels =
+        painted({{1, Box{{0, 0, 0}, {40, 40, 40}}}, {5, Box{{-20, -20, -30}, {60, 60, -3}}}}, 1.0);
+    Contact contact;
+    contact.body = ObstacleLabel{5};
+    const tled::Obstacle table = obstacle(contact, tissue(), 1.0, &labels, silent_observer());
+    const auto lost = [&](const Vector3d& moved) {
+        return passed_unseen(contact, table, tissue(), tissue().colwise() + moved, &labels);
+    };
+    EXPECT_EQ(lost({0, 0, -500}), tissue().cols());
+    EXPECT_EQ(lost({0, 0, 500}), 0);
+    EXPECT_EQ(lost({500, 0, 0}), 0);
+}
+
 meshing::SurfaceMesh box_surface() {
     meshing::TetMesh mesh = meshing::box_mesh({10, 20, 30}, {2, 2, 2});
     return meshing::boundary_surface(mesh).surface;
