@@ -203,7 +203,7 @@ void add_fits(json& report, const registration::UpdateResult& result) {
 }
 
 json to_json(const registration::HeldOut& held_out) {
-    return {{"z", number(held_out.z)}, {"regions", held_out.regions}};
+    return {{"z", number(held_out.z)}, {"regions", held_out.regions}, {"seconds", held_out.seconds}};
 }
 
 json to_json(const registration::UncertaintySummary& s) {

@@ -7,6 +7,7 @@
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -120,6 +121,8 @@ void add_fold(const Fold& fold, const LinearRegistration& rest, const Eigen::Mat
 
 std::optional<HeldOut> held_out(const PreparedModel& prepared, const LastPulls& pulls, const LastPulls& unseen,
                                 const Eigen::Matrix3Xd& displacement, const Truths& truths, const DataErrors& errors) {
+    using Clock = std::chrono::steady_clock;
+    const Clock::time_point begin = Clock::now();
     const auto& [count, folds, draws] = held_out_options;
     const std::vector<PulledNode> data = pulls.data();
     const std::vector<int> region = regions_of(data, prepared.model.mesh.nodes, count);
@@ -145,6 +148,7 @@ std::optional<HeldOut> held_out(const PreparedModel& prepared, const LastPulls& 
     }
     if (result.regions == 0) return std::nullopt;
     result.z = std::sqrt(sum / result.regions);
+    result.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
     return result;
 }
 

@@ -201,7 +201,7 @@ TEST(Uncertainty, DoubtsDataThatLeaveHalfOfTheTissueUnknown) {
     EXPECT_FALSE(doubt_of_data(summary));
     summary.poor_share = 0.76;
     ASSERT_TRUE(doubt_of_data(summary));
-    EXPECT_NE(doubt_of_data(summary)->text.find("76 % of its tissue may lie more than 7 mm"), std::string::npos);
+    EXPECT_NE(doubt_of_data(summary)->text.find("76 % of its tissue may lie more than 5 mm"), std::string::npos);
 }
 
 TEST(CoarseTwin, CarriesLinearFieldsAndAllOfTheStiffness) {
