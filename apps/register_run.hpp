@@ -20,11 +20,12 @@ inline constexpr double gap_value = 0;
 
 /// Results on grids and at points.
 struct Products {
-    imaging::Volume moving_to_fixed, fixed_to_moving;  ///< displacement fields, mm, LPS
-    imaging::Volume warped, warped_labels;             ///< on the output grid; warped is empty without --moving
-    imaging::Volume gap;                               ///< there, uint8: where tissue is gone; empty without --resected
-    Eigen::Matrix3Xd landmarks, points;                ///< where moving landmarks and points went, mm, LPS; NaN where
-                                                       ///< their tissue is gone
+    imaging::Volume moving_to_fixed, fixed_to_moving;       ///< displacement fields, mm, LPS
+    registration::Unfolding unfolded_forth, unfolded_back;  ///< of them
+    imaging::Volume warped, warped_labels;                  ///< on the output grid; warped is empty without --moving
+    imaging::Volume gap;                 ///< there, uint8: where tissue is gone; empty without --resected
+    Eigen::Matrix3Xd landmarks, points;  ///< where moving landmarks and points went, mm, LPS; NaN where
+                                         ///< their tissue is gone
     std::optional<registration::Uncertainty> uncertainty;
     registration::UncertaintyVolumes uncertainty_volumes;  ///< on the output grid
     std::optional<meshing::SurfaceMesh> surface;

@@ -119,11 +119,13 @@ void make_backward_field(RegistrationRun& run, ProgressLine& progress) {
     if (!run.inputs.moving.empty() && !run.inputs.fixed.empty())
         deformation.surroundings = rigid_surroundings(deformation, run.inputs.moving, run.inputs.fixed, options);
     run.products.fixed_to_moving = displacement_fixed_to_moving(deformation, output_grid(run), options, progress);
+    run.products.unfolded_back = unfold_fixed_to_moving(run.products.fixed_to_moving, deformation);
 }
 
 void make_forward_field(RegistrationRun& run, ProgressLine& progress) {
     run.products.moving_to_fixed = displacement_moving_to_fixed(run.result.deformation, run.inputs.moving_grid(),
                                                                 FieldOptions{run.options.fade}, progress);
+    run.products.unfolded_forth = unfold_moving_to_fixed(run.products.moving_to_fixed, run.result.deformation);
 }
 
 void warp_everything(RegistrationRun& run) {
@@ -202,7 +204,9 @@ void score_forward_field(RegistrationRun& run) {
 /// What the scores and what is gone say against the result.
 void doubt_scores(RegistrationRun& run) {
     std::vector<Doubt>& doubts = run.result.doubts;
-    if (auto doubt = doubt_of_folds(run.scores.organ)) doubts.push_back(std::move(*doubt));
+    if (auto doubt = doubt_of_folds(run.scores.grid, run.scores.organ)) doubts.push_back(std::move(*doubt));
+    if (auto doubt = doubt_of_unfolding(run.products.unfolded_forth, run.products.unfolded_back))
+        doubts.push_back(std::move(*doubt));
     if (!run.products.gap.empty() && !run.inputs.fixed_labels.empty())
         if (auto doubt = doubt_of_gap(run.products.gap, run.inputs.fixed_labels)) doubts.push_back(std::move(*doubt));
     if (!run.resection) return;

@@ -287,6 +287,12 @@ json to_json(const registration::JacobianReport& report) {
             {"folded_places_mm", places}};
 }
 
+json to_json(const registration::Unfolding& unfolding) {
+    return {{"voxels", unfolding.voxels},
+            {"in_organ", unfolding.in_organ},
+            {"most_in_organ_mm", number(unfolding.most_in_organ_mm)}};
+}
+
 json to_json(const std::map<int, registration::Overlap>& overlaps, const imaging::LabelNames& names) {
     json object = json::object();
     for (const auto& [label, overlap] : overlaps) {
@@ -334,28 +340,32 @@ json alignment_json(const RegistrationRun& run) {
 
 json report_json(const RegistrationRun& run, double total_seconds) {
     const Scores& scores = run.scores;
-    json report{
-        {"schema", "tissuewarp.report"},
-        {"schema_version", 2},
-        {"program", "tissuewarp"},
-        {"version", program_version()},
-        {"versions", versions()},
-        {"started", run.started},
-        {"inputs", inputs(run.inputs)},
-        {"parameters", parameters(run.options)},
-        {"materials", materials(run)},
-        {"device", run.result.engine},
-        {"mesh", mesh(run)},
-        {"alignment", alignment(run)},
-        {"rounds", rounds(run)},
-        {"jacobian",
-         {{"mesh", to_json(scores.mesh)}, {"field_in_organ", to_json(scores.organ)}, {"field", to_json(scores.grid)}}},
-        {"doubts", doubts(run.result.doubts)},
-        {"notes", notes(run)},
-        {"outputs", output_names(run.options)},
-        {"stages", stages(run)},
-        {"total_seconds", total_seconds},
-        {"peak_memory_mb", static_cast<double>(peak_memory_bytes()) / 1e6}};
+    json report{{"schema", "tissuewarp.report"},
+                {"schema_version", 2},
+                {"program", "tissuewarp"},
+                {"version", program_version()},
+                {"versions", versions()},
+                {"started", run.started},
+                {"inputs", inputs(run.inputs)},
+                {"parameters", parameters(run.options)},
+                {"materials", materials(run)},
+                {"device", run.result.engine},
+                {"mesh", mesh(run)},
+                {"alignment", alignment(run)},
+                {"rounds", rounds(run)},
+                {"jacobian",
+                 {{"mesh", to_json(scores.mesh)},
+                  {"field_in_organ", to_json(scores.organ)},
+                  {"field", to_json(scores.grid)},
+                  {"unfolded",
+                   {{"moving_to_fixed", to_json(run.products.unfolded_forth)},
+                    {"fixed_to_moving", to_json(run.products.unfolded_back)}}}}},
+                {"doubts", doubts(run.result.doubts)},
+                {"notes", notes(run)},
+                {"outputs", output_names(run.options)},
+                {"stages", stages(run)},
+                {"total_seconds", total_seconds},
+                {"peak_memory_mb", static_cast<double>(peak_memory_bytes()) / 1e6}};
     report["estimated_error_mm"] =
         run.result.rounds.empty() ? json(nullptr) : number(run.result.rounds.back().estimated_error_mm);
     if (!scores.after.empty())

@@ -51,6 +51,7 @@ void warp_volume(const WarpOptions& options, const std::optional<WarpMotion>& mo
         const imaging::Geometry grid =
             options.reference.empty() ? image.geometry : read_noted_volume(options.reference, observer).geometry;
         field = registration::displacement_fixed_to_moving(motion->deformation, grid, {options.fade}, observer);
+        registration::unfold_fixed_to_moving(field, motion->deformation);
     } else {
         field = displacement(options, imaging::FieldType::Resampling, observer);
     }

@@ -4,6 +4,7 @@
 #include "core/observer.hpp"
 #include "imaging/volume.hpp"
 #include "registration/deformation.hpp"
+#include "registration/field.hpp"
 #include "registration/result.hpp"
 
 #include <Eigen/Core>
@@ -78,7 +79,17 @@ JacobianReport mesh_jacobians(const Deformation& deformation);
 /// det J of a forward field on its grid, every voxel, or those of a mask.
 JacobianReport field_jacobians(const imaging::Volume& moving_to_fixed, const imaging::Volume* mask = nullptr);
 
-/// `field.folds` where such a report of the organ's voxels holds folded ones, which tissue never has.
-std::optional<Doubt> doubt_of_folds(const JacobianReport& in_organ);
+/// `field.folds` where such a report of all voxels holds folded ones, which no tissue has; and how many the organ's
+/// does.
+std::optional<Doubt> doubt_of_folds(const JacobianReport& everywhere, const JacobianReport& in_organ);
+
+/// From where on a field that was unfolded is doubted.
+struct UnfoldingDoubtLimits {
+    double most_mm = 1;  ///< of a voxel of the organ
+};
+inline constexpr UnfoldingDoubtLimits unfolding_doubt_limits{};
+
+/// `field.unfolded` where one of the fields, so that it does not fold, is not that of the simulation.
+std::optional<Doubt> doubt_of_unfolding(const Unfolding& forth, const Unfolding& back);
 
 }  // namespace tissuewarp::registration

@@ -7,6 +7,7 @@
 #include "registration/field/rasterisation.hpp"
 #include "registration/field/row_inverse.hpp"
 #include "registration/field/uninitialised.hpp"
+#include "registration/field/voxel_jacobian.hpp"
 
 #include <tbb/parallel_for.h>
 
@@ -255,28 +256,12 @@ Volume jacobian_determinant(const Volume& displacement) {
     if (displacement.voxels.type() != CV_32FC3)
         throw InvalidInput("Jacobian: the field must have three channels of float32; give a displacement field");
     const Geometry& grid = displacement.geometry;
-    const Eigen::Matrix3d to_index = grid.point_to_index();
-    const std::array<std::int64_t, 3> stride{1, grid.size[0], std::int64_t{grid.size[0]} * grid.size[1]};
-    const auto* field = displacement.data<cv::Vec3f>();
+    const detail::VoxelJacobian jacobian(displacement);
     Volume result(grid, CV_32FC1);
     auto* target = result.data<float>();
     tbb::parallel_for(0, grid.size[2], [&](int k) {
-        for (int j = 0; j < grid.size[1]; ++j) {
-            for (int i = 0; i < grid.size[0]; ++i) {
-                const std::array<int, 3> index{i, j, k};
-                const std::int64_t voxel = displacement.offset(i, j, k);
-                Eigen::Matrix3d gradient;  // ∂d/∂index; zero along an axis of one voxel
-                for (int axis = 0; axis < 3; ++axis) {
-                    const int back = index[axis] > 0, ahead = index[axis] + 1 < grid.size[axis];
-                    const cv::Vec3f& from = field[voxel - back * stride[axis]];
-                    const cv::Vec3f& to = field[voxel + ahead * stride[axis]];
-                    const double scale = 1.0 / std::max(back + ahead, 1);
-                    for (int c = 0; c < 3; ++c) gradient(c, axis) = scale * (double{to[c]} - from[c]);
-                }
-                const Eigen::Matrix3d F = Eigen::Matrix3d::Identity() + gradient * to_index;
-                target[voxel] = static_cast<float>(F.determinant());
-            }
-        }
+        for (int j = 0; j < grid.size[1]; ++j)
+            for (int i = 0; i < grid.size[0]; ++i) target[result.offset(i, j, k)] = jacobian.determinant({i, j, k});
     });
     return result;
 }

@@ -7,8 +7,8 @@
 /// (harmonically where it is gentle, with less slope where that would fold) into the rigid placement, reached `fade_mm`
 /// away from the organ. There the backward field inverts the forward one numerically, to about 0.01 mm where the field
 /// does not fold. Where the surroundings' motion is known (Deformation::surroundings) that motion takes the place of
-/// the placement, rigid ones move by it but for 2.5 mm at their edges, and the backward field is continued on its own: tissue that parts from
-/// bone leaves places to which no preoperative point comes.
+/// the placement, rigid ones move by it but for 2.5 mm at their edges, and the backward field is continued on its own:
+/// tissue that parts from bone leaves places to which no preoperative point comes.
 
 #include "core/observer.hpp"
 #include "imaging/volume.hpp"
@@ -54,7 +54,22 @@ private:
     std::unique_ptr<Impl> impl_;
 };
 
-/// det(∂y/∂X) of a forward field by central differences, one channel float32 (one-sided at the border of the grid).
+/// What was changed so that a field does not fold.
+struct Unfolding {
+    std::int64_t voxels = 0;      ///< whose displacement is another
+    std::int64_t in_organ = 0;    ///< of these in the mesh
+    double most_in_organ_mm = 0;  ///< largest of their changes
+};
+
+/// Take the folds out of a field, in place: voxels about those with det(∂y/∂X) ≤ 0.05 take the mean of their six
+/// neighbours again and again (Laplacian smoothing), beside the mesh first. Where that does not do, since parts of the
+/// mesh pass into each other, its outermost voxels do too, and at last all near a fold. Rigid surroundings stay. A
+/// field without folds is not touched. PointTransform, which has no voxels, does not follow.
+Unfolding unfold_moving_to_fixed(imaging::Volume& field, const Deformation& deformation);
+Unfolding unfold_fixed_to_moving(imaging::Volume& field, const Deformation& deformation);
+
+/// det(∂y/∂X) of a forward field, or the like of a backward one, by central differences, one channel float32 (one-sided
+/// at the border of the grid).
 imaging::Volume jacobian_determinant(const imaging::Volume& displacement);
 
 }  // namespace tissuewarp::registration

@@ -125,6 +125,7 @@ Products Computer::compute(const Job& job, Observer& observer) {
         const Deformation& deformation = products.result.deformation;
         const imaging::Geometry grid = output_grid(job, moving, deformation.placement);
         products.field = displacement_fixed_to_moving(deformation, grid, {job.request.fade_mm}, observer);
+        unfold_fixed_to_moving(products.field, deformation);
         if (wanted("warped")) {
             if (patient_.image.empty()) throw InvalidInput("the patient was prepared without an image to warp");
             products.warped = warp_image(patient_.image, products.field);

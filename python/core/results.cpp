@@ -133,13 +133,17 @@ void bind_fields(py::module_& module) {
     module.def(
         "field_moving_to_fixed",
         [](const UpdateResult& result, const imaging::Geometry& grid) {
-            return registration::displacement_moving_to_fixed(result.deformation, grid);
+            imaging::Volume field = registration::displacement_moving_to_fixed(result.deformation, grid);
+            registration::unfold_moving_to_fixed(field, result.deformation);
+            return field;
         },
         py::arg("result"), py::arg("grid"), py::call_guard<py::gil_scoped_release>());
     module.def(
         "field_fixed_to_moving",
         [](const UpdateResult& result, const imaging::Geometry& grid) {
-            return registration::displacement_fixed_to_moving(result.deformation, grid);
+            imaging::Volume field = registration::displacement_fixed_to_moving(result.deformation, grid);
+            registration::unfold_fixed_to_moving(field, result.deformation);
+            return field;
         },
         py::arg("result"), py::arg("grid"), py::call_guard<py::gil_scoped_release>());
     module.def("warp_image", &registration::warp_image, py::arg("image"), py::arg("field"), py::arg("outside"),

@@ -123,16 +123,29 @@ JacobianReport field_jacobians(const Volume& moving_to_fixed, const Volume* mask
     return report;
 }
 
-std::optional<Doubt> doubt_of_folds(const JacobianReport& in_organ) {
-    if (in_organ.folded == 0) return std::nullopt;
+std::optional<Doubt> doubt_of_folds(const JacobianReport& everywhere, const JacobianReport& in_organ) {
+    if (everywhere.folded == 0) return std::nullopt;
     char least[32];
-    std::snprintf(least, sizeof least, "%.3g", in_organ.minimum);
+    std::snprintf(least, sizeof least, "%.3g", everywhere.minimum);
     return Doubt{
-        "field.folds", double(in_organ.folded), 0,
-        "the displacement field folds in " + std::to_string(in_organ.folded) +
-            " voxels of the organ, where its det J falls to " + least,
+        "field.folds", double(everywhere.folded), 0,
+        "the displacement field folds in " + std::to_string(everywhere.folded) + " voxels, " +
+            std::to_string(in_organ.folded) + " of them in the organ, and its det J falls to " + least,
         "do not trust it there (report.json lists places); a finer mesh, or labels and points that do not pull "
         "against each other there"};
+}
+
+std::optional<Doubt> doubt_of_unfolding(const Unfolding& forth, const Unfolding& back) {
+    const Unfolding& unfolding = forth.most_in_organ_mm > back.most_in_organ_mm ? forth : back;
+    if (unfolding.most_in_organ_mm <= unfolding_doubt_limits.most_mm) return std::nullopt;
+    char text[240];
+    std::snprintf(
+        text, sizeof text,
+        "the displacement field folded where parts of the organ pass into each other: %lld of its voxels were "
+        "moved by up to %.2g mm, so that it does not",
+        static_cast<long long>(unfolding.in_organ), unfolding.most_in_organ_mm);
+    return Doubt{"field.unfolded", unfolding.most_in_organ_mm, unfolding_doubt_limits.most_mm, text,
+                 "look where labels lie close together; give parts that slide on each other as one label"};
 }
 
 }  // namespace tissuewarp::registration

@@ -1,5 +1,6 @@
 /// Ultrasound of a generated organ: known as such, explained by the other image, and registered.
 #include "registration/matching/ultrasound/echo_costs.hpp"
+#include "registration/matching/ultrasound/echo_pose.hpp"
 #include "registration/matching/ultrasound/speckle.hpp"
 #include "registration/matching/ultrasound/ultrasound_search.hpp"
 #include "registration/terms/datum_kind.hpp"
@@ -108,6 +109,26 @@ TEST(EchoCosts, AreLeastAtTheShiftThatWasMade) {
     Eigen::Index least = 0;
     total.minCoeff(&least);
     EXPECT_EQ(costs.shift(static_cast<std::size_t>(least)), Eigen::Vector3i(1, -2, 1));
+}
+
+// How the organ is turned, they can hardly say.
+TEST(EchoPose, IsSoughtFromAFewPlacesCloseTogether) {
+    const Organ one = organ();
+    Eigen::Isometry3d shift = Eigen::Isometry3d::Identity();
+    shift.translation() = one.labels.geometry.direction * Eigen::Vector3d(3, -6, 3);
+    const detail::SeenImage seen(echoes(one.labels.geometry, shift));
+    detail::EchoSource source(one.model.model.mesh, one.image, seen);
+    const detail::State rest{Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, one.model.rest.node_count)};
+    const detail::EchoCosts all = detail::echo_costs(source.on_grid(rest, 3, 12), {8, 3, 3});
+    for (const std::size_t count : {1, 2, 3}) {
+        detail::EchoCosts few = all;
+        few.at.resize(count);
+        few.cost.resize(count * few.lattice());
+        few.window_share.resize(count);
+        const detail::EchoPose found = detail::echo_pose(few, {}, silent_observer());
+        EXPECT_TRUE(found.motion.matrix().allFinite());
+        EXPECT_LT(found.motion.translation().norm(), 30) << count;
+    }
 }
 
 class Noted : public Observer {

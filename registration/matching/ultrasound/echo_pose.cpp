@@ -27,7 +27,7 @@ public:
             add_evidence(costs.of(n), lattice, independent * costs.window_share[n], evidence_.data() + n * lattice);
         }
         centre_ = places_.rowwise().mean();
-        radius_ = std::sqrt((places_.colwise() - centre_).colwise().squaredNorm().mean());
+        radius_ = std::max(1.0, std::sqrt((places_.colwise() - centre_).colwise().squaredNorm().mean()));
     }
 
     [[nodiscard]] double radius() const { return radius_; }
@@ -87,7 +87,7 @@ private:
     std::vector<float> evidence_;  // −log odds of each shift of each place against chance
     Eigen::Matrix3Xd places_;
     Eigen::Vector3d centre_;
-    double radius_ = 1;
+    double radius_ = 1;  // of the places, mm
 
     static void add_evidence(const float* cost, std::size_t lattice, double independent, float* evidence) {
         constexpr double least_cost = 1e-3;
@@ -154,7 +154,9 @@ Found descended(const PoseEvidence& evidence, const Pose& start, const EchoPoseO
     search.set_lower_bounds(low);
     search.set_upper_bounds(bound);
     constexpr double first_step_mm = 2, tolerance_mm = 0.02;
-    search.set_initial_step(first_step_mm);
+    std::vector<double> step;
+    for (const double b : bound) step.push_back(std::min(first_step_mm, 0.5 * b));  // BOBYQA needs room for two
+    search.set_initial_step(step);
     search.set_xtol_abs(tolerance_mm);
     search.set_maxeval(options.evaluations);
     std::vector<double> x(start.begin(), start.end());

@@ -1,0 +1,209 @@
+#include "core/errors.hpp"
+#include "imaging/mask_lookup.hpp"
+#include "registration/field.hpp"
+#include "registration/field/rasterisation.hpp"
+#include "registration/field/voxel_jacobian.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <unordered_map>
+#include <vector>
+
+namespace tissuewarp::registration {
+
+namespace {
+
+using imaging::Geometry;
+using imaging::Volume;
+using Voxels = std::vector<std::int64_t>;  // in ascending order
+
+constexpr float least_determinant = 0.05F;
+
+/// Voxels that may be smoothed: beside the mesh, the outermost of it too, all.
+enum class Free { Beside, Rim, All };
+
+/// Who is smoothed, and how much.
+struct Pass {
+    Free free;
+    int reach;  // steps from a folded voxel
+    int sweeps, rounds;
+};
+// What is beside the mesh is free to give way, and most folds go. Those left lie where parts of the mesh pass into each
+// other or a gap of a voxel closes: there the mesh gives way, as little as it can.
+constexpr Pass passes[] = {{Free::Beside, 2, 5, 10}, {Free::Rim, 1, 1, 20}, {Free::All, 1, 1, 20}};
+
+std::array<int, 3> index_of(std::int64_t voxel, const Geometry& grid) {
+    const std::int64_t row = voxel / grid.size[0];
+    return {int(voxel % grid.size[0]), int(row % grid.size[1]), int(row / grid.size[1])};
+}
+
+/// Calls visit(neighbour) for those of the six that the grid holds.
+template <class Visit>
+void for_each_neighbour(std::int64_t voxel, const Geometry& grid, const Visit& visit) {
+    const auto index = index_of(voxel, grid);
+    std::int64_t stride = 1;
+    for (std::size_t axis = 0; axis < 3; stride *= grid.size[int(axis)], ++axis) {
+        if (index[axis] > 0) visit(voxel - stride);
+        if (index[axis] + 1 < grid.size[int(axis)]) visit(voxel + stride);
+    }
+}
+
+Voxels with_neighbours(const Voxels& voxels, const Geometry& grid) {
+    Voxels result = voxels;
+    for (const std::int64_t voxel : voxels)
+        for_each_neighbour(voxel, grid, [&](std::int64_t neighbour) { result.push_back(neighbour); });
+    std::sort(result.begin(), result.end());
+    result.erase(std::unique(result.begin(), result.end()), result.end());
+    return result;
+}
+
+std::vector<std::uint8_t> voxels_in(const meshing::TetMesh& mesh, const Geometry& grid) {
+    std::vector<std::uint8_t> inside(static_cast<std::size_t>(grid.voxel_count()));
+    const Eigen::Matrix3Xd index = grid.point_to_index() * (mesh.nodes.colwise() - grid.origin);
+    detail::rasterise(index, mesh.tets, grid.size, [&](int, const Eigen::Vector4d&) {
+        return [&](const detail::TetRow& row) {
+            const std::int64_t start = grid.size[0] * (row.j + std::int64_t{grid.size[1]} * row.k);
+            std::fill(inside.begin() + start + row.first, inside.begin() + start + row.last + 1, std::uint8_t{1});
+        };
+    });
+    return inside;
+}
+
+Voxels folded_of_all(const Volume& displacement) {
+    const Geometry& grid = displacement.geometry;
+    const detail::VoxelJacobian jacobian(displacement);
+    std::vector<Voxels> slices(static_cast<std::size_t>(grid.size[2]));
+    tbb::parallel_for(0, grid.size[2], [&](int k) {
+        for (int j = 0; j < grid.size[1]; ++j)
+            for (int i = 0; i < grid.size[0]; ++i)
+                if (jacobian.determinant({i, j, k}) <= least_determinant)
+                    slices[std::size_t(k)].push_back(displacement.offset(i, j, k));
+    });
+    Voxels result;
+    for (const Voxels& slice : slices) result.insert(result.end(), slice.begin(), slice.end());
+    return result;
+}
+
+/// The organ and what is rigid about it, in the frame of a field.
+struct Bodies {
+    meshing::TetMesh mesh;
+    imaging::MaskLookup rigid;
+    Eigen::Isometry3d to_rigid;  // into the frame of that mask
+};
+
+class Unfolder {
+public:
+    Unfolder(Volume& displacement, const Bodies& bodies, Voxels folded)
+        : grid_(displacement.geometry),
+          field_(displacement.data<cv::Vec3f>()),
+          jacobian_(displacement),
+          inside_(voxels_in(bodies.mesh, grid_)),
+          bodies_(bodies),
+          folded_(std::move(folded)) {}
+
+    void operator()(const Pass& pass) {
+        for (int round = 0; round < pass.rounds && !folded_.empty(); ++round) {
+            const Voxels free = free_about_folds(pass);
+            for (int sweep = 0; sweep < pass.sweeps; ++sweep) smooth(free);
+            find_folds(free);
+        }
+    }
+
+    [[nodiscard]] Unfolding changes() const {
+        Unfolding result;
+        for (const auto& [voxel, before] : before_) {
+            ++result.voxels;
+            if (!inside_[std::size_t(voxel)]) continue;
+            ++result.in_organ;
+            result.most_in_organ_mm = std::max(result.most_in_organ_mm, cv::norm(field_[voxel] - before));
+        }
+        return result;
+    }
+
+private:
+    [[nodiscard]] bool on_rim(std::int64_t voxel) const {
+        bool rim = false;
+        for_each_neighbour(voxel, grid_, [&](std::int64_t other) { rim = rim || !inside_[std::size_t(other)]; });
+        return rim;
+    }
+    [[nodiscard]] bool is_free(std::int64_t voxel, const Pass& pass) const {
+        if (inside_[std::size_t(voxel)]) return pass.free == Free::All || (pass.free == Free::Rim && on_rim(voxel));
+        const auto index = index_of(voxel, grid_);
+        return !bodies_.rigid(bodies_.to_rigid * grid_.point(Eigen::Vector3d(index[0], index[1], index[2])));
+    }
+    [[nodiscard]] Voxels free_about_folds(const Pass& pass) const {
+        Voxels near = folded_;
+        for (int step = 0; step < pass.reach; ++step) near = with_neighbours(near, grid_);
+        std::erase_if(near, [&](std::int64_t voxel) { return !is_free(voxel, pass); });
+        return near;
+    }
+    /// All at once take the mean of their neighbours; in place of one beyond the border counts the voxel itself.
+    void smooth(const Voxels& free) {
+        std::vector<cv::Vec3f> means;
+        for (const std::int64_t voxel : free) {
+            cv::Vec3f sum(0, 0, 0);
+            int count = 0;
+            for_each_neighbour(voxel, grid_, [&](std::int64_t other) {
+                sum += field_[other];
+                ++count;
+            });
+            means.push_back((sum + float(6 - count) * field_[voxel]) / 6.0F);
+        }
+        for (std::size_t n = 0; n < free.size(); ++n) {
+            before_.try_emplace(free[n], field_[free[n]]);
+            field_[free[n]] = means[n];
+        }
+    }
+    void find_folds(const Voxels& changed) {
+        Voxels candidates = with_neighbours(changed, grid_);
+        candidates.insert(candidates.end(), folded_.begin(), folded_.end());
+        std::sort(candidates.begin(), candidates.end());
+        candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
+        std::erase_if(candidates, [&](std::int64_t voxel) {
+            return jacobian_.determinant(index_of(voxel, grid_)) > least_determinant;
+        });
+        folded_ = std::move(candidates);
+    }
+
+    const Geometry& grid_;
+    cv::Vec3f* field_;
+    detail::VoxelJacobian jacobian_;
+    std::vector<std::uint8_t> inside_;
+    const Bodies& bodies_;
+    Voxels folded_;
+    std::unordered_map<std::int64_t, cv::Vec3f> before_;
+};
+
+template <class MakeBodies>
+Unfolding unfold(Volume& field, const MakeBodies& bodies_of_frame) {
+    if (field.voxels.type() != CV_32FC3)
+        throw InvalidInput("unfolding: the field must have three channels of float32; give a displacement field");
+    Voxels folded = folded_of_all(field);
+    if (folded.empty()) return {};
+    const Bodies bodies = bodies_of_frame();
+    Unfolder unfolder(field, bodies, std::move(folded));
+    for (const Pass& pass : passes) unfolder(pass);
+    return unfolder.changes();
+}
+
+imaging::MaskLookup rigid_about(const Deformation& deformation) {
+    return imaging::MaskLookup(deformation.surroundings ? deformation.surroundings->rigid : Volume());
+}
+
+}  // namespace
+
+Unfolding unfold_moving_to_fixed(Volume& field, const Deformation& deformation) {
+    return unfold(field, [&] {
+        return Bodies{deformation.mesh, rigid_about(deformation), Eigen::Isometry3d::Identity()};
+    });
+}
+
+Unfolding unfold_fixed_to_moving(Volume& field, const Deformation& deformation) {
+    return unfold(field, [&] {
+        return Bodies{deformation.deformed_mesh(), rigid_about(deformation), deformation.far_motion().inverse()};
+    });
+}
+
+}  // namespace tissuewarp::registration
