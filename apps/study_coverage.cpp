@@ -111,6 +111,7 @@ void run_coverage_study(const StudyOptions& options) {
     progress.begin("registering phantoms", 0.0, 1.0);
     const auto coverage = study::coverage_of(measured(options, plan, progress));
     progress.clear();
+    for (const std::string& note : progress.notes()) fmt::print("note: {}\n", note);
     if (coverage.empty()) throw SolverFailure("no phantom could be registered; give other seeds");
     write_file(study::coverage_figure(coverage), options.output / "coverage.svg");
     fmt::print("{}", study::table_of(coverage));

@@ -71,6 +71,7 @@ void run_dial_study(const StudyOptions& options) {
     progress.begin("registering phantoms", 0.0, 1.0);
     const std::vector<DialTrial> trials = measured(options, plan, progress);
     progress.clear();
+    for (const std::string& note : progress.notes()) fmt::print("note: {}\n", note);
     if (trials.empty()) throw SolverFailure("no phantom could be made; give other seeds");
     std::vector<std::vector<DialTrial>> groups;
     for (const DialTrial& trial : trials) {

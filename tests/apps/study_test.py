@@ -12,7 +12,7 @@ import unittest
 
 from phantom import PROGRAM, PhantomTest, run
 
-INPUT, IO, GPU, INTERRUPTED = 2, 3, 5, 130
+INPUT, IO, SOLVER, GPU, INTERRUPTED = 2, 3, 4, 5, 130
 CHROMIUM = shutil.which("chromium")
 
 
@@ -179,6 +179,13 @@ class StudyOptions(PhantomTest):
         labels = ["--organs", self.phantom.fixed_labels]
         self.assert_refused(run(*found, *labels), INPUT, "--fields")
         self.assert_refused(run(*found, *labels, "--fields", self.phantom.fixed_labels), INPUT, "1 components")
+
+    # Patient 2097 has no cavity of 10 to 60 ml in ten draws.
+    def test_patients_left_out_are_named(self):
+        result = run("study", "coverage", "--problems", "resected:2097-2097", "--evidence", "image", "--device", "cpu",
+                     "--output", self.phantom.output, timeout=200)
+        self.assertEqual(result.returncode, SOLVER, result.stderr)
+        self.assertIn("note: phantom 2097 has no truth in 10 draws", result.stdout)
 
     def test_without_output(self):
         self.assert_refused(run("study", "accuracy-time", "--quick"), INPUT, "--output")
