@@ -46,6 +46,10 @@ bool writes(const RegisterOptions& options, const OptionalOutput& output) {
     return true;
 }
 
+bool writes_gap(const RegisterOptions& options) {
+    return !options.resected.empty() || options.find_resected || (!options.moving.empty() && !options.fixed.empty());
+}
+
 bool writes_cavity(const RegisterOptions& options) {
     return options.find_resected && options.match_image && options.fixed_labels.empty();
 }
@@ -56,7 +60,7 @@ std::vector<std::string> output_names(const RegisterOptions& options) {
     for (const char* name :
          {"warped_labels.nii.gz", moving_to_fixed_name, fixed_to_moving_name, transform_name, "mesh.vtu", "record.h5"})
         names.emplace_back(name);
-    if (!options.resected.empty() || options.find_resected) names.emplace_back(gap_name);
+    if (writes_gap(options)) names.emplace_back(gap_name);
     if (writes_cavity(options)) names.emplace_back(cavity_name);
     if (!options.no_error_estimate)
         for (const char* name : {"uncertainty.nii.gz", "uncertainty_trust.nii.gz"}) names.emplace_back(name);

@@ -40,6 +40,9 @@ std::vector<std::string> words_of_write();
 /// Whether --write asks for a file of `optional_outputs` that these inputs can give.
 bool writes(const RegisterOptions& options, const OptionalOutput& output);
 
+/// Whether it is said where tissue is gone or parted: with resections, and where both images are at hand.
+bool writes_gap(const RegisterOptions& options);
+
 /// Whether what is gone is sought in an image alone.
 bool writes_cavity(const RegisterOptions& options);
 

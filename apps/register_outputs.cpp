@@ -9,6 +9,7 @@
 #include "apps/report_json.hpp"
 #include "apps/versions.hpp"
 #include "core/atomic_file.hpp"
+#include "imaging/labels.hpp"
 #include "meshing/mesh_io.hpp"
 #include "registration/field.hpp"
 #include "registration/io/transform_file.hpp"
@@ -120,15 +121,11 @@ std::string estimate_text(const registration::UncertaintySummary& s) {
                       100 * s.unknown_share);
 }
 
-double millilitres(const imaging::Volume& mask) {
-    return mask.empty() ? 0 : cv::countNonZero(mask.voxels.reshape(1, 1)) * mask.geometry.voxel_volume() / 1000;
-}
-
 std::string resected_text(const RegistrationRun& run) {
     if (run.prepared->resected.empty()) return "resected: nothing was found to be\n";
     return fmt::format("resected: {:.1f} ml of labels {}; the hole of {:.1f} ml is in {}\n",
-                       millilitres(run.prepared->resected), fmt::join(run.prepared->options.resected, ", "),
-                       millilitres(run.products.gap), gap_name);
+                       imaging::millilitres(run.prepared->resected), fmt::join(run.prepared->options.resected, ", "),
+                       imaging::millilitres(run.products.gap), gap_name);
 }
 
 /// Puts files into the output folder, under the names that they have there. Copies write for the same run.
@@ -222,7 +219,6 @@ void start_writing_warped(const RegistrationRun& run, const OutputFolder& output
         if (!products.warped.empty())
             writer.start("warped.nii.gz", [&](auto& path) { write_volume(products.warped, path); });
         writer.start("warped_labels.nii.gz", [&](auto& path) { write_volume(compact(products.warped_labels), path); });
-        if (!products.gap.empty()) writer.start(gap_name, [&](auto& path) { write_volume(products.gap, path); });
         if (writes_cavity(run.options))
             writer.start(cavity_name, [&](auto& path) { write_volume(run.resection->cavity, path); });
         writer.start("mesh.vtu", [&](auto& path) { write_mesh(run.result.deformation, path); });
@@ -241,6 +237,14 @@ void start_writing_forward(const RegistrationRun& run, const OutputFolder& outpu
     start_optional(writer, Part::Forward);
 }
 
+/// 1 where tissue is gone, 2 where it parted.
+imaging::Volume gone_or_parted(const RegistrationRun& run) {
+    imaging::Volume result = run.products.parted.clone();
+    result.voxels *= 2;
+    if (!run.products.gap.empty()) result.voxels += run.products.gap.voxels;
+    return result;
+}
+
 void start_writing_estimates(const RegistrationRun& run, const OutputFolder& output, tbb::task_group& tasks) {
     const Writer writer(run, output, tasks);
     const Products& products = run.products;
@@ -249,6 +253,7 @@ void start_writing_estimates(const RegistrationRun& run, const OutputFolder& out
         writer.start("uncertainty.nii.gz", [&](auto& path) { write_volume(volumes.deviation, path); });
         writer.start("uncertainty_trust.nii.gz", [&](auto& path) { write_volume(volumes.trust, path); });
     }
+    if (writes_gap(run.options)) writer.start(gap_name, [&](auto& path) { write_volume(gone_or_parted(run), path); });
     writer.start("record.h5",
                  [&](auto& path) { registration::write_record(*run.prepared, run.result, record_info(run), path); });
     if (run.inputs.landmarks) writer.start("warped_landmarks.csv", [&](auto& path) { write_landmarks(run, path); });

@@ -24,6 +24,7 @@ struct Products {
     registration::Unfolding unfolded_forth, unfolded_back;  ///< of them
     imaging::Volume warped, warped_labels;                  ///< on the output grid; warped is empty without --moving
     imaging::Volume gap;                 ///< there, uint8: where tissue is gone; empty without --resected
+    imaging::Volume parted;              ///< there, uint8: where tissue parted; empty unless writes_gap()
     Eigen::Matrix3Xd landmarks, points;  ///< where moving landmarks and points went, mm, LPS; NaN where
                                          ///< their tissue is gone
     std::optional<registration::Uncertainty> uncertainty;

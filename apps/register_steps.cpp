@@ -15,6 +15,7 @@
 #include "imaging/labels.hpp"
 #include "registration/evaluation/curve_residual.hpp"
 #include "registration/field.hpp"
+#include "registration/field/parted.hpp"
 #include "registration/io/curves.hpp"
 #include "registration/resection/gap.hpp"
 #include "registration/stretch/stretched_update.hpp"
@@ -175,6 +176,24 @@ void require_no_doubts(const RegistrationRun& run) {
         fmt::join(codes, ", "), (run.options.output / "report.json").string()));
 }
 
+/// What is gone is no tissue that parted.
+void find_parted(RegistrationRun& run) {
+    Products& products = run.products;
+    if (!writes_gap(run.options)) return;
+    products.parted = parted_after(run.result.deformation, products.fixed_to_moving);
+    if (!products.gap.empty()) products.parted.voxels.setTo(0, products.gap.voxels);
+}
+
+void note_parted(const RegistrationRun& run, ProgressLine& progress) {
+    constexpr double least_ml = 0.1;
+    const double ml = imaging::millilitres(run.products.parted);
+    if (ml < least_ml) return;
+    progress.note(
+        fmt::format("tissue parted: {:.1f} ml of what was warped show what lay there before stretched to more "
+                    "than twice its volume ({} is 2 there)",
+                    ml, gap_name));
+}
+
 /// How well labels agree, and points.
 void score_warped(RegistrationRun& run) {
     Scores& scores = run.scores;
@@ -294,7 +313,10 @@ void register_and_write(RegistrationRun& run, OutputFolder& output, StageClock& 
         run.times.push_back(clock.lap("error estimate"));
     }
     progress.begin("writing and scoring", 0.85, 0.97);
-    warped_scored.group.run([&] { score_warped(run); });
+    warped_scored.group.run([&] {
+        score_warped(run);
+        find_parted(run);
+    });
     if (run.products.moving_to_fixed.empty()) make_forward_field(run, progress);
     start_writing_forward(run, output, writing);
     forward_scored.group.run([&] { score_forward_field(run); });
@@ -309,6 +331,7 @@ void register_and_write(RegistrationRun& run, OutputFolder& output, StageClock& 
     start_writing_estimates(run, output, writing);
     writing.wait();
     silenced.reset();
+    note_parted(run, progress);
     run.times.push_back(clock.lap("write"));
 
     progress.begin("report", 0.97, 1.0);

@@ -4,6 +4,7 @@
 #include "apps/register_outputs.hpp"
 #include "apps/versions.hpp"
 #include "core/atomic_file.hpp"
+#include "imaging/labels.hpp"
 
 #include <cmath>
 
@@ -221,12 +222,9 @@ json to_json(const registration::UncertaintySummary& s) {
 
 /// What is gone, before and after.
 json resected(const RegistrationRun& run) {
-    const auto millilitres = [](const imaging::Volume& mask) {
-        return mask.empty() ? 0.0 : cv::countNonZero(mask.voxels.reshape(1, 1)) * mask.geometry.voxel_volume() / 1000;
-    };
     json object{{"labels", run.prepared->options.resected},
-                {"volume_ml", number(millilitres(run.prepared->resected))},
-                {"gap_ml", number(millilitres(run.products.gap))},
+                {"volume_ml", number(imaging::millilitres(run.prepared->resected))},
+                {"gap_ml", number(imaging::millilitres(run.products.gap))},
                 {"value", gap_value}};
     if (run.resection)
         object["found"] = {{"cavity_ml", number(run.resection->cavity_ml)},
@@ -374,6 +372,7 @@ json report_json(const RegistrationRun& run, double total_seconds) {
     if (run.inputs.foreground) report["foreground"] = foreground(*run.inputs.foreground);
     if (run.inputs.start) report["initial_transform"] = start(*run.inputs.start);
     if (!run.products.gap.empty()) report["resected"] = resected(run);
+    if (!run.products.parted.empty()) report["parted_ml"] = number(imaging::millilitres(run.products.parted));
     add_fits(report, run.result);
     if (run.products.uncertainty) {
         report["error_estimate"] = to_json(registration::summarise(*run.products.uncertainty));

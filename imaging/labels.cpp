@@ -123,6 +123,10 @@ Volume mask_of_all(const Volume& labels) {
     return nonzero(labels);
 }
 
+double millilitres(const Volume& mask) {
+    return mask.empty() ? 0 : cv::countNonZero(mask.voxels.reshape(1, 1)) * mask.geometry.voxel_volume() / 1000;
+}
+
 Volume connected_components(const Volume& mask) {
     Volume result = nonzero(mask).as(CV_32S);
     const std::vector<detail::LabelRun> runs = detail::connected_runs(result);

@@ -34,6 +34,9 @@ std::map<int, LabelStatistics> label_statistics(const Volume& labels, const Volu
 Volume mask_of(const Volume& labels, int label);
 Volume mask_of_all(const Volume& labels);
 
+/// Volume of the voxels != 0; 0 for an empty mask.
+double millilitres(const Volume& mask);
+
 /// The map with these labels turned to background, int32; the map itself, not a copy, where none is given.
 Volume without_labels(const Volume& labels, const std::vector<int>& which);
 

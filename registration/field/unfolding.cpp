@@ -1,7 +1,7 @@
 #include "core/errors.hpp"
 #include "imaging/mask_lookup.hpp"
 #include "registration/field.hpp"
-#include "registration/field/rasterisation.hpp"
+#include "registration/field/mesh_labels.hpp"
 #include "registration/field/voxel_jacobian.hpp"
 
 #include <tbb/parallel_for.h>
@@ -59,18 +59,6 @@ Voxels with_neighbours(const Voxels& voxels, const Geometry& grid) {
     return result;
 }
 
-std::vector<std::uint8_t> voxels_in(const meshing::TetMesh& mesh, const Geometry& grid) {
-    std::vector<std::uint8_t> inside(static_cast<std::size_t>(grid.voxel_count()));
-    const Eigen::Matrix3Xd index = grid.point_to_index() * (mesh.nodes.colwise() - grid.origin);
-    detail::rasterise(index, mesh.tets, grid.size, [&](int, const Eigen::Vector4d&) {
-        return [&](const detail::TetRow& row) {
-            const std::int64_t start = grid.size[0] * (row.j + std::int64_t{grid.size[1]} * row.k);
-            std::fill(inside.begin() + start + row.first, inside.begin() + start + row.last + 1, std::uint8_t{1});
-        };
-    });
-    return inside;
-}
-
 Voxels folded_of_all(const Volume& displacement) {
     const Geometry& grid = displacement.geometry;
     const detail::VoxelJacobian jacobian(displacement);
@@ -99,7 +87,8 @@ public:
         : grid_(displacement.geometry),
           field_(displacement.data<cv::Vec3f>()),
           jacobian_(displacement),
-          inside_(voxels_in(bodies.mesh, grid_)),
+          organ_(mask_of_mesh(bodies.mesh, grid_)),
+          inside_(organ_.data<std::uint8_t>()),
           bodies_(bodies),
           folded_(std::move(folded)) {}
 
@@ -115,7 +104,7 @@ public:
         Unfolding result;
         for (const auto& [voxel, before] : before_) {
             ++result.voxels;
-            if (!inside_[std::size_t(voxel)]) continue;
+            if (!inside_[voxel]) continue;
             ++result.in_organ;
             result.most_in_organ_mm = std::max(result.most_in_organ_mm, cv::norm(field_[voxel] - before));
         }
@@ -125,11 +114,11 @@ public:
 private:
     [[nodiscard]] bool on_rim(std::int64_t voxel) const {
         bool rim = false;
-        for_each_neighbour(voxel, grid_, [&](std::int64_t other) { rim = rim || !inside_[std::size_t(other)]; });
+        for_each_neighbour(voxel, grid_, [&](std::int64_t other) { rim = rim || !inside_[other]; });
         return rim;
     }
     [[nodiscard]] bool is_free(std::int64_t voxel, const Pass& pass) const {
-        if (inside_[std::size_t(voxel)]) return pass.free == Free::All || (pass.free == Free::Rim && on_rim(voxel));
+        if (inside_[voxel]) return pass.free == Free::All || (pass.free == Free::Rim && on_rim(voxel));
         const auto index = index_of(voxel, grid_);
         return !bodies_.rigid(bodies_.to_rigid * grid_.point(Eigen::Vector3d(index[0], index[1], index[2])));
     }
@@ -170,7 +159,8 @@ private:
     const Geometry& grid_;
     cv::Vec3f* field_;
     detail::VoxelJacobian jacobian_;
-    std::vector<std::uint8_t> inside_;
+    Volume organ_;
+    const std::uint8_t* inside_;
     const Bodies& bodies_;
     Voxels folded_;
     std::unordered_map<std::int64_t, cv::Vec3f> before_;

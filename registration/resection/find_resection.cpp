@@ -18,7 +18,8 @@ namespace tissuewarp::registration {
 
 namespace {
 
-using detail::CavityView, detail::millilitres;
+using detail::CavityView;
+using imaging::millilitres;
 using Eigen::Vector3d;
 using imaging::Volume;
 

@@ -101,17 +101,12 @@ double median(std::vector<float> values) {
     return *middle;
 }
 
-double millilitres(const Volume& mask) {
-    constexpr double mm3_per_ml = 1000;
-    return cv::countNonZero(mask.voxels.reshape(1, 1)) * mask.geometry.voxel_volume() / mm3_per_ml;
-}
-
 std::vector<Volume> pieces_of(const Volume& mask, double least_ml) {
     const Volume numbered = imaging::connected_components(mask);
     std::vector<Volume> pieces;
     for (const int piece : imaging::labels_in(numbered)) {
         Volume one = imaging::mask_of(numbered, piece);
-        if (millilitres(one) < least_ml) break;
+        if (imaging::millilitres(one) < least_ml) break;
         pieces.push_back(std::move(one));
     }
     return pieces;

@@ -31,7 +31,6 @@ imaging::Volume local_deviation(const imaging::Volume& image);
 
 std::vector<float> values_in(const imaging::Volume& image, const imaging::Volume& mask);
 double median(std::vector<float> values);
-double millilitres(const imaging::Volume& mask);
 
 /// Pieces of a mask, largest first, of more than a volume.
 std::vector<imaging::Volume> pieces_of(const imaging::Volume& mask, double least_ml);

@@ -12,7 +12,7 @@ import numpy
 
 from phantom import CENTRE_LPS, FIXED_AFFINE, MOVING_AFFINE, SHIFT_LPS, SIZE, Phantom, run
 
-OUTPUTS = ["displacement_fixed_to_moving.nii.gz", "displacement_moving_to_fixed.nii.gz", "mesh.vtu", "preview.png",
+OUTPUTS = ["displacement_fixed_to_moving.nii.gz", "displacement_moving_to_fixed.nii.gz", "gap.nii.gz", "mesh.vtu", "preview.png",
            "record.h5", "report.html", "report.json", "transform.h5", "uncertainty.nii.gz",
            "uncertainty_trust.nii.gz", "warped.nii.gz",
            "warped_labels.nii.gz", "warped_landmarks.csv", "warped_points.csv"]

@@ -318,13 +318,7 @@ TEST(Continuation, HoldsTheSurfaceOfASheetThinnerThanItsGrid) {
 Deformation blocks_across_a_gap(double gap, double lower, const Eigen::Vector3d& second) {
     const meshing::TetMesh a = test::box_at({lower - 12, 0, 0}, {12, 24, 24}, {3, 6, 6});
     const meshing::TetMesh b = test::box_at({lower + gap, 0, 0}, {12, 24, 24}, {3, 6, 6});
-    meshing::TetMesh both = a;
-    both.nodes.conservativeResize(3, a.node_count() + b.node_count());
-    both.nodes.rightCols(b.node_count()) = b.nodes;
-    both.tets.conservativeResize(4, a.tet_count() + b.tet_count());
-    both.tets.rightCols(b.tet_count()) = b.tets.array() + a.node_count();
-    both.labels = Eigen::VectorXi::Ones(both.tet_count());
-    return test::deformed_by(both, [&](const Eigen::Vector3d& X) -> Eigen::Vector3d {
+    return test::deformed_by(test::beside(a, b), [&](const Eigen::Vector3d& X) -> Eigen::Vector3d {
         return X[0] > lower + 0.5 * gap ? second : Eigen::Vector3d::Zero();
     });
 }

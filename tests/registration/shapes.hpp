@@ -30,6 +30,17 @@ inline meshing::TetMesh ball(const Eigen::Vector3d& centre, double radius, int c
     return mesh;
 }
 
+/// Both in one mesh, of one label.
+inline meshing::TetMesh beside(const meshing::TetMesh& a, const meshing::TetMesh& b) {
+    meshing::TetMesh both = a;
+    both.nodes.conservativeResize(3, a.node_count() + b.node_count());
+    both.nodes.rightCols(b.node_count()) = b.nodes;
+    both.tets.conservativeResize(4, a.tet_count() + b.tet_count());
+    both.tets.rightCols(b.tet_count()) = b.tets.array() + a.node_count();
+    both.labels = Eigen::VectorXi::Ones(both.tet_count());
+    return both;
+}
+
 /// The deformation whose displacement at the nodes is u(X).
 inline Deformation deformed_by(const meshing::TetMesh& mesh,
                                const std::function<Eigen::Vector3d(const Eigen::Vector3d&)>& u) {

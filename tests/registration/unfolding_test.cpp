@@ -21,13 +21,7 @@ const Geometry grid = test::plain_grid({47, 25, 25}, 1, {-2, -2, -2});
 Deformation two_blocks(const Eigen::Vector3d& second) {
     const meshing::TetMesh a = test::box_at({0, 0, 0}, {20.4, 20.4, 20.4}, {4, 4, 4}),
                            b = test::box_at({22.4, 0, 0}, {20.4, 20.4, 20.4}, {4, 4, 4});
-    meshing::TetMesh both = a;
-    both.nodes.conservativeResize(3, a.node_count() + b.node_count());
-    both.nodes.rightCols(b.node_count()) = b.nodes;
-    both.tets.conservativeResize(4, a.tet_count() + b.tet_count());
-    both.tets.rightCols(b.tet_count()) = b.tets.array() + a.node_count();
-    both.labels = Eigen::VectorXi::Ones(both.tet_count());
-    return test::deformed_by(both, [&](const Eigen::Vector3d& X) -> Eigen::Vector3d {
+    return test::deformed_by(test::beside(a, b), [&](const Eigen::Vector3d& X) -> Eigen::Vector3d {
         return X[0] > 21 ? second : Eigen::Vector3d::Zero();
     });
 }

@@ -17,10 +17,6 @@ Phantom patient(Family family, std::uint64_t seed) {
     return random_phantom(seed, options);
 }
 
-double millilitres(const imaging::Volume& mask) {
-    return cv::countNonZero(mask.voxels.reshape(1, 1)) * mask.geometry.voxel_volume() / 1000;
-}
-
 const Phantom& resected() {
     static const Phantom phantom = patient(Family::Resected, 2);
     return phantom;
@@ -29,14 +25,14 @@ const Phantom& resected() {
 TEST(ResectionPhantom, HasACavityOfWhatIsGone) {
     const Phantom& gone = resected();
     ASSERT_EQ(gone.resected, std::vector<int>{2});
-    const double before_ml = millilitres(imaging::mask_of(gone.moving_labels, 2));
+    const double before_ml = imaging::millilitres(imaging::mask_of(gone.moving_labels, 2));
     EXPECT_GT(before_ml, 9.5);
     EXPECT_LT(before_ml, 61);
     EXPECT_NE(gone.story.find("resected"), std::string::npos) << gone.story;
     const std::vector<int> left = imaging::labels_in(gone.fixed_labels);
     EXPECT_EQ(std::count(left.begin(), left.end(), 2), 0);
     const PhantomImages images = gone.images();
-    const double after_ml = millilitres(images.cavity);
+    const double after_ml = imaging::millilitres(images.cavity);
     EXPECT_GT(after_ml, 0.3 * before_ml);
     EXPECT_LT(after_ml, 1.2 * before_ml);
     cv::Scalar mean, deviation;
