@@ -223,7 +223,8 @@ void score_forward_field(RegistrationRun& run) {
 /// What the scores and what is gone say against the result.
 void doubt_scores(RegistrationRun& run) {
     std::vector<Doubt>& doubts = run.result.doubts;
-    if (auto doubt = doubt_of_folds(run.scores.grid, run.scores.organ)) doubts.push_back(std::move(*doubt));
+    if (auto doubt = doubt_of_folds(run.scores.grid, run.scores.organ, run.products.unfolded_back))
+        doubts.push_back(std::move(*doubt));
     if (auto doubt = doubt_of_unfolding(run.products.unfolded_forth, run.products.unfolded_back))
         doubts.push_back(std::move(*doubt));
     if (!run.products.gap.empty() && !run.inputs.fixed_labels.empty())

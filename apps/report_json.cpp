@@ -287,6 +287,7 @@ json to_json(const registration::JacobianReport& report) {
 
 json to_json(const registration::Unfolding& unfolding) {
     return {{"voxels", unfolding.voxels},
+            {"left", unfolding.left},
             {"in_organ", unfolding.in_organ},
             {"most_in_organ_mm", number(unfolding.most_in_organ_mm)}};
 }

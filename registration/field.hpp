@@ -57,6 +57,7 @@ private:
 /// What was changed so that a field does not fold.
 struct Unfolding {
     std::int64_t voxels = 0;      ///< whose displacement is another
+    std::int64_t left = 0;        ///< that are folded nevertheless: det ≤ 0
     std::int64_t in_organ = 0;    ///< of these in the mesh
     double most_in_organ_mm = 0;  ///< largest of their changes
 };
@@ -64,7 +65,8 @@ struct Unfolding {
 /// Take the folds out of a field, in place: voxels about those with det(∂y/∂X) ≤ 0.05 take the mean of their six
 /// neighbours again and again (Laplacian smoothing), beside the mesh first. Where that does not do, since parts of the
 /// mesh pass into each other, its outermost voxels do too, and at last all near a fold. Rigid surroundings stay. A
-/// field without folds is not touched. PointTransform, which has no voxels, does not follow.
+/// field without folds is not touched, nor one that folds in a twentieth of its voxels. PointTransform, which has no
+/// voxels, does not follow.
 Unfolding unfold_moving_to_fixed(imaging::Volume& field, const Deformation& deformation);
 Unfolding unfold_fixed_to_moving(imaging::Volume& field, const Deformation& deformation);
 

@@ -123,14 +123,16 @@ JacobianReport field_jacobians(const Volume& moving_to_fixed, const Volume* mask
     return report;
 }
 
-std::optional<Doubt> doubt_of_folds(const JacobianReport& everywhere, const JacobianReport& in_organ) {
-    if (everywhere.folded == 0) return std::nullopt;
+std::optional<Doubt> doubt_of_folds(const JacobianReport& everywhere, const JacobianReport& in_organ,
+                                    const Unfolding& back) {
+    if (everywhere.folded == 0 && back.left == 0) return std::nullopt;
     char least[32];
     std::snprintf(least, sizeof least, "%.3g", everywhere.minimum);
     return Doubt{
-        "field.folds", double(everywhere.folded), 0,
+        "field.folds", double(everywhere.folded + back.left), 0,
         "the displacement field folds in " + std::to_string(everywhere.folded) + " voxels, " +
-            std::to_string(in_organ.folded) + " of them in the organ, and its det J falls to " + least,
+            std::to_string(in_organ.folded) + " of them in the organ, and its det J falls to " + least +
+            "; the backward field folds in " + std::to_string(back.left),
         "do not trust it there (report.json lists places); a finer mesh, or labels and points that do not pull "
         "against each other there"};
 }

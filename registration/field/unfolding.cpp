@@ -20,6 +20,7 @@ using imaging::Volume;
 using Voxels = std::vector<std::int64_t>;  // in ascending order
 
 constexpr float least_determinant = 0.05F;
+constexpr double most_folded_share = 0.05;  // of all voxels: more is no map to mend
 
 /// Voxels that may be smoothed: beside the mesh, the outermost of it too, all.
 enum class Free { Beside, Rim, All };
@@ -74,6 +75,11 @@ Voxels folded_of_all(const Volume& displacement) {
     return result;
 }
 
+std::int64_t count_turned(const detail::VoxelJacobian& jacobian, const Voxels& voxels, const Geometry& grid) {
+    return std::count_if(voxels.begin(), voxels.end(),
+                         [&](std::int64_t voxel) { return jacobian.determinant(index_of(voxel, grid)) <= 0; });
+}
+
 /// The organ and what is rigid about it, in the frame of a field.
 struct Bodies {
     meshing::TetMesh mesh;
@@ -101,7 +107,7 @@ public:
     }
 
     [[nodiscard]] Unfolding changes() const {
-        Unfolding result;
+        Unfolding result{.left = count_turned(jacobian_, folded_, grid_)};
         for (const auto& [voxel, before] : before_) {
             ++result.voxels;
             if (!inside_[voxel]) continue;
@@ -172,6 +178,9 @@ Unfolding unfold(Volume& field, const MakeBodies& bodies_of_frame) {
         throw InvalidInput("unfolding: the field must have three channels of float32; give a displacement field");
     Voxels folded = folded_of_all(field);
     if (folded.empty()) return {};
+    const Geometry& grid = field.geometry;
+    if (double(folded.size()) > most_folded_share * double(grid.voxel_count()))
+        return {.left = count_turned(detail::VoxelJacobian(field), folded, grid)};
     const Bodies bodies = bodies_of_frame();
     Unfolder unfolder(field, bodies, std::move(folded));
     for (const Pass& pass : passes) unfolder(pass);

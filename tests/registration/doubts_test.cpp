@@ -97,12 +97,13 @@ TEST(Doubts, OfTheCourse) {
 
 TEST(Doubts, OfFoldsSolverAndAccuracy) {
     JacobianReport report;
-    EXPECT_EQ(code(doubt_of_folds(report, {})), "");
+    EXPECT_EQ(code(doubt_of_folds(report, report, {})), "");
+    EXPECT_EQ(code(doubt_of_folds(report, report, {.left = 1})), "field.folds");
     report.folded = 1;
-    EXPECT_EQ(code(doubt_of_folds(report, {})), "field.folds");
-    EXPECT_EQ(code(doubt_of_unfolding({20, 3, 0.9}, {10, 2, 0.8})), "");
-    EXPECT_EQ(code(doubt_of_unfolding({20, 3, 1.1}, {})), "field.unfolded");
-    EXPECT_EQ(code(doubt_of_unfolding({20, 3, 0.1}, {20, 3, 1.1})), "field.unfolded");
+    EXPECT_EQ(code(doubt_of_folds(report, {}, {})), "field.folds");
+    EXPECT_EQ(code(doubt_of_unfolding({20, 0, 3, 0.9}, {10, 0, 2, 0.8})), "");
+    EXPECT_EQ(code(doubt_of_unfolding({20, 0, 3, 1.1}, {})), "field.unfolded");
+    EXPECT_EQ(code(doubt_of_unfolding({20, 0, 3, 0.1}, {20, 0, 3, 1.1})), "field.unfolded");
     UncertaintySummary summary;
     summary.algebraic_mm = 0.051;
     EXPECT_EQ(code(doubt_of_solver(summary, 0.06)), "");

@@ -63,6 +63,7 @@ TEST(Unfolding, TakesFoldsBesideTheMeshOutBesideTheMesh) {
     EXPECT_GT(field_jacobians(after).minimum, 0.05);
     EXPECT_GT(unfolding.voxels, 3);
     EXPECT_EQ(unfolding.in_organ, 0);
+    EXPECT_EQ(unfolding.left, 0);
     EXPECT_EQ(most_changed(before, after, [](const Eigen::Vector3d& X) { return in_a_block(X, 1e-6); }), 0);
     EXPECT_LT(unfolding.voxels, 500);
 }
@@ -116,6 +117,19 @@ TEST(Unfolding, DoesNotBendRigidSurroundings) {
     Volume after = before.clone();
     EXPECT_GT(unfold_moving_to_fixed(after, deformation).voxels, 0);
     EXPECT_EQ(most_changed(before, after, rigid), 0);
+}
+
+// A map that turns all inside out is no map with a few folds.
+TEST(Unfolding, LeavesAFieldThatFoldsEverywhere) {
+    Volume field(grid, CV_32FC3);
+    for_each_voxel(field, [&](const Eigen::Vector3d& index, std::int64_t n) {
+        field.data<cv::Vec3f>()[n] = cv::Vec3f(float(-2 * index[0]), 0, 0);
+    });
+    const Volume before = field.clone();
+    const Unfolding unfolding = unfold_moving_to_fixed(field, two_blocks({0, 0, 0}));
+    EXPECT_EQ(unfolding.voxels, 0);
+    EXPECT_EQ(unfolding.left, grid.voxel_count());
+    EXPECT_EQ(std::memcmp(field.voxels.data, before.voxels.data, field.voxels.total() * field.voxels.elemSize()), 0);
 }
 
 TEST(Unfolding, RefusesWhatIsNoField) {
