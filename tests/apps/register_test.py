@@ -134,6 +134,13 @@ class Register(unittest.TestCase):
         for chapter in ("mesh", "field_in_organ", "field"):
             self.assertGreater(self.report["jacobian"][chapter]["minimum"], 0)
             self.assertEqual(self.report["jacobian"][chapter]["folded"], 0)
+        for field in ("moving_to_fixed", "fixed_to_moving"):
+            self.assertEqual(self.report["jacobian"]["unfolded"][field]["left"], 0)
+        parted = numpy.asarray(self.load("gap.nii.gz").dataobj) == 2
+        voxel_ml = abs(numpy.linalg.det(self.load("gap.nii.gz").affine)) / 1000
+        self.assertAlmostEqual(self.report["parted_ml"], parted.sum() * voxel_ml, 6)
+        self.assertGreater(self.report["held_out"]["seconds"], 0)
+        self.assertLess(self.report["held_out"]["seconds"], self.report["total_seconds"])
         for key in ("dice", "hausdorff_95_mm", "mean_surface_distance_mm"):
             self.assertIn(key, self.report["overlap"]["after"]["all"])
         stages = [entry["stage"] for entry in self.report["stages"]]

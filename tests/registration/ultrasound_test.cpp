@@ -93,14 +93,19 @@ TEST(Speckle, IsWhatUltrasoundShowsAndTissueDoesNot) {
     EXPECT_FALSE(detail::is_speckled(detail::SeenImage(bright)));
 }
 
-TEST(EchoCosts, AreLeastAtTheShiftThatWasMade) {
+/// Of an organ that was shifted by (1, −2, 1) places along the axes of its grid.
+detail::EchoCosts costs_of_a_shift() {
     const Organ one = organ();
     Eigen::Isometry3d shift = Eigen::Isometry3d::Identity();
     shift.translation() = one.labels.geometry.direction * Eigen::Vector3d(3, -6, 3);
     const detail::SeenImage seen(echoes(one.labels.geometry, shift));
     detail::EchoSource source(one.model.model.mesh, one.image, seen);
     const detail::State rest{Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, one.model.rest.node_count)};
-    const detail::EchoCosts costs = detail::echo_costs(source.on_grid(rest, 3, 12), {8, 3, 3});
+    return detail::echo_costs(source.on_grid(rest, 3, 12), {8, 3, 3});
+}
+
+TEST(EchoCosts, AreLeastAtTheShiftThatWasMade) {
+    const detail::EchoCosts costs = costs_of_a_shift();
     ASSERT_GT(costs.at.size(), 20U);
     Eigen::VectorXd total = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(costs.lattice()));
     for (std::size_t n = 0; n < costs.at.size(); ++n)
@@ -113,13 +118,7 @@ TEST(EchoCosts, AreLeastAtTheShiftThatWasMade) {
 
 // How the organ is turned, they can hardly say.
 TEST(EchoPose, IsSoughtFromAFewPlacesCloseTogether) {
-    const Organ one = organ();
-    Eigen::Isometry3d shift = Eigen::Isometry3d::Identity();
-    shift.translation() = one.labels.geometry.direction * Eigen::Vector3d(3, -6, 3);
-    const detail::SeenImage seen(echoes(one.labels.geometry, shift));
-    detail::EchoSource source(one.model.model.mesh, one.image, seen);
-    const detail::State rest{Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, one.model.rest.node_count)};
-    const detail::EchoCosts all = detail::echo_costs(source.on_grid(rest, 3, 12), {8, 3, 3});
+    const detail::EchoCosts all = costs_of_a_shift();
     for (const std::size_t count : {1, 2, 3}) {
         detail::EchoCosts few = all;
         few.at.resize(count);
