@@ -90,4 +90,18 @@ Eigen::MatrixXd Posterior::inverse(const Eigen::MatrixXd& forces) const {
     return result;
 }
 
+// Rows of the freed motions, and by symmetry of K⁻¹ columns of P K⁻¹.
+Eigen::MatrixXd Posterior::inverse_between(const std::vector<int>& nodes) const {
+    Columns result = stiffness_.inverse_between(nodes);
+    if (freed_.cols() == 0) return result;
+    const Columns seen = stiffness_.solve_columns(prior_.followed().transpose());
+    Columns freed_there(result.rows(), freed_.cols()), seen_there(result.rows(), freed_.cols());
+    for (std::size_t n = 0; n < nodes.size(); ++n) {
+        const auto row = static_cast<Eigen::Index>(3 * n);
+        freed_there.middleRows<3>(row) = freed_.middleRows<3>(3 * nodes[n]);
+        seen_there.middleRows<3>(row) = seen.middleRows<3>(3 * nodes[n]);
+    }
+    return result + freed_there * seen_there.transpose();
+}
+
 }  // namespace tissuewarp::registration::detail

@@ -69,6 +69,8 @@ public:
 
     /// The inverse of K times forces, 3N × k, mN: displacements, mm.
     [[nodiscard]] Eigen::MatrixXd inverse(const Eigen::MatrixXd& forces) const;
+    /// The same between some nodes, 3n × 3n: displacements of these under forces at them, mm/mN.
+    [[nodiscard]] Eigen::MatrixXd inverse_between(const std::vector<int>& nodes) const;
 
     [[nodiscard]] const Prior& prior() const { return prior_; }
     /// K with a prior that stays, taken out.

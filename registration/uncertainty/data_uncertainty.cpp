@@ -67,12 +67,6 @@ MatrixXd beside(const MatrixXd& a, const MatrixXd& b) {
     return result;
 }
 
-/// Half of the columns each.
-Truths few_of(const Truths& a, const Truths& b, Eigen::Index count) {
-    return {beside(a.displacement.leftCols(count / 2), b.displacement.leftCols(count / 2)),
-            beside(a.loads.leftCols(count / 2), b.loads.leftCols(count / 2))};
-}
-
 DataErrors few_of(const DataErrors& errors, Eigen::Index count) {
     DataErrors result;
     for (const MatrixXd& each : errors) result.emplace_back(each.leftCols(count));
@@ -137,9 +131,10 @@ OpenParts open_parts(const PreparedModel& prepared, const LastPulls& given, cons
     const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
     const Covariances placement =
         sum_of_squares(beside(unseen_motions(pulls, nodes), missed_if_rigid(pulls, nodes, displacement, registration)));
-    result.held_out =
-        held_out(prepared, pulls, unseen, displacement, few_of(on.truths, in.truths, held_out_options.draws),
-                 few_of(errors, held_out_options.draws));
+    constexpr int draws = HeldOutOptions().draws;
+    const MatrixXd truths =
+        beside(on.truths.displacement.leftCols(draws / 2), in.truths.displacement.leftCols(draws / 2));
+    result.held_out = held_out(prepared, pulls, registration.posterior(), displacement, truths, few_of(errors, draws));
     if (result.held_out) result.covariance *= std::max(1.0, result.held_out->z * result.held_out->z);
     result.covariance += placement;
     return {std::move(result), std::move(registration).stiffness()};

@@ -5,12 +5,16 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 namespace tissuewarp::registration::detail {
@@ -82,62 +86,115 @@ struct Region {
     }
 };
 
-struct Fold {
-    std::vector<PulledNode> kept, left_out;
-    DataErrors errors_of_kept, errors_of_left_out;
-    std::vector<int> region;  // of those left out
+/// Data, and the nodes that they pull at.
+struct PulledNodes {
+    std::vector<PulledNode> data;
+    std::vector<int> nodes;           // ascending
+    std::vector<Eigen::Index> place;  // of every datum's node: its first row in vectors of 3 rows a node
+
+    explicit PulledNodes(std::vector<PulledNode> given) : data(std::move(given)) {
+        for (const PulledNode& pulled : data) nodes.push_back(pulled.spring.node);
+        std::sort(nodes.begin(), nodes.end());
+        nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+        for (const PulledNode& pulled : data)
+            place.push_back(3 * (std::lower_bound(nodes.begin(), nodes.end(), pulled.spring.node) - nodes.begin()));
+    }
+    [[nodiscard]] Eigen::Index rows() const { return static_cast<Eigen::Index>(3 * nodes.size()); }
 };
 
-Fold fold_of(int number, int folds, const std::vector<PulledNode>& data, const DataErrors& errors,
-             const std::vector<int>& region) {
+struct Fold {
+    std::vector<std::size_t> kept, left_out;  // data
+};
+
+Fold fold_of(int number, int folds, const std::vector<int>& region) {
     Fold fold;
-    for (std::size_t n = 0; n < data.size(); ++n) {
-        const bool out = region[n] >= 0 && region[n] % folds == number;
-        (out ? fold.left_out : fold.kept).push_back(data[n]);
-        (out ? fold.errors_of_left_out : fold.errors_of_kept).push_back(errors[n]);
-        if (out) fold.region.push_back(region[n]);
-    }
+    for (std::size_t n = 0; n < region.size(); ++n)
+        (region[n] >= 0 && region[n] % folds == number ? fold.left_out : fold.kept).push_back(n);
     return fold;
 }
 
+/// A₋⁻¹ between the nodes of the data, forces to displacements: of the stiffness A without the springs of a fold.
+using Flexibility = std::function<MatrixXd(const MatrixXd&)>;
+
+/// From S, the inverse with all springs: (A − B)⁻¹ = (1 − S B)⁻¹ S between these nodes, B the springs left out
+/// (Woodbury). Throws InvalidInput where the rest does not hold the tissue.
+Flexibility taken_out(const Fold& fold, const PulledNodes& pulled, const MatrixXd& with_all) {
+    MatrixXd middle = MatrixXd::Identity(pulled.rows(), pulled.rows());
+    for (const std::size_t n : fold.left_out)
+        middle.middleCols<3>(pulled.place[n]) -=
+            with_all.middleCols<3>(pulled.place[n]) * pulled.data[n].spring.stiffness;
+    constexpr double digits_left = 1e-10;
+    const Eigen::PartialPivLU<MatrixXd> factor(middle);
+    if (!(factor.rcond() > digits_left)) throw InvalidInput("the data that are left hold the tissue no longer");
+    return
+        [between = MatrixXd(factor.solve(with_all))](const MatrixXd& forces) -> MatrixXd { return between * forces; };
+}
+
+/// The slow twin: a factor without the springs.
+Flexibility refactored(const Fold& fold, const PulledNodes& pulled, const PreparedModel& prepared,
+                       const LastPulls& pulls) {
+    std::vector<PulledNode> kept;
+    for (const std::size_t n : fold.kept) kept.push_back(pulled.data[n]);
+    const auto rest = std::make_shared<const Posterior>(prepared, with_data(without_fold(pulls, kept)));
+    std::vector<Eigen::Index> rows;
+    for (const int node : pulled.nodes)
+        for (int c = 0; c < 3; ++c) rows.push_back(3 * Eigen::Index{node} + c);
+    return [rest, rows, all = 3 * Eigen::Index{prepared.rest.node_count}](const MatrixXd& forces) -> MatrixXd {
+        MatrixXd spread = MatrixXd::Zero(all, forces.cols());
+        spread(rows, Eigen::all) = forces;
+        return rest->inverse(spread)(rows, Eigen::all);
+    };
+}
+
 // With r the residuals of the data left out, taking their springs away moves the tissue by −A₋⁻¹ K r: they are missed
-// by r + A₋⁻¹ K r. To be expected is ε + u − û₋ of truths u and errors ε.
-void add_fold(const Fold& fold, const LinearRegistration& rest, const Eigen::Matrix3Xd& displacement,
-              const Truths& truths, std::vector<Region>& regions) {
-    const auto nodes = static_cast<int>(displacement.cols());
-    DataErrors residuals;
-    for (const PulledNode& pulled : fold.left_out)
-        residuals.emplace_back(pulled.spring.target - displacement.col(pulled.spring.node));
-    const MatrixXd moved = rest.inverse(forces_of(fold.left_out, residuals, nodes)),
-                   off = rest.missed(truths) - rest.inverse(forces_of(fold.kept, fold.errors_of_kept, nodes));
-    for (std::size_t n = 0; n < fold.left_out.size(); ++n) {
-        const tled::Spring& spring = fold.left_out[n].spring;
-        regions[std::size_t(fold.region[n])].add(spring, residuals[n] + moved.middleRows<3>(3 * spring.node),
-                                                 fold.errors_of_left_out[n] + off.middleRows<3>(3 * spring.node));
+// by r + A₋⁻¹ K r. To be expected is ε + u − û₋ of truths u and errors ε, where û₋ = A₋⁻¹ K₋ (u + ε) of the data kept.
+void add_fold(const Fold& fold, const PulledNodes& pulled, const Flexibility& rest,
+              const Eigen::Matrix3Xd& displacement, const MatrixXd& truths, const DataErrors& errors,
+              const std::vector<int>& region, std::vector<Region>& regions) {
+    const auto true_at = [&](std::size_t n) { return truths.middleRows<3>(3 * pulled.data[n].spring.node); };
+    const auto residual = [&](std::size_t n) -> Eigen::Vector3d {
+        return pulled.data[n].spring.target - displacement.col(pulled.data[n].spring.node);
+    };
+    MatrixXd forces = MatrixXd::Zero(pulled.rows(), 1 + truths.cols());
+    for (const std::size_t n : fold.left_out)
+        forces.col(0).segment<3>(pulled.place[n]) += pulled.data[n].spring.stiffness * residual(n);
+    for (const std::size_t n : fold.kept)
+        forces.block(pulled.place[n], 1, 3, truths.cols()) +=
+            pulled.data[n].spring.stiffness * (true_at(n) + errors[n]);
+    const MatrixXd moved = rest(forces);
+    for (const std::size_t n : fold.left_out) {
+        const auto here = moved.middleRows<3>(pulled.place[n]);
+        regions[std::size_t(region[n])].add(pulled.data[n].spring, residual(n) + here.col(0),
+                                            errors[n] + true_at(n) - here.rightCols(truths.cols()));
     }
 }
 
 }  // namespace
 
-std::optional<HeldOut> held_out(const PreparedModel& prepared, const LastPulls& pulls, const LastPulls& unseen,
-                                const Eigen::Matrix3Xd& displacement, const Truths& truths, const DataErrors& errors) {
+std::optional<HeldOut> held_out(const PreparedModel& prepared, const LastPulls& pulls, const Posterior& all,
+                                const Eigen::Matrix3Xd& displacement, const MatrixXd& truths, const DataErrors& errors,
+                                const HeldOutOptions& options) {
     using Clock = std::chrono::steady_clock;
     const Clock::time_point begin = Clock::now();
-    const auto& [count, folds, draws] = held_out_options;
-    const std::vector<PulledNode> data = pulls.data();
-    const std::vector<int> region = regions_of(data, prepared.model.mesh.nodes, count);
-    if (data.empty() || *std::max_element(region.begin(), region.end()) + 1 < folds) return std::nullopt;
-    std::vector<Region> regions(static_cast<std::size_t>(count));
+    const PulledNodes pulled(pulls.data());
+    const std::vector<int> region = regions_of(pulled.data, prepared.model.mesh.nodes, options.regions);
+    if (region.empty() || *std::max_element(region.begin(), region.end()) + 1 < options.folds) return std::nullopt;
+    // Data that tell where the prior moves to are gone from there too: another stiffness.
+    const bool between = pulls.prior_moves != PriorMoves::WithData &&
+                         static_cast<int>(pulled.nodes.size()) <= options.most_nodes_between;
+    const MatrixXd with_all = between ? all.inverse_between(pulled.nodes) : MatrixXd();
+    std::vector<Region> regions(static_cast<std::size_t>(options.regions));
     const auto leave_out = [&](int number) {
-        const Fold fold = fold_of(number, folds, data, errors, region);
+        const Fold fold = fold_of(number, options.folds, region);
         try {
-            const LinearRegistration rest(prepared, without_fold(pulls, fold.kept), unseen);
-            add_fold(fold, rest, displacement, truths, regions);
+            const Flexibility rest =
+                between ? taken_out(fold, pulled, with_all) : refactored(fold, pulled, prepared, pulls);
+            add_fold(fold, pulled, rest, displacement, truths, errors, region, regions);
         } catch (const InvalidInput&) {  // the rest holds the tissue no longer
         }
     };
     // Each has regions of its own, and a factor; isolated, so that no thread holds those of two.
-    tbb::parallel_for(0, folds, [&](int number) { tbb::this_task_arena::isolate([&] { leave_out(number); }); });
+    tbb::parallel_for(0, options.folds, [&](int number) { tbb::this_task_arena::isolate([&] { leave_out(number); }); });
     HeldOut result;
     double sum = 0;
     for (const Region& region_left_out : regions) {

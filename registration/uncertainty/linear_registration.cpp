@@ -60,9 +60,6 @@ LinearRegistration::LinearRegistration(Posterior posterior, const PreparedModel&
     expected_.emplace(prepared.model.mesh.nodes, without_data(unseen));
 }
 
-LinearRegistration::LinearRegistration(const PreparedModel& prepared, const LastPulls& pulls, const LastPulls& unseen)
-    : LinearRegistration(Posterior(prepared, with_data(pulls)), prepared, pulls, unseen) {}
-
 std::pair<LinearRegistration, Posterior> LinearRegistration::with_unseen(const PreparedModel& prepared,
                                                                          const LastPulls& pulls,
                                                                          const LastPulls& unseen) {

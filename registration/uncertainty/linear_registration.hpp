@@ -33,10 +33,8 @@ DataErrors drawn_errors(const std::vector<PulledNode>& data, const Eigen::Matrix
 class LinearRegistration {
 public:
     /// Of what pulled in the last round, and of all organs, of which nothing is known but what `unseen` expects: its
-    /// springs are G. Throws InvalidInput where the springs do not hold the tissue, SolverFailure without memory for
-    /// the factors.
-    LinearRegistration(const PreparedModel& prepared, const LastPulls& pulls, const LastPulls& unseen);
-    /// Also gives the posterior without data, made at the same time.
+    /// springs are G. Also gives the posterior without data, made at the same time. Throws InvalidInput where the
+    /// springs do not hold the tissue, SolverFailure without memory for the factors.
     static std::pair<LinearRegistration, Posterior> with_unseen(const PreparedModel& prepared, const LastPulls& pulls,
                                                                 const LastPulls& unseen);
 

@@ -127,6 +127,20 @@ TEST_P(RestStiffnessTest, SolvesColumnsAsOneByOne) {
     }
 }
 
+// Constrained ones among them, out of order.
+TEST_P(RestStiffnessTest, TheInverseBetweenNodesIsThatOfForcesOneByOne) {
+    const RestStiffness stiffness(rest, nodal_conditions(held_with_springs(2.0), rest.node_count));
+    const std::vector<int> nodes{rest.node_count - 1, 0, 3, 17, rest.node_count / 2, 4};
+    const Eigen::MatrixXd between = stiffness.inverse_between(nodes);
+    for (std::size_t n = 0; n < nodes.size(); ++n)
+        for (int c = 0; c < 3; ++c) {
+            Matrix3Xd force = Matrix3Xd::Zero(3, rest.node_count);
+            force(c, nodes[n]) = 1;
+            const Matrix3Xd moved = stiffness.solve(force)(Eigen::all, nodes);
+            EXPECT_LT((between.col(static_cast<int>(3 * n) + c) - moved.reshaped()).norm(), 1e-10 * between.norm());
+        }
+}
+
 TEST_P(RestStiffnessTest, OtherConstraintsAreRefused) {
     const RestStiffness stiffness(rest, nodal_conditions(held_with_springs(2.0), rest.node_count));
     Conditions other = held_with_springs(2.0);

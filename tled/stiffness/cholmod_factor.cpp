@@ -190,6 +190,44 @@ Eigen::MatrixXd CholmodFactor::solve_columns(const Eigen::MatrixXd& b) const {
     return impl_->solved(b);
 }
 
+// A⁻¹ between them is YᵀY of L Y = P E, E their unit vectors. Supernodes that hold no row of Y but 0 are passed over.
+Eigen::MatrixXd CholmodFactor::inverse_between(const std::vector<int>& unknowns) const {
+    const cholmod_factor& L = *impl_->L;
+    const auto n = static_cast<Eigen::Index>(L.n), count = static_cast<Eigen::Index>(unknowns.size());
+    const int *order = static_cast<const int*>(L.Perm), *first_column = static_cast<const int*>(L.super),
+              *first_row = static_cast<const int*>(L.pi), *first_value = static_cast<const int*>(L.px),
+              *rows = static_cast<const int*>(L.s);
+    const auto* values = static_cast<const double*>(L.x);
+    std::vector<int> place(static_cast<std::size_t>(n));
+    for (int k = 0; k < n; ++k) place[static_cast<std::size_t>(order[k])] = k;
+    std::vector<char> reached(static_cast<std::size_t>(n), 0);
+    using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    Rows Y = Rows::Zero(n, count);
+    for (Eigen::Index c = 0; c < count; ++c) {
+        const int row = place[static_cast<std::size_t>(unknowns[static_cast<std::size_t>(c)])];
+        Y(row, c) = 1;
+        reached[static_cast<std::size_t>(row)] = 1;
+    }
+    Eigen::MatrixXd result = Eigen::MatrixXd::Zero(count, count);
+    for (std::size_t s = 0; s < L.nsuper; ++s) {
+        const int begin = first_column[s], columns = first_column[s + 1] - begin, *row = rows + first_row[s],
+                  height = first_row[s + 1] - first_row[s];
+        if (std::find(reached.begin() + begin, reached.begin() + begin + columns, 1) ==
+            reached.begin() + begin + columns)
+            continue;
+        const Eigen::Map<const Eigen::MatrixXd> block(values + first_value[s], height, columns);
+        auto here = Y.middleRows(begin, columns);
+        block.topRows(columns).triangularView<Eigen::Lower>().solveInPlace(here);
+        result.selfadjointView<Eigen::Lower>().rankUpdate(here.transpose());
+        const Rows below = block.bottomRows(height - columns) * here;
+        for (int r = columns; r < height; ++r) {
+            Y.row(row[r]) -= below.row(r - columns);
+            reached[static_cast<std::size_t>(row[r])] = 1;
+        }
+    }
+    return result.selfadjointView<Eigen::Lower>();
+}
+
 double CholmodFactor::solves_per_factor() const {
     return impl_->solves_per_factor;
 }

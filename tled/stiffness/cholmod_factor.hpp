@@ -31,6 +31,10 @@ public:
     /// The same for every column at once: the factor is read once for all.
     [[nodiscard]] Eigen::MatrixXd solve_columns(const Eigen::MatrixXd& b) const;
 
+    /// Rows and columns of A⁻¹ that belong to some unknowns. Of few that lie together it takes a small part of as many
+    /// solves: only columns of L that these unknowns reach are read (Gilbert and Peierls 1988), and none twice.
+    [[nodiscard]] Eigen::MatrixXd inverse_between(const std::vector<int>& unknowns) const;
+
     /// About how many solves with one vector take as long as a factorisation.
     [[nodiscard]] double solves_per_factor() const;
 

@@ -298,6 +298,22 @@ MatrixXd RestStiffness::solve_columns(const MatrixXd& forces) const {
     return impl_->free.on_free(forces, [&](const MatrixXd& free) { return impl_->factor().solve_columns(free); });
 }
 
+MatrixXd RestStiffness::inverse_between(const std::vector<int>& nodes) const {
+    std::vector<int> unknowns;
+    std::vector<Eigen::Index> place;  // of each, among the degrees of freedom of `nodes`
+    for (std::size_t n = 0; n < nodes.size(); ++n)
+        for (std::size_t c = 0; c < 3; ++c) {
+            const int unknown = impl_->free.index()[3 * static_cast<std::size_t>(nodes[n]) + c];
+            if (unknown < 0) continue;
+            unknowns.push_back(unknown);
+            place.push_back(static_cast<Eigen::Index>(3 * n + c));
+        }
+    const auto count = static_cast<Eigen::Index>(3 * nodes.size());
+    MatrixXd result = MatrixXd::Zero(count, count);
+    if (!unknowns.empty()) result(place, place) = impl_->factor().inverse_between(unknowns);
+    return result;
+}
+
 bool RestStiffness::is_large() const {
     return impl_->position.cols() > most_factorised_nodes;
 }

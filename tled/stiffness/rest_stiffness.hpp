@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include <memory>
+#include <vector>
 
 namespace tissuewarp::tled {
 
@@ -49,6 +50,10 @@ public:
 
     /// K⁻¹ of many forces at once, 3N × k, the nodes' vectors one after the other: several times as fast as one by one.
     [[nodiscard]] Eigen::MatrixXd solve_columns(const Eigen::MatrixXd& forces) const;
+
+    /// K⁻¹ between some nodes, 3n × 3n: their displacements under forces at them (mm/mN), 0 where constrained. Of few
+    /// nodes that lie together it takes a fraction of as many solves.
+    [[nodiscard]] Eigen::MatrixXd inverse_between(const std::vector<int>& nodes) const;
 
     /// Of more nodes than this the following are found without a factor, whose entries and work grow too fast.
     static constexpr int most_factorised_nodes = 15000;
