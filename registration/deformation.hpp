@@ -15,6 +15,7 @@ struct Surroundings {
     Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();  ///< moving → fixed
     imaging::Volume rigid;  ///< voxels != 0 moved by it exactly, uint8, moving frame; elsewhere they move so far from
                             ///< the organ
+    bool slide = false;     ///< along the organ: beside it they go where its surface goes, not where its tissue goes
 };
 
 /// y = placement · (X + u(X)): elastic displacement u in the preoperative (moving) frame, then a rigid motion into the

@@ -6,6 +6,7 @@
 #include "registration/field/growth.hpp"
 #include "registration/field/rasterisation.hpp"
 #include "registration/field/row_inverse.hpp"
+#include "registration/field/sliding.hpp"
 #include "registration/field/uninitialised.hpp"
 #include "registration/field/voxel_jacobian.hpp"
 
@@ -48,6 +49,22 @@ void require_usable(const Deformation& deformation, const FieldOptions& options)
 
 Volume rigid_mask(const Deformation& deformation) {
     return deformation.surroundings ? deformation.surroundings->rigid : Volume();
+}
+
+/// Displacements of the mesh's surface as what lies beside it has them, and within it of any value.
+Eigen::Matrix3Xd beside_surface(const Deformation& deformation, const Eigen::Matrix3Xd& nodes,
+                                const meshing::BoundarySurface& boundary, const Eigen::Matrix3Xd& values) {
+    const bool slides = deformation.surroundings && deformation.surroundings->slide;
+    return slides ? detail::motion_across_surface(nodes, boundary, values) : values;
+}
+
+/// Of a deformation whose placement is the motion far away.
+detail::Continuation forward_continuation(const Deformation& deformation, double fade_mm) {
+    const auto& mesh = deformation.mesh;
+    const meshing::BoundarySurface boundary = meshing::boundary_surface(mesh);
+    return {mesh.nodes, mesh.tets,
+            boundary,   beside_surface(deformation, mesh.nodes, boundary, deformation.displacement),
+            fade_mm,    rigid_mask(deformation)};
 }
 
 /// Relative displacements on a grid, and which voxels the mesh covers.
@@ -149,9 +166,7 @@ Volume displacement_moving_to_fixed(const Deformation& given, const Geometry& mo
     Raster raster = rasterise_mesh(mesh.nodes, mesh.tets, deformation.displacement, moving_grid);
     observer.checkpoint(stage, 0.2);
     std::optional<detail::Continuation> continuation;
-    if (!raster.full())
-        continuation.emplace(mesh.nodes, mesh.tets, meshing::boundary_surface(mesh), deformation.displacement,
-                             options.fade_mm, rigid_mask(deformation));
+    if (!raster.full()) continuation.emplace(forward_continuation(deformation, options.fade_mm));
     observer.checkpoint(stage, 0.6);
     const Eigen::Matrix3d rotation = deformation.placement.linear();
     complete(raster, moving_grid, rotation, rotation - Eigen::Matrix3d::Identity(), deformation.placement.translation(),
@@ -194,7 +209,9 @@ Volume displacement_fixed_to_moving(const Deformation& given, const Geometry& fi
     const meshing::BoundarySurface boundary = meshing::boundary_surface(mesh);
     std::optional<detail::Continuation> forward;
     detail::LazyContinuation backward([&] {
-        return detail::Continuation(deformed, mesh.tets, boundary, inverse, options.fade_mm, rigid_mask(deformation));
+        return detail::Continuation(deformed, mesh.tets, boundary,
+                                    beside_surface(deformation, deformed, boundary, inverse), options.fade_mm,
+                                    rigid_mask(deformation));
     });
     const Eigen::Matrix3d identity = Eigen::Matrix3d::Identity(), linear = to_moving.linear() - identity;
     if (deformation.surroundings) {  // tissue parts from them: the forward field leaves gaps, where it has no inverse
@@ -218,8 +235,7 @@ struct PointTransform::Impl {
     Impl(const Deformation& given, const FieldOptions& options)
         : deformation(given.with_placement(given.far_motion())),
           locator(deformation.mesh),
-          continuation(deformation.mesh.nodes, deformation.mesh.tets, meshing::boundary_surface(deformation.mesh),
-                       deformation.displacement, options.fade_mm, rigid_mask(deformation)) {}
+          continuation(forward_continuation(deformation, options.fade_mm)) {}
 
     [[nodiscard]] Eigen::Vector3d operator()(const Eigen::Vector3d& point) const {
         const auto location = locator.find(point);

@@ -8,7 +8,8 @@
 /// away from the organ. There the backward field inverts the forward one numerically, to about 0.01 mm where the field
 /// does not fold. Where the surroundings' motion is known (Deformation::surroundings) that motion takes the place of
 /// the placement, rigid ones move by it but for 2.5 mm at their edges, and the backward field is continued on its own:
-/// tissue that parts from bone leaves places to which no preoperative point comes.
+/// tissue that parts from bone leaves places to which no preoperative point comes. Where the organ slid along them
+/// (Surroundings::slide) both continue the motion of its surface across itself instead, and jump there.
 
 #include "core/observer.hpp"
 #include "imaging/volume.hpp"

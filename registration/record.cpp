@@ -15,13 +15,16 @@ namespace tissuewarp::registration {
 namespace {
 
 constexpr const char* format = "tissuewarp registration record";
-constexpr int version = 3, oldest_version = 1;
-constexpr const char* resected = "resected";  // absent where no tissue is gone
+constexpr int version = 4, oldest_version = 1;
+constexpr const char* resected = "resected";         // absent where no tissue is gone
+constexpr const char* slide = "surroundings/slide";  // absent where they do not
 
-/// The version to write: older programs would leave no gap, and read everything else.
-int version_of(const PreparedModel& prepared) {
-    constexpr int before_resection = 2;
-    return prepared.resected.empty() ? before_resection : version;
+/// The version to write: older programs would leave no gap, or drag along what the organ slid along, and read
+/// everything else.
+int version_of(const PreparedModel& prepared, const Deformation& deformation) {
+    constexpr int before_resection = 2, before_sliding = 3;
+    if (deformation.surroundings && deformation.surroundings->slide) return version;
+    return prepared.resected.empty() ? before_resection : before_sliding;
 }
 
 /// det F of every tetrahedron; the placement is rigid and has no part in it.
@@ -68,6 +71,7 @@ Eigen::Isometry3d read_matrix(const Hdf5Input& file, const std::string& name) {
 void write_surroundings(Hdf5Output& file, const Surroundings& surroundings) {
     write_matrix(file, "surroundings/motion", surroundings.motion);
     detail::write_grid(file, "surroundings/grid", surroundings.rigid.geometry);
+    if (surroundings.slide) file.scalar<int>(slide, 1, "1");
     const auto* voxel = surroundings.rigid.data<std::uint8_t>();
     const std::int64_t count = surroundings.rigid.geometry.voxel_count();
     std::vector<int> runs;
@@ -85,7 +89,8 @@ void write_surroundings(Hdf5Output& file, const Surroundings& surroundings) {
 std::optional<Surroundings> read_surroundings(const Hdf5Input& file) {
     if (!file.holds("surroundings/runs")) return std::nullopt;
     Surroundings surroundings{read_matrix(file, "surroundings/motion"),
-                              imaging::Volume(detail::read_grid(file, "surroundings/grid"), CV_8UC1)};
+                              imaging::Volume(detail::read_grid(file, "surroundings/grid"), CV_8UC1),
+                              file.holds(slide)};
     auto* voxel = surroundings.rigid.data<std::uint8_t>();
     const std::int64_t count = surroundings.rigid.geometry.voxel_count();
     std::int64_t at = 0;
@@ -162,7 +167,7 @@ void write_record(const PreparedModel& prepared, const UpdateResult& result, con
     if (deformation.mesh.tets != prepared.model.mesh.tets || deformation.mesh.nodes != prepared.model.mesh.nodes)
         throw InvalidInput("the result's mesh is not the prepared model's; pass the model that was updated");
     AtomicFile target(path);
-    Hdf5Output file(target.path(), format, version_of(prepared));
+    Hdf5Output file(target.path(), format, version_of(prepared, deformation));
     detail::write_model(file, prepared.model);
     detail::write_grid(file, "moving_grid", prepared.labels.geometry);
     if (!prepared.resected.empty()) detail::write_label_map(file, resected, prepared.resected);

@@ -1,6 +1,7 @@
 #include "registration/field/parted.hpp"
 
 #include "core/errors.hpp"
+#include "imaging/filters.hpp"
 #include "imaging/mask_lookup.hpp"
 #include "registration/field/mesh_labels.hpp"
 #include "registration/field/voxel_jacobian.hpp"
@@ -15,7 +16,9 @@ Volume parted_after(const Deformation& deformation, const Volume& fixed_to_movin
     if (fixed_to_moving.voxels.type() != CV_32FC3)
         throw InvalidInput("parted tissue: the field must have three channels of float32; give a displacement field");
     const imaging::Geometry& grid = fixed_to_moving.geometry;
-    const Volume organ = mask_of_mesh(deformation.deformed_mesh(), grid);
+    Volume organ = mask_of_mesh(deformation.deformed_mesh(), grid);
+    if (deformation.surroundings && deformation.surroundings->slide)  // differences across the jump say nothing
+        organ = imaging::dilate(organ, grid.spacing.maxCoeff());
     const imaging::MaskLookup rigid(deformation.surroundings ? deformation.surroundings->rigid : Volume());
     const Eigen::Isometry3d to_rigid = deformation.far_motion().inverse();
     const detail::VoxelJacobian jacobian(fixed_to_moving);

@@ -32,8 +32,9 @@ struct Pass {
     int sweeps, rounds;
 };
 // What is beside the mesh is free to give way, and most folds go. Those left lie where parts of the mesh pass into each
-// other or a gap of a voxel closes: there the mesh gives way, as little as it can.
-constexpr Pass passes[] = {{Free::Beside, 2, 5, 10}, {Free::Rim, 1, 1, 20}, {Free::All, 1, 1, 20}};
+// other, a gap of a voxel closes, or the organ slid far along bone: there the mesh gives way, as little as it can.
+constexpr Pass passes[] = {
+    {Free::Beside, 2, 5, 10}, {Free::Rim, 1, 1, 20}, {Free::All, 1, 1, 20}, {Free::All, 3, 1, 20}};
 
 std::array<int, 3> index_of(std::int64_t voxel, const Geometry& grid) {
     const std::int64_t row = voxel / grid.size[0];

@@ -7,7 +7,9 @@
 /// that motion carries it is compared with itself shifted along the displacement that the continuation adds, each by
 /// what is left of the preoperative image after the best linear map of intensities in a window (as local correlation,
 /// so contrast and brightness may differ). A place is rigid where the least of that lies nearer to the motion than to
-/// the continuation. Places without structure say nothing and are left to the continuation.
+/// the continuation. Places without structure say nothing and are left to the continuation. Whether the organ slid
+/// along its surroundings the images tell likewise, from all places around it that motion with its surface's tissue and
+/// motion across its surface bring apart.
 
 #include "registration/field.hpp"
 
@@ -16,8 +18,8 @@ namespace tissuewarp::registration {
 /// How the surroundings moved, with the voxels of the moving image's grid that are rigid; those of
 /// `deformation.surroundings` among them. None of them lies in the organ, before or after it deformed. Only what
 /// `deformation` has where an image has several components or fewer than two voxels along an axis, where no rigid
-/// motion explains the surroundings, or where the organ moved against them by more than 8 mm in the mean. Throws
-/// InvalidInput where the deformation is not usable.
+/// motion explains the surroundings, or where the organ did not slide and moved against them by more than 8 mm in the
+/// mean. Throws InvalidInput where the deformation is not usable.
 std::optional<Surroundings> rigid_surroundings(const Deformation& deformation, const imaging::Volume& moving,
                                                const imaging::Volume& fixed, const FieldOptions& options = {});
 

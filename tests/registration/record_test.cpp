@@ -172,6 +172,12 @@ TEST_F(Records, HoldHowTheSurroundingsMoved) {
     EXPECT_EQ(back->motion.matrix(), result.deformation.surroundings->motion.matrix());
     EXPECT_TRUE(imaging::same_grid(back->rigid.geometry, mask.geometry, 1e-12));
     EXPECT_EQ(cv::norm(back->rigid.voxels, mask.voxels, cv::NORM_INF), 0);
+    EXPECT_FALSE(back->slide);
+    EXPECT_EQ(read_record(path).format_version, 2);
+    result.deformation.surroundings->slide = true;
+    write_record(prepared(), result, some_info(), path);
+    EXPECT_TRUE(read_record(path).deformation.surroundings->slide);
+    EXPECT_EQ(read_record(path).format_version, 4);  // older programs must not drag along what slides
     for (const int wrong : {-1, 1 << 30, 2}) {
         write_record(prepared(), result, some_info(), path);
         poke<int>("surroundings/runs", 0, wrong);
@@ -319,8 +325,8 @@ TEST_F(Records, OfForeignFormatsAreRefused) {
 
 TEST_F(Records, OfANewerVersionAreRefused) {
     write();
-    set_version(4);
-    EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr("format version 4")));
+    set_version(5);
+    EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr("format version 5")));
 }
 
 TEST_F(Records, WithNodeIndicesOutOfRangeAreRefused) {

@@ -6,6 +6,7 @@
 #include "registration/evaluation.hpp"
 #include "registration/evaluation/percentile.hpp"
 #include "registration/field/inverse_transform.hpp"
+#include "registration/field/parted.hpp"
 #include "textured_phantom.hpp"
 
 #include <gtest/gtest.h>
@@ -170,6 +171,77 @@ TEST(RigidSurroundings, ImagesOfSeveralComponentsLeaveWhatIsKnown) {
     const auto same = rigid_surroundings(deformation, vectors, vectors);
     ASSERT_TRUE(same);
     EXPECT_EQ(same->rigid.voxels.data, deformation.surroundings->rigid.voxels.data);
+}
+
+/// The organ turned in its shell, 10 mm along it at the equator.
+Deformation turned() {
+    const Eigen::Isometry3d turn = test::motion(15, {0, 0, 1}, {0, 0, 0});
+    Deformation deformation = test::deformed_by(test::ball({0, 0, 0}, organ_radius, 16), [&](const Eigen::Vector3d& X) {
+        return Eigen::Vector3d(turn * X - X);
+    });
+    deformation.placement = of_bone;
+    return deformation;
+}
+
+/// What is seen afterwards: bone stayed, and around it the skin.
+Volume turned_image() {
+    const Eigen::Isometry3d back = test::motion(-15, {0, 0, 1}, {0, 0, 0});
+    return test::sampled(
+        test::plain_grid({68, 68, 68}, 2, of_bone * Eigen::Vector3d(-66, -66, -66)),
+        [&](const Eigen::Vector3d& y) {
+            const Eigen::Vector3d z = of_bone.inverse() * y;
+            return head(z.norm() > organ_radius ? z : Eigen::Vector3d(back * z));
+        },
+        1.5, 3);
+}
+
+TEST(RigidSurroundings, AnOrganThatSlidAlongThemDragsNothing) {
+    Deformation deformation = turned();
+    const Volume moving = test::sampled(grid, head, 1.5, 2), fixed = turned_image();
+    deformation.surroundings = rigid_surroundings(deformation, moving, fixed);
+    ASSERT_TRUE(deformation.surroundings);
+    EXPECT_TRUE(deformation.surroundings->slide);
+    const Eigen::Isometry3d& motion = deformation.surroundings->motion;
+    Volume forward = displacement_moving_to_fixed(deformation, grid);
+    Volume backward = displacement_fixed_to_moving(deformation, fixed.geometry);
+    EXPECT_EQ(unfold_moving_to_fixed(forward, deformation).left, 0);
+    EXPECT_EQ(unfold_fixed_to_moving(backward, deformation).left, 0);
+    std::vector<double> bone_off, organ_off;
+    for_each_voxel(forward, [&](const Eigen::Vector3d& index, std::int64_t n) {
+        const Eigen::Vector3d X = grid.point(index);
+        if (X.norm() > bone_from && X.norm() < bone_to)
+            bone_off.push_back((X + vector_at(forward, n) - motion * X).norm());
+        if (X.norm() < organ_radius - 3) {
+            const Eigen::Vector3d y = of_bone * (test::motion(15, {0, 0, 1}, {0, 0, 0}) * X);
+            organ_off.push_back((X + vector_at(forward, n) - y).norm());
+        }
+    });
+    EXPECT_LT(detail::percentile(bone_off, 95), 0.3);
+    EXPECT_LT(detail::percentile(organ_off, 95), 0.3);
+    bone_off.clear();
+    for_each_voxel(backward, [&](const Eigen::Vector3d& index, std::int64_t n) {
+        const Eigen::Vector3d y = backward.geometry.point(index), z = motion.inverse() * y;
+        if (z.norm() > bone_from && z.norm() < bone_to) bone_off.push_back((y + vector_at(backward, n) - z).norm());
+    });
+    EXPECT_LT(detail::percentile(bone_off, 95), 0.3);
+}
+
+TEST(RigidSurroundings, WhatTurnedAlongWithTheOrganWasNotSlidAlong) {
+    const Deformation deformation = turned();
+    const Volume moving = test::sampled(grid, head, 1.5, 2), fixed = seen_after(deformation, 1);
+    const auto found = rigid_surroundings(deformation, moving, fixed);
+    EXPECT_FALSE(found && found->slide);
+}
+
+// Differences of what lies next to the organ reach across the jump: they are not asked.
+TEST(RigidSurroundings, WhereAnOrganSlidNothingParted) {
+    Deformation deformation = turned();
+    deformation.surroundings = Surroundings{of_bone, Volume(grid, CV_8UC1), true};
+    const Geometry there = test::plain_grid({68, 68, 68}, 2, of_bone * Eigen::Vector3d(-66, -66, -66));
+    const Volume backward = displacement_fixed_to_moving(deformation, there);
+    EXPECT_EQ(cv::countNonZero(cv::Mat(1, int(there.voxel_count()), CV_8UC1,
+                                       parted_after(deformation, backward).data<std::uint8_t>())),
+              0);
 }
 
 // A lung that breathes out moves by centimetres along its ribs: a field from the one to the other folds.
