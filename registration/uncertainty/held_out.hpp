@@ -15,8 +15,7 @@ struct HeldOutOptions {
     int folds = 4;     ///< each leaves out every fourth region
     int draws = 16;    ///< of truths and of errors, that tell what is to be expected
     /// Of so many nodes that data pull at the springs of a fold are taken out of the inverse between these nodes
-    /// (Woodbury), at a fraction of the time of a factor; of more, four factors take less. Chosen by hand on the time
-    /// of heads and livers.
+    /// (Woodbury), at a fraction of the time of a factor; of more each fold has a factor. Set by hand.
     int most_nodes_between = 250;
 };
 
