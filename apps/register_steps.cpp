@@ -118,7 +118,8 @@ void make_backward_field(RegistrationRun& run, ProgressLine& progress) {
     const FieldOptions options{run.options.fade};
     Deformation& deformation = run.result.deformation;
     if (!run.inputs.moving.empty() && !run.inputs.fixed.empty())
-        deformation.surroundings = rigid_surroundings(deformation, run.inputs.moving, run.inputs.fixed, options);
+        deformation.surroundings =
+            rigid_surroundings(deformation, run.inputs.moving, run.inputs.fixed, options, progress);
     run.products.fixed_to_moving = displacement_fixed_to_moving(deformation, output_grid(run), options, progress);
     run.products.unfolded_back = unfold_fixed_to_moving(run.products.fixed_to_moving, deformation);
 }

@@ -46,8 +46,6 @@ function(tissuewarp_test name)
   endif()
   add_executable(test_${name} ${ARG_SOURCES})
   target_link_libraries(test_${name} PRIVATE ${ARG_LIBS} tissuewarp_test_main GTest::gmock tissuewarp_warnings)
-  target_compile_definitions(test_${name} PRIVATE
-    TISSUEWARP_SOURCE_DIR="${PROJECT_SOURCE_DIR}" TISSUEWARP_BINARY_DIR="${PROJECT_BINARY_DIR}")
   # No test reads what the user has measured on this machine.
   gtest_discover_tests(test_${name} NO_PRETTY_VALUES DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
     PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}"

@@ -113,7 +113,7 @@ Products Computer::compute(const Job& job, Observer& observer) {
     if (job.seen.image && !patient_.image.empty()) {
         Deformation& deformation = products.result.deformation;
         deformation.surroundings =
-            rigid_surroundings(deformation, patient_.image, *job.seen.image, {job.request.fade_mm});
+            rigid_surroundings(deformation, patient_.image, *job.seen.image, {job.request.fade_mm}, observer);
     }
     products.organ = organ_of(products);
     products.targets = targets_of(products, job.targets, job.request.fade_mm);

@@ -29,7 +29,7 @@ bool is_image(Evidence evidence) {
 /// What a registration without resected tissue leaves open.
 struct Hole {
     double dice = 0;  ///< of the hole or the found cavity with the true cavity
-    int doubts = 0;   ///< of what was found to be gone
+    std::vector<registration::Doubt> doubts;  ///< of what was found to be gone
 };
 
 /// A phantom, its images once they are needed, and models made of it.
@@ -122,7 +122,7 @@ public:
         cv::Mat both;
         cv::bitwise_and(told.voxels, imaging::mask_of_all(truth).voxels, both);
         return Hole{2 * count(both) / (count(told.voxels) + count(truth.voxels)),
-                    found_ ? count_of_severe(doubts_of(*found_, gap)) : 0};
+                    found_ ? doubts_of(*found_, gap) : std::vector<registration::Doubt>()};
     }
 
     /// Of a partial image or ultrasound: whether it shows where the target is. Of everything else yes.
@@ -164,6 +164,11 @@ private:
     std::optional<registration::FoundResection> found_;
 };
 
+void add_codes(std::string& codes, const std::vector<registration::Doubt>& doubts) {
+    for (const registration::Doubt& doubt : doubts)
+        if (doubt.severity == registration::Severity::Doubt) codes.append(codes.empty() ? "" : " ").append(doubt.code);
+}
+
 std::vector<CoverageRow> rows_of(const Phantom& phantom, Patient& patient, Evidence evidence,
                                  const CoverageOptions& options, Observer& observer) {
     const registration::Intraoperative seen = patient.seen(evidence);
@@ -179,9 +184,10 @@ std::vector<CoverageRow> rows_of(const Phantom& phantom, Patient& patient, Evide
     const Eigen::MatrixXd& nodal = result.deformation.displacement;
     const double z = uncertainty.held_out() ? uncertainty.held_out()->z : 1;
     const std::optional<Hole> hole = patient.hole(evidence, prepared, result.deformation);
-    const int doubts = count_of_severe(result.doubts) +
-                       count_of_severe(doubts_of(uncertainty, options.update.equilibrium.tolerance_mm)) +
-                       (hole ? hole->doubts : 0);
+    std::string doubts;
+    add_codes(doubts, result.doubts);
+    add_codes(doubts, doubts_of(uncertainty, options.update.equilibrium.tolerance_mm));
+    if (hole) add_codes(doubts, hole->doubts);
     std::vector<CoverageRow> rows;
     for (std::size_t k = 0; k < estimates.size(); ++k) {
         const auto column = static_cast<Eigen::Index>(k);

@@ -53,7 +53,7 @@ struct CoverageRow {
     int target = 0;
     Eigen::Vector3d error = Eigen::Vector3d::Zero();  ///< where it was put less where it is, moving frame, mm
     double held_out_z = 1;  ///< of the registration: what regions left out were missed by, over what was expected
-    int doubts = 0;         ///< of the registration as a whole, which the program names
+    std::string doubts;     ///< codes of the registration's, apart by spaces; notices are none
     double moved_mm = 0;    ///< elastic displacement that the registration gave it
     bool in_view = true;    ///< where it truly is lies in what was seen
     registration::ErrorEstimate estimate;

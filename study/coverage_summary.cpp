@@ -76,7 +76,7 @@ bool has_failed(const Rows& rows) {
 void add_doubts(Coverage& result, const std::map<std::uint64_t, Rows>& by_phantom) {
     int failed = 0, doubted_failures = 0, doubted_successes = 0;
     for (const auto& [seed, rows] : by_phantom) {
-        const bool has_doubt = rows.front()->doubts > 0, fails = has_failed(rows);
+        const bool has_doubt = !rows.front()->doubts.empty(), fails = has_failed(rows);
         failed += fails;
         (fails ? doubted_failures : doubted_successes) += has_doubt;
     }

@@ -9,7 +9,7 @@ namespace tissuewarp::study {
 namespace {
 
 constexpr const char* header =
-    "seed,evidence,target,held_out_z,doubts,error_x,error_y,error_z,moved,in_view,algebraic,discretisation,data,"
+    "seed,evidence,target,held_out_z,doubt_codes,error_x,error_y,error_z,moved,in_view,algebraic,discretisation,data,"
     "deviation,"
     "interval,trust,"
     "xx,yy,zz,xy,yz,zx,"
@@ -25,7 +25,7 @@ CoverageRow parsed(detail::TableLine& line) {
     row.evidence = *evidence;
     row.target = static_cast<int>(line.number());
     row.held_out_z = line.number();
-    row.doubts = static_cast<int>(line.number());
+    row.doubts = line.next();
     registration::ErrorEstimate& e = row.estimate;
     for (double* value : {&row.error[0], &row.error[1], &row.error[2], &row.moved_mm}) *value = line.number();
     row.in_view = line.number() != 0;

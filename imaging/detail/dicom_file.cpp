@@ -22,8 +22,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr DicomTag pixel_data = 0x7fe00010;
-
 /// Attributes of frames: in their own functional groups, in the shared ones, or, in files of one frame, in the file.
 class FrameAttributes {
 public:

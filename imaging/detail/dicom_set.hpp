@@ -14,6 +14,7 @@ namespace tissuewarp::imaging::detail {
 
 /// Group and element, (group << 16) + element.
 using DicomTag = std::uint32_t;
+inline constexpr DicomTag pixel_data = 0x7fe00010;
 
 /// How elements are written; of a transfer syntax.
 struct DicomEncoding {

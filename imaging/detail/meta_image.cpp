@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-Scalar type_of(const fs::path& path, const std::string& name) {
+Scalar meta_type(const fs::path& path, const std::string& name) {
     static const std::map<std::string, Scalar> types = {
         {"MET_CHAR", Scalar::Int8},     {"MET_UCHAR", Scalar::UInt8},    {"MET_SHORT", Scalar::Int16},
         {"MET_USHORT", Scalar::UInt16}, {"MET_INT", Scalar::Int32},      {"MET_UINT", Scalar::UInt32},
@@ -111,7 +111,7 @@ void skip_headers(const fs::path& path, const TextHeader& header, std::uint64_t 
 void read_layout(const fs::path& path, const TextHeader& header, const std::vector<double>& sizes, ImageHeader& image) {
     StoredVoxels& voxels = image.voxels;
     const std::uint64_t grid = values_of(path, sizes);
-    voxels.type = type_of(path, header.value("elementtype"));
+    voxels.type = meta_type(path, header.value("elementtype"));
     for (std::size_t axis = 0; axis < 3; ++axis) voxels.size[axis] = static_cast<int>(sizes[axis]);
     if (const auto channels = numbers_of(path, header, {"elementnumberofchannels"}, 1)) {
         values_of(path, {(*channels)[0], static_cast<double>(grid)});

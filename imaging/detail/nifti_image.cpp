@@ -44,7 +44,7 @@ bool has_voxel_size(const Geometry& grid, const Eigen::Vector3d& size) {
     return ((grid.spacing - size.cwiseAbs()).cwiseAbs().array() <= 1e-2 * size.cwiseAbs().array()).all();
 }
 
-std::string text_of(const Eigen::Vector3d& size) {
+std::string voxel_text(const Eigen::Vector3d& size) {
     std::ostringstream text;
     text.precision(6);
     text << size[0] << " x " << size[1] << " x " << size[2];
@@ -54,8 +54,8 @@ std::string text_of(const Eigen::Vector3d& size) {
 /// The sform alone: its voxels must be those of pixdim, and at right angles.
 Geometry sform_alone(const fs::path& path, const Geometry& sform, const Eigen::Vector3d& size) {
     if (!has_voxel_size(sform, size))
-        throw unusable(path, "its sform states voxels of " + text_of(sform.spacing) + " and its pixdim of " +
-                                 text_of(size) + ", and no qform decides; write the true voxel size into both");
+        throw unusable(path, "its sform states voxels of " + voxel_text(sform.spacing) + " and its pixdim of " +
+                                 voxel_text(size) + ", and no qform decides; write the true voxel size into both");
     return sform;
 }
 
@@ -75,7 +75,7 @@ Geometry chosen_form(const fs::path& path, const NiftiHeader& header, const std:
     }
     if (!has_qform) return sform_alone(path, sform, voxel_size(header));
     if (voxel_size(header).minCoeff() < 0.0)
-        throw unusable(path, "its pixdim states voxels of " + text_of(voxel_size(header)) +
+        throw unusable(path, "its pixdim states voxels of " + voxel_text(voxel_size(header)) +
                                  ", and a qform needs positive ones; write the true voxel size, and turn the qform "
                                  "where an axis is reversed");
     if (!has_sform) return qform;
@@ -107,7 +107,7 @@ void read_geometry(const fs::path& path, const NiftiHeader& header, ImageHeader&
                           " and were converted to mm");
 }
 
-Scalar type_of(const fs::path& path, int code) {
+Scalar nifti_type(const fs::path& path, int code) {
     static const std::map<int, Scalar> types = {{2, Scalar::UInt8},    {4, Scalar::Int16},    {8, Scalar::Int32},
                                                 {16, Scalar::Float32}, {64, Scalar::Float64}, {256, Scalar::Int8},
                                                 {512, Scalar::UInt16}, {768, Scalar::UInt32}, {1024, Scalar::Int64},
@@ -146,7 +146,7 @@ void read_sizes(const fs::path& path, const NiftiHeader& header, StoredVoxels& v
     const double components = sizes[4];
     const bool more = sizes.size() > 5 && std::any_of(sizes.begin() + 5, sizes.end(), [](double s) { return s > 1.0; });
     if ((components != 1.0 && components != 3.0) || more)
-        throw unusable(path, "its size " + detail::text_of(sizes) +
+        throw unusable(path, "its size " + text_of(sizes) +
                                  " is neither a scalar image nor vectors of three components; extract one volume");
     voxels.channels = static_cast<int>(components);
     voxels.planar = true;
@@ -197,7 +197,7 @@ void read_layout(const fs::path& path, const NiftiHeader& header, ImageHeader& i
     if (!(header.data_offset >= least && header.data_offset < 1e9))
         throw unreadable(
             path, "its voxels are to begin at byte " + std::to_string(header.data_offset) + "; the header is damaged");
-    voxels.type = type_of(path, header.datatype);
+    voxels.type = nifti_type(path, header.datatype);
     if (header.bits_per_voxel != static_cast<int>(8 * bytes_of(voxels.type)))
         throw unreadable(path, "data type " + std::to_string(header.datatype) + " of " +
                                    std::to_string(header.bits_per_voxel) + " bits a voxel; the header is damaged");

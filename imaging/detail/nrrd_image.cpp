@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-Scalar type_of(const fs::path& path, const std::string& name) {
+Scalar nrrd_type(const fs::path& path, const std::string& name) {
     static const std::map<std::string, Scalar> types = {{"signed char", Scalar::Int8},
                                                         {"int8", Scalar::Int8},
                                                         {"int8_t", Scalar::Int8},
@@ -376,7 +376,7 @@ private:
     }
     void read_layout() {
         StoredVoxels& voxels = image_.voxels;
-        voxels.type = type_of(path_, header_.value("type"));
+        voxels.type = nrrd_type(path_, header_.value("type"));
         read_components();
         const std::string encoding = lower_case(header_.value("encoding")),
                           endian = lower_case(header_.value("endian"));

@@ -124,13 +124,9 @@ imaging::Geometry read_grid(const Hdf5Input& file, const std::string& group) {
     return grid;
 }
 
-namespace {
-
 std::vector<hsize_t> voxel_shape(const imaging::Geometry& grid) {
     return {static_cast<hsize_t>(grid.size[2]), static_cast<hsize_t>(grid.size[1]), static_cast<hsize_t>(grid.size[0])};
 }
-
-}  // namespace
 
 void write_label_map(Hdf5Output& file, const std::string& group, const imaging::Volume& labels) {
     const imaging::Volume integers = labels.as(CV_32S);

@@ -23,6 +23,8 @@ tled::Model read_model(const Hdf5Input& file);
 void write_grid(Hdf5Output& file, const std::string& group, const imaging::Geometry& grid);
 imaging::Geometry read_grid(const Hdf5Input& file, const std::string& group);
 
+/// Of a dataset of voxels: x runs fastest.
+std::vector<hsize_t> voxel_shape(const imaging::Geometry& grid);
 /// A group with the grid and voxels (int32) of a label map.
 void write_label_map(Hdf5Output& file, const std::string& group, const imaging::Volume& labels);
 imaging::Volume read_label_map(const Hdf5Input& file, const std::string& group);

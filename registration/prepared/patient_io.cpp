@@ -13,17 +13,13 @@ namespace {
 constexpr const char* facts_name = "patient/facts";
 constexpr const char* image_group = "patient/image";
 
-std::vector<hsize_t> voxel_shape(const imaging::Geometry& grid) {
-    return {static_cast<hsize_t>(grid.size[2]), static_cast<hsize_t>(grid.size[1]), static_cast<hsize_t>(grid.size[0])};
-}
-
 /// Whole numbers as such, which keeps them small; `depth` says of which kind they were.
 void write_image(Hdf5Output& file, const imaging::Volume& image) {
     const std::string group = image_group;
     if (image.channels() != 1) throw InvalidInput("the image of a patient has more than one component");
     detail::write_grid(file, group + "/grid", image.geometry);
     file.scalar<int>(group + "/depth", image.voxels.depth(), "1");
-    const auto shape = voxel_shape(image.geometry);
+    const auto shape = detail::voxel_shape(image.geometry);
     if (image.voxels.depth() == CV_64F)
         file.array<double>(group + "/voxels", image.data<double>(), shape, "1");
     else if (image.voxels.depth() == CV_32F)
@@ -38,7 +34,7 @@ imaging::Volume read_image(const Hdf5Input& file) {
     const int depth = file.scalar<int>(group + "/depth");
     if (depth < CV_8U || depth > CV_64F)
         throw InvalidInput("'" + group + "/depth' is " + std::to_string(depth) + ", not 0 to 6");
-    const auto shape = voxel_shape(grid);
+    const auto shape = detail::voxel_shape(grid);
     file.require_shape(group + "/voxels", shape);
     const bool real = depth == CV_32F || depth == CV_64F;
     imaging::Volume image(grid, real ? CV_MAKETYPE(depth, 1) : CV_32SC1);

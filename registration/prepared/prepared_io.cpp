@@ -23,10 +23,6 @@ std::string contrast_group(std::size_t number) {
     return "contrasts/" + std::to_string(number);
 }
 
-std::vector<hsize_t> voxel_shape(const imaging::Geometry& grid) {
-    return {static_cast<hsize_t>(grid.size[2]), static_cast<hsize_t>(grid.size[1]), static_cast<hsize_t>(grid.size[0])};
-}
-
 void write_list(Hdf5Output& file, const std::string& name, const std::vector<int>& list) {
     file.vector<int>(name, Eigen::VectorXi::Map(list.data(), static_cast<Eigen::Index>(list.size())), "1");
 }
@@ -97,7 +93,7 @@ void write_image(Hdf5Output& file, const std::string& group, const ImageModel& m
     const imaging::Volume grey = model.image.as(CV_32F);
     const TemplateOptions& options = model.blocks.options();
     detail::write_grid(file, group + "/grid", grey.geometry);
-    file.array<float>(group + "/voxels", grey.data<float>(), voxel_shape(grey.geometry), "1");
+    file.array<float>(group + "/voxels", grey.data<float>(), detail::voxel_shape(grey.geometry), "1");
     file.columns<double>(group + "/points", model.blocks.points(), "mm");
     file.scalar<double>(group + "/template/grid_spacing", options.grid_spacing_mm, "mm");
     file.scalar<int>(group + "/template/levels", options.levels, "1");
@@ -106,9 +102,9 @@ void write_image(Hdf5Output& file, const std::string& group, const ImageModel& m
 
 ImageModel read_image(const Hdf5Input& file, const std::string& group) {
     const imaging::Geometry grid = detail::read_grid(file, group + "/grid");
-    file.require_shape(group + "/voxels", voxel_shape(grid));
+    file.require_shape(group + "/voxels", detail::voxel_shape(grid));
     imaging::Volume grey(grid, CV_32FC1);
-    file.array<float>(group + "/voxels", grey.data<float>(), voxel_shape(grid));
+    file.array<float>(group + "/voxels", grey.data<float>(), detail::voxel_shape(grid));
     const TemplateOptions options{file.scalar<double>(group + "/template/grid_spacing"),
                                   file.scalar<int>(group + "/template/levels"),
                                   file.scalar<int>(group + "/template/block_radius")};

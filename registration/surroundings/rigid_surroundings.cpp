@@ -4,9 +4,8 @@
 #include "imaging/mask_lookup.hpp"
 #include "imaging/places.hpp"
 #include "imaging/sampling.hpp"
-#include "registration/field/continuation.hpp"
 #include "registration/field/mesh_labels.hpp"
-#include "registration/field/sliding.hpp"
+#include "registration/surroundings/organ_slid.hpp"
 #include "registration/surroundings/surroundings_motion.hpp"
 
 #include <algorithm>
@@ -23,7 +22,6 @@ using imaging::Volume;
 /// Chosen by hand on the brain-shift phantom; docs/decisions/rigid_surroundings.md says what they do elsewhere.
 struct SurroundingsOptions {
     double spacing_mm = 3.4;       ///< of the places that are looked at
-    double continuation_mm = 8;    ///< spacing of the continuation that is tried
     double motion_spacing_mm = 4;  ///< of those that the motion of the surroundings is found from
     double window_mm = 3.5;        ///< standard deviation of the window around each
     double step_mm = 1.5;          ///< to both sides, along the continued displacement, that no motion is compared with
@@ -32,10 +30,7 @@ struct SurroundingsOptions {
     double gain = 1.4;             ///< what the continued displacement must leave over what no motion leaves
     double layer_mm = 2.5;         ///< around the organ, that is never rigid
     double most_moved_mm = 8;  ///< of the organ against its surroundings, in the mean, that does not fold between them
-    double slid_mm = 2;        ///< apart are motions with an organ's surface and across it that tell whether it slid
-    double least_slid_cm3 = 20;   ///< of places that they must be told by
-    double slid_gain = 1.2;       ///< what motion with the surface must leave over what motion across it leaves
-    double nearest_mm = 0.3;      ///< motions below it are none
+    double nearest_mm = 0.3;   ///< motions below it are none
     double negligible_mm = 0.05;  ///< continued displacements below it are not looked at
 };
 constexpr SurroundingsOptions choice;
@@ -140,43 +135,6 @@ Views views_of(const Deformation& deformation, const detail::Continuation& conti
     return views;
 }
 
-/// Two motions of what lies beside the organ: with its surface's tissue, or across its surface alone.
-struct Beside {
-    detail::Continuation with, across;
-};
-
-Beside beside(const Deformation& deformation, double fade_mm) {
-    const auto& mesh = deformation.mesh;
-    const meshing::BoundarySurface boundary = meshing::boundary_surface(mesh);
-    const auto continued = [&](const Eigen::Matrix3Xd& values) {
-        return detail::Continuation(mesh.nodes, mesh.tets, boundary, values, fade_mm, {}, choice.continuation_mm);
-    };
-    return {continued(deformation.displacement),
-            continued(detail::motion_across_surface(mesh.nodes, boundary, deformation.displacement))};
-}
-
-/// Whether the organ slid: the intraoperative image explains the preoperative one better where it is read after a
-/// motion across the surface than with it, over all places where the two are apart.
-bool slid(const Deformation& deformation, const Beside& beside, const detail::Outside& outside) {
-    Volume weight(outside.grid, CV_32FC1), with(outside.grid, CV_32FC1), across(outside.grid, CV_32FC1);
-    const imaging::LinearSampler intraoperative(outside.fixed);
-    for_each_place(outside.grid, [&](const Eigen::Vector3d& X, std::int64_t n) {
-        if (!(outside.weight.data<float>()[n] > 0)) return;
-        const Eigen::Vector3d u = beside.with(X), v = beside.across(X);
-        const Eigen::Vector3d one = deformation.placement * (X + u), other = deformation.placement * (X + v);
-        with.data<float>()[n] = static_cast<float>(intraoperative.value(one));
-        across.data<float>()[n] = static_cast<float>(intraoperative.value(other));
-        const bool counts =
-            (u - v).norm() > choice.slid_mm && intraoperative.contains(one) && intraoperative.contains(other);
-        weight.data<float>()[n] = counts ? 1.0F : 0.0F;
-    });
-    const double places = cv::sum(weight.voxels)[0];
-    if (places * outside.grid.spacing.prod() < 1000 * choice.least_slid_cm3) return false;
-    const detail::WindowFit fit(outside.moving.voxels, weight, choice.window_mm);
-    const auto left = [&](const Volume& view) { return fit.of(view.voxels).residual.dot(weight.voxels); };
-    return left(with) > choice.slid_gain * left(across);
-}
-
 /// At least 1 where a place moved with the placement, less the less is said for it.
 Volume rigid_score(const Views& views, const Volume& moving) {
     const detail::WindowFit fit(moving.voxels, views.weight, choice.window_mm);
@@ -230,7 +188,7 @@ Surroundings rigid_bodies(const Volume& mask, const Deformation& deformation) {
 }
 
 std::optional<Surroundings> rigid_surroundings(const Deformation& given, const Volume& moving, const Volume& fixed,
-                                               const FieldOptions& options) {
+                                               const FieldOptions& options, Observer& observer) {
     if (!is_usable(moving) || !is_usable(fixed)) return given.surroundings;
     const auto around = [&](double spacing_mm) {
         const Geometry grid = grid_around(given.mesh, moving.geometry, options.fade_mm, spacing_mm);
@@ -241,11 +199,12 @@ std::optional<Surroundings> rigid_surroundings(const Deformation& given, const V
     if (!motion) return given.surroundings;
     const Deformation deformation = given.with_placement(*motion);
     const detail::Outside outside = around(choice.spacing_mm);
-    const Beside continued = beside(deformation, options.fade_mm);
-    const bool slides = slid(deformation, continued, outside);
+    const detail::MotionsBeside beside = detail::motions_beside(deformation, options.fade_mm);
+    const bool slides = detail::organ_slid(deformation, beside, outside);
+    if (slides) observer.note(sliding_note);
     if (!slides && moved_against(given, *motion) > choice.most_moved_mm) return given.surroundings;
     const imaging::LinearSampler score(
-        rigid_score(views_of(deformation, slides ? continued.across : continued.with, outside), outside.moving));
+        rigid_score(views_of(deformation, slides ? beside.across : beside.with, outside), outside.moving));
     const imaging::MaskLookup known(given.surroundings ? given.surroundings->rigid : Volume());
     Volume mask(voxels_around(moving.geometry, outside.grid), CV_8UC1);
     for_each_place(mask.geometry, [&](const Eigen::Vector3d& X, std::int64_t n) {

@@ -8,20 +8,23 @@
 /// what is left of the preoperative image after the best linear map of intensities in a window (as local correlation,
 /// so contrast and brightness may differ). A place is rigid where the least of that lies nearer to the motion than to
 /// the continuation. Places without structure say nothing and are left to the continuation. Whether the organ slid
-/// along its surroundings the images tell likewise, from all places around it that motion with its surface's tissue and
-/// motion across its surface bring apart.
+/// along its surroundings the images tell likewise (organ_slid.hpp).
 
 #include "registration/field.hpp"
 
 namespace tissuewarp::registration {
 
+inline constexpr const char* sliding_note =
+    "the images show that the organ slid along what lies around it, which is not dragged along: the fields jump there";
+
 /// How the surroundings moved, with the voxels of the moving image's grid that are rigid; those of
 /// `deformation.surroundings` among them. None of them lies in the organ, before or after it deformed. Only what
 /// `deformation` has where an image has several components or fewer than two voxels along an axis, where no rigid
 /// motion explains the surroundings, or where the organ did not slide and moved against them by more than 8 mm in the
-/// mean. Throws InvalidInput where the deformation is not usable.
+/// mean. Notes that the organ slid. Throws InvalidInput where the deformation is not usable.
 std::optional<Surroundings> rigid_surroundings(const Deformation& deformation, const imaging::Volume& moving,
-                                               const imaging::Volume& fixed, const FieldOptions& options = {});
+                                               const imaging::Volume& fixed, const FieldOptions& options = {},
+                                               Observer& observer = silent_observer());
 
 /// Bodies that are known to be rigid and to move with the placement, without what the organ covers, before or after it
 /// deformed. `mask` uint8, moving frame.

@@ -61,6 +61,21 @@ Missed missed_under(MatrixXd loads, const PreparedModel& prepared, const LinearR
     return result;
 }
 
+/// Of displacements (3N × k, mm) beside their motions as a whole, root mean square.
+double elastic_motion_mm(const MatrixXd& displacements, const Eigen::Matrix3Xd& nodes) {
+    const MatrixXd motions = rigid_motions(nodes);
+    const MatrixXd rigid = motions * (motions.transpose() * motions).ldlt().solve(motions.transpose() * displacements);
+    return std::sqrt((displacements - rigid).squaredNorm() / double(nodes.cols() * displacements.cols()));
+}
+
+/// How large errors are over what strain energy says. Noise that the tissue followed strains it much in short waves
+/// that move it little, and loads of longer waves with that energy would move it far: where the motion that was found
+/// is less than theirs, the size lies between what both say. `least` is the share of both that nothing found lessens.
+double size_by_motion(const Missed& missed, const Eigen::Matrix3Xd& nodes, double found_mm, double least) {
+    const double expected_mm = elastic_motion_mm(missed.truths.displacement - missed.error, nodes);
+    return std::pow(std::clamp(found_mm / expected_mm, least, 1.0), error_model.motion_weight);
+}
+
 MatrixXd beside(const MatrixXd& a, const MatrixXd& b) {
     MatrixXd result(a.rows(), a.cols() + b.cols());
     result << a, b;
@@ -125,10 +140,14 @@ OpenParts open_parts(const PreparedModel& prepared, const LastPulls& given, cons
     const std::vector<PulledNode> data = pulls.data();
     const DataErrors errors =
         drawn_errors(data, prepared.model.mesh.nodes, pulls.energy, options.samples, options.seed + 2);
-    DataUncertainty result;
-    result.covariance = covariances_of(beside(on.error, in.error)) +
-                        covariances_of(registration.inverse(forces_of(data, errors, prepared.rest.node_count)));
     const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
+    const auto sized = [&, least = std::sqrt(1 - strain_energy / energy),
+                        found_mm = elastic_motion_mm(displacement.reshaped(), nodes)](const Missed& missed) {
+        return MatrixXd(size_by_motion(missed, nodes, found_mm, least) * missed.error);
+    };
+    DataUncertainty result;
+    result.covariance = covariances_of(beside(sized(on), sized(in))) +
+                        covariances_of(registration.inverse(forces_of(data, errors, prepared.rest.node_count)));
     const Covariances placement =
         sum_of_squares(beside(unseen_motions(pulls, nodes), missed_if_rigid(pulls, nodes, displacement, registration)));
     constexpr int draws = HeldOutOptions().draws;

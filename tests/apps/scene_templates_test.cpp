@@ -6,6 +6,7 @@
 #include "core/errors.hpp"
 #include "simulation/presets.hpp"
 #include "simulation/run.hpp"
+#include "tests/support/folders.hpp"
 
 #include <gtest/gtest.h>
 
@@ -19,7 +20,7 @@ namespace {
 using simulation::Scene;
 
 Scene small(const std::string& name) {
-    Scene scene = read_scene(std::filesystem::path(TISSUEWARP_SOURCE_DIR) / "data/scenes" / (name + ".toml"));
+    Scene scene = read_scene(tissuewarp::test::source_folder() / "data/scenes" / (name + ".toml"));
     if (auto* box = std::get_if<simulation::BoxGeometry>(&scene.geometry))
         for (int& cells : box->cells) cells = (cells + 1) / 2;
     if (auto* volume = std::get_if<simulation::LabelledVolume>(&scene.geometry)) volume->edge_length *= 1.7;
@@ -73,7 +74,7 @@ TEST(SceneTemplates, CavityChangesItsWalls) {
 
 TEST(Presets, StandInTheManualWithTheirSources) {
     std::ostringstream manual;
-    manual << std::ifstream(std::filesystem::path(TISSUEWARP_SOURCE_DIR) / "docs/manual/simulate.md").rdbuf();
+    manual << std::ifstream(tissuewarp::test::source_folder() / "docs/manual/simulate.md").rdbuf();
     for (const simulation::Preset& preset : simulation::presets()) {
         EXPECT_NE(manual.str().find('`' + preset.name + '`'), std::string::npos) << preset.name;
         EXPECT_NO_THROW(tled::require_valid(preset.material, preset.name));

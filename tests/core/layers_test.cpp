@@ -1,4 +1,6 @@
 /// The one direction of dependency: no folder includes a header of a folder that it may not know.
+#include "tests/support/folders.hpp"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -91,7 +93,7 @@ std::string room_of(const std::string& path) {
 
 std::vector<Include> includes() {
     std::vector<Include> found;
-    const fs::path root = TISSUEWARP_SOURCE_DIR;
+    const fs::path root = tissuewarp::test::source_folder();
     const std::regex quoted(R"re(^\s*#include\s+"(([a-z]+)/[^"]+)")re");
     for (const auto& [folder, allowed] : may_include)
         for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
@@ -140,7 +142,7 @@ TEST(Layers, RoomsOfRegistrationLookOneWay) {
 
 // The method is one page, and no folder a hall.
 TEST(Layers, FilesAndFoldersStaySmall) {
-    const fs::path root = TISSUEWARP_SOURCE_DIR;
+    const fs::path root = tissuewarp::test::source_folder();
     const auto lines = [](const fs::path& path) {
         std::ifstream file(path);
         return std::count(std::istreambuf_iterator<char>(file), {}, '\n');
@@ -180,7 +182,7 @@ int members_of(const std::string& text, std::size_t body) {
 TEST(Layers, ClassesOfRegistrationHoldFewThings) {
     static const std::regex begin(R"(\nclass \w[^;{]*\{)"), remark(R"(//[^\n]*)");
     int seen = 0, most = 0;
-    for (const auto& entry : fs::recursive_directory_iterator(fs::path(TISSUEWARP_SOURCE_DIR) / "registration")) {
+    for (const auto& entry : fs::recursive_directory_iterator(tissuewarp::test::source_folder() / "registration")) {
         if (entry.path().extension() != ".hpp" && entry.path().extension() != ".cpp") continue;
         std::ifstream file(entry.path());
         std::string text(std::istreambuf_iterator<char>(file), {});
@@ -218,7 +220,7 @@ TEST(Layers, ProductsKnowFewRoomsOfTled) {
 TEST(Layers, ThirdPartyImageAndMeshTypesStayOutOfHeaders) {
     const std::regex heavy(R"re(#include\s+[<"](itk|CGAL|nlopt|CLI|hdf5|H5|epoxy|GL/))re");
     for (const auto& [folder, allowed] : may_include)
-        for (const auto& entry : fs::directory_iterator(fs::path(TISSUEWARP_SOURCE_DIR) / folder)) {
+        for (const auto& entry : fs::directory_iterator(tissuewarp::test::source_folder() / folder)) {
             if (entry.path().extension() != ".hpp" || folder == "apps") continue;
             std::ifstream file(entry.path());
             for (std::string line; std::getline(file, line);)

@@ -2,6 +2,7 @@
 #include "core/errors.hpp"
 #include "imaging/sampling.hpp"
 #include "test_volumes.hpp"
+#include "tests/support/folders.hpp"
 
 #include <gmock/gmock.h>
 #include <zlib.h>
@@ -18,7 +19,7 @@ namespace {
 using test::oblique_grid;
 using test::TemporaryFolder;
 
-const std::filesystem::path sample = std::filesystem::path(TISSUEWARP_SOURCE_DIR) / "data" / "brainshift";
+const std::filesystem::path sample = tissuewarp::test::source_folder() / "data" / "brainshift";
 
 class EveryFormat : public testing::TestWithParam<const char*> {};
 

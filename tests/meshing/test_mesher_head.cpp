@@ -3,6 +3,7 @@
 #include "imaging/image_io.hpp"
 #include "meshing/mesher.hpp"
 #include "meshing/quality.hpp"
+#include "tests/support/folders.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +13,8 @@ namespace tissuewarp::meshing {
 namespace {
 
 TEST(MesherHead, BrainVentriclesAndTumourAtSixMillimetres) {
-    const imaging::Volume labels = imaging::read_labels(TISSUEWARP_SOURCE_DIR "/data/brainshift/preop_labels.nii.gz");
+    const imaging::Volume labels =
+        imaging::read_labels(tissuewarp::test::source_folder() / "data/brainshift/preop_labels.nii.gz");
     MeshingOptions options;
     options.edge_length = 6.0;
     const TetMesh mesh = mesh_labels(labels, options);
@@ -30,7 +32,7 @@ TEST(MesherHead, BrainVentriclesAndTumourAtSixMillimetres) {
 }
 
 TEST(MesherHead, TorsoKeepsEveryLabel) {
-    const imaging::Volume labels = imaging::read_labels(TISSUEWARP_SOURCE_DIR "/data/torso/labels.nii.gz");
+    const imaging::Volume labels = imaging::read_labels(tissuewarp::test::source_folder() / "data/torso/labels.nii.gz");
     MeshingOptions options;
     options.edge_length = 8.0;
     const TetMesh mesh = mesh_labels(labels, options);

@@ -4,6 +4,7 @@
 #include "core/errors.hpp"
 #include "meshing/mesh_io.hpp"
 #include "scratch_folder.hpp"
+#include "tests/support/noted.hpp"
 
 #include <gmock/gmock.h>
 
@@ -180,11 +181,6 @@ TEST_F(PointTables, AnEmptyLineBetweenPointsWithoutNamesIsNoted) {
     EXPECT_EQ(noted("x,y,z\r\r\n1,2,3\r\r\n4,5,6\r\r\n7,8,9\r\r\n"), "");
 }
 
-struct Notes : Observer {
-    std::string all;
-    void note(std::string_view text) override { all += text; }
-};
-
 std::string replaced(std::string text, const std::string& from, const std::string& to) {
     return text.replace(text.find(from), from.size(), to);
 }
@@ -198,15 +194,15 @@ TEST_F(PointTables, SurfacesAreTurnedFromTheFrameThatTheyName) {
     for (const std::string extension : {"ply", "stl", "obj", "vtk", "vtp"}) {
         const auto path = file("lps." + extension);
         write_surface(triangle, path);
-        Notes silent, said;
+        tissuewarp::test::Noted silent, said;
         EXPECT_EQ(read_surface(path, silent).mesh.nodes.col(1), Eigen::Vector3d(triangle.nodes.col(1))) << extension;
-        EXPECT_EQ(silent.all, "") << extension;
+        EXPECT_EQ(silent.notes, "") << extension;
         const bool xml = extension == "vtp";
         const std::string text = bytes_of(path), ras = xml ? replaced(text, "76 80 83 0", "82 65 83 0")
                                                            : replaced(text, "SPACE=LPS", "SPACE=RAS");
         const Surface surface = read_surface(file("ras." + extension, ras), said);
         EXPECT_EQ(surface.mesh.nodes.col(1), turned) << extension;
-        EXPECT_THAT(said.all, HasSubstr("ras." + extension + "': says that its points are RAS")) << extension;
+        EXPECT_THAT(said.notes, HasSubstr("ras." + extension + "': says that its points are RAS")) << extension;
         const std::string las =
             xml ? replaced(text, "76 80 83 0", "76 65 83 0") : replaced(text, "SPACE=LPS", "space=LAS");
         EXPECT_THROW(read_surface(file("las." + extension, las)), InvalidInput) << extension;

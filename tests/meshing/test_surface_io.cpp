@@ -2,6 +2,7 @@
 #include "meshing/mesh_io.hpp"
 #include "meshing/primitives.hpp"
 #include "scratch_folder.hpp"
+#include "tests/support/folders.hpp"
 
 #include <gmock/gmock.h>
 
@@ -102,7 +103,7 @@ TEST_F(SurfaceIo, ReadsPointLists) {
 }
 
 TEST_F(SurfaceIo, ReadsTheSampleSurface) {
-    const Surface surface = read_surface(TISSUEWARP_SOURCE_DIR "/data/brainshift/intraop_surface.ply");
+    const Surface surface = read_surface(tissuewarp::test::source_folder() / "data/brainshift/intraop_surface.ply");
     EXPECT_EQ(surface.mesh.node_count(), 2500);
     ASSERT_EQ(surface.normals.cols(), 2500);
     EXPECT_NEAR(surface.normals.colwise().norm().minCoeff(), 1.0, 1e-6);

@@ -3,6 +3,7 @@
 #include "meshing/mesh_io.hpp"
 #include "meshing/primitives.hpp"
 #include "scratch_folder.hpp"
+#include "tests/support/folders.hpp"
 
 #include <gmock/gmock.h>
 
@@ -16,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-const fs::path samples = TISSUEWARP_SOURCE_DIR "/tests/meshing/vtp";
+const fs::path samples = tissuewarp::test::source_folder() / "tests/meshing/vtp";
 
 class Vtp : public ScratchFolder {
 protected:

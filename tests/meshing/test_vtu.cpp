@@ -2,6 +2,7 @@
 #include "meshing/mesh_io.hpp"
 #include "meshing/primitives.hpp"
 #include "scratch_folder.hpp"
+#include "tests/support/folders.hpp"
 
 #include <gmock/gmock.h>
 
@@ -177,8 +178,9 @@ TEST_F(Vtu, MeshioReadsTheSameNumbers) {
     const Eigen::MatrixXd displacement = Eigen::MatrixXd::Random(3, mesh.node_count());
     const Eigen::MatrixXd energy = Eigen::MatrixXd::Random(1, mesh.tet_count());
     write_vtu(mesh, file("box.vtu"), {{"displacement", displacement}}, {{"energy <1>", energy}});
-    const auto [output, good] =
-        run(std::string("/usr/bin/python3 ") + TISSUEWARP_MESHIO_SCRIPT + " " + file("box.vtu").string());
+    const auto [output, good] = run(std::string("/usr/bin/python3 ") +
+                                    (tissuewarp::test::source_folder() / "tests/meshing/vtu_meshio.py").string() + " " +
+                                    file("box.vtu").string());
     ASSERT_TRUE(good) << output;
     std::istringstream numbers(output);
     int points = 0, tets = 0, last = 0, labels = 0;
@@ -198,8 +200,9 @@ TEST_F(Vtu, ReadsWhatMeshioWrites) {
     const TetMesh mesh = labelled_box();
     write_vtu(mesh, file("box.vtu"));
     for (const char* mode : {"binary", "zlib", "ascii"}) {
-        const auto [output, good] = run(std::string("/usr/bin/python3 ") + TISSUEWARP_MESHIO_SCRIPT + " " +
-                                        file("box.vtu").string() + " " + file("again.vtu").string() + " " + mode);
+        const auto [output, good] = run(std::string("/usr/bin/python3 ") +
+                                        (tissuewarp::test::source_folder() / "tests/meshing/vtu_meshio.py").string() +
+                                        " " + file("box.vtu").string() + " " + file("again.vtu").string() + " " + mode);
         ASSERT_TRUE(good) << output;
         const TetMesh again = read_vtu(file("again.vtu"));
         EXPECT_EQ(again.tets, mesh.tets) << mode;

@@ -3,13 +3,14 @@
 #include "imaging/image_io.hpp"
 #include "registration/io/surface_points.hpp"
 #include "tests/phantoms/claims.hpp"
+#include "tests/support/folders.hpp"
 
 namespace tissuewarp::registration {
 namespace {
 
 class BrainShift : public ::testing::Test {
 protected:
-    const std::filesystem::path head = std::filesystem::path(TISSUEWARP_SOURCE_DIR) / "data" / "brainshift";
+    const std::filesystem::path head = tissuewarp::test::source_folder() / "data" / "brainshift";
     const imaging::Volume moving = imaging::read_labels(head / "preop_labels.nii.gz");
 
     /// Scores, and asks for a result that folds nowhere and that the program does not doubt.

@@ -5,6 +5,7 @@
 #include "registration/io/surface_points.hpp"
 #include "registration/warp.hpp"
 #include "tests/phantoms/claims.hpp"
+#include "tests/support/folders.hpp"
 
 namespace tissuewarp::registration {
 namespace {
@@ -13,7 +14,7 @@ using ::testing::IsEmpty;
 
 class Liver : public ::testing::Test {
 protected:
-    const std::filesystem::path liver = std::filesystem::path(TISSUEWARP_SOURCE_DIR) / "data" / "liver";
+    const std::filesystem::path liver = tissuewarp::test::source_folder() / "data" / "liver";
     const imaging::Volume moving = imaging::read_labels(liver / "preop_labels.nii.gz");
 
     /// Scores, and asks for a result that folds nowhere and that the program does not doubt.

@@ -5,6 +5,7 @@
 #include "registration/field.hpp"
 #include "registration/warp.hpp"
 #include "tests/phantoms/claims.hpp"
+#include "tests/support/folders.hpp"
 
 namespace tissuewarp::registration {
 namespace {
@@ -13,7 +14,7 @@ namespace fs = std::filesystem;
 
 class SharedPhantoms : public ::testing::Test {
 protected:
-    const fs::path data = fs::path(TISSUEWARP_SOURCE_DIR) / ".." / "shared" / "data";
+    const fs::path data = tissuewarp::test::source_folder() / ".." / "shared" / "data";
     void SetUp() override {
         if (!fs::exists(data)) GTEST_SKIP() << "for want of ../shared/data";
     }

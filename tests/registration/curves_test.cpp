@@ -2,6 +2,7 @@
 #include "registration/io/curves.hpp"
 
 #include "core/errors.hpp"
+#include "tests/support/folders.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
@@ -76,7 +77,7 @@ TEST_F(CurveFiles, PolydataOfBothVersions) {
 }
 
 TEST_F(CurveFiles, XmlPolydataAsVtkWritesIt) {
-    const fs::path path = fs::path(TISSUEWARP_SOURCE_DIR) / "tests/meshing/vtp/raw-zlib-32.vtp";
+    const fs::path path = tissuewarp::test::source_folder() / "tests/meshing/vtp/raw-zlib-32.vtp";
     const Curves curves = read_curves(path, path);
     ASSERT_EQ(curves.moving.size(), 2u);
     EXPECT_EQ(curves.moving[1].col(1), Vector3d(10, 10, -0.125));

@@ -3,6 +3,7 @@
 
 #include "core/errors.hpp"
 #include "shapes.hpp"
+#include "tests/support/noted.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -382,19 +383,14 @@ TEST_F(LandmarkFile, PairsPointsByNameWhereBothFilesNameThem) {
     EXPECT_THAT(refused(head + "20,0,0,apex\n10,0,0,\n"), HasSubstr("point 2 has no name"));
 }
 
-struct Notes : Observer {
-    std::string all;
-    void note(std::string_view text) override { all += text; }
-};
-
 TEST_F(LandmarkFile, PointsWithoutPartnerAreLeftOutAndNamed) {
     const std::string head = "# CoordinateSystem = LPS\n# columns = x,y,z,label\n";
-    Notes notes;
+    tissuewarp::test::Noted noted;
     const Landmarks pairs = read_landmarks(write("m.fcsv", head + "1,0,0,apex\n2,0,0,hilum\n"),
-                                           write("f.fcsv", head + "5,0,0,tip\n10,0,0,apex\n"), notes);
+                                           write("f.fcsv", head + "5,0,0,tip\n10,0,0,apex\n"), noted);
     EXPECT_EQ(pairs.moving, Eigen::Vector3d(1, 0, 0));
     EXPECT_EQ(pairs.fixed, Eigen::Vector3d(10, 0, 0));
-    EXPECT_THAT(notes.all, ::testing::AllOf(HasSubstr("hilum"), HasSubstr("tip")));
+    EXPECT_THAT(noted.notes, ::testing::AllOf(HasSubstr("hilum"), HasSubstr("tip")));
 }
 
 // By order tip would be paired with the hilum, and as many points would be left on both sides.
@@ -406,31 +402,31 @@ TEST_F(LandmarkFile, PointsThatWereNotPlacedLeaveThePairsOfTheOthers) {
             {"label": "apex", "position": [300, 0, 0], "positionStatus": ")" +
                apex + R"("}, {"label": "base", "position": [4000, 0, 0]}]}]})";
     };
-    Notes notes;
+    tissuewarp::test::Noted noted;
     const Landmarks pairs = read_landmarks(write("m.mrk.json", markups("undefined", "defined")),
-                                           write("f.mrk.json", markups("defined", "missing")), notes);
+                                           write("f.mrk.json", markups("defined", "missing")), noted);
     ASSERT_EQ(pairs.moving.cols(), 2);
     EXPECT_EQ(pairs.moving.row(0), Eigen::RowVector2d(20, 4000));
     EXPECT_EQ(pairs.fixed, pairs.moving);
-    EXPECT_THAT(notes.all, ::testing::AllOf(HasSubstr("tip"), HasSubstr("apex")));
+    EXPECT_THAT(noted.notes, ::testing::AllOf(HasSubstr("tip"), HasSubstr("apex")));
 }
 
 TEST_F(LandmarkFile, PointsOfSlicerThatDoNotCountAreLeftOutAndNamed) {
     const std::string head =
         "# CoordinateSystem = LPS\n# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n";
-    Notes notes;
+    tissuewarp::test::Noted noted;
     const auto file = write("a.fcsv", head +
                                           "0,1,2,3,0,0,0,1,1,1,0,A,,,2,0\n1,0,0,0,0,0,0,1,1,1,0,B,,,0,0\n"
                                           "2,0,0,0,0,0,0,1,1,1,0,C,,,3,0\n3,7,8,9,0,0,0,1,0,1,0,D,,,2,0\n");
-    EXPECT_EQ(read_points(file, notes), Eigen::Vector3d(1, 2, 3));
-    EXPECT_THAT(notes.all,
+    EXPECT_EQ(read_points(file, noted), Eigen::Vector3d(1, 2, 3));
+    EXPECT_THAT(noted.notes,
                 ::testing::AllOf(HasSubstr("B (not placed)"), HasSubstr("C (missing)"), HasSubstr("D (hidden)")));
     const auto table = write("a.csv",
                              "label,r,a,s,defined,selected,visible,locked,description\n"
                              "A,-1,-2,3,1,1,1,0,\nB,0,0,0,0,1,1,0,\n");
-    notes.all.clear();
-    EXPECT_EQ(read_points(table, notes), Eigen::Vector3d(1, 2, 3));
-    EXPECT_THAT(notes.all, ::testing::AllOf(HasSubstr("r, a, s were turned to LPS"), HasSubstr("left out: B")));
+    noted.notes.clear();
+    EXPECT_EQ(read_points(table, noted), Eigen::Vector3d(1, 2, 3));
+    EXPECT_THAT(noted.notes, ::testing::AllOf(HasSubstr("r, a, s were turned to LPS"), HasSubstr("left out: B")));
 }
 
 TEST_F(LandmarkFile, TablesOfPointsArePairsToo) {
@@ -455,20 +451,20 @@ TEST_F(LandmarkFile, ColumnsOfNumbersPairWhereTheyAreNoOrderOfTheirOwn) {
 
 TEST_F(LandmarkFile, TablesOfPairsHaveRemarksAndRowsThatDoNotCount) {
     const std::string header = "pre_x,pre_y,pre_z,intra_x,intra_y,intra_z";
-    Notes notes;
+    tissuewarp::test::Noted noted;
     const Landmarks turned =
-        read_landmarks(write("p.csv", "# CoordinateSystem = RAS\n" + header + "\n1,2,3,4,5,6\n"), notes);
+        read_landmarks(write("p.csv", "# CoordinateSystem = RAS\n" + header + "\n1,2,3,4,5,6\n"), noted);
     EXPECT_EQ(turned.moving.col(0), Eigen::Vector3d(-1, -2, 3));
     EXPECT_EQ(turned.fixed.col(0), Eigen::Vector3d(-4, -5, 6));
-    EXPECT_THAT(notes.all, HasSubstr("says that its points are RAS"));
-    notes.all.clear();
+    EXPECT_THAT(noted.notes, HasSubstr("says that its points are RAS"));
+    noted.notes.clear();
     const Landmarks pairs =
         read_landmarks(write("d.csv", "label," + header +
                                           ",defined,intra_visible\na,1,2,3,4,5,6,1,1\nb,0,0,0,0,0,0,0,1\n"
                                           "c,0,0,0,0,0,0,True,False\n"),
-                       notes);
+                       noted);
     EXPECT_EQ(pairs.moving.cols(), 1);
-    EXPECT_THAT(notes.all, HasSubstr("left out: b, c"));
+    EXPECT_THAT(noted.notes, HasSubstr("left out: b, c"));
     EXPECT_THAT(csv_refusal("# unit: cm\n" + header + "\n1,2,3,4,5,6\n"), HasSubstr("its unit is cm"));
 }
 

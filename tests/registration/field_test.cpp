@@ -6,6 +6,8 @@
 #include "registration/evaluation.hpp"
 #include "registration/field/inverse_transform.hpp"
 #include "shapes.hpp"
+#include "tests/support/folders.hpp"
+#include "tests/support/noted.hpp"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -420,31 +422,25 @@ TEST(JacobianDeterminant, TakesOneSidedDifferencesAtTheBorderAndNoneAlongASingle
 }
 
 TEST(Field, SaysNothingOfInversionOnALeftHandedGrid) {
-    struct Notes : Observer {
-        std::string text;
-        void note(std::string_view message) override { text += message; }
-    } observer;
+    tissuewarp::test::Noted observer;
     const Deformation deformation =
         test::deformed_by(test::box_at({0, 0, 0}, {30, 30, 30}, {3, 3, 3}), affine_displacement);
     displacement_fixed_to_moving(deformation, test::oblique_grid({15, 15, 15}, {31, 31, 31}, {1, 1, 1}), {}, observer);
-    EXPECT_EQ(observer.text, "");
+    EXPECT_EQ(observer.notes, "");
 }
 
 TEST(Field, SaysHowManyTetrahedraAreInverted) {
-    struct Notes : Observer {
-        std::string text;
-        void note(std::string_view message) override { text += message; }
-    } observer;
+    tissuewarp::test::Noted observer;
     Deformation deformation = test::deformed_by(test::box_at({0, 0, 0}, {30, 30, 30}, {3, 3, 3}),
                                                 [](const auto&) -> Eigen::Vector3d { return Eigen::Vector3d::Zero(); });
     deformation.displacement.col(1 + 4 * (1 + 4)) = Eigen::Vector3d(14, 0, 0);  // an inner node past its neighbour
     const Geometry grid = test::plain_grid({31, 31, 31});
     const Volume field = displacement_fixed_to_moving(deformation, grid, {}, observer);
-    EXPECT_NE(observer.text.find("inverted"), std::string::npos);
+    EXPECT_NE(observer.notes.find("inverted"), std::string::npos);
     EXPECT_LT(cv::norm(field.voxels, cv::NORM_INF), 14.001);
     const JacobianReport report = mesh_jacobians(deformation);
     EXPECT_GT(report.folded, 0);
-    EXPECT_NE(observer.text.find(std::to_string(report.folded) + " inverted"), std::string::npos);
+    EXPECT_NE(observer.notes.find(std::to_string(report.folded) + " inverted"), std::string::npos);
     EXPECT_GT(field_jacobians(displacement_moving_to_fixed(deformation, grid)).folded, 0);
 }
 
@@ -493,7 +489,7 @@ Eigen::Vector3d sample(const Volume& field, const Eigen::Vector3d& point) {
 }
 
 TEST(PointTransform, CarriesLandmarksOfTheBrainShiftPhantomByItsTrueField) {
-    const std::filesystem::path folder = std::filesystem::path(TISSUEWARP_SOURCE_DIR) / "data/brainshift";
+    const std::filesystem::path folder = tissuewarp::test::source_folder() / "data/brainshift";
     const Volume truth = imaging::read_volume(folder / "truth_forward.nii.gz");
     const Landmarks landmarks = read_landmarks(folder / "landmarks.csv");
     const Eigen::Vector3d lower = landmarks.moving.rowwise().minCoeff().array() - 4.0;

@@ -8,6 +8,7 @@
 #include "registration/field/gpu_warp_check.hpp"
 #include "registration/warp.hpp"
 #include "shapes.hpp"
+#include "tests/support/folders.hpp"
 
 #include <gmock/gmock.h>
 
@@ -275,7 +276,7 @@ TEST(GpuWarp, AcceptsASingleSlice) {
 }
 
 TEST(GpuWarp, OfARealHeadIsThatOfTheCpu) {
-    const std::filesystem::path folder = std::filesystem::path(TISSUEWARP_SOURCE_DIR) / "data/brainshift";
+    const std::filesystem::path folder = tissuewarp::test::source_folder() / "data/brainshift";
     const Volume image = imaging::read_volume(folder / "preop.nii.gz");
     const Volume labels = imaging::read_labels(folder / "preop_labels.nii.gz");
     Geometry coarse = labels.geometry;

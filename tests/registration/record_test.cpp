@@ -4,6 +4,7 @@
 #include "registration/io/stored_model.hpp"
 #include "registration/prepared/prepared_io.hpp"
 #include "tests/registration/shapes.hpp"
+#include "tests/support/folders.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -391,7 +392,7 @@ TEST_F(Records, AreNotWrittenIntoMissingFolders) {
 TEST_F(Records, AreReadByH5py) {
     if (std::system("/usr/bin/python3 -c 'import h5py, numpy' 2>/dev/null") != 0) GTEST_SKIP() << "no h5py";
     write();
-    const std::string script = std::string(TISSUEWARP_SOURCE_DIR) + "/tests/registration/check_record.py";
+    const std::string script = (tissuewarp::test::source_folder() / "tests/registration/check_record.py").string();
     const UpdateResult result = some_result();
     std::ofstream expected(folder / "expected.txt");
     expected.precision(17);

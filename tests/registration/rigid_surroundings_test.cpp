@@ -7,6 +7,7 @@
 #include "registration/evaluation/percentile.hpp"
 #include "registration/field/inverse_transform.hpp"
 #include "registration/field/parted.hpp"
+#include "tests/support/noted.hpp"
 #include "textured_phantom.hpp"
 
 #include <gtest/gtest.h>
@@ -198,9 +199,11 @@ Volume turned_image() {
 TEST(RigidSurroundings, AnOrganThatSlidAlongThemDragsNothing) {
     Deformation deformation = turned();
     const Volume moving = test::sampled(grid, head, 1.5, 2), fixed = turned_image();
-    deformation.surroundings = rigid_surroundings(deformation, moving, fixed);
+    tissuewarp::test::Noted observer;
+    deformation.surroundings = rigid_surroundings(deformation, moving, fixed, {}, observer);
     ASSERT_TRUE(deformation.surroundings);
     EXPECT_TRUE(deformation.surroundings->slide);
+    EXPECT_EQ(observer.notes, std::string(sliding_note) + "\n");
     const Eigen::Isometry3d& motion = deformation.surroundings->motion;
     Volume forward = displacement_moving_to_fixed(deformation, grid);
     Volume backward = displacement_fixed_to_moving(deformation, fixed.geometry);
@@ -229,8 +232,10 @@ TEST(RigidSurroundings, AnOrganThatSlidAlongThemDragsNothing) {
 TEST(RigidSurroundings, WhatTurnedAlongWithTheOrganWasNotSlidAlong) {
     const Deformation deformation = turned();
     const Volume moving = test::sampled(grid, head, 1.5, 2), fixed = seen_after(deformation, 1);
-    const auto found = rigid_surroundings(deformation, moving, fixed);
+    tissuewarp::test::Noted observer;
+    const auto found = rigid_surroundings(deformation, moving, fixed, {}, observer);
     EXPECT_FALSE(found && found->slide);
+    EXPECT_EQ(observer.notes, "");
 }
 
 // Differences of what lies next to the organ reach across the jump: they are not asked.

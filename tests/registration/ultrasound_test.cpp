@@ -9,6 +9,7 @@
 #include "tests/registration/doubt_codes.hpp"
 #include "tests/registration/textured_phantom.hpp"
 #include "tests/support/label_shapes.hpp"
+#include "tests/support/noted.hpp"
 
 #include <gtest/gtest.h>
 
@@ -130,19 +131,13 @@ TEST(EchoPose, IsSoughtFromAFewPlacesCloseTogether) {
     }
 }
 
-class Noted : public Observer {
-public:
-    void note(std::string_view text) override { notes.append(text).append("\n"); }
-    std::string notes;
-};
-
 TEST(UltrasoundUpdate, FindsTheOrganAndSaysHowItCompared) {
     const Organ one = organ();
     UpdateOptions options;
     options.device = Device::Cpu;
     Intraoperative seen;
     seen.image = echoes(one.labels.geometry, moved());
-    Noted observer;
+    tissuewarp::test::Noted observer;
     const UpdateResult result = update(one.model, seen, options, observer);
     EXPECT_NE(observer.notes.find("ultrasound"), std::string::npos) << observer.notes;
     Deformation before = result.deformation;

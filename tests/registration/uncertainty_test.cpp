@@ -9,6 +9,7 @@
 #include "registration/springs/ground_springs.hpp"
 #include "registration/terms/datum_kind.hpp"
 #include "registration/uncertainty/data_uncertainty.hpp"
+#include "registration/uncertainty/error_model.hpp"
 #include "registration/uncertainty/held_out.hpp"
 #include "registration/update.hpp"
 #include "tests/registration/doubt_codes.hpp"
@@ -404,6 +405,26 @@ TEST(OpenParts, MotionsThatDataHardlyTellCount) {
     pulls.placement_sought = false;  // headers place the organ
     pulls.hardly_shown = {3, 0.5};
     EXPECT_LT(mean_square(), before + 1e-9);
+}
+
+// By energy alone sixteen times as much would be sixteen times the variance.
+TEST(OpenParts, StrainThatMovedTheTissueLittleCountsLess) {
+    const PreparedModel prepared = organ();
+    const Matrix3Xd& nodes = prepared.model.mesh.nodes;
+    LastPulls pulls = pulls_at_the_surface(prepared, 0.3);
+    const auto variance = [&](double energy, double bent_mm) {
+        Matrix3Xd bent = Matrix3Xd::Zero(3, nodes.cols());
+        bent.row(2) = bent_mm * (nodes.row(0) / 40).array().square();
+        const auto open = detail::open_parts(prepared, pulls, bent, energy, {});
+        return open.data.covariance.topRows<3>().sum();
+    };
+    const auto growth = [&](double energy, double bent_mm) {
+        const double once = variance(energy, bent_mm), more = variance(16 * energy, bent_mm);
+        return (variance(256 * energy, bent_mm) - more) / (more - once);
+    };
+    const double much = 1e3 * pulls.energy;
+    EXPECT_NEAR(growth(much, 0.2), std::pow(16, 1 - detail::error_model.motion_weight), 0.1);
+    EXPECT_NEAR(growth(much, 2000), 16, 0.1);  // what moved as far as its strain says
 }
 
 // Labels that turned the organ may hide more of a turn; where headers place it nothing is added.

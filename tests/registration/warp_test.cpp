@@ -5,6 +5,7 @@
 #include "imaging/labels.hpp"
 #include "registration/field.hpp"
 #include "shapes.hpp"
+#include "tests/support/folders.hpp"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -100,7 +101,7 @@ TEST(Warp, RefusesWhatItCannotUse) {
 TEST(WarpLabels, OfARealHeadFollowAnAnalyticField) {
     // A deformation known in closed form: y = X + a (0, 0, sin²(x/40) …), shear only, whose inverse is explicit. Each
     // warped voxel must hold the label found at the exact preimage.
-    const std::filesystem::path folder = std::filesystem::path(TISSUEWARP_SOURCE_DIR) / "data/brainshift";
+    const std::filesystem::path folder = tissuewarp::test::source_folder() / "data/brainshift";
     const Volume labels = imaging::read_labels(folder / "preop_labels.nii.gz");
     const Geometry& grid = labels.geometry;
     const auto u = [](const Eigen::Vector3d& X) {

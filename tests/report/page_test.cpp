@@ -8,6 +8,7 @@
 #include "report/detail/viewer_volumes.hpp"
 
 #include "core/errors.hpp"
+#include "tests/support/folders.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -65,7 +66,7 @@ struct Example {
 };
 
 json example_report() {
-    std::ifstream file(std::string(TISSUEWARP_SOURCE_DIR) + "/tests/report/report.json");
+    std::ifstream file(tissuewarp::test::source_folder() / "tests/report/report.json");
     return json::parse(file);
 }
 
@@ -83,7 +84,7 @@ protected:
     }
     /// Exit code of Debian's Python on a script of this folder.
     [[nodiscard]] int python(const std::string& arguments) const {
-        const std::string script = std::string(TISSUEWARP_SOURCE_DIR) + "/tests/report/check_page.py ";
+        const std::string script = (tissuewarp::test::source_folder() / "tests/report/check_page.py ").string();
         const int status = std::system(("/usr/bin/python3 " + script + arguments).c_str());
         return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
     }

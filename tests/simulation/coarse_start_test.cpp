@@ -5,6 +5,7 @@
 #include "meshing/primitives.hpp"
 #include "simulation/run.hpp"
 #include "tests/simulation/cube.hpp"
+#include "tests/support/noted.hpp"
 
 #include <gtest/gtest.h>
 
@@ -25,11 +26,6 @@ Scene rod(int cells_across) {
     scene.solve.device = Device::Cpu;
     return scene;
 }
-
-struct Listening : Observer {
-    std::string notes;
-    void note(std::string_view text) override { notes.append(text) += "\n"; }
-};
 
 TEST(CoarserScene, HasTwiceTheEdgeWhereItIsTheSameScene) {
     const Scene fine = rod(6);
@@ -68,7 +64,7 @@ TEST(CoarseStart, LiesNearTheEquilibriumAndSavesThePathToIt) {
     const auto start = coarse_start(built, 1.0, silent_observer());
     ASSERT_TRUE(start);
     Matrix3Xd u;
-    Listening observer;
+    tissuewarp::test::Noted observer;
     const RunSummary summary = simulate(
         built, [&](const Frame& frame) { u = frame.displacement; }, observer);
     EXPECT_GT(u.colwise().norm().maxCoeff(), 90);

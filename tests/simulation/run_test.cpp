@@ -5,6 +5,7 @@
 #include "core/errors.hpp"
 #include "meshing/primitives.hpp"
 #include "tests/simulation/cube.hpp"
+#include "tests/support/noted.hpp"
 #include "tled/model/internal_force.hpp"
 
 #include <gtest/gtest.h>
@@ -350,11 +351,6 @@ TEST(Simulate, RefusesFrictionInEquilibrium) {
     EXPECT_THROW(simulate(build(scene)), InvalidInput);
 }
 
-struct Listening : Observer {
-    std::string notes;
-    void note(std::string_view text) override { notes.append(text) += "\n"; }
-};
-
 TEST(Simulate, AColumnThatBucklesUnderItsWeightIsFollowedToWhereItHangs) {
     // Held at its foot it stands up to (7.84 E I/(ρ g A))^⅓ = 51 mm (Greenhill 1881), and is 90 mm high.
     Scene scene;
@@ -365,7 +361,7 @@ TEST(Simulate, AColumnThatBucklesUnderItsWeightIsFollowedToWhereItHangs) {
     scene.gravity = Gravity{std::nullopt, {0, 0, -1}, 9810.0, {}};
     scene.solve.device = Device::Cpu;
     const BuiltScene built = build(scene);
-    Listening observer;
+    tissuewarp::test::Noted observer;
     Matrix3Xd u;
     const RunSummary summary = simulate(
         built, [&](const Frame& frame) { u = frame.displacement; }, observer);

@@ -3,6 +3,7 @@
 #include "study/reference.hpp"
 
 #include "meshing/primitives.hpp"
+#include "tests/support/folders.hpp"
 #include "tled/reference/quadratic.hpp"
 
 #include <gtest/gtest.h>
@@ -56,8 +57,8 @@ TEST(StretchedCube, PartIsHeldByTheSameSprings) {
 // Against an independent solution by other software: data/reference/p1_cube_stretch.json, known to 0.001 mm; its ν is
 // 0.489997 in place of 0.49.
 TEST(StretchedCube, ReferenceAgreesWithAnIndependentSolution) {
-    const nlohmann::json file = nlohmann::json::parse(
-        std::ifstream(std::string(TISSUEWARP_SOURCE_DIR) + "/data/reference/p1_cube_stretch.json"));
+    const nlohmann::json file =
+        nlohmann::json::parse(std::ifstream(tissuewarp::test::source_folder() / "data/reference/p1_cube_stretch.json"));
     Body cube = stretched_cube();
     const auto& points = file.at("points");
     const auto& truth = file.at("values").at("lnJ").at("u").at("value");

@@ -4,6 +4,7 @@
 #include "core/errors.hpp"
 #include "study/coverage_summary.hpp"
 #include "study/detail/random.hpp"
+#include "tests/support/folders.hpp"
 
 #include <gtest/gtest.h>
 
@@ -76,7 +77,7 @@ TEST(Coverage, TellsClassesAndViewsApart) {
     for (std::size_t k = 0; k < rows.size(); k += 4) {
         rows[k].estimate.trust = registration::Trust::Unknown;
         rows[k].error *= 100;
-        rows[k].doubts = 1;
+        rows[k].doubts = "data.contradict placement.loose";
     }
     for (std::size_t k = 1; k < rows.size(); k += 4) rows[k].in_view = false;
     const auto coverage = coverage_of(rows);
@@ -97,7 +98,7 @@ TEST(Coverage, TellsClassesAndViewsApart) {
 }
 
 TEST(Coverage, TablesAreKeptAndBrokenOnesRefused) {
-    const fs::path folder = fs::path(TISSUEWARP_BINARY_DIR) / "coverage_test";
+    const fs::path folder = tissuewarp::test::binary_folder() / "coverage_test";
     fs::remove_all(folder);
     fs::create_directories(folder);
     auto rows = drawn_rows(1);
@@ -134,7 +135,7 @@ TEST(Coverage, FigureNamesWhatItShows) {
 
 // One phantom from end to end, twice: the second time read, not computed.
 TEST(Coverage, APhantomIsMeasuredOnceAndKept) {
-    const fs::path folder = fs::path(TISSUEWARP_BINARY_DIR) / "coverage_kept";
+    const fs::path folder = tissuewarp::test::binary_folder() / "coverage_kept";
     fs::remove_all(folder);
     CoverageOptions options;
     options.first_seed = options.last_seed = 5;

@@ -1,6 +1,7 @@
 #include "tests/verification/reference_file.hpp"
 
 #include "core/errors.hpp"
+#include "tests/support/folders.hpp"
 #include "tests/verification/solution.hpp"
 
 #include <fstream>
@@ -25,7 +26,7 @@ void flatten(const json& value, std::vector<double>& out) {
 }  // namespace
 
 json reference_file(const std::string& name) {
-    const std::string path = std::string(TISSUEWARP_SOURCE_DIR) + "/data/reference/" + name + ".json";
+    const std::string path = (tissuewarp::test::source_folder() / "data/reference/").string() + name + ".json";
     std::ifstream stream(path);
     if (!stream) throw IoError("cannot read " + path + ": run from a complete checkout");
     return json::parse(stream);

@@ -2,6 +2,7 @@
 
 #include "core/errors.hpp"
 #include "meshing/primitives.hpp"
+#include "tests/support/folders.hpp"
 #include "tled/dynamics.hpp"
 #include "tled/stiffness/rest_stiffness.hpp"
 
@@ -21,7 +22,7 @@ using Eigen::Vector3d;
 namespace {
 
 nlohmann::json values_of(const std::string& name) {
-    const std::string path = std::string(TISSUEWARP_SOURCE_DIR) + "/data/reference/" + name;
+    const std::string path = (tissuewarp::test::source_folder() / "data/reference/").string() + name;
     std::ifstream stream(path);
     if (!stream) throw IoError("cannot read " + path + ": run from a complete checkout");
     return nlohmann::json::parse(stream).at("values");

@@ -3,6 +3,7 @@
 #include "tled/model/springs.hpp"
 #include "tled/parallel/parallel.hpp"
 #include "tled/stiffness/chebyshev.hpp"
+#include "tled/stiffness/dot.hpp"
 
 #include <Eigen/LU>
 
@@ -13,14 +14,6 @@ namespace tissuewarp::tled::detail {
 
 using Eigen::Matrix3d;
 using Eigen::Matrix3Xd;
-
-namespace {
-
-double dot(const Matrix3Xd& a, const Matrix3Xd& b) {
-    return a.cwiseProduct(b).sum();
-}
-
-}  // namespace
 
 Enrichment::Enrichment(const HierarchicalTissue& tissue, const BubbleConditions& bubbles,
                        const NodalConditions& conditions, const RestStiffness& corners)

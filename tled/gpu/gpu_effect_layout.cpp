@@ -13,10 +13,6 @@ using Eigen::Matrix3Xd;
 using Eigen::Vector3d;
 using Words = std::vector<std::uint32_t>;
 
-float single(double value) {
-    return static_cast<float>(value);
-}
-
 std::uint32_t place(std::size_t at) {
     return static_cast<std::uint32_t>(at);
 }

@@ -9,10 +9,6 @@ namespace {
 
 constexpr std::size_t nodes_at_once = 4096;  // of one task
 
-float single(double value) {
-    return static_cast<float>(value);
-}
-
 Uint4 column(const Eigen::Matrix4Xi& matrix, int index) {
     Uint4 result{};
     for (int corner = 0; corner < 4; ++corner)

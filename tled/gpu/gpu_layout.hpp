@@ -15,6 +15,10 @@ using Float2 = std::array<float, 2>;
 using Float4 = std::array<float, 4>;
 using Uint4 = std::array<std::uint32_t, 4>;
 
+inline float single(double value) {
+    return static_cast<float>(value);
+}
+
 struct GpuElements {
     std::vector<Uint4> nodes;                   ///< M
     std::vector<Float4> rest;                   ///< 3 M

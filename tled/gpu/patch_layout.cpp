@@ -11,7 +11,6 @@
 namespace tissuewarp::tled::detail {
 namespace {
 
-constexpr std::uint32_t none = 0xffffffffU;
 constexpr std::uint32_t no_local_node = 0xffffU;
 constexpr std::uint32_t other_material = 0x80000000U;  // flag of a source
 
@@ -135,8 +134,8 @@ public:
         layout_.rest.resize(8 * room(c.slots));
         layout_.sources.resize(room(c.sources));
         layout_.neighbours.resize(room(c.neighbours));
-        layout_.node_of_slot.resize(room(c.slots), none);
-        layout_.slot_of_node.resize(index(rest.node_count), none);
+        layout_.node_of_slot.resize(room(c.slots), no_slot);
+        layout_.slot_of_node.resize(index(rest.node_count), no_slot);
     }
 
     PatchLayout build() {
@@ -182,7 +181,7 @@ private:
             for (std::size_t c = 0; c < 3; ++c) layout_.rest[c * plane + first + i] = X[static_cast<Eigen::Index>(c)];
             layout_.node_of_slot[first + i] = word(index(nodes[i]));
             std::uint32_t& owner = layout_.slot_of_node[index(nodes[i])];
-            if (owner == none) owner = word(first + i);
+            if (owner == no_slot) owner = word(first + i);
         }
     }
 
@@ -208,7 +207,7 @@ private:
 
     void write_places() {
         const std::size_t patches = index(layout_.capacity.patches), fans = index(layout_.capacity.fans);
-        layout_.element_of_place.assign(index(layout_.capacity.longest_fan) * patches * fans, none);
+        layout_.element_of_place.assign(index(layout_.capacity.longest_fan) * patches * fans, no_slot);
         for (std::size_t p = 0; p < patches; ++p)
             for (std::size_t f = 0; f < patches_[p].fan.size(); ++f) {
                 const Fan& fan = patches_[p].fan[f];

@@ -19,6 +19,9 @@ constexpr std::size_t slots_for(std::size_t nodes) {
     return (nodes + slot_step - 1) / slot_step * slot_step;
 }
 
+/// A node, a slot or a tetrahedron that is not there.
+inline constexpr std::uint32_t no_slot = 0xffffffffU;
+
 /// Every patch has as much room as the largest, so that addresses follow from the patch's number alone.
 struct PatchCapacity {
     int patches = 0;

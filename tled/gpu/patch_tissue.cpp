@@ -5,8 +5,6 @@
 namespace tissuewarp::tled::detail {
 namespace {
 
-constexpr std::uint32_t none = 0xffffffffU;
-
 /// (x, y) of the fibre, or of its opposite, on the half z ≥ 0 of the octahedron |x| + |y| + z = 1.
 Float2 folded(const Eigen::Vector3d& fibre) {
     const double scale = (fibre.z() < 0 ? -1 : 1) / fibre.lpNorm<1>();
@@ -32,7 +30,7 @@ TissueOfPatches::TissueOfPatches(const shaders::Device& device, const RestState&
     if (shaders::has_fibres(kind_.law)) {
         std::vector<Float2> fibres(places_, Float2{0.0F, 0.0F});
         for (std::size_t place = 0; place < places_; ++place)
-            if (const std::uint32_t e = layout.element_of_place[place]; e != none)
+            if (const std::uint32_t e = layout.element_of_place[place]; e != no_slot)
                 fibres[place] = folded(rest.fibre.col(static_cast<Eigen::Index>(e)));
         tissue_->upload(fibres);
     }

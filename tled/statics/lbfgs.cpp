@@ -5,6 +5,7 @@
 
 #include "tled/statics/equilibrium_search.hpp"
 #include "tled/statics/line_search.hpp"
+#include "tled/stiffness/dot.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -21,10 +22,6 @@ namespace {
 constexpr std::size_t most_pairs = 30;
 constexpr int most_idle_iterations = 25;  // without the error falling by a tenth
 constexpr double volume_dominated = 200;  // volumetric over shear modulus, ν = 0.4975
-
-double dot(const Matrix3Xd& a, const Matrix3Xd& b) {
-    return a.cwiseProduct(b).sum();
-}
 
 /// A step s, the fall of the residual y over it, and B y.
 struct Pair {

@@ -1,5 +1,7 @@
 #include "tled/statics/line_search.hpp"
 
+#include "tled/stiffness/dot.hpp"
+
 #include <algorithm>
 #include <cmath>
 
@@ -11,10 +13,6 @@ namespace {
 
 constexpr double slope_kept = 0.9;  // a step is long enough when |r·d| falls below this part of its start
 constexpr int most_trials = 12;
-
-double dot(const Matrix3Xd& a, const Matrix3Xd& b) {
-    return a.cwiseProduct(b).sum();
-}
 
 }  // namespace
 

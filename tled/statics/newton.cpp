@@ -5,6 +5,7 @@
 #include "tled/statics/equilibrium_search.hpp"
 #include "tled/statics/finite_rotations.hpp"
 #include "tled/statics/line_search.hpp"
+#include "tled/stiffness/dot.hpp"
 #include "tled/stiffness/tangent_factor.hpp"
 
 #include <algorithm>
@@ -33,10 +34,6 @@ Matrix3Xd first_state(EquilibriumSearch& search, const FiniteRotations& rotation
     }
     Matrix3Xd u = search.conditions.constrained.select(search.conditions.imposed, *start);
     return search.admissible(u) ? u : search.begin(start);
-}
-
-double dot(const Matrix3Xd& a, const Matrix3Xd& b) {
-    return a.cwiseProduct(b).sum();
 }
 
 /// Whether going from `u`, with its residual `r`, to `next` led downhill and not too far; the residual is then that

@@ -1,6 +1,7 @@
 #include "tled/stiffness/conjugate_gradients.hpp"
 
 #include "core/errors.hpp"
+#include "tled/stiffness/dot.hpp"
 
 #include <cmath>
 #include <string>
@@ -24,7 +25,6 @@ Matrix3Xd conjugate_gradients(const Product& product, const Product& preconditio
 
 ConjugateGradients conjugate_gradients_within(int most_iterations, const Product& product, const Product& precondition,
                                               const Matrix3Xd& force, double relative_tolerance) {
-    const auto dot = [](const Matrix3Xd& a, const Matrix3Xd& b) { return a.cwiseProduct(b).sum(); };
     ConjugateGradients found;
     found.x = Matrix3Xd::Zero(3, force.cols());
     Matrix3Xd r = force, z = precondition(r), p = z;
