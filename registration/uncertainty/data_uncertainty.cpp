@@ -71,6 +71,7 @@ double elastic_motion_mm(const MatrixXd& displacements, const Eigen::Matrix3Xd& 
 /// How large errors are over what strain energy says. Noise that the tissue followed strains it much in short waves
 /// that move it little, and loads of longer waves with that energy would move it far: where the motion that was found
 /// is less than theirs, the size lies between what both say. `least` is the share of both that nothing found lessens.
+/// Where data show the organ as a whole their energy stands: what labels of lungs miss is as large.
 double size_by_motion(const Missed& missed, const Eigen::Matrix3Xd& nodes, double found_mm, double least) {
     const double expected_mm = elastic_motion_mm(missed.truths.displacement - missed.error, nodes);
     return std::pow(std::clamp(found_mm / expected_mm, least, 1.0), error_model.motion_weight);
@@ -143,7 +144,8 @@ OpenParts open_parts(const PreparedModel& prepared, const LastPulls& given, cons
     const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
     const auto sized = [&, least = std::sqrt(1 - strain_energy / energy),
                         found_mm = elastic_motion_mm(displacement.reshaped(), nodes)](const Missed& missed) {
-        return MatrixXd(size_by_motion(missed, nodes, found_mm, least) * missed.error);
+        const bool whole = given.prior_moves == PriorMoves::Not;
+        return MatrixXd((whole ? 1 : size_by_motion(missed, nodes, found_mm, least)) * missed.error);
     };
     DataUncertainty result;
     result.covariance = covariances_of(beside(sized(on), sized(in))) +
