@@ -38,10 +38,14 @@ ChosenPose choose_pose(const std::vector<FoundPose>& found, const Eigen::Matrix3
     const auto chosen = std::min_element(
         poses.begin(), last, [&](const FoundPose& a, const FoundPose& b) { return motion_mm(a) < motion_mm(b); });
     ChosenPose result{*chosen};
-    if (poses.size() < 2) return result;
-    const FoundPose& rival = chosen == poses.begin() ? poses[1] : poses[0];
-    result.rival_cost = rival.cost;
-    result.rival_mm = mean_distance_mm(rival.placement, chosen->placement, places);
+    const double ruled_out_mm =
+        rival_pose_options.headers_tell * std::max(rival_pose_options.same_pose_mm, motion_mm(*chosen));
+    const auto rival = std::find_if(poses.begin(), poses.end(), [&](const FoundPose& pose) {
+        return &pose != &*chosen && motion_mm(pose) < ruled_out_mm;
+    });
+    if (rival == poses.end()) return result;
+    result.rival_cost = rival->cost;
+    result.rival_mm = mean_distance_mm(rival->placement, chosen->placement, places);
     return result;
 }
 
