@@ -34,7 +34,8 @@ bool ImageSearch::shows_echoes() const {
     Eigen::Index expected = 0;
     for (Eigen::Index n = 0; n < points.cols(); ++n) expected += view.distance(points.col(n)) < 0;
     if (expected == 0) return false;
-    return double(block_search(by_headers, silent_observer()).matches.size()) < most_found * double(expected);
+    const auto found = block_search(by_headers, silent_observer()).matches.size();
+    return double(found) < most_found * double(expected) && has_more_speckle(fixed_, SeenImage(moving_.image));
 }
 
 std::optional<EchoPose> ImageSearch::echo_pose(const State& state, Observer& observer) {

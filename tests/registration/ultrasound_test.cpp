@@ -94,6 +94,19 @@ TEST(Speckle, IsWhatUltrasoundShowsAndTissueDoesNot) {
     EXPECT_FALSE(detail::is_speckled(detail::SeenImage(bright)));
 }
 
+// A scanner's noise is in both images, cut to a part of the organ or not.
+TEST(Speckle, ThatTheMovingImageHasTooIsNoSignOfUltrasound) {
+    const Organ one = organ();
+    const detail::SeenImage ultrasound(echoes(one.labels.geometry, moved()));
+    EXPECT_TRUE(detail::has_more_speckle(ultrasound, detail::SeenImage(one.image)));
+    cv::RNG random(9);
+    const auto noisy = [&](const Eigen::Vector3d& y) { return 100 + 20 * Texture()(y) + random.gaussian(25); };
+    const auto in_part = [&](const Eigen::Vector3d& y) { return in_fan(y) ? noisy(y) : 0; };
+    const detail::SeenImage whole(sampled(one.labels.geometry, noisy)), part(sampled(one.labels.geometry, in_part));
+    EXPECT_TRUE(detail::is_speckled(part)) << "as ultrasound is, by itself";
+    EXPECT_FALSE(detail::has_more_speckle(part, whole));
+}
+
 /// Of an organ that was shifted by (1, −2, 1) places along the axes of its grid.
 detail::EchoCosts costs_of_a_shift() {
     const Organ one = organ();

@@ -67,4 +67,8 @@ bool is_speckled(const SeenImage& image, const SpeckleOptions& options) {
     return speckle_of(image) >= options.least_speckle;
 }
 
+bool has_more_speckle(const SeenImage& fixed, const SeenImage& moving, const SpeckleOptions& options) {
+    return speckle_of(fixed) >= options.least_over_moving * speckle_of(moving);
+}
+
 }  // namespace tissuewarp::registration::detail
