@@ -96,10 +96,12 @@ LastPulls nothing_seen(const PreparedModel& prepared, LastPulls pulls) {
     return pulls;
 }
 
-/// Of a motion of the organ as a whole of which the data show this share.
+/// Of a motion of the organ as a whole of which the data show this share s: what springs mistake for it is as large as
+/// they feel little of it, like 1/√s.
 double unseen_deviation_mm(double share, const HardlyShown& hardly) {
     if (share < shown_motion_limits.least_share) return error_model.unseen_motion_mm;
-    return share < hardly.below_share ? hardly.deviation_mm * std::sqrt(1 - share / hardly.below_share) : 0;
+    if (share >= hardly.below_share) return 0;
+    return hardly.deviation_mm * std::min(1.0, std::sqrt(hardly.below_share / share) - 1);
 }
 
 /// One deviation of each motion of the organ as a whole beyond what the springs of the data leave open, 3N × 6, mm.
