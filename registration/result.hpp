@@ -33,8 +33,8 @@ struct SurfaceFit {
     double residual_mm = 0;      ///< root mean square of those, along normals
     double coverage = 0;         ///< the area they stand for over that of the model's surface
     bool pose_searched = false;  ///< among all places, not only near the headers'
-    double rival_mm = 0;       ///< how far it lies from the chosen pose in the best other that headers leave open, mean
-    double rival_support = 0;  ///< what that one explains of the points over what the chosen one explains
+    double rival_mm = 0;         ///< from the chosen pose to the best other that headers leave open, mean over it
+    double rival_support = 0;    ///< what that one explains of the points over what the chosen one explains
 };
 
 /// What was found of the preoperative image's blocks.
@@ -56,11 +56,11 @@ struct PointFit {
 
 /// How points along vessels agree with the registered model.
 struct CurveFit {
-    int points = 0;           ///< that were taken
-    double inlier_share = 0;  ///< of them: within the scale of the last round of a line
-    double residual_mm = 0;   ///< root mean square of those, across the line
-    double length_mm = 0;     ///< of the preoperative lines in the model
-    double rival_mm = 0;  ///< how far these lie from the chosen pose in the best other that headers leave open, mean
+    int points = 0;            ///< that were taken
+    double inlier_share = 0;   ///< of them: within the scale of the last round of a line
+    double residual_mm = 0;    ///< root mean square of those, across the line
+    double length_mm = 0;      ///< of the preoperative lines in the model
+    double rival_mm = 0;       ///< from the chosen pose to the best other that headers leave open, mean over these
     double rival_support = 0;  ///< what that one explains of the points over what the chosen one explains
 };
 

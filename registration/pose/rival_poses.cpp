@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 namespace tissuewarp::registration::detail {
 
@@ -38,15 +39,31 @@ ChosenPose choose_pose(const std::vector<FoundPose>& found, const Eigen::Matrix3
     const auto chosen = std::min_element(
         poses.begin(), last, [&](const FoundPose& a, const FoundPose& b) { return motion_mm(a) < motion_mm(b); });
     ChosenPose result{*chosen};
-    const double ruled_out_mm =
+    const double near_mm =
         rival_pose_options.headers_tell * std::max(rival_pose_options.same_pose_mm, motion_mm(*chosen));
-    const auto rival = std::find_if(poses.begin(), poses.end(), [&](const FoundPose& pose) {
-        return &pose != &*chosen && motion_mm(pose) < ruled_out_mm;
-    });
-    if (rival == poses.end()) return result;
-    result.rival_cost = rival->cost;
-    result.rival_mm = mean_distance_mm(rival->placement, chosen->placement, places);
+    const auto best_other = [&](auto first, auto end, auto admits) {
+        const auto other =
+            std::find_if(first, end, [&](const FoundPose& pose) { return &pose != &*chosen && admits(pose); });
+        return other == end ? nullptr : &*other;
+    };
+    const auto from_chosen_mm = [&](const FoundPose& pose) {
+        return mean_distance_mm(pose.placement, chosen->placement, places);
+    };
+    const auto is_near = [&](const FoundPose& pose) { return motion_mm(pose) < near_mm; };
+    if (const FoundPose* rival = best_other(poses.begin(), poses.end(), is_near)) {
+        result.rival_cost = rival->cost;
+        result.rival_mm = from_chosen_mm(*rival);
+    }
+    if (const FoundPose* far = best_other(poses.begin(), last, std::not_fn(is_near)))
+        result.ruled_out_mm = from_chosen_mm(*far);
     return result;
+}
+
+void tell_what_headers_decide(const ChosenPose& pose, const std::string& data, Observer& observer) {
+    if (pose.ruled_out_mm > 0)
+        observer.note(data + " fit about as well with the organ placed " +
+                      std::to_string(std::lround(pose.ruled_out_mm)) +
+                      " mm elsewhere; it was left near where the headers place it");
 }
 
 std::vector<Eigen::Matrix3d> start_rotations(double angle_deg) {

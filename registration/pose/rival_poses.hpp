@@ -1,10 +1,13 @@
 #pragma once
 /// Which of several poses is taken where more than one explains the data.
 
+#include "core/observer.hpp"
+
 #include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <vector>
 
 namespace tissuewarp::registration::detail {
@@ -36,8 +39,9 @@ struct FoundPose {
 /// Two poses that explain the data, the first chosen.
 struct ChosenPose {
     FoundPose chosen;
-    double rival_cost = 1;  ///< of the best pose that is another and that the headers do not rule out
-    double rival_mm = 0;    ///< and how far the organ lies from it there, mean over its places
+    double rival_cost = 1;    ///< of the best pose that is another and that the headers do not rule out
+    double rival_mm = 0;      ///< and how far the organ lies from it there, mean over its places
+    double ruled_out_mm = 0;  ///< how far it lies from it in the best pose that only headers rule out; 0: there is none
 
     /// What that one explains over what the chosen one does.
     [[nodiscard]] double rival_support() const { return chosen.cost < 1 ? (1 - rival_cost) / (1 - chosen.cost) : 1; }
@@ -51,6 +55,9 @@ std::vector<FoundPose> distinct_poses(std::vector<FoundPose> poses, const Eigen:
 /// fits all round a smooth organ, and where the headers place it is the likelier. Precondition: some pose was found.
 ChosenPose choose_pose(const std::vector<FoundPose>& found, const Eigen::Matrix3Xd& places,
                        const Eigen::Isometry3d& start);
+
+/// Tells that only headers rule out another pose, where they do. `data` in words: "the points".
+void tell_what_headers_decide(const ChosenPose& pose, const std::string& data, Observer& observer);
 
 /// About the corners of an icosahedron by an angle, none first: starts all around one.
 std::vector<Eigen::Matrix3d> start_rotations(double angle_deg);

@@ -119,9 +119,10 @@ std::vector<CurveMatch> CurveTerm::matches(const State& state, double reach_mm) 
     return match_curves(deformed_lines(state), data_, state.placement, reach_mm, options_.max_angle_deg);
 }
 
-Alignment CurveTerm::pose(const Eigen::Isometry3d& start, Observer& /*observer*/) {
+Alignment CurveTerm::pose(const Eigen::Isometry3d& start, Observer& observer) {
     const double scale_mm = curve_pose_options.bending_mm + final_scale_mm();
     pose_ = search_curve_pose({samples_, segments_}, data_, start, scale_mm, options_.max_angle_deg);
+    tell_what_headers_decide(*pose_, "the points along vessels", observer);
     return {pose_->chosen.placement, pose_->chosen.typical_distance_mm(scale_mm)};
 }
 

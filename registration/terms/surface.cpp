@@ -73,6 +73,7 @@ double SurfaceTerm::final_scale_mm() const {
 
 Alignment SurfaceTerm::pose(const Eigen::Isometry3d& /*start*/, Observer& observer) {
     pose_ = search_surface_pose(meshing::SurfaceTree(surface_.at_rest), surface_.at_rest, data_, alignment_, observer);
+    tell_what_headers_decide(pose_.pose, "the points", observer);
     return {pose_.pose.chosen.placement, pose_.pose.chosen.typical_distance_mm(pose_.scale_mm)};
 }
 

@@ -2,6 +2,7 @@
 #include "registration/pose/rival_poses.hpp"
 
 #include "tests/support/label_shapes.hpp"
+#include "tests/support/noted.hpp"
 
 #include <gtest/gtest.h>
 
@@ -46,10 +47,21 @@ TEST(RivalPoses, AreNoneWhereTheHeadersTellThemApart) {
     EXPECT_EQ(chosen_beside(29).rival_mm, 19);
     EXPECT_EQ(chosen_beside(31).rival_mm, 0);
     EXPECT_EQ(chosen_beside(31).rival_cost, 1);
+    EXPECT_EQ(chosen_beside(31).ruled_out_mm, 21);
+    EXPECT_EQ(chosen_beside(29).ruled_out_mm, 0);
     const std::vector<FoundPose> all_far{shifted(80, 0.10), shifted(-120, 0.10)};
     EXPECT_EQ(choose_pose(all_far, corners(), Eigen::Isometry3d::Identity()).rival_mm, 200) << "headers tell nothing";
     const std::vector<FoundPose> both_near{shifted(1, 0.10), shifted(-20, 0.10)};
     EXPECT_EQ(choose_pose(both_near, corners(), Eigen::Isometry3d::Identity()).rival_mm, 21) << "they err by some mm";
+}
+
+TEST(RivalPoses, ThatOnlyHeadersRuleOutAreTold) {
+    tissuewarp::test::Noted observer;
+    tell_what_headers_decide({}, "the points", observer);
+    EXPECT_EQ(observer.notes, "");
+    tell_what_headers_decide({{}, 1, 0, 80.4}, "the points", observer);
+    EXPECT_NE(observer.notes.find("the points fit about as well with the organ placed 80 mm elsewhere"),
+              std::string::npos);
 }
 
 // A descent that stopped early is nearer to its start than one that arrived; both are one pose.
