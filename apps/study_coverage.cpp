@@ -62,6 +62,15 @@ void take_sought(std::vector<std::string>& problems, study::CoverageOptions& pla
     plan.evidence = {study::Evidence::Image};
 }
 
+/// "turned:7-9": patients as "bent:7-9" that headers place anyhow, as labels show them.
+void take_turned(std::vector<std::string>& problems, study::CoverageOptions& plan) {
+    constexpr std::string_view name = "turned:";
+    if (problems.size() != 1 || !problems.front().starts_with(name)) return;
+    problems.front().replace(0, name.size(), "bent:");
+    plan.phantom.misplacement = {180, 20};
+    plan.evidence = {study::Evidence::Labels};
+}
+
 study::Evidence evidence_of(const std::string& name) {
     std::vector<std::string> names;
     for (const study::Evidence each : study::all_evidence) {
@@ -77,6 +86,7 @@ study::CoverageOptions plan_of(const StudyOptions& options, Observer& observer) 
     std::vector<std::string> wanted = options.problems;
     take_ultrasound(wanted, plan);
     take_sought(wanted, plan);
+    take_turned(wanted, plan);
     const auto [family, problems] = family_of(std::move(wanted));
     plan.phantom.family = family;
     std::tie(plan.first_seed, plan.last_seed) = phantom_seeds(problems, {plan.first_seed, plan.last_seed});

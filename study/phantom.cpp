@@ -47,7 +47,7 @@ void require_valid(const PhantomOptions& options) {
     require_between("the deviation of points in mm", options.point_deviation_mm, 0.01, 5);
     require_between("the number of targets", options.targets, 1, 100000);
     if (options.misplacement) {
-        require_between("the misplacement in degrees", options.misplacement->most_deg, 0, 90);
+        require_between("the misplacement in degrees", options.misplacement->most_deg, 0, 180);
         require_between("the misplacement in mm", options.misplacement->most_mm, 0, 100);
     }
     if (takes_organs(options.family) && options.organs.voxels.empty())

@@ -1,10 +1,12 @@
 """`tissuewarp study accuracy-time` in its reduced form: the shape of its fronts, not how fast they are."""
 
 import csv
+import math
 import os
 import pathlib
 import shutil
 import signal
+import statistics
 import subprocess
 import tempfile
 import time
@@ -186,6 +188,24 @@ class StudyOptions(PhantomTest):
                      "--output", self.phantom.output, timeout=200)
         self.assertEqual(result.returncode, SOLVER, result.stderr)
         self.assertIn("note: phantom 2097 has no truth in 10 draws", result.stdout)
+
+    # The same patient: its labels are found however they are turned, and a turn that springs hardly feel widens radii.
+    def test_turned_patients(self):
+        rows = {}
+        for family in ("bent", "turned"):
+            folder = self.phantom.output / family
+            result = run("study", "coverage", "--problems", f"{family}:829-829", "--evidence", "labels", "--device", "cpu",
+                         "--output", folder, timeout=200)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            with (folder / "phantom_829.csv").open() as file:
+                rows[family] = list(csv.DictReader(file))
+        def mean(family, number):
+            return statistics.mean(map(number, rows[family]))
+        def error(row):
+            return math.hypot(*(float(row[f"error_{axis}"]) for axis in "xyz"))
+        self.assertLess(mean("turned", error), mean("bent", error) + 0.5)
+        self.assertGreater(mean("turned", lambda row: float(row["interval"])),
+                           2 * mean("bent", lambda row: float(row["interval"])))
 
     def test_without_output(self):
         self.assert_refused(run("study", "accuracy-time", "--quick"), INPUT, "--output")
