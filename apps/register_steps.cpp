@@ -43,6 +43,7 @@ UpdateOptions update_options(const RegistrationRun& run) {
     if (options.similarity == "self-similarity") result.image.similarity = Similarity::SelfSimilarity;
     if (options.similarity == "linear-combination") result.image.similarity = Similarity::LinearCombination;
     result.equilibrium.tolerance_mm = options.tolerance;
+    expect_motion_of(tissue_named(options.tissue), result);
     if (run.dial) result.time_budget_s = run.dial->update_budget_s;
     return result;
 }

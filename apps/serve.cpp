@@ -21,11 +21,14 @@ namespace {
 
 server::ServedPatient served(const ServeOptions& options, Observer& observer) {
     PreparedPatient read = read_patient_file(options.patient, observer);
-    if (registration::tissue_named(read.options.tissue).free_stretch > 0)
+    const registration::Tissue& tissue = registration::tissue_named(read.options.tissue);
+    if (tissue.free_stretch > 0)
         observer.note("the server does not stretch the organ as a whole, as register and update do for '" +
                       read.options.tissue + "'; take these where its volume changes by much");
+    registration::UpdateOptions update = on_device(options.device);
+    registration::expect_motion_of(tissue, update);
     return {std::move(read.model), std::move(read.inputs.moving), std::move(read.inputs.moving_labels),
-            sha256_of_file(options.patient), on_device(options.device)};
+            sha256_of_file(options.patient), update};
 }
 
 server::NamedPoints targets(const ServeOptions& options, Observer& observer) {

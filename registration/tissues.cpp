@@ -16,18 +16,19 @@ std::vector<Tissue> table() {
         return tled::neo_hookean_lnj(youngs_modulus, poissons_ratio);
     };
     constexpr double watery = 1.1;  // changes of volume that labels and their smoothing bring about
+    const double usual = TissuePrior().expected_strain, near = BlockMatchingOptions().search_mm;
     // clang-format off
     return {
-        // name      E kPa, ν            free   growth  source
-        {"default",  soft( 3.0, 0.45),   0,     watery,  "as brain"},
-        {"brain",    soft( 3.0, 0.45),   0,     watery,  "Ferrant et al., IEEE Trans Med Imaging 20 (2001) 1384; E 2.5: Miller and Chinzei, J Biomech 35 (2002) 483"},
-        {"lung",     soft( 1.0, 0.25),   0.5,   5.0,    "E and nu of models: Werner et al., Med Phys 36 (2009) 1500; nu and stretch chosen in docs/decisions/large_motion.md"},
-        {"liver",    soft( 6.0, 0.45),   0,     watery,  "shear modulus 2: Venkatesh, Yin and Ehman, J Magn Reson Imaging 37 (2013) 544"},
-        {"prostate", soft(60.0, 0.45),   0,     watery,  "Krouskop et al., Ultrason Imaging 20 (1998) 260"},
-        {"breast",   soft( 3.2, 0.45),   0,     watery,  "Samani, Zubovits and Plewes, Phys Med Biol 52 (2007) 1565"},
-        {"kidney",   soft(14.0, 0.45),   0,     watery,  "shear modulus 4.7: Rouviere et al., J Magn Reson Imaging 34 (2011) 880"},
-        {"muscle",   soft(11.0, 0.45),   0,     watery,  "shear modulus 3.7 at rest: Bensamoun et al., J Magn Reson Imaging 23 (2006) 242"},
-        {"tumour",   soft(12.0, 0.45),   0,     watery,  "several times as stiff as what is around: Samani, Zubovits and Plewes, Phys Med Biol 52 (2007) 1565"},
+        // name      E kPa, ν            free   growth  strain  search  source
+        {"default",  soft( 3.0, 0.45),   0,     watery,  usual,  near,   "as brain"},
+        {"brain",    soft( 3.0, 0.45),   0,     watery,  usual,  near,   "Ferrant et al., IEEE Trans Med Imaging 20 (2001) 1384; E 2.5: Miller and Chinzei, J Biomech 35 (2002) 483"},
+        {"lung",     soft( 1.0, 0.25),   0.5,   5.0,    0.5,    32,     "E and nu of models: Werner et al., Med Phys 36 (2009) 1500; nu and stretch chosen in docs/decisions/large_motion.md"},
+        {"liver",    soft( 6.0, 0.45),   0,     watery,  usual,  near,   "shear modulus 2: Venkatesh, Yin and Ehman, J Magn Reson Imaging 37 (2013) 544"},
+        {"prostate", soft(60.0, 0.45),   0,     watery,  usual,  near,   "Krouskop et al., Ultrason Imaging 20 (1998) 260"},
+        {"breast",   soft( 3.2, 0.45),   0,     watery,  usual,  near,   "Samani, Zubovits and Plewes, Phys Med Biol 52 (2007) 1565"},
+        {"kidney",   soft(14.0, 0.45),   0,     watery,  usual,  near,   "shear modulus 4.7: Rouviere et al., J Magn Reson Imaging 34 (2011) 880"},
+        {"muscle",   soft(11.0, 0.45),   0,     watery,  usual,  near,   "shear modulus 3.7 at rest: Bensamoun et al., J Magn Reson Imaging 23 (2006) 242"},
+        {"tumour",   soft(12.0, 0.45),   0,     watery,  usual,  near,   "several times as stiff as what is around: Samani, Zubovits and Plewes, Phys Med Biol 52 (2007) 1565"},
     };
     // clang-format on
 }
@@ -46,6 +47,11 @@ const Tissue& tissue_named(const std::string& name) {
     std::string names;
     for (const Tissue& tissue : tissues()) names += (names.empty() ? "" : ", ") + tissue.name;
     throw InvalidInput("no tissue is called '" + name + "'; give one of " + names);
+}
+
+void expect_motion_of(const Tissue& tissue, UpdateOptions& options) {
+    options.tissue.expected_strain = tissue.expected_strain;
+    options.image.matching.search_mm = tissue.search_mm;
 }
 
 }  // namespace tissuewarp::registration

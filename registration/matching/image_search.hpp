@@ -45,6 +45,10 @@ public:
     [[nodiscard]] bool gains() const { return gain_ >= search_gain.least_agreement; }
     /// Of both images, in the last dense search: DenseForces::agreement.
     [[nodiscard]] std::optional<double> agreement() const { return agreement_; }
+    /// Blocks of the preoperative image about where the model has put them.
+    [[nodiscard]] LocatedMatches block_search(const State& state, Observer& observer) const;
+    /// What the first search found, for blocks of the preoperative image; of ultrasound places, in the last.
+    [[nodiscard]] const LocatedMatches& blocks() const { return blocks_; }
     /// Blocks that the first search found; of ultrasound places, in the last.
     [[nodiscard]] std::size_t blocks_found() const { return blocks_.matches.size(); }
     /// Places of ultrasound that the last search looked at.
@@ -69,7 +73,6 @@ private:
     int last_coarsening_ = -1;  // of the grid of the last dense search
     double gain_ = 0;           // in agreement, see gains()
 
-    [[nodiscard]] LocatedMatches block_search(const State& state, Observer& observer) const;
     [[nodiscard]] LocatedMatches dense_search(const State& state);
     [[nodiscard]] LocatedMatches echo_search(const State& state);
     /// Whether the fixed image is ultrasound: it shows speckle, and blocks of self-similarity are not found in it.

@@ -15,11 +15,17 @@
 #include <cmath>
 #include <functional>
 #include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 namespace tissuewarp::registration::detail {
 
 namespace {
+
+/// Of RoundPlan::most_step_mm: how far a match may pull at once. Matches found together move tissue together, so that
+/// it is far until an equilibrium fails and the step is halved. Chosen by hand, on a lung that was torn.
+constexpr double most_image_steps = 4;
 
 double median_distance(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to) {
     Eigen::VectorXd distances = (to - from).colwise().norm();
@@ -53,6 +59,18 @@ std::vector<Doubt> doubts_of(const ImageFit& fit, const std::string& name, const
                               " mm from where the tissue went",
                           "look where image and result differ; give labels or landmarks beside the image"});
     return doubts;
+}
+
+std::vector<Doubt> doubts_of(const LeftBehind& left, double spacing_mm, const std::string& name,
+                             const LeftBehindLimits& limits) {
+    const double most_mm = std::max(limits.least_mm, limits.most_spacings * spacing_mm);
+    if (left.distance_mm <= most_mm) return {};
+    const auto at = [&](int axis) { return std::to_string(std::lround(left.place[axis])); };
+    return {{"image.left_behind", left.distance_mm, most_mm,
+             "regions of the moving " + name + " were found " + to_text(left.distance_mm) +
+                 " mm from where the tissue went and farther, farthest about (" + at(0) + ", " + at(1) + ", " + at(2) +
+                 ") mm",
+             "look there where image and result differ; say which --tissue it is, or give labels of the fixed image"}};
 }
 
 std::vector<Doubt> doubts_of_echoes(double agreement, const std::optional<EchoPose>& pose, const std::string& name) {
@@ -172,11 +190,15 @@ Contribution ImageTerm::linearise(const RoundPlan& plan, const State& state, Obs
         result.pulls_anew = true;
     }
     const std::vector<PulledMatch>& matches = pulled(state);
+    const double most_mm = most_image_steps * plan.most_step_mm;
     memory_.forces.resize(matches.size());
     tbb::parallel_for(std::size_t{0}, matches.size(), [&](std::size_t n) {
         const double weight = energy_ * matches[n].confidence * robust_weight(matches[n].residual_mm, plan.scale_mm);
-        memory_.forces[n] = {weight * matches[n].pull.stiffness, weight * matches[n].pull.force};
+        const double step = most_mm / std::max(most_mm, matches[n].residual_mm);
+        memory_.forces[n] = {weight * matches[n].pull.stiffness, step * weight * matches[n].pull.force};
     });
+    result.held_back = static_cast<int>(std::count_if(
+        matches.begin(), matches.end(), [&](const PulledMatch& match) { return match.residual_mm > most_mm; }));
     result.candidates = std::max(static_cast<int>(moving_.blocks.points().cols()), static_cast<int>(matches.size()));
     result.matched = static_cast<int>(matches.size());
     result.mean_residual_mm = mean_residual(matches);
@@ -223,12 +245,39 @@ ImageFit ImageTerm::fit(const State& state) {
     return fit;
 }
 
+LeftBehind ImageTerm::left_behind_of(const LocatedMatches& blocks, const State& state) const {
+    std::vector<Eigen::Vector3d> surface;
+    for (const InterfaceNode& node : prepared_.interfaces.nodes())
+        if (node.outer == 0) surface.push_back(prepared_.model.mesh.nodes.col(node.node));
+    const meshing::PointTree outside(surface);
+    std::vector<BlockMatch> deep;
+    std::vector<Eigen::Vector3d> went;
+    for (std::size_t n = 0; n < blocks.matches.size(); ++n) {
+        const Eigen::Vector3d& at = blocks.matches[n].moving;
+        if (outside.any_within(at, left_behind_limits.depth_mm)) continue;
+        deep.push_back(blocks.matches[n]);
+        went.push_back(state.placement *
+                       (at + displacement_at(prepared_.model.mesh, state.displacement, blocks.places[n])));
+    }
+    return left_behind(deep, went, left_behind_limits.neighbours, left_behind_limits.percent);
+}
+
+std::vector<Doubt> ImageTerm::doubts_of_blocks(const State& state) const {
+    if (shows_echoes()) return {};
+    const auto doubts = [&](const LocatedMatches& blocks) {
+        return doubts_of(left_behind_of(blocks, state), larger_voxel(moving_.image.geometry, fixed_grid_), name_);
+    };
+    if (doubts(search_.blocks()).empty()) return {};
+    return doubts(search_.block_search(state, silent_observer()));  // the first may have erred, far from where they are
+}
+
 void ImageTerm::judge(const State& state, UpdateResult& result) {
     result.images.push_back(fit(state));
     ImageDoubtLimits limits = image_doubt_limits;
     if (search_.similarity() == Similarity::LinearCombination)
         limits.most_residual_mm = echo_doubt_limits.most_residual_mm;
     for (Doubt& doubt : doubts_of(result.images.back(), name_, limits)) result.doubts.push_back(std::move(doubt));
+    for (Doubt& doubt : doubts_of_blocks(state)) result.doubts.push_back(std::move(doubt));
     if (search_.similarity() != Similarity::LinearCombination) return;
     for (Doubt& doubt : doubts_of_echoes(search_.agreement().value_or(0), echo_pose_, name_))
         result.doubts.push_back(std::move(doubt));

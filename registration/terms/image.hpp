@@ -1,6 +1,7 @@
 #pragma once
 /// A bare intraoperative volume: blocks of the preoperative image, then all of it, belong where they were found.
 
+#include "registration/matching/consistency/left_behind.hpp"
 #include "registration/matching/image_search.hpp"
 #include "registration/matching/points/field_of_view.hpp"
 #include "registration/springs/pull.hpp"
@@ -49,6 +50,21 @@ struct ImageDoubtLimits {
     double least_agreement = 0.25;
 };
 inline constexpr ImageDoubtLimits image_doubt_limits{};
+
+/// When tissue did not follow blocks that were found (docs/decisions/error_model.md).
+struct LeftBehindLimits {
+    double depth_mm = 10;      ///< of the blocks that count: nearer to the surface they see what the organ slides along
+    int neighbours = 24;       ///< of a region of blocks, about 25 mm wide
+    double percent = 98;       ///< of the regions, that are left behind less …
+    double most_spacings = 2;  ///< … than so many times the larger image spacing …
+    double least_mm = 2;       ///< … and than so much, of fine images
+};
+inline constexpr LeftBehindLimits left_behind_limits{};
+
+/// What is to be said where tissue stayed behind the blocks of an image of this name; `spacing_mm`: the largest of
+/// both.
+std::vector<Doubt> doubts_of(const LeftBehind& left, double spacing_mm, const std::string& name = "image",
+                             const LeftBehindLimits& limits = left_behind_limits);
 
 /// What is to be said against a registration that fits an image of this name so.
 std::vector<Doubt> doubts_of(const ImageFit& fit, const std::string& name = "image",
@@ -122,6 +138,8 @@ private:
     /// Blocks whose places in this state the fixed image shows.
     [[nodiscard]] int blocks_in_view(const State& state) const;
     [[nodiscard]] ImageFit fit(const State& state);
+    [[nodiscard]] LeftBehind left_behind_of(const LocatedMatches& blocks, const State& state) const;
+    [[nodiscard]] std::vector<Doubt> doubts_of_blocks(const State& state) const;
 
     static double mean_residual(const std::vector<PulledMatch>& matches);
 };

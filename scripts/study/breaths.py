@@ -1,9 +1,10 @@
-"""Synthetic breaths: masks of lungs at full inspiration and at full expiration, and where points within went.
+"""Synthetic breaths: masks and images of lungs at full inspiration and at full expiration, and where points within went.
 
 The lungs are those of two patients (lung-ct and torso-4dct of the data folder), as one lung and its mirror image, in another
 size and shape with every seed. The breath is a smooth map without folds: the diaphragm rises by 10 to 60 mm under a resting
 apex, more behind than in front or the other way, the chest sinks towards the spine, lungs narrow, whirls of some mm let tissue
-slide along the chest wall, and the patient lies a little otherwise. The volume shrinks by 20 to 45 %.
+slide along the chest wall, and the patient lies a little otherwise. The volume shrinks by 20 to 45 %. Images hold the patients'
+CT within the lungs, soft tissue around them that shows nothing, and noise.
 """
 
 import dataclasses
@@ -17,6 +18,7 @@ SPACING = 2.5  # mm, of both masks
 COARSE = 10.0  # mm, where the inverse of a map is found
 MARGIN = 12.0  # mm of background about them
 POINTS = 300
+WALL, NOISE = 40, 20  # HU
 VOLUME = (0.55, 0.80)  # expiration over inspiration
 CHOOSING, REPORTING = range(1, 9), range(101, 113)  # seeds
 
@@ -29,10 +31,12 @@ class Breath:
     expiration_affine: numpy.ndarray
     before: numpy.ndarray  # points in the lungs, n x 3, LPS mm, at inspiration …
     after: numpy.ndarray  # … and at expiration
+    inspiration_image: numpy.ndarray  # int16, HU, on the grids of the masks
+    expiration_image: numpy.ndarray
 
 
 def lung_of_torso(data):
-    """Right lung at inspiration: the largest air within the body, without the trachea."""
+    """Right lung at inspiration, the largest air within the body, without the trachea; its affine; the CT."""
     voxels, affine = fields.read_image(data / "real" / "torso-4dct" / "t0.nii.gz")
     labels, _ = ndimage.label(voxels < -400)
     sizes = numpy.bincount(labels.ravel())
@@ -41,12 +45,12 @@ def lung_of_torso(data):
     labels, _ = ndimage.label(ndimage.binary_opening(lung, iterations=4))
     sizes = numpy.bincount(labels.ravel())
     sizes[0] = 0
-    return labels == sizes.argmax(), affine
+    return labels == sizes.argmax(), affine, voxels
 
 
 def lung_of_follow_up(data):
     voxels, affine = fields.read_image(data / "lung-ct" / "moving_mask.mha")
-    return voxels > 0, affine
+    return voxels > 0, affine, fields.read_image(data / "lung-ct" / "moving.mha")[0]
 
 
 def surface_level(mask):
@@ -56,8 +60,8 @@ def surface_level(mask):
 class Body:
     """One lung and its mirror image about a sagittal plane beside it, of another size and shape."""
 
-    def __init__(self, lung, affine, draw):
-        self.level, self.affine = surface_level(lung), affine
+    def __init__(self, lung, affine, grey, draw):
+        self.level, self.affine, self.grey = surface_level(lung), affine, numpy.where(lung, grey, WALL).astype(numpy.float32)
         points = fields.to_points(affine, numpy.argwhere(lung))
         self.centre = points.mean(axis=0)
         self.shape = numpy.diag(draw.uniform(0.9, 1.2, 3)) + draw.uniform(-0.08, 0.08, (3, 3))
@@ -66,13 +70,20 @@ class Body:
         self.plane = (low[0] if self.centre[0] > 0.5 * (low[0] + high[0]) else high[0]) - self.centre[0]
         self.gap = draw.uniform(10, 40) * (-1 if self.plane < 0 else 1)
 
-    def inside(self, points):
-        """Whether points about the middle plane (x = 0, mm) lie in one of the lungs."""
+    def index(self, points):
+        """Of points about the middle plane (x = 0, mm), in the patient's images."""
         side = -1 if self.plane > 0 else 1
         local = points.copy()
         local[:, 0] = side * numpy.abs(points[:, 0]) + self.plane + 0.5 * self.gap
-        index = fields.to_index(self.affine, local @ numpy.linalg.inv(self.shape).T + self.centre)
-        return ndimage.map_coordinates(self.level, index.T, order=1, mode="constant") > 0.5
+        return fields.to_index(self.affine, local @ numpy.linalg.inv(self.shape).T + self.centre).T
+
+    def inside(self, points):
+        """Whether points lie in one of the lungs."""
+        return ndimage.map_coordinates(self.level, self.index(points), order=1, mode="constant") > 0.5
+
+    def image(self, points):
+        """HU, without noise."""
+        return ndimage.map_coordinates(self.grey, self.index(points), order=1, mode="constant", cval=WALL)
 
 
 def drawn_map(low, high, draw):
@@ -131,6 +142,12 @@ def inverse_on_grid(move, low, high, start):
     return lambda asked: asked + fields.sample(shift, affine, asked)
 
 
+def drawn(body, points, shape, seed):
+    """Mask and image at points of a body at inspiration."""
+    noise = numpy.random.default_rng(seed).normal(0, NOISE, len(points))
+    return body.inside(points).reshape(shape), (body.image(points) + noise).round().astype(numpy.int16).reshape(shape)
+
+
 def breath(seed, data):
     """The breath of a seed; even seeds breathe with the lung of torso-4dct, odd ones with that of lung-ct."""
     draw = numpy.random.default_rng(seed)
@@ -146,11 +163,12 @@ def breath(seed, data):
         if VOLUME[0] <= volume <= VOLUME[1]:
             break
     first = grid_about(low, high)
-    inspiration = body.inside(fields.grid_points(*first)).reshape(first[0])
+    inspiration, early = drawn(body, fields.grid_points(*first), first[0], seed)
     moved = move(few)
     low, high = moved.min(axis=0) - MARGIN, moved.max(axis=0) + MARGIN
     back, second = inverse_on_grid(move, low, high, few), grid_about(low, high)
-    expiration = body.inside(back(fields.grid_points(*second))).reshape(second[0])
+    expiration, late = drawn(body, back(fields.grid_points(*second)), second[0], seed + 10**6)
     deep = fields.to_points(first[1], numpy.argwhere(ndimage.binary_erosion(inspiration, iterations=2)))
     before = deep[draw.choice(len(deep), POINTS, replace=False)]
-    return Breath(inspiration.astype(numpy.uint8), first[1], expiration.astype(numpy.uint8), second[1], before, move(before))
+    return Breath(inspiration.astype(numpy.uint8), first[1], expiration.astype(numpy.uint8), second[1], before, move(before),
+                  early, late)

@@ -54,6 +54,19 @@ TEST(Doubts, OfImages) {
     EXPECT_THAT(of(bad), ElementsAre("image.apart"));
 }
 
+TEST(Doubts, OfRegionsLeftBehind) {
+    const auto of_left = [](double distance_mm, double spacing_mm) {
+        return of(detail::LeftBehind{distance_mm, {1, 2, 3}}, spacing_mm);
+    };
+    EXPECT_THAT(of_left(5.0, 2.5), IsEmpty());
+    EXPECT_THAT(of_left(5.1, 2.5), ElementsAre("image.left_behind"));
+    EXPECT_THAT(of_left(2.0, 0.5), IsEmpty());
+    EXPECT_THAT(of_left(2.1, 0.5), ElementsAre("image.left_behind"));
+    const auto text = detail::doubts_of(detail::LeftBehind{6, {-1, 2.4, -99.6}}, 1.0).front().text;
+    EXPECT_THAT(text, testing::HasSubstr("6.00 mm"));
+    EXPECT_THAT(text, testing::HasSubstr("(-1, 2, -100) mm"));
+}
+
 TEST(Doubts, OfSurfaces) {
     const SurfaceFit good{0.51, 1.39, 0.26, true, 30, 0.94};
     EXPECT_THAT(of(good, 1.0), IsEmpty());

@@ -7,10 +7,14 @@
 #include "registration/matching/image_mask.hpp"
 #include "registration/matching/image_matching.hpp"
 #include "registration/prepared/prepared_io.hpp"
+#include "registration/terms/image.hpp"
+#include "registration/tissues.hpp"
 #include "registration/uncertainty.hpp"
+#include "tests/registration/doubt_codes.hpp"
 #include "tests/registration/textured_phantom.hpp"
 #include "tests/support/label_shapes.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -75,6 +79,69 @@ TEST(ImageUpdate, FollowsADeformationThroughTheWholeOrgan) {
     EXPECT_LT(error.mean, 0.22);
     EXPECT_LT(error.percentile_95, 0.485);
     EXPECT_TRUE(result.doubts.empty());
+}
+
+struct Collapse {
+    double mean_error_mm = 0;
+    std::vector<std::string> doubts;
+};
+
+/// What the lower half of the organ keeps of its height, as lungs do above a diaphragm that rises.
+constexpr double kept_height = 0.55;
+
+Volume collapsed(const PreparedModel& prepared) {
+    return sampled(prepared.labels.geometry, [](const Eigen::Vector3d& y) {
+        return Texture()(Eigen::Vector3d(y.x(), y.y(), y.z() < 0 ? y.z() / kept_height : y.z()));
+    });
+}
+
+Eigen::Matrix3Xd collapsed_nodes(const PreparedModel& prepared) {
+    Eigen::Matrix3Xd nodes = prepared.model.mesh.nodes;
+    for (auto node : nodes.colwise())
+        if (node.z() < 0) node.z() *= kept_height;
+    return nodes;
+}
+
+Collapse collapse_of(const PreparedModel& prepared, double expected_strain) {
+    UpdateOptions options = quick();
+    options.image.matching.search_mm = 16;
+    options.align = false;
+    options.tissue.expected_strain = expected_strain;
+    const auto result = update(prepared, {.image = collapsed(prepared)}, options);
+    const Eigen::Matrix3Xd errors = result.deformation.deformed_nodes() - collapsed_nodes(prepared);
+    return {errors.colwise().norm().mean(), codes(result.doubts)};
+}
+
+TEST(ImageUpdate, TissueThatIsToStrainFollowsACollapse) {
+    const PreparedModel prepared = textured_model();
+    const Collapse of_lung = collapse_of(prepared, tissue_named("lung").expected_strain);
+    EXPECT_LT(of_lung.mean_error_mm, 0.5 * collapse_of(prepared, TissuePrior().expected_strain).mean_error_mm);
+    EXPECT_THAT(of_lung.doubts, testing::IsEmpty());
+}
+
+// The blocks were found where the tissue is to go; judged are tissue that stayed at rest, and tissue that went there.
+TEST(ImageUpdate, TissueThatStaysBehindItsBlocksIsDoubted) {
+    const PreparedModel prepared = textured_model();
+    const meshing::TetMesh& mesh = prepared.model.mesh;
+    detail::ImageTools tools{
+        detail::make_cpu_image_engine(mesh, *prepared.image), std::make_shared<const meshing::PointLocator>(mesh), {}};
+    const Eigen::Vector3d shift(0, 4, 3);
+    const Volume shifted = sampled(prepared.labels.geometry, [&](const auto& y) { return Texture()(y - shift); });
+    const ImageOptions options;
+    detail::ImageTerm term(prepared, *prepared.image, shifted, "image", options, tools, 1);
+    detail::State state{Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, mesh.nodes.cols())};
+    detail::RoundPlan plan;
+    plan.searches_due = 1;
+    plan.scale_mm = plan.most_step_mm = 100;
+    (void)term.linearise(plan, state, silent_observer());
+    const auto doubts = [&] {
+        UpdateResult result;
+        term.judge(state, result);
+        return codes(result.doubts);
+    };
+    EXPECT_THAT(doubts(), testing::Contains("image.left_behind"));
+    state.displacement.colwise() += shift;
+    EXPECT_THAT(doubts(), testing::Not(testing::Contains("image.left_behind")));
 }
 
 const Eigen::Vector3d artefact_middle(14, 0, 0);

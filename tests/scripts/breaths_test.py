@@ -51,7 +51,7 @@ class Breaths(unittest.TestCase):
         affine = numpy.diag([2.0, 2.0, 2.0, 1.0])
         lung = numpy.zeros((40, 40, 40), bool)
         lung[5:35, 8:32, 6:34] = True
-        body = breaths.Body(lung, affine, numpy.random.default_rng(5))
+        body = breaths.Body(lung, affine, numpy.full(lung.shape, -800), numpy.random.default_rng(5))
         few = points(4000, 3) * 0.6
         inside = body.inside(few)
         self.assertGreater(inside.sum(), 100)
