@@ -1,9 +1,11 @@
 """Tissues by name: what the report says of them, what lungs gain, and what is refused."""
 
 import json
+import shutil
 import unittest
 
-from phantom import CENTRE_LPS, FIXED_AFFINE, SHIFT_LPS, PhantomTest, ellipsoid, save
+import numpy
+from phantom import CENTRE_LPS, FIXED_AFFINE, MOVING_AXES, SHIFT_LPS, PhantomTest, ellipsoid, save
 
 INPUT = 2
 
@@ -33,6 +35,22 @@ class Tissues(PhantomTest):
         self.assertEqual(report["materials"]["1"]["poissons_ratio"], 0.25)
         self.assertNotIn("labels.volume_changed", [doubt["code"] for doubt in report["doubts"]])
         self.assertGreater(report["overlap"]["after"]["all"]["dice"], 0.9)
+
+    def test_a_lung_follows_a_breath_in_its_image(self):
+        axes = numpy.array([14.5, 11.5, 9.5])
+        fixed = save(ellipsoid(FIXED_AFFINE, CENTRE_LPS + SHIFT_LPS, axes)[1], FIXED_AFFINE, self.phantom.folder / "breath.nii.gz")
+        places = numpy.random.default_rng(1).uniform(-0.5, 0.5, (40, 3))
+        table = self.phantom.folder / "places.csv"
+        numpy.savetxt(table, numpy.c_[CENTRE_LPS + places * MOVING_AXES, CENTRE_LPS + SHIFT_LPS + places * axes], delimiter=",",
+                      header="pre_x,pre_y,pre_z,intra_x,intra_y,intra_z", comments="")
+
+        def mean_error(*more):
+            self.report("--edge-length", 5, "--landmarks", table, *more, fixed=fixed, fixed_labels=None)
+            carried = numpy.genfromtxt(self.phantom.output / "warped_landmarks.csv", delimiter=",", names=True)
+            shutil.rmtree(self.phantom.output)
+            return carried["after_mm"].mean()
+
+        self.assertLess(mean_error("--tissue", "lung"), 0.8 * mean_error())
 
     def test_another_tissue_that_collapsed_is_told_of_lungs(self):
         report = self.report("--edge-length", 6, "--rounds", 2, fixed=None, fixed_labels=self.collapsed([14.5, 11.5, 10.5]))

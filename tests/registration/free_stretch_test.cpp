@@ -186,6 +186,18 @@ TEST(Tissues, TheDefaultIsThatOfModels) {
     EXPECT_DOUBLE_EQ(tled::poisson_ratio(tissue_named("default").material), tled::poisson_ratio(of_models));
     EXPECT_DOUBLE_EQ(tled::shear_modulus(tissue_named("default").material), tled::shear_modulus(of_models));
     EXPECT_EQ(tissue_named("default").free_stretch, 0);
+    UpdateOptions options;
+    expect_motion_of(tissue_named("default"), options);
+    EXPECT_EQ(options.tissue.expected_strain, TissuePrior().expected_strain);
+    EXPECT_EQ(options.image.matching.search_mm, BlockMatchingOptions().search_mm);
+}
+
+TEST(Tissues, OfALungMoreAndFartherMotionIsExpected) {
+    UpdateOptions options;
+    expect_motion_of(tissue_named("lung"), options);
+    EXPECT_EQ(options.tissue.expected_strain, tissue_named("lung").expected_strain);
+    EXPECT_GT(options.tissue.expected_strain, 2 * TissuePrior().expected_strain);
+    EXPECT_EQ(options.image.matching.search_mm, 32);
 }
 
 TEST(Tissues, AnUnknownNameIsRefusedWithThoseThereAre) {
