@@ -66,11 +66,12 @@ std::vector<Doubt> doubts_of(const LeftBehind& left, double spacing_mm, const st
     const double most_mm = std::max(limits.least_mm, limits.most_spacings * spacing_mm);
     if (left.distance_mm <= most_mm) return {};
     const auto at = [&](int axis) { return std::to_string(std::lround(left.place[axis])); };
-    return {{"image.left_behind", left.distance_mm, most_mm,
-             "regions of the moving " + name + " were found " + to_text(left.distance_mm) +
-                 " mm from where the tissue went and farther, farthest about (" + at(0) + ", " + at(1) + ", " + at(2) +
-                 ") mm",
-             "look there where image and result differ; say which --tissue it is, or give labels of the fixed image"}};
+    return {
+        Doubt{"image.left_behind", left.distance_mm, most_mm,
+              "regions of the moving " + name + " were found " + to_text(left.distance_mm) +
+                  " mm from where the tissue went and farther, farthest about (" + at(0) + ", " + at(1) + ", " + at(2) +
+                  ") mm",
+              "look there where image and result differ; say which --tissue it is, or give labels of the fixed image"}};
 }
 
 std::vector<Doubt> doubts_of_echoes(double agreement, const std::optional<EchoPose>& pose, const std::string& name) {

@@ -1,11 +1,11 @@
 #pragma once
 /// A bare intraoperative volume: blocks of the preoperative image, then all of it, belong where they were found.
 
-#include "registration/matching/consistency/left_behind.hpp"
 #include "registration/matching/image_search.hpp"
 #include "registration/matching/points/field_of_view.hpp"
 #include "registration/springs/pull.hpp"
 #include "registration/terms/datum_kind.hpp"
+#include "registration/terms/left_behind.hpp"
 #include "registration/terms/term.hpp"
 
 #include <optional>

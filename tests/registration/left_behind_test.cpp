@@ -1,5 +1,5 @@
 /// Whether regions of blocks are heard that say something in common, and single ones are not.
-#include "registration/matching/consistency/left_behind.hpp"
+#include "registration/terms/left_behind.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "registration/matching/consistency/left_behind.hpp"
+#include "registration/terms/left_behind.hpp"
 
 #include "registration/evaluation/percentile.hpp"
 #include "registration/matching/consistency/local_affine.hpp"
