@@ -119,29 +119,54 @@ TEST(ImageUpdate, TissueThatIsToStrainFollowsACollapse) {
     EXPECT_THAT(of_lung.doubts, testing::IsEmpty());
 }
 
-// The blocks were found where the tissue is to go; judged are tissue that stayed at rest, and tissue that went there.
-TEST(ImageUpdate, TissueThatStaysBehindItsBlocksIsDoubted) {
+/// An image of the tissue 5 mm beside where it is, in which blocks are found.
+struct ShiftedImage {
+    const Eigen::Vector3d shift{0, 4, 3};
     const PreparedModel prepared = textured_model();
     const meshing::TetMesh& mesh = prepared.model.mesh;
+    const Volume image = sampled(prepared.labels.geometry, [this](const auto& y) { return Texture()(y - shift); });
+    const ImageOptions options;
     detail::ImageTools tools{
         detail::make_cpu_image_engine(mesh, *prepared.image), std::make_shared<const meshing::PointLocator>(mesh), {}};
-    const Eigen::Vector3d shift(0, 4, 3);
-    const Volume shifted = sampled(prepared.labels.geometry, [&](const auto& y) { return Texture()(y - shift); });
-    const ImageOptions options;
-    detail::ImageTerm term(prepared, *prepared.image, shifted, "image", options, tools, 1);
+    detail::ImageTerm term{prepared, *prepared.image, image, "image", options, tools, 1};
     detail::State state{Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, mesh.nodes.cols())};
-    detail::RoundPlan plan;
-    plan.searches_due = 1;
-    plan.scale_mm = plan.most_step_mm = 100;
-    (void)term.linearise(plan, state, silent_observer());
+
+    detail::Contribution linearised(double most_step_mm) {
+        detail::RoundPlan plan;
+        plan.searches_due = 1;
+        plan.scale_mm = 100;
+        plan.most_step_mm = most_step_mm;
+        return term.linearise(plan, state, silent_observer());
+    }
+};
+
+// Judged are tissue that stayed at rest, and tissue that went there.
+TEST(ImageUpdate, TissueThatStaysBehindItsBlocksIsDoubted) {
+    ShiftedImage shifted;
+    (void)shifted.linearised(100);
     const auto doubts = [&] {
         UpdateResult result;
-        term.judge(state, result);
+        shifted.term.judge(shifted.state, result);
         return codes(result.doubts);
     };
     EXPECT_THAT(doubts(), testing::Contains("image.left_behind"));
-    state.displacement.colwise() += shift;
+    shifted.state.displacement.colwise() += shifted.shift;
     EXPECT_THAT(doubts(), testing::Not(testing::Contains("image.left_behind")));
+}
+
+// A step that was halved because no equilibrium was found shortens the pulls of an image too.
+TEST(ImageUpdate, MatchesPullNoFartherThanFourSteps) {
+    ShiftedImage shifted;
+    const auto mean_pull_mm = [](const detail::Contribution& of) {
+        double sum = 0;
+        for (const PulledNode& pulled : of.springs) sum += pulled.spring.target.norm();
+        return sum / double(of.springs.size());
+    };
+    const detail::Contribution free = shifted.linearised(6), bounded = shifted.linearised(0.5);
+    EXPECT_EQ(free.held_back, 0);
+    EXPECT_GT(mean_pull_mm(free), 4);
+    EXPECT_GT(bounded.held_back, 0.9 * bounded.matched);
+    EXPECT_LT(mean_pull_mm(bounded), 2.5);
 }
 
 const Eigen::Vector3d artefact_middle(14, 0, 0);
