@@ -257,9 +257,10 @@ json data_view(const json& report) {
         lines.push_back("Intraoperative labels: boundaries of the tissue were brought to theirs.");
     if (const json& image = at(report, "image"); image.is_object())
         lines.push_back("Intraoperative image: " + number(at(image, "matched"), 0) + " of " +
-                        number(at(image, "blocks"), 0) + " blocks of the preoperative image were found in it, " +
-                        number(at(image, "residual_mm"), 2) + " mm from where the tissue went. " +
-                        percent(at(image, "shown_share")) + " of the organ lies near one of them.");
+                        number(at(image, "blocks"), 0) +
+                        " blocks of the preoperative image were found in it. What was matched last lies " +
+                        number(at(image, "residual_mm"), 2) + " mm from where the tissue went, in the mean; " +
+                        percent(at(image, "shown_share")) + " of the organ lies near some of it.");
     if (const json& surface = at(report, "surface"); surface.is_object())
         lines.push_back("Points of the intraoperative surface: " + percent(at(surface, "inlier_share")) +
                         " of them lie on the model, " + number(at(surface, "residual_mm"), 2) +
