@@ -279,7 +279,7 @@ Phantom drawn_phantom(std::uint64_t seed, const PhantomOptions& options, Observe
         tissue.length = shape->length();
     };
     if (takes_organs(options.family)) {
-        constexpr double least_ml = 45;
+        constexpr double least_ml = 50;
         const auto organ =
             std::make_shared<const detail::LabelOrgan>(detail::random_label_organ(options.organs, least_ml, random));
         of_shape(organ);

@@ -1,6 +1,7 @@
 #include "registration/loads/load_finder.hpp"
 
 #include "registration/loads/coarse_twin.hpp"
+#include "registration/loads/unknown_bends.hpp"
 #include "registration/loads/unknown_loads.hpp"
 #include "registration/springs/ground_springs.hpp"
 
@@ -38,8 +39,8 @@ std::pair<Eigen::MatrixXd, Eigen::MatrixXd> LoadFinder::loads(LoadKind kind, con
         Eigen::MatrixXd weights = unknown_weights(model);
         return {weights, same ? weights : unknown_weights(prepared_)};
     }
-    const PrincipalLoads principal = principal_loads(model, tissue_.load_shapes);
-    return {principal.loads, same ? principal.loads : loads_along(prepared_, principal.axes)};
+    const PrincipalBends principal = principal_bends(model, tissue_.load_shapes);
+    return {principal.loads, same ? principal.loads : bends_along(prepared_, principal.axes)};
 }
 
 const LoadFinder::Shapes& LoadFinder::shapes(LoadKind kind, const PreparedModel& model, const WeighedSprings& unseen) {
@@ -60,7 +61,10 @@ FoundLoads LoadFinder::found(LoadKind kind, const PreparedModel& model, const La
     const LoadFit fit(of_kind.known, posterior);
     const Eigen::VectorXd shown =
         posterior.inverse(forces_of(pulls.of(Origin::Datum), 3 * Eigen::Index{model.rest.node_count}));
-    const double size = fit.likeliest_size(shown);
+    const double size = kind == LoadKind::Bends
+                            ? fit.likeliest_size(shown, {expected_bend_mm(model) / of_kind.known.deviation_mm(),
+                                                         bend_draws.log_deviation})
+                            : fit.likeliest_size(shown);
     const Eigen::VectorXd forces = of_kind.forces * fit.coefficients(shown, size);
     return {Eigen::Map<const Eigen::Matrix3Xd>(forces.data(), 3, forces.size() / 3), size};
 }

@@ -17,13 +17,13 @@ struct FoundLoads {
 
 /// What may act on the tissue.
 enum class LoadKind {
-    Smooth,  ///< body force, and tractions smooth over half the organ's radius
-    Weight   ///< body force alone
+    Bends,  ///< whatever bends the organ smoothly, as much as organs are expected to (unknown_bends.hpp)
+    Weight  ///< body force alone
 };
 
 /// Shares of a time budget that must be left where loads are to be looked for.
 struct LoadBudget {
-    double left_for_smooth = 0.5;  ///< chosen by hand; on which data is not recorded
+    double left_for_bends = 0.5;   ///< chosen by hand; on which data is not recorded
     double left_for_weight = 0.9;  ///< chosen on the brain shift from labels in 3 s, which half overran by 6 %
 };
 inline constexpr LoadBudget load_budget{};
@@ -38,7 +38,7 @@ public:
     /// as long as those before.
     [[nodiscard]] bool worth_while(LoadKind kind, double budget_left) const {
         return tissue_.load_shapes > 0 &&
-               budget_left > (kind == LoadKind::Weight ? load_budget.left_for_weight : load_budget.left_for_smooth);
+               budget_left > (kind == LoadKind::Weight ? load_budget.left_for_weight : load_budget.left_for_bends);
     }
 
     /// The loads of this kind that data pulling like `pulls` tell. Weight is that of a free organ, whatever prior the

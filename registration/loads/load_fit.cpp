@@ -16,6 +16,10 @@ LoadShapes::LoadShapes(Eigen::MatrixXd loads, const Posterior& unseen, double en
     answers_ *= scale_;
 }
 
+double LoadShapes::deviation_mm() const {
+    return std::sqrt(answers_.squaredNorm() / (double(answers_.rows()) / 3));
+}
+
 LoadFit::LoadFit(const LoadShapes& shapes, const Posterior& seen)
     : shapes_(shapes), answers_(seen.inverse(shapes.forces_)) {
     const Eigen::MatrixXd product = shapes.forces_.transpose() * (shapes.answers_ - answers_) / shapes.energy_;
@@ -24,13 +28,15 @@ LoadFit::LoadFit(const LoadShapes& shapes, const Posterior& seen)
     information_ = modes.eigenvalues().cwiseMax(0.0);
 }
 
-double LoadFit::likeliest_size(const Eigen::VectorXd& shown) const {
+double LoadFit::likeliest_size(const Eigen::VectorXd& shown, const SizePrior& prior) const {
     const Eigen::ArrayXd b = axes_.transpose() * (shapes_.forces_.transpose() * shown) / shapes_.energy_;
     double best = -std::numeric_limits<double>::infinity(), size = 0;
     for (int power = load_sizes.least_power; power <= load_sizes.most_power; ++power) {
         const double squared = std::pow(2.0, power);
+        const double deviations = 0.5 * std::log(squared / (prior.median * prior.median)) / prior.log_deviation;
         const double evidence =
-            0.5 * (b.square() / (information_ + 1 / squared) - (1 + squared * information_).log()).sum();
+            0.5 * (b.square() / (information_ + 1 / squared) - (1 + squared * information_).log()).sum() -
+            0.5 * deviations * deviations;
         if (evidence <= best) continue;
         best = evidence;
         size = std::sqrt(squared);
@@ -42,6 +48,15 @@ Eigen::MatrixXd LoadFit::coefficients(const Eigen::MatrixXd& shown, double size)
     const Eigen::VectorXd variances = (information_ + 1 / (size * size)).inverse();
     return axes_ *
            (variances.asDiagonal() * (axes_.transpose() * (shapes_.forces_.transpose() * shown) / shapes_.energy_));
+}
+
+Eigen::MatrixXd LoadFit::flexibility_between(const std::vector<int>& nodes, double size) const {
+    Eigen::MatrixXd there(3 * static_cast<Eigen::Index>(nodes.size()), answers_.cols());
+    for (std::size_t n = 0; n < nodes.size(); ++n)
+        there.middleRows<3>(static_cast<Eigen::Index>(3 * n)) = answers_.middleRows<3>(3 * Eigen::Index{nodes[n]});
+    there *= axes_;
+    const Eigen::VectorXd variances = (information_ + 1 / (size * size)).inverse();
+    return there * variances.asDiagonal() * there.transpose() / shapes_.energy_;
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -13,6 +13,9 @@
 
 #include <Eigen/Core>
 
+#include <limits>
+#include <vector>
+
 namespace tissuewarp::registration::detail {
 
 /// The sizes of loads that are tried, as powers of √2: from such as strain tissue by nothing to such as strain it by
@@ -31,11 +34,18 @@ public:
 
     /// B over the loads given, so that loads a of size s have the mean strain energy s² ε.
     [[nodiscard]] double scale() const { return scale_; }
+    /// Deviation of the displacement under loads a of size 1, mm.
+    [[nodiscard]] double deviation_mm() const;
 
 private:
     friend class LoadFit;
     Eigen::MatrixXd forces_, answers_;  // B and K⁻¹ B, 3N × count, mN and mm
     double energy_, scale_ = 1;         // ε, and B over what was given
+};
+
+/// What is expected of s beforehand: log-normal, or nothing.
+struct SizePrior {
+    double median = 1, log_deviation = std::numeric_limits<double>::infinity();
 };
 
 class LoadFit {
@@ -44,13 +54,17 @@ public:
     LoadFit(const LoadShapes& shapes, const Posterior& seen);
 
     /// The likeliest s where the data show the displacement u₀ (3N, mm).
-    [[nodiscard]] double likeliest_size(const Eigen::VectorXd& shown) const;
+    [[nodiscard]] double likeliest_size(const Eigen::VectorXd& shown, const SizePrior& prior = {}) const;
 
     /// The mean of a under loads of size s, for each u₀ (3N × k, mm): count × k.
     [[nodiscard]] Eigen::MatrixXd coefficients(const Eigen::MatrixXd& shown, double size) const;
 
     /// What loads of these coefficients do to tissue that data hold, (K + K_d)⁻¹ B a, 3N × k, mm.
     [[nodiscard]] Eigen::MatrixXd answers(const Eigen::MatrixXd& coefficients) const { return answers_ * coefficients; }
+
+    /// What loads of size s leave open beside the data, over ε: (K + K_d)⁻¹ B (M + s⁻²)⁻¹ Bᵀ (K + K_d)⁻¹/ε between some
+    /// nodes, 3n × 3n, mm/mN.
+    [[nodiscard]] Eigen::MatrixXd flexibility_between(const std::vector<int>& nodes, double size) const;
 
 private:
     const LoadShapes& shapes_;

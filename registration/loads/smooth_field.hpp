@@ -1,5 +1,5 @@
 #pragma once
-/// A smooth Gaussian field of vectors by random waves (Rahimi and Recht 2007).
+/// Smooth Gaussian fields of vectors by random waves (Rahimi and Recht 2007).
 
 #include "registration/loads/white_noise.hpp"
 
@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <random>
+#include <vector>
 
 namespace tissuewarp::registration::detail {
 
@@ -27,6 +28,31 @@ private:
     static constexpr int waves = 20;  // of each component. Chosen by hand; on which data is not recorded
     Eigen::Matrix<double, 3, 3 * waves> wave_;
     Eigen::Matrix<double, 3 * waves, 1> phase_;
+};
+
+/// As smooth, and without divergence: every wave moves across its own direction.
+class SolenoidalField {
+public:
+    SolenoidalField(double length_mm, int waves, std::mt19937_64& generator) {
+        for (int w = 0; w < waves; ++w) {
+            const Eigen::Vector3d wave = white_noise(3, 1, generator) / length_mm;
+            const Eigen::Vector3d any = white_noise(3, 1, generator);
+            const Eigen::Vector3d across = any - wave * (wave.dot(any) / wave.squaredNorm());
+            waves_.push_back({wave, std::sqrt(2.0 / waves) * across, double(2 * EIGEN_PI) * uniform(generator)});
+        }
+    }
+    [[nodiscard]] Eigen::Vector3d operator()(const Eigen::Vector3d& point) const {
+        Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+        for (const Wave& wave : waves_) sum += std::cos(wave.number.dot(point) + wave.phase) * wave.amplitude;
+        return sum;
+    }
+
+private:
+    struct Wave {
+        Eigen::Vector3d number, amplitude;
+        double phase;
+    };
+    std::vector<Wave> waves_;
 };
 
 }  // namespace tissuewarp::registration::detail

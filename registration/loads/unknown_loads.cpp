@@ -5,11 +5,9 @@
 #include "registration/pose/rigid_part.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 
 #include <tbb/parallel_for.h>
 
-#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -18,8 +16,6 @@ namespace tissuewarp::registration::detail {
 namespace {
 
 using Columns = Eigen::MatrixXd;  // 3N × k, nodes' vectors one after the other
-
-constexpr int draws = load_draws.draws;
 
 /// mm³ of each node's share of its elements.
 Eigen::VectorXd nodal_volumes(const meshing::TetMesh& mesh) {
@@ -38,11 +34,6 @@ Eigen::VectorXd nodal_areas(const PreparedModel& prepared) {
     return result;
 }
 
-double radius_of(const Eigen::Matrix3Xd& nodes) {
-    const Eigen::Vector3d middle = nodes.rowwise().mean();
-    return std::sqrt((nodes.colwise() - middle).colwise().squaredNorm().mean());
-}
-
 /// Every node's vectors times its weight.
 Columns weighted(const Columns& vectors, const Eigen::VectorXd& weights) {
     Columns result = vectors;
@@ -57,6 +48,11 @@ Columns in_equilibrium(const Columns& loads, const Eigen::Matrix3Xd& nodes, cons
 }
 
 }  // namespace
+
+double radius_of(const Eigen::Matrix3Xd& nodes) {
+    const Eigen::Vector3d middle = nodes.rowwise().mean();
+    return std::sqrt((nodes.colwise() - middle).colwise().squaredNorm().mean());
+}
 
 Columns unknown_loads(const PreparedModel& prepared, int count, std::uint64_t seed) {
     const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
@@ -102,31 +98,6 @@ Columns unknown_weights(const PreparedModel& prepared) {
     for (Eigen::Index n = 0; n < nodes.cols(); ++n)
         weights.middleRows<3>(3 * n) = densities[n] * Eigen::Matrix3d::Identity();
     return in_equilibrium(weights, nodes, nodal_areas(prepared));
-}
-
-namespace {
-
-/// The same on every mesh of an organ.
-Columns draws_of(const PreparedModel& prepared) {
-    return unknown_loads(prepared, draws, load_draws.seed);
-}
-
-}  // namespace
-
-PrincipalLoads principal_loads(const PreparedModel& prepared, int count) {
-    const Columns drawn = draws_of(prepared);
-    const meshing::TetMesh& mesh = prepared.model.mesh;
-    const Eigen::VectorXd sizes = nodal_areas(prepared) + nodal_volumes(mesh) / radius_of(mesh.nodes);
-    const Columns densities = weighted(drawn, sizes.cwiseInverse());  // tractions, where there is a surface
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(drawn.transpose() * densities);
-    PrincipalLoads result;
-    result.axes = modes.eigenvectors().rightCols(std::min(count, draws));
-    result.loads = drawn * result.axes / std::sqrt(double(draws));
-    return result;
-}
-
-Columns loads_along(const PreparedModel& prepared, const Eigen::MatrixXd& axes) {
-    return draws_of(prepared) * axes / std::sqrt(double(draws));
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -67,7 +67,7 @@ Terms::Terms(std::vector<std::unique_ptr<Term>> terms, double energy, bool align
     placement_sought_ = align && !placed;
     free_placement_ = parts_alone_ && placement_sought_;
     take_own_metric_ = volume || !boundary || placed;
-    if (free_placement_) unknown_loads_ = LoadKind::Smooth;
+    if (free_placement_) unknown_loads_ = LoadKind::Bends;
     if (boundary && !volume && !placed) unknown_loads_ = LoadKind::Weight;
 }
 

@@ -1,5 +1,6 @@
 #include "registration/uncertainty/data_uncertainty.hpp"
 
+#include "registration/loads/unknown_bends.hpp"
 #include "registration/loads/unknown_loads.hpp"
 #include "registration/pose/rigid_part.hpp"
 #include "registration/pose/shown_motions.hpp"
@@ -83,6 +84,63 @@ MatrixXd beside(const MatrixXd& a, const MatrixXd& b) {
     return result;
 }
 
+/// What a model of how organs move says: what registrations miss of such motions, and some of the motions themselves.
+struct Model {
+    MatrixXd error;   ///< 3N × k, mm
+    MatrixXd truths;  ///< 3N × HeldOutOptions::draws, mm
+};
+
+/// Strain energy that was found, and the unit, mN mm.
+struct Energies {
+    double found = 0, unit = 1;
+};
+
+/// Unknown loads on and in the organ, of the size that tells the strain energy found.
+Model under_unknown_loads(const PreparedModel& prepared, PriorMoves prior_moves, const LinearRegistration& registration,
+                          const Posterior& unseen, const Eigen::Matrix3Xd& displacement, const Energies& energies,
+                          const UncertaintyOptions& options) {
+    const int half = options.samples / 2;
+    const double energy = energies.found + error_model.least_energy * energies.unit;
+    const Missed on = missed_under(unknown_loads(prepared, half, options.seed), prepared, registration, unseen, energy),
+                 in = missed_under(unknown_body_forces(prepared, half, options.seed + 1), prepared, registration,
+                                   unseen, energy);
+    const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
+    const auto sized = [&, least = std::sqrt(1 - energies.found / energy),
+                        found_mm = elastic_motion_mm(displacement.reshaped(), nodes)](const Missed& missed) {
+        const bool whole = prior_moves == PriorMoves::Not;
+        return MatrixXd((whole ? 1 : size_by_motion(missed, nodes, found_mm, least)) * missed.error);
+    };
+    constexpr int half_of_draws = HeldOutOptions().draws / 2;
+    return {beside(sized(on), sized(in)),
+            beside(on.truths.displacement.leftCols(half_of_draws), in.truths.displacement.leftCols(half_of_draws))};
+}
+
+/// Smooth bends, bend_mm in root mean square.
+Model bent_by(double bend_mm, const PreparedModel& prepared, const LinearRegistration& registration,
+              const Posterior& unseen, const UncertaintyOptions& options) {
+    Truths truths;
+    truths.loads = unknown_bends(prepared, options.samples, options.seed);
+    truths.displacement = unseen.inverse(truths.loads);
+    const double drawn_mm =
+        std::sqrt(truths.displacement.squaredNorm() / double(prepared.rest.node_count * options.samples));
+    for (MatrixXd* part : {&truths.loads, &truths.displacement}) *part *= bend_mm / drawn_mm;
+    return {registration.missed(truths), truths.displacement.leftCols(HeldOutOptions().draws)};
+}
+
+/// Of points of it alone, tissue bends smoothly; seen as a whole or by its grey values, it does what its loads say.
+Model model_of(const PreparedModel& prepared, const LastPulls& pulls, const Eigen::Matrix3Xd& displacement,
+               const Energies& energies, const Posterior& unseen, LinearRegistration& registration,
+               const UncertaintyOptions& options) {
+    if (pulls.prior_moves != PriorMoves::WithSurface)
+        return under_unknown_loads(prepared, pulls.prior_moves, registration, unseen, displacement, energies, options);
+    LoadShapes shapes(principal_bends(prepared, TissuePrior().load_shapes).loads, unseen, pulls.energy);
+    const double expected_mm = expected_bend_mm(prepared), found_mm = pulls.load_size * shapes.deviation_mm();
+    if (pulls.load_size == 0) return bent_by(expected_mm, prepared, registration, unseen, options);
+    registration = std::move(registration).with_loads({std::move(shapes), pulls.load_size});
+    // A part tells little of how far the rest bends: where it tells less than expected, the truth lies between both.
+    return bent_by(std::max(found_mm, std::sqrt(found_mm * expected_mm)), prepared, registration, unseen, options);
+}
+
 DataErrors few_of(const DataErrors& errors, Eigen::Index count) {
     DataErrors result;
     for (const MatrixXd& each : errors) result.emplace_back(each.leftCols(count));
@@ -134,30 +192,19 @@ OpenParts open_parts(const PreparedModel& prepared, const LastPulls& given, cons
                      double strain_energy, const UncertaintyOptions& options) {
     const LastPulls unseen = nothing_seen(prepared, given), pulls = has_prior(given) ? given : unseen;
     auto [registration, without] = LinearRegistration::with_unseen(prepared, pulls, unseen);
-    const int half = options.samples / 2;
-    const double energy = strain_energy + error_model.least_energy * pulls.energy;
-    const Missed on =
-                     missed_under(unknown_loads(prepared, half, options.seed), prepared, registration, without, energy),
-                 in = missed_under(unknown_body_forces(prepared, half, options.seed + 1), prepared, registration,
-                                   without, energy);
+    const Model model =
+        model_of(prepared, given, displacement, {strain_energy, pulls.energy}, without, registration, options);
     const std::vector<PulledNode> data = pulls.data();
-    const DataErrors errors =
-        drawn_errors(data, prepared.model.mesh.nodes, pulls.energy, options.samples, options.seed + 2);
     const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
-    const auto sized = [&, least = std::sqrt(1 - strain_energy / energy),
-                        found_mm = elastic_motion_mm(displacement.reshaped(), nodes)](const Missed& missed) {
-        const bool whole = given.prior_moves == PriorMoves::Not;
-        return MatrixXd((whole ? 1 : size_by_motion(missed, nodes, found_mm, least)) * missed.error);
-    };
+    const DataErrors errors = drawn_errors(data, nodes, pulls.energy, options.samples, options.seed + 2);
     DataUncertainty result;
-    result.covariance = covariances_of(beside(sized(on), sized(in))) +
+    result.covariance = covariances_of(model.error) +
                         covariances_of(registration.inverse(forces_of(data, errors, prepared.rest.node_count)));
     const Covariances placement =
         sum_of_squares(beside(unseen_motions(pulls, nodes), missed_if_rigid(pulls, nodes, displacement, registration)));
     constexpr int draws = HeldOutOptions().draws;
-    const MatrixXd truths =
-        beside(on.truths.displacement.leftCols(draws / 2), in.truths.displacement.leftCols(draws / 2));
-    result.held_out = held_out(prepared, pulls, registration.posterior(), displacement, truths, few_of(errors, draws));
+    result.held_out = held_out(prepared, pulls, registration.posterior(), displacement, model.truths.leftCols(draws),
+                               few_of(errors, draws));
     if (result.held_out) result.covariance *= std::max(1.0, result.held_out->z * result.held_out->z);
     result.covariance += placement;
     return {std::move(result), std::move(registration).stiffness()};

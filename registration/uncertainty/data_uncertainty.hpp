@@ -1,7 +1,7 @@
 #pragma once
 /// What data and tissue leave open: part of the error estimate.
 
-#include "registration/loads/posterior.hpp"
+#include "registration/loads/loaded_posterior.hpp"
 #include "registration/uncertainty.hpp"
 #include "registration/uncertainty/linear_registration.hpp"
 

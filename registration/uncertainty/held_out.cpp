@@ -132,10 +132,11 @@ Flexibility taken_out(const Fold& fold, const PulledNodes& pulled, const MatrixX
 
 /// The slow twin: a factor without the springs.
 Flexibility refactored(const Fold& fold, const PulledNodes& pulled, const PreparedModel& prepared,
-                       const LastPulls& pulls) {
+                       const LastPulls& pulls, const LoadedPosterior& all) {
     std::vector<PulledNode> kept;
     for (const std::size_t n : fold.kept) kept.push_back(pulled.data[n]);
-    const auto rest = std::make_shared<const Posterior>(prepared, with_data(without_fold(pulls, kept)));
+    const auto rest =
+        std::make_shared<const LoadedPosterior>(Posterior(prepared, with_data(without_fold(pulls, kept))), all.loads());
     std::vector<Eigen::Index> rows;
     for (const int node : pulled.nodes)
         for (int c = 0; c < 3; ++c) rows.push_back(3 * Eigen::Index{node} + c);
@@ -171,7 +172,7 @@ void add_fold(const Fold& fold, const PulledNodes& pulled, const Flexibility& re
 
 }  // namespace
 
-std::optional<HeldOut> held_out(const PreparedModel& prepared, const LastPulls& pulls, const Posterior& all,
+std::optional<HeldOut> held_out(const PreparedModel& prepared, const LastPulls& pulls, const LoadedPosterior& all,
                                 const Eigen::Matrix3Xd& displacement, const MatrixXd& truths, const DataErrors& errors,
                                 const HeldOutOptions& options) {
     using Clock = std::chrono::steady_clock;
@@ -188,7 +189,7 @@ std::optional<HeldOut> held_out(const PreparedModel& prepared, const LastPulls& 
         const Fold fold = fold_of(number, options.folds, region);
         try {
             const Flexibility rest =
-                between ? taken_out(fold, pulled, with_all) : refactored(fold, pulled, prepared, pulls);
+                between ? taken_out(fold, pulled, with_all) : refactored(fold, pulled, prepared, pulls, all);
             add_fold(fold, pulled, rest, displacement, truths, errors, region, regions);
         } catch (const InvalidInput&) {  // the rest holds the tissue no longer
         }

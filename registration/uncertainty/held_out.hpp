@@ -2,7 +2,7 @@
 /// A registration tests itself: whole regions of the data are left out and predicted from the rest, and what is missed
 /// is set against what the error estimate says of it.
 
-#include "registration/loads/posterior.hpp"
+#include "registration/loads/loaded_posterior.hpp"
 #include "registration/uncertainty.hpp"
 #include "registration/uncertainty/linear_registration.hpp"
 
@@ -23,7 +23,7 @@ struct HeldOutOptions {
 /// mean square: 1 where the estimate is right, more where it promises too much. Nothing where there are too few
 /// data to leave any out. `all` is the posterior of all pulls, `truths` are displacements that the organ may have (3N ×
 /// k, mm), `errors` of the data as many.
-std::optional<HeldOut> held_out(const PreparedModel& prepared, const LastPulls& pulls, const Posterior& all,
+std::optional<HeldOut> held_out(const PreparedModel& prepared, const LastPulls& pulls, const LoadedPosterior& all,
                                 const Eigen::Matrix3Xd& displacement, const Eigen::MatrixXd& truths,
                                 const DataErrors& errors, const HeldOutOptions& options = {});
 

@@ -8,6 +8,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include <memory>
 #include <random>
 #include <utility>
 
@@ -55,7 +56,7 @@ MatrixXd forces_of(const std::vector<PulledNode>& data, const DataErrors& errors
 
 LinearRegistration::LinearRegistration(Posterior posterior, const PreparedModel& prepared, const LastPulls& pulls,
                                        const LastPulls& unseen)
-    : posterior_(std::move(posterior)) {
+    : posterior_(LoadedPosterior(std::move(posterior))) {
     if (pulls.prior_moves == PriorMoves::WithSurface) return;  // one and the same
     expected_.emplace(prepared.model.mesh.nodes, without_data(unseen));
 }
@@ -67,11 +68,20 @@ std::pair<LinearRegistration, Posterior> LinearRegistration::with_unseen(const P
     return {LinearRegistration(std::move(seen), prepared, pulls, unseen), std::move(without)};
 }
 
-// A (u − û) = (K + G') u = f + (G' − G) u
+LinearRegistration LinearRegistration::with_loads(KnownLoads loads) && {
+    LinearRegistration result = std::move(*this);
+    result.posterior_ =
+        LoadedPosterior(std::move(result.posterior_).unloaded(), std::make_shared<const KnownLoads>(std::move(loads)));
+    return result;
+}
+
+// Without loads A (u − û) = (K + G') u = f + (G' − G) u =: r; with them û gains what is found of A⁻¹ K_D u = u − A⁻¹ r.
 MatrixXd LinearRegistration::missed(const Truths& truths) const {
-    if (!expected_) return inverse(truths.loads);
     const MatrixXd& u = truths.displacement;
-    return inverse(truths.loads + posterior_.prior().forces(u) - expected_->forces(u));
+    const Posterior& unloaded = posterior_.unloaded();
+    const MatrixXd missed = unloaded.inverse(
+        expected_ ? MatrixXd(truths.loads + unloaded.prior().forces(u) - expected_->forces(u)) : truths.loads);
+    return missed - posterior_.of_loads(u - missed);
 }
 
 }  // namespace tissuewarp::registration::detail

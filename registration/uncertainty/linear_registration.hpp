@@ -2,7 +2,7 @@
 /// What a registration makes of organs whose motion is known, in linear elasticity: where it errs is where the true
 /// place may lie.
 
-#include "registration/loads/posterior.hpp"
+#include "registration/loads/loaded_posterior.hpp"
 
 #include <Eigen/Core>
 
@@ -28,8 +28,8 @@ using DataErrors = std::vector<Eigen::MatrixXd>;
 DataErrors drawn_errors(const std::vector<PulledNode>& data, const Eigen::Matrix3Xd& nodes, double energy, int count,
                         std::uint64_t seed);
 
-/// û = A⁻¹ K_D (u + ε) with A = K + G' + K_D: the displacement that data K_D give of a true one, u, under the prior G'
-/// of the registration.
+/// û = S K_D (u + ε): the displacement that data K_D give of a true one, u. S is A⁻¹, A = K + G' + K_D, under the prior
+/// G' of the registration; where it finds loads with it, see LoadedPosterior.
 class LinearRegistration {
 public:
     /// Of what pulled in the last round, and of all organs, of which nothing is known but what `unseen` expects: its
@@ -38,18 +38,21 @@ public:
     static std::pair<LinearRegistration, Posterior> with_unseen(const PreparedModel& prepared, const LastPulls& pulls,
                                                                 const LastPulls& unseen);
 
-    /// u − û for data without errors: A⁻¹ (K + G') u, 3N × k, mm.
+    /// The same registration, finding loads too.
+    [[nodiscard]] LinearRegistration with_loads(KnownLoads loads) &&;
+
+    /// u − û for data without errors, 3N × k, mm.
     [[nodiscard]] Eigen::MatrixXd missed(const Truths& truths) const;
-    /// Displacements under forces: A⁻¹ f, 3N × k, mm.
+    /// Displacements under forces: S f, 3N × k, mm.
     [[nodiscard]] Eigen::MatrixXd inverse(const Eigen::MatrixXd& forces) const { return posterior_.inverse(forces); }
-    [[nodiscard]] const Posterior& posterior() const { return posterior_; }
-    [[nodiscard]] tled::RestStiffness stiffness() && { return std::move(posterior_).stiffness(); }
+    [[nodiscard]] const LoadedPosterior& posterior() const { return posterior_; }
+    [[nodiscard]] tled::RestStiffness stiffness() && { return std::move(posterior_).unloaded().stiffness(); }
 
 private:
     LinearRegistration(Posterior posterior, const PreparedModel& prepared, const LastPulls& pulls,
                        const LastPulls& unseen);
 
-    Posterior posterior_;
+    LoadedPosterior posterior_;
     std::optional<Prior> expected_;  // G, where it is not the posterior's prior G'
 };
 

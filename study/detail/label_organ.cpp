@@ -65,11 +65,11 @@ LabelOrgan random_label_organ(const imaging::Volume& labels, double least_ml, Ra
     for (const auto& [label, statistics] : imaging::label_statistics(labels)) {
         const auto largest =
             imaging::label_statistics(imaging::largest_component(imaging::mask_of(labels, label)).as(CV_32S)).at(1);
-        if (largest.volume_mm3 >= 1000 * least_ml && !largest.touches_border) usable.push_back(label);
+        if (largest.volume_mm3 >= 1000 * least_ml) usable.push_back(label);
     }
     if (usable.empty())
         throw InvalidInput("the label map has no organ of " + std::to_string(int(least_ml)) +
-                           " ml or more that lies wholly in it");
+                           " ml or more");
     return {labels, usable[std::size_t(random.index(int(usable.size())))]};
 }
 

@@ -10,7 +10,8 @@
 
 namespace tissuewarp::study::detail {
 
-/// The largest piece of one label. Its boundary is smoothed over a voxel.
+/// The largest piece of one label. Its boundary is smoothed over a voxel. Where it meets the border of the map it ends in
+/// a flat face there.
 class LabelOrgan {
 public:
     LabelOrgan(const imaging::Volume& labels, int label);
@@ -33,8 +34,7 @@ private:
     std::string kind_;
 };
 
-/// One of the labels whose largest piece has `least_ml` or more and does not meet the border of the map. Throws
-/// InvalidInput where there is none.
+/// One of the labels whose largest piece has `least_ml` or more. Throws InvalidInput where there is none.
 LabelOrgan random_label_organ(const imaging::Volume& labels, double least_ml, Random& random);
 
 }  // namespace tissuewarp::study::detail

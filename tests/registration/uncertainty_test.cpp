@@ -425,7 +425,7 @@ TEST(OpenParts, StrainThatMovedTheTissueLittleCountsLess) {
     };
     const double much = 1e3 * pulls.energy;
     EXPECT_NEAR(growth(much, 0.2), 16, 0.1);  // data show the organ as a whole
-    pulls.prior_moves = PriorMoves::WithSurface;
+    pulls.prior_moves = PriorMoves::WithData;
     EXPECT_NEAR(growth(much, 0.2), std::pow(16, 1 - detail::error_model.motion_weight), 0.1);
     EXPECT_NEAR(growth(pulls.energy, 30), 16, 0.1);  // it moved as far as its strain says
 }
@@ -502,7 +502,7 @@ TEST(HeldOut, SaysNothingOfThreeData) {
     std::erase_if(pulls.springs,
                   [&](const PulledNode& pulled) { return pulled.origin == Origin::Datum && ++kept > 3; });
     const Matrix3Xd none = Matrix3Xd::Zero(3, prepared.rest.node_count);
-    const detail::Posterior all(prepared, detail::with_data(pulls));
+    const detail::LoadedPosterior all(detail::Posterior(prepared, detail::with_data(pulls)));
     EXPECT_FALSE(detail::held_out(prepared, pulls, all, none, {}, detail::DataErrors(3)).has_value());
 }
 

@@ -5,6 +5,7 @@
 #include "study/phantom.hpp"
 
 #include "core/errors.hpp"
+#include "imaging/filters.hpp"
 #include "imaging/labels.hpp"
 #include "imaging/sampling.hpp"
 
@@ -14,6 +15,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <string>
 #include <utility>
 
 namespace tissuewarp::study {
@@ -71,6 +74,30 @@ TEST(LabelOrgan, IsTheLargestPieceOfALabelOfSomeSize) {
     EXPECT_NEAR(double(imaging::label_statistics(organ.voxels()).at(1).volume_mm3), 4.0 / 3 * EIGEN_PI * 23 * 23 * 23,
                 1000);
     EXPECT_THROW(static_cast<void>(detail::random_label_organ(labels, 100, random)), InvalidInput);
+}
+
+TEST(LabelOrgan, MayMeetTheBorderOfTheMapAndEndsThereInAFace) {
+    const imaging::Volume whole = two_balls();
+    imaging::Geometry upper_half = whole.geometry;
+    upper_half.size[2] = 24;
+    upper_half.origin = whole.geometry.point({0, 0, 24});
+    const imaging::Volume labels = imaging::resample(whole, upper_half, imaging::Interpolation::Nearest);
+    detail::Random random(1);
+    const detail::LabelOrgan organ = detail::random_label_organ(labels, 20, random);
+    EXPECT_EQ(organ.kind(), "label 7");
+    const Vector3d middle = whole.geometry.origin + Vector3d(40, 45, 45);
+    EXPECT_EQ(organ.label(middle + Vector3d(0, 0, 6)), 1);
+    EXPECT_EQ(organ.label(middle - Vector3d(0, 0, 6)), 0);
+    EXPECT_NEAR(organ.outer_distance(middle - Vector3d(0, 0, 6)), 8, 2);  // the face lies 2 mm above the middle
+}
+
+TEST(LabelOrgan, IsAnyThatIsLargeEnough) {
+    std::set<std::string> drawn;
+    for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+        detail::Random random(seed);
+        drawn.insert(detail::random_label_organ(two_balls(), 2.5, random).kind());
+    }
+    EXPECT_EQ(drawn, (std::set<std::string>{"label 4", "label 7"}));
 }
 
 /// Displacements of up to 20 mm on a grid of 4 mm, which vary over some 60 mm and change volume.
