@@ -2,6 +2,7 @@
 #include "registration/field.hpp"
 #include "registration/loads/load_finder.hpp"
 #include "registration/loads/loaded_posterior.hpp"
+#include "registration/loads/smooth_field.hpp"
 #include "registration/loads/unknown_bends.hpp"
 #include "registration/loads/unknown_loads.hpp"
 #include "registration/pose/rigid_part.hpp"
@@ -14,6 +15,8 @@
 #include <Eigen/Cholesky>
 
 #include <cmath>
+#include <memory>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -110,6 +113,13 @@ TEST(LoadFit, IsTheMeanUnderThePriorOfSmoothLoads) {
     EXPECT_LT((found - expected).norm(), 1e-6 * expected.norm());
     EXPECT_GT((shown - expected).norm(), 0.02 * expected.norm());  // loads matter here
 
+    const detail::LoadedPosterior loaded(detail::Posterior(prepared, seen),
+                                         std::make_shared<const detail::KnownLoads>(shapes, size));
+    EXPECT_LT((loaded.inverse(pulls) - expected).norm(), 1e-6 * expected.norm());
+    const MatrixXd from_all = units.transpose() * loaded.inverse(units);
+    EXPECT_LT((loaded.inverse_between(held) - from_all).norm(), 1e-6 * from_all.norm());
+    EXPECT_EQ(detail::LoadedPosterior(detail::Posterior(prepared, seen)).inverse(pulls), shown);
+
     // And the likeliest size is that of the largest density of the targets, of those that are tried.
     const auto density = [&](double s) {
         const MatrixXd c =
@@ -121,6 +131,37 @@ TEST(LoadFit, IsTheMeanUnderThePriorOfSmoothLoads) {
     const double likeliest = fit.likeliest_size(shown);
     EXPECT_GT(density(likeliest), density(likeliest * std::sqrt(2.0)));
     EXPECT_GT(density(likeliest), density(likeliest / std::sqrt(2.0)));
+    EXPECT_EQ(fit.likeliest_size(shown, {likeliest / 8, 1e-3}), likeliest / 8);  // certain beforehand
+    EXPECT_EQ(fit.likeliest_size(shown, {likeliest / 8, 1e3}), likeliest);       // as good as unknown
+    const double between_both = fit.likeliest_size(shown, {likeliest / 8, 0.5});
+    EXPECT_LE(between_both, likeliest);
+    EXPECT_GT(between_both, likeliest / 8);
+}
+
+TEST(UnknownBends, ConserveVolumeAndAreAsLargeAsExpected) {
+    std::mt19937_64 generator(5);
+    const detail::SolenoidalField field(20, 20, generator);
+    double divergence = 0, gradient = 0, squares = 0;
+    constexpr double h = 1e-3;
+    for (int n = 0; n < 500; ++n) {
+        const Vector3d x(std::fmod(7.3 * n, 90), std::fmod(11.9 * n, 110), std::fmod(3.1 * n, 70));
+        Eigen::Matrix3d slope;
+        for (int axis = 0; axis < 3; ++axis)
+            slope.col(axis) = (field(x + h * Vector3d::Unit(axis)) - field(x - h * Vector3d::Unit(axis))) / (2 * h);
+        divergence += std::abs(slope.trace());
+        gradient += slope.norm();
+        squares += field(x).squaredNorm() / 500;
+    }
+    EXPECT_LT(divergence, 1e-6 * gradient);
+    EXPECT_NEAR(squares, 2, 1);  // of three components of variance 1 one is lost
+
+    const PreparedModel prepared = organ(12);
+    const detail::Posterior unseen(prepared, prior(prepared, 60));
+    const detail::LoadShapes shapes(detail::principal_bends(prepared, 48).loads, unseen, 60);
+    const double size = detail::expected_bend_mm(prepared) / shapes.deviation_mm();
+    const MatrixXd bends = size * shapes.scale() * unseen.inverse(detail::principal_bends(prepared, 48).loads);
+    EXPECT_NEAR(std::sqrt(bends.squaredNorm() / prepared.rest.node_count),
+                0.08 * detail::radius_of(prepared.model.mesh.nodes), 1e-6);
 }
 
 TEST(LoadFit, LoadsOfSizeOneHaveTheStrainEnergyOfOneDeviation) {

@@ -4,6 +4,7 @@
 #include "registration/field.hpp"
 #include "registration/loads/coarse_twin.hpp"
 #include "registration/loads/posterior.hpp"
+#include "registration/loads/unknown_bends.hpp"
 #include "registration/loads/unknown_loads.hpp"
 #include "registration/pose/shown_motions.hpp"
 #include "registration/springs/ground_springs.hpp"
@@ -407,6 +408,28 @@ TEST(OpenParts, MotionsThatDataHardlyTellCount) {
     EXPECT_LT(mean_square(), before + 1e-9);
 }
 
+// What the linear registration misses is what its definition says: u − S K_D u.
+TEST(LinearRegistration, MissesWhatItsDataAndItsLoadsLeave) {
+    const PreparedModel prepared = organ();
+    LastPulls pulls = pulls_at_the_surface(prepared, 0.3);
+    pulls.prior_moves = PriorMoves::WithSurface;
+    auto [registration, without] = detail::LinearRegistration::with_unseen(prepared, pulls, pulls);
+    detail::Truths truths;
+    truths.loads = detail::unknown_bends(prepared, 3, 9);
+    truths.displacement = without.inverse(truths.loads);
+    const auto left = [&](const detail::LinearRegistration& r) {
+        return Eigen::MatrixXd(truths.displacement -
+                               r.inverse(detail::forces_of(pulls.of(Origin::Datum), truths.displacement)));
+    };
+    const Eigen::MatrixXd alone = registration.missed(truths);
+    EXPECT_LT((alone - left(registration)).norm(), 1e-6 * truths.displacement.norm());
+    registration =
+        std::move(registration).with_loads({{detail::principal_bends(prepared, 48).loads, without, pulls.energy}, 50});
+    const Eigen::MatrixXd loaded = registration.missed(truths);
+    EXPECT_LT((loaded - left(registration)).norm(), 1e-6 * truths.displacement.norm());
+    EXPECT_LT(loaded.norm(), 0.9 * alone.norm());
+}
+
 // By energy alone sixteen times as much would be sixteen times the variance.
 TEST(OpenParts, StrainThatMovedTheTissueLittleCountsLess) {
     const PreparedModel prepared = organ();
@@ -450,10 +473,13 @@ TEST(OpenParts, WhatLabelsHideGrowsWithTheTurnThatTheyShow) {
 
 /// Data that lie where one of the truths and errors of the estimate itself puts them.
 double z_of_drawn_data(const PreparedModel& prepared, double factor, PriorMoves prior_moves = PriorMoves::Not,
-                       const detail::HeldOutOptions& options = {}) {
+                       const detail::HeldOutOptions& options = {}, bool finds_loads = false) {
     LastPulls pulls = pulls_at_the_surface(prepared, 0.3);
     pulls.prior_moves = prior_moves;
-    const auto [registration, without] = detail::LinearRegistration::with_unseen(prepared, pulls, pulls);
+    auto [registration, without] = detail::LinearRegistration::with_unseen(prepared, pulls, pulls);
+    if (finds_loads)
+        registration = std::move(registration)
+                           .with_loads({{detail::principal_bends(prepared, 20).loads, without, pulls.energy}, 10});
     const Eigen::MatrixXd truths = without.inverse(40 * detail::unknown_loads(prepared, 17, 3));
     const auto errors = detail::drawn_errors(pulls.data(), prepared.model.mesh.nodes, pulls.energy, 17, 7);
     std::size_t datum = 0;
@@ -488,11 +514,12 @@ TEST(HeldOut, IsOneForDataOfTheStatedKindAndScalesWithThem) {
 // The slow twin: a factor of what is left without each fold.
 TEST(HeldOut, TakesSpringsOutOfTheInverseAsAFactorWithoutThemDoes) {
     const PreparedModel prepared = organ();
-    for (const PriorMoves moves : {PriorMoves::Not, PriorMoves::WithSurface}) {
-        const double with_factors = z_of_drawn_data(prepared, 2, moves, {.most_nodes_between = 0}),
-                     taken_out = z_of_drawn_data(prepared, 2, moves, {.most_nodes_between = 10000});
-        EXPECT_NEAR(taken_out / with_factors, 1, 1e-6);
-    }
+    for (const PriorMoves moves : {PriorMoves::Not, PriorMoves::WithSurface})
+        for (const bool finds_loads : {false, true}) {
+            const double with_factors = z_of_drawn_data(prepared, 2, moves, {.most_nodes_between = 0}, finds_loads),
+                         taken_out = z_of_drawn_data(prepared, 2, moves, {.most_nodes_between = 10000}, finds_loads);
+            EXPECT_NEAR(taken_out / with_factors, 1, 1e-6);
+        }
 }
 
 TEST(HeldOut, SaysNothingOfThreeData) {
