@@ -127,15 +127,17 @@ Model bent_by(double bend_mm, const PreparedModel& prepared, const LinearRegistr
     return {registration.missed(truths), truths.displacement.leftCols(HeldOutOptions().draws)};
 }
 
-/// Of points of it alone, tissue bends smoothly; seen as a whole or by its grey values, it does what its loads say.
+/// Of points of it alone, tissue bends smoothly, and a registration that found bends finds them here too; seen as a
+/// whole or by its grey values, tissue does what its loads say.
 Model model_of(const PreparedModel& prepared, const LastPulls& pulls, const Eigen::Matrix3Xd& displacement,
                const Energies& energies, const Posterior& unseen, LinearRegistration& registration,
                const UncertaintyOptions& options) {
     if (pulls.prior_moves != PriorMoves::WithSurface)
         return under_unknown_loads(prepared, pulls.prior_moves, registration, unseen, displacement, energies, options);
-    LoadShapes shapes(principal_bends(prepared, TissuePrior().load_shapes).loads, unseen, pulls.energy);
-    const double expected_mm = expected_bend_mm(prepared), found_mm = pulls.load_size * shapes.deviation_mm();
+    const double expected_mm = expected_bend_mm(prepared);
     if (pulls.load_size == 0) return bent_by(expected_mm, prepared, registration, unseen, options);
+    LoadShapes shapes(principal_bends(prepared, TissuePrior().load_shapes).loads, unseen, pulls.energy);
+    const double found_mm = pulls.load_size * shapes.deviation_mm();
     registration = std::move(registration).with_loads({std::move(shapes), pulls.load_size});
     // A part tells little of how far the rest bends: where it tells less than expected, the truth lies between both.
     return bent_by(std::max(found_mm, std::sqrt(found_mm * expected_mm)), prepared, registration, unseen, options);
