@@ -26,10 +26,12 @@ public:
     /// The data say where the organ lies as a whole.
     [[nodiscard]] bool placement_sought() const { return placement_sought_; }
     /// Of the data that do: the farther they turned the organ of these nodes (3 × N, mm), the more of a turn that they
-    /// do not tell is to be expected. Nothing where headers place the organ.
+    /// do not tell is to be expected; any turn where they tell a shift alone. Nothing where headers place the organ.
     [[nodiscard]] HardlyShown hardly_shown(const Eigen::Isometry3d& placement, const Eigen::Matrix3Xd& nodes) const;
-    /// Loads that nobody stated and that data may tell: of points of a free organ all, tractions too, since these also
-    /// move what no point shows; of labels, which show the boundary all over, whatever presses on it there, a force
+    /// They say how far it was shifted, and not how it turned.
+    [[nodiscard]] bool shift_alone() const;
+    /// Loads that nobody stated and that data may tell: of points of a free organ whatever bends it, since that also
+    /// moves what no point shows; of labels, which show the boundary all over, whatever presses on it there, a force
     /// within. Otherwise none.
     [[nodiscard]] std::optional<LoadKind> unknown_loads() const { return unknown_loads_; }
     /// Springs differ from those that the model was prepared with, or few of them are the same.

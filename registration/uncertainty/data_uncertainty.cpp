@@ -132,8 +132,7 @@ Model bent_by(double bend_mm, const PreparedModel& prepared, const LinearRegistr
 Model model_of(const PreparedModel& prepared, const LastPulls& pulls, const Eigen::Matrix3Xd& displacement,
                const Energies& energies, const Posterior& unseen, LinearRegistration& registration,
                const UncertaintyOptions& options) {
-    constexpr std::size_t nodes_of_two_pairs = 8;  // these do not tell how the organ turned
-    if (pulls.prior_moves != PriorMoves::WithSurface || pulls.data().size() <= nodes_of_two_pairs)
+    if (pulls.prior_moves != PriorMoves::WithSurface)
         return under_unknown_loads(prepared, pulls.prior_moves, registration, unseen, displacement, energies, options);
     const double expected_mm = expected_bend_mm(prepared);
     if (pulls.load_size == 0) return bent_by(expected_mm, prepared, registration, unseen, options);

@@ -23,9 +23,10 @@ struct OpenParts {
     tled::RestStiffness stiffness;
 };
 
-/// Of unknown loads on and in the organ, as large as tells the strain energy (mN mm) that the registration found, and
-/// of errors of the data; `displacement` (3 × N, mm) is what was found in the frame of the pulls. Throws InvalidInput
-/// where the springs do not hold the tissue, SolverFailure without memory for the factors.
+/// Of unknown loads on and in the organ, as large as tells the strain energy (mN mm) that the registration found, or,
+/// where points of a part alone show it, of smooth bends (unknown_bends.hpp), and of errors of the data; `displacement`
+/// (3 × N, mm) is what was found in the frame of the pulls. Throws InvalidInput where the springs do not hold the
+/// tissue, SolverFailure without memory for the factors.
 OpenParts open_parts(const PreparedModel& prepared, const LastPulls& pulls, const Eigen::Matrix3Xd& displacement,
                      double strain_energy, const UncertaintyOptions& options);
 

@@ -68,8 +68,7 @@ LabelOrgan random_label_organ(const imaging::Volume& labels, double least_ml, Ra
         if (largest.volume_mm3 >= 1000 * least_ml) usable.push_back(label);
     }
     if (usable.empty())
-        throw InvalidInput("the label map has no organ of " + std::to_string(int(least_ml)) +
-                           " ml or more");
+        throw InvalidInput("the label map has no organ of " + std::to_string(int(least_ml)) + " ml or more");
     return {labels, usable[std::size_t(random.index(int(usable.size())))]};
 }
 

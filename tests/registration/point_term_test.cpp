@@ -89,6 +89,21 @@ TEST(PointTerm, TwoPairsShiftTheOrganAndDoNotTurnIt) {
     EXPECT_GT(summarise(uncertainty(prepared, result)).failed_share, 0.3);  // two points say little of the rest
 }
 
+// Of pairs on a line nobody knows the turn about it, however many they are.
+TEST(PointTerm, PairsOnALineDoNotTellTheTurnAboutIt) {
+    const auto prepared = prepare(shapes::organ_labels({}), coarse());
+    const auto failed_share = [&](int count, double off_the_line_mm) {
+        PointPairs pairs{Matrix3Xd::Zero(3, count), Matrix3Xd::Zero(3, count), 1.0};
+        for (int n = 0; n < count; ++n)
+            pairs.moving.col(n) = Vector3d(-35 + 70.0 * n / (count - 1), off_the_line_mm * std::cos(2.0 * n),
+                                           off_the_line_mm * std::sin(2.0 * n));
+        pairs.fixed = pairs.moving.colwise() + Vector3d(3, -2, 4);
+        return summarise(uncertainty(prepared, update(prepared, {.points = pairs}, on_cpu()))).failed_share;
+    };
+    for (const int count : {2, 3, 12}) EXPECT_GT(failed_share(count, 0), 0.3) << count;
+    EXPECT_EQ(failed_share(12, 8), 0);
+}
+
 TEST(PointTerm, WrongPairsAmongFewAreSaid) {
     const auto prepared = prepare(shapes::organ_labels({}), coarse());
     PointPairs pairs = grid_pairs(20);
