@@ -323,6 +323,16 @@ TEST(CurveTerm, TogetherWithASurfaceBetterThanEither) {
     EXPECT_LT(both, 0.9 * surface_alone);
 }
 
+// It tells neither how far the organ slid along it nor how it turned about it.
+TEST(CurveTerm, AStraightVesselAloneLeavesTheOrganUnknown) {
+    const auto prepared = prepare(shapes::organ_labels({}), coarse());
+    Curves curves{{vessel({-35, 0, 0}, {35, 0, 0}, Vector3d::Zero())}, Matrix3Xd(3, 0), Matrix3Xd(3, 0), 1.0};
+    curves.fixed = curves.moving[0].colwise() + Vector3d(2, -2, 3);
+    const UpdateResult seen = update(prepared, {.curves = curves}, on_cpu());
+    EXPECT_EQ(summarise(uncertainty(prepared, seen)).unknown_share, 1);
+    EXPECT_THAT(test::codes(seen.doubts), testing::Contains("placement.loose"));
+}
+
 TEST(CurveTerm, WhatLiesElsewhereIsRefused) {
     Numbers numbers(13);
     const PreparedModel prepared = prepare(shapes::organ_labels({}), coarse());

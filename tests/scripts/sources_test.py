@@ -33,6 +33,16 @@ class Sources(unittest.TestCase):
             read = subprocess.run(["bash", "-n", script], capture_output=True, text=True)
             self.assertEqual(read.returncode, 0, read.stderr)
 
+    def test_scripts_say_how_they_are_used(self):
+        for name in ("build", "demo", "docs", "setup", "test", "test_package"):
+            script = ROOT / "scripts" / name
+            told = subprocess.run([script, "--help"], capture_output=True, text=True, timeout=10, cwd="/")
+            self.assertEqual(told.returncode, 0, name)
+            self.assertIn(f"scripts/{name}", told.stdout)
+            refused = subprocess.run([script, "--no-such-option"], capture_output=True, text=True, timeout=10, cwd="/")
+            self.assertEqual(refused.returncode, 2, name)
+            self.assertIn("--no-such-option", refused.stderr)
+
 
 if __name__ == "__main__":
     unittest.main()
