@@ -7,7 +7,9 @@
 #include "tled/model/symmetric.hpp"
 #include "tled/parallel/parallel.hpp"
 
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace tissuewarp::tled {
@@ -101,6 +103,32 @@ NodalConditions nodal_conditions(const Conditions& conditions, int node_count) {
     if (!conditions.effects.none())
         throw InvalidInput("effects of the conditions need the rest state of the model: pass it for the node count");
     return without_effects(conditions, node_count);
+}
+
+NodalConditions with_springs(NodalConditions conditions, const std::vector<Spring>& springs) {
+    struct Sum {
+        Eigen::Matrix<double, 6, 1> stiffness = Eigen::Matrix<double, 6, 1>::Zero();
+        Eigen::Vector3d force = Eigen::Vector3d::Zero();
+    };
+    NodalConditions more;
+    sum_springs(springs, static_cast<int>(conditions.constrained.cols()), more);
+    std::map<int, Sum> sums;
+    for (const NodalConditions* each : {&std::as_const(conditions), &std::as_const(more)})
+        for (std::size_t s = 0; s < each->spring_node.size(); ++s) {
+            Sum& sum = sums[each->spring_node[s]];
+            sum.stiffness += each->spring_stiffness.col(static_cast<Eigen::Index>(s));
+            sum.force += each->spring_force.col(static_cast<Eigen::Index>(s));
+        }
+    conditions.spring_node.clear();
+    conditions.spring_stiffness.resize(6, static_cast<Eigen::Index>(sums.size()));
+    conditions.spring_force.resize(3, static_cast<Eigen::Index>(sums.size()));
+    for (const auto& [node, sum] : sums) {
+        const auto column = static_cast<Eigen::Index>(conditions.spring_node.size());
+        conditions.spring_stiffness.col(column) = sum.stiffness;
+        conditions.spring_force.col(column) = sum.force;
+        conditions.spring_node.push_back(node);
+    }
+    return conditions;
 }
 
 NodalConditions scaled(NodalConditions conditions, double part) {

@@ -49,6 +49,9 @@ NodalConditions nodal_conditions(const Conditions& conditions, const RestState& 
 /// there are any.
 NodalConditions nodal_conditions(const Conditions& conditions, int node_count);
 
+/// `conditions` with these springs too. Throws InvalidInput for what nodal_conditions() refuses.
+NodalConditions with_springs(NodalConditions conditions, const std::vector<Spring>& more);
+
 /// Forces, pressures, weights, targets of springs and imposed displacements times `part`; what holds is as it was.
 NodalConditions scaled(NodalConditions conditions, double part);
 

@@ -28,6 +28,9 @@ struct ContactResult {
 /// stiffness), lets go of nodes that are pulled and takes those that have entered. Pairs that may part are held
 /// together or absent in a round: those that are pulled are let go for the next, those that overlap are held.
 ///
+/// Tissue that rolls on to other nodes or flattens within a round finds none so. Then damped motion leads to where it
+/// lies, and Newton's method solves rounds of contact that pushes and never pulls (one_sided_contact.hpp).
+///
 /// Throws InvalidInput without either or with friction, which depends on the way there: take dynamics; SolverFailure
 /// when the rounds do not settle, or from an equilibrium.
 ContactResult equilibrium_in_contact(Engine& engine, const RestState& rest, const NodalConditions& conditions,

@@ -25,7 +25,9 @@ void require_usable(const NodalConditions& conditions, const EquilibriumOptions&
                            std::to_string(conditions.constrained.cols()) + " nodes, or values that are not finite");
     if (!conditions.effects.surface.parting.empty())
         throw InvalidInput("equilibrium: some pairs may part, which it does not decide; take equilibrium_in_contact()");
-    if (options.rest != nullptr) detail::require_held(*options.rest, conditions);
+    if (options.one_sided != nullptr && options.method != EquilibriumMethod::Newton)
+        throw InvalidInput("equilibrium: contact that pushes alone takes Newton's method");
+    if (options.rest != nullptr && options.one_sided == nullptr) detail::require_held(*options.rest, conditions);
 }
 
 /// By expected work in force evaluations: relaxation's from the lowest frequency, L-BFGS's from the size of the factor

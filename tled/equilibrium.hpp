@@ -10,8 +10,9 @@
 namespace tissuewarp::tled {
 
 namespace detail {
+class OneSidedContact;
 class TangentFactor;
-}
+}  // namespace detail
 
 enum class EquilibriumMethod {
     Automatic,
@@ -32,6 +33,7 @@ struct EquilibriumOptions {
     const RestState* rest = nullptr;  ///< that of the engine: lets L-BFGS factorise a metric near the answer for tissue
                                       ///< of which almost only the volume is stiff, and Newton's method decide
     detail::TangentFactor* tangent = nullptr;  ///< of that tissue at another state, which Newton's method begins with
+    const detail::OneSidedContact* one_sided = nullptr;  ///< pushes too; Newton's method alone follows it
     bool on_the_way = false;  ///< a part of a load path: Newton's method need not know whether the tissue is stable
 };
 

@@ -1,5 +1,7 @@
 #include "tled/statics/equilibrium_search.hpp"
 
+#include "tled/statics/one_sided_contact.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -71,6 +73,8 @@ void EquilibriumSearch::require_evaluations(int count) {
 Matrix3Xd EquilibriumSearch::residual() {
     require_evaluations(1);
     Matrix3Xd r = engine.residual();
+    if (options.one_sided != nullptr)
+        r = conditions.constrained.select(r, r + options.one_sided->force(engine.displacement()));
     if (!r.allFinite())
         fail("the forces are not finite (" + place(smallest_) + ")", "use a finer mesh there or softer springs");
     return r;

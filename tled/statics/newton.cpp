@@ -5,6 +5,7 @@
 #include "tled/statics/equilibrium_search.hpp"
 #include "tled/statics/finite_rotations.hpp"
 #include "tled/statics/line_search.hpp"
+#include "tled/statics/one_sided_contact.hpp"
 #include "tled/stiffness/dot.hpp"
 #include "tled/stiffness/tangent_factor.hpp"
 
@@ -22,7 +23,7 @@ constexpr const char* of_several =
     "on the way to it the tissue was not stable: where it buckles or snaps through there are several equilibria, of "
     "which this is a stable one";
 constexpr int most_saddles = 5, most_crawling = 3;  // iterations near one, by steps that hardly become shorter
-constexpr int most_idle = 15;                       // iterations without the correction falling by a tenth
+constexpr int most_idle = 15;  // iterations without the correction or the residual falling by a tenth
 
 /// The start as it is, with the imposed displacements in place; from rest the linear-elastic solution turned by finite
 /// angles, or as far as no tetrahedron is turned inside out.
@@ -65,6 +66,19 @@ bool left_saddle(EquilibriumSearch& search, Matrix3Xd& u, const Matrix3Xd& falli
     return false;
 }
 
+/// What gives the tangent at `u`: the springs of contact that push there too.
+NodalConditions tangent_conditions(const EquilibriumSearch& search, const Matrix3Xd& u) {
+    const OneSidedContact* contact = search.options.one_sided;
+    return contact != nullptr ? contact->stiffened(search.conditions, u) : search.conditions;
+}
+
+/// As much of a correction as leaves no node more than an edge from where it was: farther on tissue may have passed
+/// through a body and find no contact on its other side.
+Matrix3Xd short_of_bodies(const EquilibriumSearch& search, const Matrix3Xd& d) {
+    if (search.options.one_sided == nullptr) return d;
+    return std::min(1.0, std::cbrt(search.options.rest->volume.mean()) / largest_norm(d)) * d;
+}
+
 /// Whether corrections that go on to shrink as the second did against the first leave no more than the tolerance.
 bool settles(const Matrix3Xd& first, const Matrix3Xd& second, double tolerance_mm) {
     const double before = largest_norm(first), now = largest_norm(second), contraction = now / before;
@@ -87,19 +101,19 @@ std::optional<Matrix3Xd> missing_after(EquilibriumSearch& search, const TangentF
 }  // namespace
 
 EquilibriumResult newton(EquilibriumSearch& search, const Matrix3Xd* start, TangentFactor& tangent) {
-    const NodalConditions& conditions = search.conditions;
-    const FiniteRotations rotations(*search.options.rest, conditions);
+    const FiniteRotations rotations(*search.options.rest, search.conditions);
     search.keep_upright();  // elsewhere there is no tangent
     Matrix3Xd u = first_state(search, rotations, start);
     if (!search.admissible(u)) search.fail_stalled();
     Matrix3Xd r = search.residual();
-    double least = 0;
+    double least = 0, least_residual = r.norm();
     bool was_unstable = false;
     bool last = false;
     int saddles = 0, crawling = 0;
     int settled = 0;  // times in a row; where tissue was unstable once does not tell
     double before = 0;
     for (int iteration = 0, idle = 0; iteration < most_iterations; ++iteration, ++idle) {
+        const NodalConditions conditions = tangent_conditions(search, u);
         TangentFactor::Prepared prepared;
         if (!last) prepared = tangent.solve_at(conditions, u, r);
         was_unstable |= !prepared.positive;
@@ -137,18 +151,25 @@ EquilibriumResult newton(EquilibriumSearch& search, const Matrix3Xd* start, Tang
             continue;
         }
         last = false;
+        // Corrections by conjugate gradients that stopped at a falling direction are short, and no measure by
+        // themselves.
         if (iteration == 0 || correction < 0.9 * least) {
             least = correction;
             idle = 0;
         }
+        if (r.norm() < 0.9 * least_residual) {
+            least_residual = r.norm();
+            idle = 0;
+        }
         if (idle > most_idle) search.fail_stalled();
-        if (Matrix3Xd next = rotations.moved(u, d); taken(search, u, next, r)) {
+        const Matrix3Xd way = short_of_bodies(search, d);
+        if (Matrix3Xd next = rotations.moved(u, way); taken(search, u, next, r)) {
             u = std::move(next);
             continue;
         }
-        std::optional<LineStep> step = line_search(search, u, r, d);
+        std::optional<LineStep> step = line_search(search, u, r, way);
         if (!step) search.fail_stalled();
-        u += step->length * d;
+        u += step->length * way;
         r = std::move(step->residual);
     }
     search.fail_stalled();
