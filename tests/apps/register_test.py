@@ -9,6 +9,7 @@ import unittest.mock
 import h5py
 import nibabel
 import numpy
+import scipy.ndimage
 
 from phantom import CENTRE_LPS, FIXED_AFFINE, MOVING_AFFINE, SHIFT_LPS, SIZE, Phantom, run
 
@@ -112,6 +113,12 @@ class Register(unittest.TestCase):
         labels = numpy.asarray(nibabel.load(self.phantom.output / "warped_labels.nii.gz").dataobj)
         values = deviation.get_fdata()
         numpy.testing.assert_array_equal(numpy.isnan(values), trust == 0)
+        # The table and the volumes speak of the same place.
+        warped = numpy.array([-table["warped_x"], -table["warped_y"], table["warped_z"], 1])  # RAS
+        voxel = (numpy.linalg.inv(deviation.affine) @ warped)[:3]
+        there = scipy.ndimage.map_coordinates(values, voxel[:, None], order=1)[0]
+        self.assertAlmostEqual(there, float(table["deviation_mm"]), delta=0.03 * there)
+        self.assertEqual(trust[tuple(numpy.round(voxel).astype(int))], float(table["trust"]))
         self.assertGreater((trust[labels > 0] > 0).mean(), 0.9)  # but for voxels cut by the surface
         self.assertLess((trust[labels == 0] > 0).mean(), 0.02)
         self.assertAlmostEqual(numpy.sqrt(numpy.nanmean(values ** 2)), estimate["deviation_mm"],
