@@ -68,7 +68,7 @@ private:
         for (result_.rounds = 1;; ++result_.rounds) {
             solve(u, result_.rounds == 1 ? start : &u);
             const bool others_touch = follow_bodies(u), pairs_changed = follow_pairs(u);
-            const double apart = largest_gap(u);
+            const double apart = one_sided_ ? std::max(largest_gap(u), largest_penetration(u)) : largest_gap(u);
             if (!pairs_changed && (one_sided_ || !others_touch) && apart <= options_.penetration_mm) break;
             if (result_.rounds == options_.most_rounds) fail(u);
             observer_.checkpoint("contact", static_cast<double>(result_.rounds) / options_.most_rounds);

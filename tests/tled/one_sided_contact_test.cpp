@@ -22,22 +22,23 @@ Obstacle below_plane(double height) {
     return {grid, {}, 0};
 }
 
-TEST(OneSidedContact, PushesAndNeverPulls) {
+/// One node that does not touch and two that do.
+class OneSidedContact : public testing::Test {
+protected:
     const std::vector<Obstacle> plane{below_plane(1)};
     const std::vector<detail::ContactNode> nodes{{0, {0, 0, 0}, 5}, {1, {10, 0, 0}, 5}, {2, {20, 0, 4}, 5}};
     const std::vector<std::optional<detail::Touch>> touches{std::nullopt, detail::Touch{0, 2}, detail::Touch{0, 2}};
-    const detail::OneSidedContact contact(plane, nodes, touches);
+    const detail::OneSidedContact contact{plane, nodes, touches};
+};
+
+TEST_F(OneSidedContact, PushesAndNeverPulls) {
     // 1 mm deep; the same beyond a push of 2 mm; 3 mm away, which is more than the push.
     Matrix3Xd expected = Matrix3Xd::Zero(3, 3);
     expected.row(2) << 5, 15, 0;
     EXPECT_NEAR((contact.force(Matrix3Xd::Zero(3, 3)) - expected).norm(), 0, 1e-6);
 }
 
-TEST(OneSidedContact, StiffnessIsTheDerivativeOfItsForce) {
-    const std::vector<Obstacle> plane{below_plane(1)};
-    const std::vector<detail::ContactNode> nodes{{0, {0, 0, 0}, 5}, {1, {10, 0, 0}, 5}, {2, {20, 0, 4}, 5}};
-    const std::vector<std::optional<detail::Touch>> touches{std::nullopt, detail::Touch{0, 2}, detail::Touch{0, 2}};
-    const detail::OneSidedContact contact(plane, nodes, touches);
+TEST_F(OneSidedContact, StiffnessIsTheDerivativeOfItsForce) {
     const Matrix3Xd u = Matrix3Xd::Constant(3, 3, 0.1);
     const NodalConditions stiffened = contact.stiffened(nodal_conditions(Conditions{}, 3), u);
     ASSERT_THAT(stiffened.spring_node, testing::ElementsAre(0, 1));
@@ -51,7 +52,7 @@ TEST(OneSidedContact, StiffnessIsTheDerivativeOfItsForce) {
 
 // A block that is as soft as brain and 138 mm high loses a quarter of its height on a table. Nodes held to the table
 // until the next round let it topple or fall through; the block's sides have to come to touch as it flattens.
-TEST(OneSidedContact, LetsASoftBlockFlattenOnATable) {
+TEST(EquilibriumInContact, LetsASoftBlockFlattenOnATable) {
     Model model;
     model.mesh = meshing::box_mesh({140.5, 114.4, 138.5}, {9, 8, 9});
     model.materials[1] = neo_hookean_stable(2.492, 0.4);
