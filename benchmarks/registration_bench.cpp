@@ -5,7 +5,9 @@
 // Errors are at the landmarks or, where there is a true field, at its points in the mask; FOLDER gets them point by
 // point, as CSV. With --repeats every update runs N times, and a line per case tells the time from data in to warped
 // image out, the model prepared: on the processor (the default) through the displacement field of all voxels, on a GPU
-// through GpuWarp, whose voxels outside the mesh follow the placement.
+// through GpuWarp, whose voxels outside the mesh follow the placement. Then N updates go on each from the last one,
+// while the patient moves at random by half a millimetre along each axis from one to the next (but for a held head) and
+// every tenth point of a surface is another one's; a second line tells their times and errors.
 
 #include "core/errors.hpp"
 #include "imaging/image_io.hpp"
@@ -28,6 +30,7 @@
 #include <fstream>
 #include <functional>
 #include <map>
+#include <random>
 #include <sstream>
 #include <string>
 
@@ -311,30 +314,103 @@ private:
     imaging::Volume warped_;
 };
 
-/// Data in, warped image out, again and again.
-void time_updates(const std::string& name, const std::shared_ptr<const PreparedModel>& prepared, const Case& study,
-                  const UpdateOptions& options, int repeats) {
-    Updater updater(prepared, options);
-    Warper warper(prepared, study, options.device);
-    std::vector<double> wall, processor;
-    std::map<std::string, std::vector<double>> stages;
-    for (int n = 0; n < repeats; ++n) {
+/// Times of updates, from data in to warped image out.
+class UpdateTimes {
+public:
+    /// What an update gives, warped.
+    UpdateResult time(const std::function<UpdateResult()>& update, Warper& warper) {
         const Clocks whole;
-        const UpdateResult result = updater.update(study.seen);
+        UpdateResult result = update();
         const Clocks warp_clock;
         warper(result.deformation);
-        stages["warp"].push_back(warp_clock.wall());
-        wall.push_back(whole.wall());
-        processor.push_back(whole.processor());
-        for (const StageTime& time : result.times) stages[time.stage].push_back(time.seconds);
+        stages_["warp"].push_back(warp_clock.wall());
+        wall_.push_back(whole.wall());
+        processor_.push_back(whole.processor());
+        for (const StageTime& time : result.times) stages_[time.stage].push_back(time.seconds);
+        return result;
     }
-    std::printf(
-        "%s, %d updates, ms: least %.0f, median %.0f, 90th %.0f, 95th %.0f, most %.0f; processor: median %.0f\n",
-        name.c_str(), repeats, 1e3 * percentile(wall, 0), 1e3 * percentile(wall, 0.5), 1e3 * percentile(wall, 0.9),
-        1e3 * percentile(wall, 0.95), 1e3 * percentile(wall, 1), 1e3 * percentile(processor, 0.5));
-    std::printf("  medians of stages, ms:");
-    for (const auto& [stage, seconds] : stages) std::printf("  %s %.0f", stage.c_str(), 1e3 * percentile(seconds, 0.5));
-    std::printf("\n");
+
+    void print(const std::string& name) const {
+        std::printf(
+            "%s, %zu updates, ms: least %.0f, median %.0f, 90th %.0f, 95th %.0f, most %.0f; processor: median %.0f\n",
+            name.c_str(), wall_.size(), 1e3 * percentile(wall_, 0), 1e3 * percentile(wall_, 0.5),
+            1e3 * percentile(wall_, 0.9), 1e3 * percentile(wall_, 0.95), 1e3 * percentile(wall_, 1),
+            1e3 * percentile(processor_, 0.5));
+        std::printf("  medians of stages, ms:");
+        for (const auto& [stage, seconds] : stages_)
+            std::printf("  %s %.0f", stage.c_str(), 1e3 * percentile(seconds, 0.5));
+        std::printf("\n");
+        std::fflush(stdout);
+    }
+
+private:
+    std::vector<double> wall_, processor_;
+    std::map<std::string, std::vector<double>> stages_;
+};
+
+void time_updates(const std::string& name, Updater& updater, Warper& warper, const Case& study, int repeats) {
+    UpdateTimes times;
+    for (int n = 0; n < repeats; ++n) times.time([&] { return updater.update(study.seen); }, warper);
+    times.print(name);
+}
+
+/// What is seen while the patient moves.
+class MovingPatient {
+public:
+    explicit MovingPatient(const Case& study) : study_(study), seen_(study.seen), held_(!study.align) {}
+
+    const Intraoperative& next() {
+        if (!held_)
+            for (double& along : shift_) along += 0.5 * normal_(generator_);
+        seen_ = study_.seen;
+        if (seen_.labels) seen_.labels->geometry.origin += shift_;
+        if (seen_.image) seen_.image->geometry.origin += shift_;
+        if (seen_.surface) {
+            Eigen::Matrix3Xd& points = seen_.surface->points;
+            Eigen::Matrix3Xd& normals = seen_.surface->normals;
+            points.colwise() += shift_;
+            for (Eigen::Index n = 0; n < points.cols() / 10; ++n) {
+                const auto to = Eigen::Index(generator_() % points.cols()),
+                           from = Eigen::Index(generator_() % points.cols());
+                points.col(to) = points.col(from);
+                if (normals.cols() > 0) normals.col(to) = normals.col(from);
+            }
+        }
+        return seen_;
+    }
+
+    /// Of a result for what was seen last.
+    [[nodiscard]] double mean_error_mm(const UpdateResult& result) const {
+        Landmarks targets = study_.targets;
+        targets.fixed.colwise() += shift_;
+        return target_error(targets, PointTransform(result.deformation)(targets.moving)).after.mean;
+    }
+
+private:
+    const Case& study_;
+    Intraoperative seen_;
+    bool held_;
+    Eigen::Vector3d shift_ = Eigen::Vector3d::Zero();
+    std::mt19937_64 generator_{1};
+    std::normal_distribution<double> normal_;
+};
+
+void time_going_on(const std::string& name, Updater& updater, Warper& warper, const Case& study, int repeats) {
+    MovingPatient patient(study);
+    UpdateResult last = updater.update(patient.next());
+    double error = 0, cold_error = 0;
+    int anew = 0;
+    UpdateTimes times;
+    for (int n = 0; n < repeats; ++n) {
+        const Intraoperative& seen = patient.next();
+        last = times.time([&] { return updater.go_on(last, seen); }, warper);
+        error += patient.mean_error_mm(last) / repeats;
+        anew += !last.beginning.at_last;
+        if (!last.beginning.at_last) std::fprintf(stderr, "  began anew: %s\n", last.beginning.why.c_str());
+        cold_error += patient.mean_error_mm(updater.update(seen)) / repeats;
+    }
+    times.print(name + ", going on");
+    std::printf("  %d began anew; mean error %.3f mm, from their beginning %.3f mm\n", anew, error, cold_error);
     std::fflush(stdout);
 }
 
@@ -372,7 +448,12 @@ void run(const Arguments& arguments) {
             const Clocks clocks;
             const UpdateResult result = update(prepared, study.seen, update_options);
             print_row(name, result, study.targets, clocks.wall());
-            if (arguments.repeats > 0) time_updates(name, model, study, update_options, arguments.repeats);
+            if (arguments.repeats > 0) {
+                Updater updater(model, update_options);
+                Warper warper(model, study, update_options.device);
+                time_updates(name, updater, warper, study, arguments.repeats);
+                time_going_on(name, updater, warper, study, arguments.repeats);
+            }
             if (!arguments.errors.empty())
                 write_errors(arguments.errors / (name + ".csv"), result.deformation, study.targets);
         }

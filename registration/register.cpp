@@ -1,17 +1,20 @@
 // During the operation, in the order of docs/method.md, section 5:
 //   place rigidly → rounds of { linearise the terms → equilibrium → follow } → search on → loads that explain what was
 //   seen → contact in balance → judge.
+// From the result of an earlier update: rounds → loads as the last search would have found them → contact → judge.
 
 #include "registration/register.hpp"
 
 #include "core/stopwatch.hpp"
 #include "registration/doubts.hpp"
+#include "registration/go_on.hpp"
 #include "registration/pace.hpp"
 #include "registration/pose/rigid_part.hpp"
 #include "registration/round.hpp"
 #include "registration/schedule.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -29,6 +32,7 @@ struct Registration {
     RoundSolver rounds;
     Pace pace;
     Standing at;
+    FoundLoads found = {};  // those that act
 
     UpdateResult run() {
         place_rigidly();
@@ -38,6 +42,22 @@ struct Registration {
         settle_contact();
         judge();
         return std::move(at.result);
+    }
+
+    UpdateResult run_on(const UpdateResult& last, const Eigen::Isometry3d& placement) {
+        stand_where_ended(last, placement);
+        go_through_rounds();
+        let_loads_follow();
+        settle_contact();
+        judge();
+        return std::move(at.result);
+    }
+
+    void stand_where_ended(const UpdateResult& last, const Eigen::Isometry3d& placement) {
+        at.state.placement = placement;
+        at.state.displacement = last.deformation.displacement;
+        at.result.alignment = last.alignment;
+        let_act(last.carried_on->loads);
     }
 
     void place_rigidly() {
@@ -80,12 +100,14 @@ struct Registration {
         for (int time = 0; time < course_options.load_searches && terms.unknown_loads(); ++time) {
             if (at.result.cut_short || !loads.worth_while(*terms.unknown_loads(), pace.share_left())) return;
             const Standing before = at;
+            const FoundLoads acted = found;
             try {
                 find_loads();
                 settle_loads();
             } catch (const SolverFailure& failure) {
                 observer.note(std::string("unknown loads are left out: ") + failure.what());
                 at = before;
+                found = acted;
                 return;
             }
         }
@@ -93,10 +115,33 @@ struct Registration {
 
     void find_loads() {
         Stopwatch stopwatch;
-        FoundLoads found = loads.find(*terms.unknown_loads(), at.result.pulls, observer);
-        at.state.found_loads = std::move(found.forces);
-        at.state.load_size = found.size;
+        let_act(loads.find(*terms.unknown_loads(), at.result.pulls, observer));
         add_time(at.result.times, stages::unknown_loads, stopwatch.lap());
+    }
+
+    /// Loads that acted already change with what data show; where they change ever more, data pull by too different
+    /// springs, and loads are sought by those.
+    void let_loads_follow() {
+        double before_mm = std::numeric_limits<double>::infinity();
+        for (int done = 0; found.search && !at.result.cut_short && done < go_on_course.load_rounds; ++done) {
+            FoundLoads next = found_beside(found, at.state.displacement);
+            const double change_mm = difference_mm(next, found);
+            const bool settled = change_mm < go_on_course.settled_loads_mm;
+            if (!settled && change_mm > go_on_course.most_growth * before_mm) {
+                find_loads();
+                return settle_loads();
+            }
+            let_act(std::move(next));
+            solve(schedule.last());
+            if (settled) return;
+            before_mm = change_mm;
+        }
+    }
+
+    void let_act(FoundLoads loads_found) {
+        found = std::move(loads_found);
+        at.state.found_loads = found.forces();
+        at.state.load_size = found.size;
     }
 
     void settle_loads() {
@@ -125,23 +170,34 @@ struct Registration {
         result.deformation = {prepared.model.mesh, at.state.displacement, at.state.placement};
         result.doubts = doubts_of_course(result);
         terms.judge(at.state, result);
+        result.carried_on = std::make_shared<const CarriedOn>(CarriedOn{{}, {}, 0, found});
     }
 };
+
+Registration registration_of(const PreparedModel& prepared, Terms& terms, LoadFinder& loads, tled::Engine& engine,
+                             const UpdateOptions& options, Observer& observer) {
+    return {prepared,
+            terms,
+            loads,
+            options,
+            observer,
+            Schedule(options, terms.searches()),
+            RoundSolver(prepared, terms, engine, options, observer),
+            Pace(options.time_budget_s),
+            at_rest(prepared, engine)};
+}
 
 }  // namespace
 
 UpdateResult register_model(const PreparedModel& prepared, Terms& terms, LoadFinder& loads, tled::Engine& engine,
                             const UpdateOptions& options, Observer& observer) {
-    return Registration{prepared,
-                        terms,
-                        loads,
-                        options,
-                        observer,
-                        Schedule(options, terms.searches()),
-                        RoundSolver(prepared, terms, engine, options, observer),
-                        Pace(options.time_budget_s),
-                        at_rest(prepared, engine)}
-        .run();
+    return registration_of(prepared, terms, loads, engine, options, observer).run();
+}
+
+UpdateResult register_on(const UpdateResult& last, const Eigen::Isometry3d& placement, const PreparedModel& prepared,
+                         Terms& terms, LoadFinder& loads, tled::Engine& engine, const UpdateOptions& options,
+                         Observer& observer) {
+    return registration_of(prepared, terms, loads, engine, options, observer).run_on(last, placement);
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -5,11 +5,16 @@
 #include "registration/stage_time.hpp"
 #include "tled/conditions.hpp"
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 namespace tissuewarp::registration {
+
+namespace detail {
+struct CarriedOn;
+}
 
 struct Alignment {
     Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();  ///< moving → fixed
@@ -153,6 +158,12 @@ std::vector<std::string> texts(const std::vector<Doubt>& doubts);
 /// Those of severity Doubt.
 int count_of_severe(const std::vector<Doubt>& doubts);
 
+/// Where an update began (Updater::go_on).
+struct Beginning {
+    bool at_last = false;  ///< at the result of an earlier one, rather than with the rigid placement
+    std::string why = {};  ///< why not, where one was given
+};
+
 struct UpdateResult {
     Deformation deformation;
     Alignment alignment;
@@ -169,6 +180,8 @@ struct UpdateResult {
     std::vector<StageTime> times;
     bool cut_short = false;     ///< by the time budget: the last round was not reached
     std::vector<Doubt> doubts;  ///< empty when there are none
+    Beginning beginning;
+    std::shared_ptr<const detail::CarriedOn> carried_on;  ///< beside this result, what updates go on from (go_on.hpp)
 };
 
 }  // namespace tissuewarp::registration

@@ -4,6 +4,7 @@
 #include "imaging/labels.hpp"
 #include "registration/boundary/surroundings.hpp"
 #include "registration/engine_choice.hpp"
+#include "registration/go_on.hpp"
 #include "registration/pose/start_pose.hpp"
 #include "registration/register.hpp"
 #include "registration/surroundings/rigid_surroundings.hpp"
@@ -30,11 +31,16 @@ std::vector<detail::ImageTools> image_tools_of(const PreparedModel& prepared, co
     return tools;
 }
 
+/// The result of an update that went on from another is not to be taken.
+struct BeginAnew {
+    std::string why;
+};
+
 }  // namespace
 
 struct Updater::Impl {
     std::shared_ptr<const PreparedModel> prepared;
-    UpdateOptions options;
+    UpdateOptions options, short_options;  // of whole courses, and of those that go on from a result
     std::unique_ptr<tled::Engine> solver;
     std::vector<detail::ImageTools> image_tools;  // for the image of the model and each of its contrasts
     detail::LoadFinder load_finder;
@@ -43,23 +49,77 @@ struct Updater::Impl {
          Observer& observer)
         : prepared(std::move(model)),
           options(given),
+          short_options(detail::short_course(given)),
           solver(std::move(engine)),
           image_tools(image_tools_of(*prepared, options, observer)),
           load_finder(*prepared, options.tissue) {}
 
     UpdateResult update(const Intraoperative& given, Observer& observer) {
-        const Eigen::Isometry3d start = given.start.value_or(Eigen::Isometry3d::Identity());
-        const Intraoperative seen = detail::without_neighbours(given.start ? detail::seen_from(given, start) : given,
-                                                               prepared->options.rigid_neighbours);
         Stopwatch stopwatch;
+        const Intraoperative seen = seen_by_model(given);
         detail::Terms terms = detail::terms_of(*prepared, seen, options, image_tools);
         const double seconds = stopwatch.lap();
-        UpdateResult result = detail::register_model(*prepared, terms, load_finder, *solver, options, observer);
-        if (given.start) detail::return_to_fixed_frame(result, start);
+        UpdateResult result = in_fixed_frame(
+            detail::register_model(*prepared, terms, load_finder, *solver, options, observer), given, seconds);
+        leave(result, {result.deformation.deformed_nodes(), detail::amount_seen(result), 0, {}});
+        return result;
+    }
+
+    /// Throws BeginAnew where the result is not to be taken, or none was found.
+    UpdateResult go_on(const UpdateResult& last, const Intraoperative& given, Observer& observer) {
+        if (!detail::same_kinds(last, given)) throw BeginAnew{"other kinds of data are seen"};
+        if (last.carried_on->since >= detail::go_on_limits.most_in_a_row)
+            throw BeginAnew{"so many updates went on that the placement is sought again"};
+        Stopwatch stopwatch;
+        const Intraoperative seen = seen_by_model(given);
+        try {
+            detail::Terms terms = detail::terms_of(*prepared, seen, short_options, image_tools);
+            const double seconds = stopwatch.lap();
+            if (!terms.take_over(last)) throw BeginAnew{"the placement must be sought for such data"};
+            const Eigen::Isometry3d placement = start_of(given).inverse() * last.alignment.placement;
+            UpdateResult result = in_fixed_frame(
+                detail::register_on(last, placement, *prepared, terms, load_finder, *solver, short_options, observer),
+                given, seconds);
+            if (const auto why = detail::why_begin_anew(last, result)) throw BeginAnew{*why};
+            result.beginning = {true};
+            const detail::CarriedOn& carried = *last.carried_on;
+            leave(result, {carried.nodes, carried.seen, carried.since + 1, {}});
+            return result;
+        } catch (const SolverFailure& failure) {
+            throw BeginAnew{failure.what()};
+        } catch (const InvalidInput& failure) {  // nothing lies near, or all of it is at fault, which update() will say
+            throw BeginAnew{failure.what()};
+        }
+    }
+
+    void require_result_of_model(const UpdateResult& last) const {
+        if (last.carried_on && last.deformation.mesh.nodes == prepared->model.mesh.nodes) return;
+        throw InvalidInput("an update cannot go on from a result of another model, or of none");
+    }
+
+private:
+    static Eigen::Isometry3d start_of(const Intraoperative& given) {
+        return given.start.value_or(Eigen::Isometry3d::Identity());
+    }
+
+    /// To updates that go on from it, with the search for loads that the course ended with.
+    static void leave(UpdateResult& result, detail::CarriedOn carried) {
+        carried.loads = result.carried_on->loads;
+        result.carried_on = std::make_shared<const detail::CarriedOn>(std::move(carried));
+    }
+
+    [[nodiscard]] Intraoperative seen_by_model(const Intraoperative& given) const {
+        return detail::without_neighbours(given.start ? detail::seen_from(given, *given.start) : given,
+                                          prepared->options.rigid_neighbours);
+    }
+
+    [[nodiscard]] UpdateResult in_fixed_frame(UpdateResult result, const Intraoperative& given,
+                                              double boundary_maps_s) const {
+        if (given.start) detail::return_to_fixed_frame(result, *given.start);
         if (prepared->neighbours)
             result.deformation.surroundings =
                 rigid_bodies(imaging::mask_of_all(prepared->neighbours->labels), result.deformation);
-        result.times.insert(result.times.begin() + 1, {stages::boundary_maps, seconds});
+        result.times.insert(result.times.begin() + 1, {stages::boundary_maps, boundary_maps_s});
         return result;
     }
 };
@@ -75,18 +135,41 @@ Updater::~Updater() = default;
 Updater::Updater(Updater&&) noexcept = default;
 Updater& Updater::operator=(Updater&&) noexcept = default;
 
+void Updater::take_processor(const GpuUnavailable& failure, Observer& observer) {
+    if (impl_->options.device != Device::Auto) throw;
+    observer.note(std::string("the CPU takes over, and the update begins again: ") + failure.what());
+    UpdateOptions options = impl_->options;
+    options.device = Device::Cpu;
+    const std::shared_ptr<const PreparedModel> prepared = impl_->prepared;
+    impl_ = std::make_unique<Impl>(prepared, options, detail::make_engine(*prepared, options, observer), observer);
+}
+
 UpdateResult Updater::update(const Intraoperative& seen, Observer& observer) {
     try {
         return impl_->update(seen, observer);
     } catch (const GpuUnavailable& failure) {
-        if (impl_->options.device != Device::Auto) throw;
-        observer.note(std::string("the CPU takes over, and the update begins again: ") + failure.what());
-        UpdateOptions options = impl_->options;
-        options.device = Device::Cpu;
-        const std::shared_ptr<const PreparedModel> prepared = impl_->prepared;
-        impl_ = std::make_unique<Impl>(prepared, options, detail::make_engine(*prepared, options, observer), observer);
+        take_processor(failure, observer);
         return impl_->update(seen, observer);
     }
+}
+
+UpdateResult Updater::go_on(const UpdateResult& last, const Intraoperative& seen, Observer& observer) {
+    impl_->require_result_of_model(last);
+    Stopwatch stopwatch;
+    std::string why;
+    try {
+        return impl_->go_on(last, seen, observer);
+    } catch (const BeginAnew& reason) {
+        why = reason.why;
+    } catch (const GpuUnavailable& failure) {
+        take_processor(failure, observer);
+        why = failure.what();
+    }
+    const double seconds = stopwatch.lap();
+    UpdateResult result = update(seen, observer);
+    result.beginning = {false, why};
+    add_time(result.times, stages::in_vain, seconds);
+    return result;
 }
 
 UpdateResult update(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options,

@@ -36,9 +36,19 @@ public:
     /// not, the processor does the update from its beginning and all later ones, with a note.
     UpdateResult update(const Intraoperative& seen, Observer& observer = silent_observer());
 
+    /// The same from where an update of this model ended, in a fraction of the time: the placement is not sought, few
+    /// rounds are taken, and loads are found with the springs of the last search for them. Where the outcome does not
+    /// agree with `last` and with what is seen (why_begin_anew), or none can be found from there, the update is made
+    /// from its beginning, and `beginning` says why. Throws what update() throws; InvalidInput where `last` is of another
+    /// model.
+    UpdateResult go_on(const UpdateResult& last, const Intraoperative& seen, Observer& observer = silent_observer());
+
 private:
     struct Impl;
     std::unique_ptr<Impl> impl_;
+
+    /// After a device failed; throws what it threw where a GPU was demanded.
+    void take_processor(const GpuUnavailable& failure, Observer& observer);
 };
 
 /// One update: Updater(prepared, options).update(seen).

@@ -42,6 +42,7 @@ constexpr int status_ok = 1, status_error = 2;
 
 std::string answer(const Job& job, const Products& products, long long sequence, long long newest_state,
                    const std::vector<std::string>& notes) {
+    const registration::Beginning& beginning = products.result.beginning;
     json object{{"do", job.follows ? "follow" : "update"},
                 {"sequence", sequence},
                 {"status", products.doubted() ? "doubted" : "ok"},
@@ -49,6 +50,7 @@ std::string answer(const Job& job, const Products& products, long long sequence,
                 {"state", job.state},
                 {"newest_state", newest_state},
                 {"outdated", newest_state > job.state},
+                {"began", {{"at_last", beginning.at_last}, {"why_not", beginning.why}}},
                 {"doubts", doubts_of(products.result)},
                 {"device", products.result.engine},
                 {"digest", products.digest},

@@ -100,15 +100,26 @@ void Computer::use_options(const Request& request, Observer& observer) {
     made_for_ = request;
 }
 
-Products Computer::compute(const Job& job, Observer& observer) {
+void Computer::estimate_errors(Products& products, Observer& observer) const {
+    if (!products.request.error_estimate) return;
+    products.uncertainty = uncertainty(*patient_.model, products.result, {}, observer);
+    for (Doubt& doubt : doubts_of(*products.uncertainty, products.request.tolerance_mm))
+        products.result.doubts.push_back(std::move(doubt));
+}
+
+Products Computer::compute(const Job& job, const Products* last, Observer& observer) {
     const auto start = std::chrono::steady_clock::now();
     use_options(job.request, observer);
     Products products;
-    products.result = updater_->update(job.seen, observer);
-    if (job.request.error_estimate) {
-        products.uncertainty = uncertainty(*patient_.model, products.result, {}, observer);
-        for (Doubt& doubt : doubts_of(*products.uncertainty, job.request.tolerance_mm))
-            products.result.doubts.push_back(std::move(doubt));
+    products.request = job.request;
+    const bool goes_on = last && !job.request.begin_anew && same_updater(last->request, job.request);
+    products.result =
+        goes_on ? updater_->go_on(last->result, job.seen, observer) : updater_->update(job.seen, observer);
+    estimate_errors(products, observer);
+    if (products.result.beginning.at_last && products.doubted() && !last->doubted()) {
+        products.result = updater_->update(job.seen, observer);
+        products.result.beginning.why = "its errors were doubted";
+        estimate_errors(products, observer);
     }
     if (job.seen.image && !patient_.image.empty()) {
         Deformation& deformation = products.result.deformation;

@@ -23,6 +23,7 @@ struct Job {
 };
 
 struct Products {
+    Request request;  ///< what they answer
     registration::UpdateResult result;
     std::optional<registration::Uncertainty> uncertainty;
     PolyData organ;
@@ -43,11 +44,15 @@ NamedPoints targets_of(const Products& products, const NamedPoints& targets, dou
 class Computer {
 public:
     explicit Computer(ServedPatient patient) : patient_(std::move(patient)) {}
-    /// Throws what Updater::update throws.
-    Products compute(const Job& job, Observer& observer);
+    /// Goes on from what the last update gave, where there is one and the request has its options; then the same last
+    /// one gives the same bits. A result that is doubted where the last was not is made again from its beginning.
+    /// Throws what Updater::go_on throws.
+    Products compute(const Job& job, const Products* last, Observer& observer);
 
 private:
     void use_options(const Request& request, Observer& observer);
+    /// With the estimate of its errors, where it is asked for, and its doubts.
+    void estimate_errors(Products& products, Observer& observer) const;
 
     ServedPatient patient_;
     std::optional<Request> made_for_;  // the options of the updater

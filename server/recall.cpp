@@ -23,10 +23,17 @@ Frame frame_of(ByteView bytes) {
     return {parse_header(bytes.first(header_bytes), limits), {body.begin(), body.end()}};
 }
 
-/// The number of an update, and the text of this key.
-std::pair<long long, std::string> words_of(const Entry& entry, const char* key) {
+json object_of(const Entry& entry) {
     try {
-        const json object = json::parse(entry.payload);
+        return json::parse(entry.payload);
+    } catch (const json::exception& problem) {
+        throw InvalidInput(std::string("an entry of the log is none: ") + problem.what());
+    }
+}
+
+/// The number of an update, and the text of this key.
+std::pair<long long, std::string> words_of(const json& object, const char* key) {
+    try {
         return {object.at("update").get<long long>(), object.at(key).get<std::string>()};
     } catch (const json::exception& problem) {
         throw InvalidInput(std::string("an entry of the log is none: ") + problem.what());
@@ -45,7 +52,9 @@ Bytes logged(const Job& job) {
 }
 
 Bytes logged(const Job& job, const Products& products) {
-    return bytes_of({{"update", job.number}, {"digest", products.digest}});
+    return bytes_of({{"update", job.number},
+                     {"digest", products.digest},
+                     {"began", products.result.beginning.at_last ? "last" : "anew"}});
 }
 
 Job job_of(const Scene& scene, const Request& request, const std::string& request_text) {
@@ -73,29 +82,51 @@ void Recalled::take(const Entry& entry) {
 }
 
 Job Recalled::job(const Entry& entry) const {
-    const auto [number, text] = words_of(entry, "request");
+    const auto [number, text] = words_of(object_of(entry), "request");
     Job job = job_of(scene, parse_request(text), text);
     job.number = number;
     job.request.send.clear();  // nobody is there to whom it could be sent
     return job;
 }
 
-void replay(const ServedPatient& patient, NamedPoints targets, const std::filesystem::path& log,
-            const std::function<void(long long, bool)>& each) {
-    std::map<long long, std::string> digests;
-    read_journal(log, patient.digest, [&](const Entry& entry) {
-        if (entry.kind == Entry::Kind::Result) digests.insert(words_of(entry, "digest"));
+LoggedResults logged_results(const std::filesystem::path& log, const std::string& patient_digest) {
+    LoggedResults results;
+    read_journal(log, patient_digest, [&](const Entry& entry) {
+        if (entry.kind != Entry::Kind::Result) return;
+        const json object = object_of(entry);
+        const auto [number, digest] = words_of(object, "digest");
+        const bool went_on = object.value("began", "anew") == "last";
+        results.of_update[number] = {digest, went_on};
+        results.last = number;
+        if (!went_on) results.begin_of_last = number;
     });
+    return results;
+}
+
+void compute_again(const ServedPatient& patient, const NamedPoints& targets, const std::filesystem::path& log,
+                   const LoggedResults& results, long long from,
+                   const std::function<void(const Job&, const std::shared_ptr<const Products>&)>& each) {
     Recalled recalled;
-    recalled.scene.set_targets(std::move(targets));
+    recalled.scene.set_targets(targets);
     Computer computer(patient);
+    std::shared_ptr<const Products> last;
     read_journal(log, patient.digest, [&](const Entry& entry) {
         recalled.take(entry);
         if (entry.kind != Entry::Kind::Update) return;
         const Job job = recalled.job(entry);
-        const auto digest = digests.find(job.number);  // none: it was cancelled, or gave no result
-        if (digest != digests.end())
-            each(job.number, computer.compute(job, silent_observer()).digest == digest->second);
+        const auto result = results.of_update.find(job.number);  // none: it was cancelled, or gave no result
+        if (job.number < from || result == results.of_update.end()) return;
+        const Products* before = result->second.went_on ? last.get() : nullptr;
+        last = std::make_shared<const Products>(computer.compute(job, before, silent_observer()));
+        each(job, last);
+    });
+}
+
+void replay(const ServedPatient& patient, const NamedPoints& targets, const std::filesystem::path& log,
+            const std::function<void(long long, bool)>& each) {
+    const LoggedResults results = logged_results(log, patient.digest);
+    compute_again(patient, targets, log, results, 0, [&](const Job& job, const auto& products) {
+        each(job.number, products->digest == results.of_update.at(job.number).digest);
     });
 }
 

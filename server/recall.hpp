@@ -5,6 +5,8 @@
 #include "server/journal.hpp"
 
 #include <functional>
+#include <map>
+#include <memory>
 #include <optional>
 #include <utility>
 
@@ -29,8 +31,27 @@ struct Recalled {
     [[nodiscard]] Job job(const Entry& entry) const;
 };
 
+/// Which updates of a log gave results, and which of them went on from the one before.
+struct LoggedResults {
+    struct Result {
+        std::string digest;
+        bool went_on = false;
+    };
+    std::map<long long, Result> of_update;
+    /// Of the last one, and of the one that began anew from which it follows; 0 without any.
+    long long last = 0, begin_of_last = 0;
+};
+/// Throws IoError, InvalidInput.
+LoggedResults logged_results(const std::filesystem::path& log, const std::string& patient_digest);
+
+/// Computes those updates again from the one of number `from` on, each from what the one before gave where it went on
+/// from it. Calls `each` with the job and what it gave.
+void compute_again(const ServedPatient& patient, const NamedPoints& targets, const std::filesystem::path& log,
+                   const LoggedResults& results, long long from,
+                   const std::function<void(const Job&, const std::shared_ptr<const Products>&)>& each);
+
 /// Repeats every update of a log that gave a result. Calls `each` with its number and whether the bits are the same.
-void replay(const ServedPatient& patient, NamedPoints targets, const std::filesystem::path& log,
+void replay(const ServedPatient& patient, const NamedPoints& targets, const std::filesystem::path& log,
             const std::function<void(long long number, bool same)>& each);
 
 }  // namespace tissuewarp::server

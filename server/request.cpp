@@ -81,10 +81,13 @@ void take_option(Request& request, const std::string& key, const json& value) {
         request.align = truth(key, value);
     else if (key == "error_estimate")
         request.error_estimate = truth(key, value);
+    else if (key == "begin_anew")
+        request.begin_anew = truth(key, value);
     else
         throw InvalidInput("there is no \"" + key.substr(0, 60) +
                            "\" in a request; keys are do, sequence, use, send, names, file, surface_sd_mm, "
-                           "points_sd_mm, curves_sd_mm, rounds, tolerance_mm, fade_mm, align and error_estimate");
+                           "points_sd_mm, curves_sd_mm, rounds, tolerance_mm, fade_mm, align, error_estimate and "
+                           "begin_anew");
 }
 
 /// Nested without end it would take the stack of whoever frees it.

@@ -21,6 +21,7 @@ struct Request {
     int rounds = 8;
     double tolerance_mm = 0.05, fade_mm = 60;
     bool align = true, error_estimate = true;
+    bool begin_anew = false;  ///< with the rigid placement, rather than where the last update ended
 };
 
 /// Throws InvalidInput, naming the key, its value and what it may be.

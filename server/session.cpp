@@ -43,8 +43,9 @@ Session::~Session() {
     computing_.join();
 }
 
-/// The scene as the log leaves it, and its last update once more.
+/// The scene as the log leaves it, what updates go on from, and the last update once more.
 void Session::go_on() {
+    const LoggedResults results = logged_results(options_.log, patient_.digest);
     Recalled recalled{std::move(scene_), {}};
     std::optional<Job> last;
     read_journal(options_.log, patient_.digest, [&](const Entry& entry) {
@@ -57,7 +58,12 @@ void Session::go_on() {
     if (!last) return;
     updates_ = last->number;
     outbox_.note(fmt::format("the log goes to state {}; update {} is computed again", scene_.state(), last->number));
-    next_ = std::move(last);
+    compute_again(patient_, options_.targets, options_.log, results, results.begin_of_last,
+                  [&](const Job&, const std::shared_ptr<const Products>& products) { last_ = products; });
+    if (last_ && results.last == last->number)
+        tell(*last, *last_, {});
+    else
+        next_ = std::move(last);
 }
 
 void Session::receive(std::uint32_t client, Frame frame) {
@@ -221,6 +227,7 @@ void Session::compute_jobs() {
     Computer computer(patient_);
     while (true) {
         std::shared_ptr<Running> running;
+        std::shared_ptr<const Products> before;
         {
             std::unique_lock lock(mutex_);
             running_.reset();
@@ -228,6 +235,7 @@ void Session::compute_jobs() {
             if (ending_) return;
             running = running_ = std::make_shared<Running>(std::move(*next_));
             next_.reset();
+            before = last_;
         }
         const Job& job = running->job;
         outbox_.show(shown({6, "busy", fmt::format("update {} of state {}", job.number, job.state)}));
@@ -236,7 +244,7 @@ void Session::compute_jobs() {
             refuse(job.client, job.request, status, why);
         };
         try {
-            Products products = computer.compute(job, *running);
+            Products products = computer.compute(job, before.get(), *running);
             if (running->cancelled) throw Cancelled();
             finish(job, std::move(products), running->notes);
         } catch (const Cancelled&) {
@@ -250,15 +258,18 @@ void Session::compute_jobs() {
     }
 }
 
-/// What it is worth is said before it is shown.
 void Session::finish(const Job& job, Products made, const std::vector<std::string>& notes) {
-    const auto kept = std::make_shared<const Products>(std::move(made));
-    const Products& products = *kept;
+    const auto products = std::make_shared<const Products>(std::move(made));
     {
         const std::scoped_lock lock(mutex_);
-        last_ = kept;  // before the answer, after which it may be asked for
+        last_ = products;  // before the answer, after which it may be asked for
     }
-    log(Entry::Kind::Result, job.client, logged(job, products));
+    log(Entry::Kind::Result, job.client, logged(job, *products));
+    tell(job, *products, notes);
+}
+
+/// What it is worth is said before it is shown.
+void Session::tell(const Job& job, const Products& products, const std::vector<std::string>& notes) {
     const long long newest = newest_state_;
     outbox_.show(shown(status_of(job, products, newest)));
     if (job.client > 0) outbox_.send(job.client, said(answer(job, products, job.request.sequence, newest, notes)));

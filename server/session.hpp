@@ -72,6 +72,7 @@ private:
     void cancel(const std::string& why);
     void compute_jobs();
     void finish(const Job& job, Products made, const std::vector<std::string>& notes);
+    void tell(const Job& job, const Products& products, const std::vector<std::string>& notes);
     void refuse(std::uint32_t client, const Request& request, const std::string& status, const std::string& why);
     void go_on();
     void log(Entry::Kind kind, std::uint32_t client, ByteView payload);
@@ -93,7 +94,7 @@ private:
     std::deque<Received> inbox_;
     std::optional<Job> next_;
     std::shared_ptr<Running> running_;
-    std::shared_ptr<const Products> last_;  // for save
+    std::shared_ptr<const Products> last_;  // that gave a result: the next update goes on from it
     bool ending_ = false;
     std::atomic<long long> newest_state_ = 0;
     std::atomic<std::uint64_t> waiting_bytes_ = 0;

@@ -166,6 +166,8 @@ void bind_results(py::module_& module) {
         .def_readonly("engine", &UpdateResult::engine)
         .def_readonly("min_jacobian", &UpdateResult::min_jacobian)
         .def_readonly("cut_short", &UpdateResult::cut_short)
+        .def_property_readonly("began_at_last", [](const UpdateResult& result) { return result.beginning.at_last; })
+        .def_property_readonly("why_begun_anew", [](const UpdateResult& result) { return result.beginning.why; })
         .def_readonly("doubts", &UpdateResult::doubts)
         .def_property_readonly("times", [](const UpdateResult& result) {
             std::map<std::string, double> seconds;

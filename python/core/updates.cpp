@@ -55,8 +55,10 @@ std::unique_ptr<Updater> make_updater(std::shared_ptr<PreparedModel> model, cons
     });
 }
 
-UpdateResult update(Updater& updater, const Intraoperative& seen, py::object progress) {
-    return observed(std::move(progress), [&](Observer& observer) { return updater.update(seen, observer); });
+UpdateResult update(Updater& updater, const Intraoperative& seen, const UpdateResult* last, py::object progress) {
+    return observed(std::move(progress), [&](Observer& observer) {
+        return last ? updater.go_on(*last, seen, observer) : updater.update(seen, observer);
+    });
 }
 
 }  // namespace
@@ -85,7 +87,7 @@ void bind_updates(py::module_& module) {
              py::arg("device"), py::arg("gpu_index"));
     py::class_<Updater>(module, "Updater")
         .def(py::init(&make_updater), py::arg("model"), py::arg("options"), py::arg("progress"))
-        .def("update", &update, py::arg("seen"), py::arg("progress"));
+        .def("update", &update, py::arg("seen"), py::arg("last"), py::arg("progress"));
 }
 
 }  // namespace tissuewarp::python

@@ -112,7 +112,7 @@ class Updater:
         self._core = _core.Updater(model._core, options, progress)
 
     def update(self, *, labels=None, image=None, contrasts: Sequence = (), surface=None, points=None, curves=None,
-               start=None, grid=None, progress: Progress = None) -> Result:
+               start=None, grid=None, last: Optional[Result] = None, progress: Progress = None) -> Result:
         """Registers the model to what was seen: any of these, alone or together. One update at a time.
 
         labels     label map with the numbers of the preoperative one
@@ -124,6 +124,9 @@ class Updater:
         start      (4, 4), moving → fixed, LPS mm: where the organ is known to lie, in place of the headers' placement
         grid       image on whose voxels results are given by default; None: that of `image` or `labels`, or else the
                    preoperative one, carried along by the placement
+        last       result of an earlier update of the same model, from which this one goes on in a fraction of the time;
+                   where what is seen does not agree with it, the update is made from its beginning
+                   (Result.why_begun_anew)
         progress   called as progress(stage, fraction in [0, 1]); returning False ends with Cancelled
 
         Raises InvalidInput, SolverFailure, GpuUnavailable, Cancelled.
@@ -140,7 +143,7 @@ class Updater:
         if not self._busy.acquire(blocking=False):
             raise InvalidInput("this Updater is at work already; wait for its update, or make another Updater")
         try:
-            result = self._core.update(seen, progress)
+            result = self._core.update(seen, None if last is None else last._core, progress)
         finally:
             self._busy.release()
         shown = next((given for given in (grid, image, labels) if given is not None), None)

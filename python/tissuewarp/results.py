@@ -84,6 +84,16 @@ class Result:
         return self._core.doubts + estimated
 
     @property
+    def began_at_last(self) -> bool:
+        """Whether the update went on from an earlier one."""
+        return self._core.began_at_last
+
+    @property
+    def why_begun_anew(self) -> str:
+        """Why it did not, where it was given one; or empty."""
+        return self._core.why_begun_anew
+
+    @property
     def times(self) -> Dict[str, float]:
         """Seconds by stage."""
         return self._core.times

@@ -5,6 +5,7 @@
 #include "registration/loads/unknown_loads.hpp"
 #include "registration/springs/ground_springs.hpp"
 
+#include <cmath>
 #include <utility>
 
 namespace tissuewarp::registration::detail {
@@ -18,6 +19,32 @@ Eigen::VectorXd forces_of(const std::vector<tled::Spring>& springs, Eigen::Index
 }
 
 }  // namespace
+
+LoadSearch::LoadSearch(std::shared_ptr<const KindOfLoads> of, const SizePrior& expected_size,
+                       const Posterior& with_data)
+    : kind(std::move(of)), expected(expected_size), fit(kind->known, with_data) {}
+
+Eigen::Matrix3Xd FoundLoads::forces() const {
+    if (!search) return {};
+    const Eigen::VectorXd forces = search->kind->forces * coefficients;
+    return Eigen::Map<const Eigen::Matrix3Xd>(forces.data(), 3, forces.size() / 3);
+}
+
+double difference_mm(const FoundLoads& a, const FoundLoads& b) {
+    const Eigen::MatrixXd moved = a.search->fit.answers(a.coefficients - b.coefficients);
+    return std::sqrt(3 * moved.squaredNorm() / double(moved.size()));
+}
+
+FoundLoads found_beside(const FoundLoads& acting, const Eigen::Matrix3Xd& displacement) {
+    const LoadSearch& search = *acting.search;
+    const Eigen::VectorXd work =
+        search.fit.work_without(acting.coefficients, search.kind->forces.transpose() * displacement.reshaped());
+    const double size = search.fit.likeliest_size(work, search.expected);
+    const Eigen::VectorXd next = search.fit.coefficients(work, size);
+    constexpr double half =
+        0.5;  // a round answers loads by less than (K + K_d)⁻¹ B a: full steps swing about what is right
+    return {size, acting.coefficients + half * (next - acting.coefficients), acting.search};
+}
 
 FoundLoads LoadFinder::find(LoadKind kind, const LastPulls& given, Observer& observer) {
     LastPulls pulls = given;
@@ -43,30 +70,29 @@ std::pair<Eigen::MatrixXd, Eigen::MatrixXd> LoadFinder::loads(LoadKind kind, con
     return {principal.loads, same ? principal.loads : bends_along(prepared_, principal.axes)};
 }
 
-const LoadFinder::Shapes& LoadFinder::shapes(LoadKind kind, const PreparedModel& model, const WeighedSprings& unseen) {
-    std::optional<Shapes>& shapes = shapes_[static_cast<std::size_t>(kind)];
+std::shared_ptr<const KindOfLoads> LoadFinder::shapes(LoadKind kind, const PreparedModel& model,
+                                                      const WeighedSprings& unseen) {
+    std::shared_ptr<const KindOfLoads>& shapes = shapes_[static_cast<std::size_t>(kind)];
     if (!shapes) {
         auto [fitted, applied] = loads(kind, model);
         LoadShapes known(std::move(fitted), Posterior(model, unseen), unseen.energy);
         Eigen::MatrixXd forces = known.scale() * applied;
-        shapes.emplace(Shapes{std::move(known), std::move(forces)});
+        shapes = std::make_shared<const KindOfLoads>(KindOfLoads{std::move(known), std::move(forces)});
     }
-    return *shapes;
+    return shapes;
 }
 
 FoundLoads LoadFinder::found(LoadKind kind, const PreparedModel& model, const LastPulls& pulls) {
-    const WeighedSprings unseen = without_data(pulls), seen = with_data(pulls);
-    const Shapes& of_kind = shapes(kind, model, unseen);
-    const Posterior posterior(model, seen);
-    const LoadFit fit(of_kind.known, posterior);
-    const Eigen::VectorXd shown =
-        posterior.inverse(forces_of(pulls.of(Origin::Datum), 3 * Eigen::Index{model.rest.node_count}));
-    const double size = kind == LoadKind::Bends
-                            ? fit.likeliest_size(shown, {expected_bend_mm(model) / of_kind.known.deviation_mm(),
-                                                         bend_draws.log_deviation})
-                            : fit.likeliest_size(shown);
-    const Eigen::VectorXd forces = of_kind.forces * fit.coefficients(shown, size);
-    return {Eigen::Map<const Eigen::Matrix3Xd>(forces.data(), 3, forces.size() / 3), size};
+    auto of_kind = shapes(kind, model, without_data(pulls));
+    SizePrior expected;
+    if (kind == LoadKind::Bends)
+        expected = {expected_bend_mm(model) / of_kind->known.deviation_mm(), bend_draws.log_deviation};
+    const Posterior posterior(model, with_data(pulls));
+    const auto search = std::make_shared<const LoadSearch>(std::move(of_kind), expected, posterior);
+    const Eigen::VectorXd work = search->fit.work(
+        posterior.inverse(forces_of(pulls.of(Origin::Datum), 3 * Eigen::Index{model.rest.node_count})));
+    const double size = search->fit.likeliest_size(work, expected);
+    return {size, search->fit.coefficients(work, size), search};
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -5,15 +5,11 @@
 #include "registration/options.hpp"
 
 #include <array>
+#include <memory>
 #include <optional>
 #include <utility>
 
 namespace tissuewarp::registration::detail {
-
-struct FoundLoads {
-    Eigen::Matrix3Xd forces;  ///< on the model's nodes, 3 × N, mN
-    double size = 0;          ///< s of load_fit.hpp
-};
 
 /// What may act on the tissue.
 enum class LoadKind {
@@ -27,6 +23,40 @@ struct LoadBudget {
     double left_for_weight = 0.9;  ///< chosen on the brain shift from labels in 3 s, which half overran by 6 %
 };
 inline constexpr LoadBudget load_budget{};
+
+/// The shapes of one kind.
+struct KindOfLoads {
+    LoadShapes known;        ///< of the model that they are found on, the coarser one or the model itself
+    Eigen::MatrixXd forces;  ///< theirs on the nodes of the model
+};
+
+/// How loads were found of data that pull by some springs, to find others of data that pull by similar ones.
+struct LoadSearch {
+    /// `expected` is the size that is expected beforehand.
+    LoadSearch(std::shared_ptr<const KindOfLoads> of, const SizePrior& expected, const Posterior& with_data);
+    LoadSearch(const LoadSearch&) = delete;
+    LoadSearch& operator=(const LoadSearch&) = delete;
+
+    std::shared_ptr<const KindOfLoads> kind;
+    SizePrior expected;
+    LoadFit fit;
+};
+
+struct FoundLoads {
+    double size = 0;               ///< s of load_fit.hpp
+    Eigen::VectorXd coefficients;  ///< and a
+    std::shared_ptr<const LoadSearch> search;
+
+    /// On the model's nodes, 3 × N, mN; 3 × 0 where none were found.
+    [[nodiscard]] Eigen::Matrix3Xd forces() const;
+};
+
+/// Root mean square of the displacements that the two differ by, mm. Of one search.
+double difference_mm(const FoundLoads& a, const FoundLoads& b);
+
+/// After a displacement (3 × N, mm, moving frame) under these and what data pull now: half a step towards those that
+/// data show now (LoadFit::work_without).
+FoundLoads found_beside(const FoundLoads& acting, const Eigen::Matrix3Xd& displacement);
 
 class LoadFinder {
 public:
@@ -51,16 +81,13 @@ private:
     const PreparedModel& prepared_;
     TissuePrior tissue_;
     std::optional<PreparedModel> twin_;  // where it was not prepared
-    struct Shapes {
-        LoadShapes known;        // of the twin, or of the model
-        Eigen::MatrixXd forces;  // theirs on the model's nodes
-    };
-    std::array<std::optional<Shapes>, 2> shapes_;  // of each kind
+    std::array<std::shared_ptr<const KindOfLoads>, 2> shapes_;
 
     [[nodiscard]] const PreparedModel& twin(Observer& observer);
     /// On the model that they are found on, and the same on the model itself.
     [[nodiscard]] std::pair<Eigen::MatrixXd, Eigen::MatrixXd> loads(LoadKind kind, const PreparedModel& model) const;
-    [[nodiscard]] const Shapes& shapes(LoadKind kind, const PreparedModel& model, const WeighedSprings& unseen);
+    [[nodiscard]] std::shared_ptr<const KindOfLoads> shapes(LoadKind kind, const PreparedModel& model,
+                                                            const WeighedSprings& unseen);
     [[nodiscard]] FoundLoads found(LoadKind kind, const PreparedModel& model, const LastPulls& pulls);
 };
 

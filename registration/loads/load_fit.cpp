@@ -28,8 +28,16 @@ LoadFit::LoadFit(const LoadShapes& shapes, const Posterior& seen)
     information_ = modes.eigenvalues().cwiseMax(0.0);
 }
 
-double LoadFit::likeliest_size(const Eigen::VectorXd& shown, const SizePrior& prior) const {
-    const Eigen::ArrayXd b = axes_.transpose() * (shapes_.forces_.transpose() * shown) / shapes_.energy_;
+Eigen::MatrixXd LoadFit::work(const Eigen::MatrixXd& shown) const {
+    return shapes_.forces_.transpose() * shown;
+}
+
+Eigen::VectorXd LoadFit::work_without(const Eigen::VectorXd& acting, const Eigen::VectorXd& work) const {
+    return work - shapes_.forces_.transpose() * (answers_ * acting);
+}
+
+double LoadFit::likeliest_size(const Eigen::VectorXd& work, const SizePrior& prior) const {
+    const Eigen::ArrayXd b = axes_.transpose() * work / shapes_.energy_;
     double best = -std::numeric_limits<double>::infinity(), size = 0;
     for (int power = load_sizes.least_power; power <= load_sizes.most_power; ++power) {
         const double squared = std::pow(2.0, power);
@@ -44,10 +52,9 @@ double LoadFit::likeliest_size(const Eigen::VectorXd& shown, const SizePrior& pr
     return size;
 }
 
-Eigen::MatrixXd LoadFit::coefficients(const Eigen::MatrixXd& shown, double size) const {
+Eigen::MatrixXd LoadFit::coefficients(const Eigen::MatrixXd& work, double size) const {
     const Eigen::VectorXd variances = (information_ + 1 / (size * size)).inverse();
-    return axes_ *
-           (variances.asDiagonal() * (axes_.transpose() * (shapes_.forces_.transpose() * shown) / shapes_.energy_));
+    return axes_ * (variances.asDiagonal() * (axes_.transpose() * work / shapes_.energy_));
 }
 
 Eigen::MatrixXd LoadFit::flexibility_between(const std::vector<int>& nodes, double size) const {

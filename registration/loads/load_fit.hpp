@@ -53,11 +53,19 @@ public:
     /// `seen` is of the data's and the prior's springs; both outlive this.
     LoadFit(const LoadShapes& shapes, const Posterior& seen);
 
-    /// The likeliest s where the data show the displacement u₀ (3N, mm).
-    [[nodiscard]] double likeliest_size(const Eigen::VectorXd& shown, const SizePrior& prior = {}) const;
+    /// What loads of size 1 do on displacements u₀ (3N × k, mm) that data show without them, Bᵀ u₀: count × k, mN mm.
+    [[nodiscard]] Eigen::MatrixXd work(const Eigen::MatrixXd& shown) const;
+    /// The same by their work Bᵀ u on the displacement u under data and loads `acting`: u₀ = u − (K + K_d)⁻¹ B a. A
+    /// little wrong where data pull by other springs K_d now; loads found by it again and again are right all the same,
+    /// since in (M + s⁻²) a = Bᵀ (u − (K + K_d)⁻¹ B a)/ε these springs cancel, and (Bᵀ K⁻¹ B/ε + s⁻²) a = Bᵀ u/ε is
+    /// left.
+    [[nodiscard]] Eigen::VectorXd work_without(const Eigen::VectorXd& acting, const Eigen::VectorXd& work) const;
 
-    /// The mean of a under loads of size s, for each u₀ (3N × k, mm): count × k.
-    [[nodiscard]] Eigen::MatrixXd coefficients(const Eigen::MatrixXd& shown, double size) const;
+    /// The likeliest s by that work on what data show.
+    [[nodiscard]] double likeliest_size(const Eigen::VectorXd& work, const SizePrior& prior = {}) const;
+
+    /// The mean of a under loads of size s: count × k.
+    [[nodiscard]] Eigen::MatrixXd coefficients(const Eigen::MatrixXd& work, double size) const;
 
     /// What loads of these coefficients do to tissue that data hold, (K + K_d)⁻¹ B a, 3N × k, mm.
     [[nodiscard]] Eigen::MatrixXd answers(const Eigen::MatrixXd& coefficients) const { return answers_ * coefficients; }

@@ -16,7 +16,7 @@ Eigen::MatrixXd LoadedPosterior::inverse(const Eigen::MatrixXd& forces) const {
 
 Eigen::MatrixXd LoadedPosterior::of_loads(const Eigen::MatrixXd& shown) const {
     if (!fit_) return Eigen::MatrixXd::Zero(shown.rows(), shown.cols());
-    return fit_->answers(fit_->coefficients(shown, loads_->size));
+    return fit_->answers(fit_->coefficients(fit_->work(shown), loads_->size));
 }
 
 Eigen::MatrixXd LoadedPosterior::inverse_between(const std::vector<int>& nodes) const {

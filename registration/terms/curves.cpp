@@ -121,9 +121,18 @@ std::vector<CurveMatch> CurveTerm::matches(const State& state, double reach_mm) 
 
 Alignment CurveTerm::pose(const Eigen::Isometry3d& start, Observer& observer) {
     const double scale_mm = curve_pose_options.bending_mm + final_scale_mm();
-    pose_ = search_curve_pose({samples_, segments_}, data_, start, scale_mm, options_.max_angle_deg);
-    tell_what_headers_decide(*pose_, "the points along vessels", observer);
-    return {pose_->chosen.placement, pose_->chosen.typical_distance_mm(scale_mm)};
+    const ChosenPose found = search_curve_pose({samples_, segments_}, data_, start, scale_mm, options_.max_angle_deg);
+    tell_what_headers_decide(found, "the points along vessels", observer);
+    rival_mm_ = found.rival_mm;
+    rival_support_ = found.rival_support();
+    return {found.chosen.placement, found.chosen.typical_distance_mm(scale_mm)};
+}
+
+bool CurveTerm::take_over(const UpdateResult& last) {
+    if (!last.curves) return false;
+    rival_mm_ = last.curves->rival_mm;
+    rival_support_ = last.curves->rival_support;
+    return true;
 }
 
 /// A place (1 − α) a + α b on a segment moves with both ends: K (1 − α) at a and K α at b, each drawn by the same way,
@@ -187,8 +196,8 @@ CurveFit CurveTerm::fit(const State& state) const {
     }
     fit.inlier_share = inliers / double(fit.points);
     fit.residual_mm = inliers > 0 ? std::sqrt(squared / inliers) : final_scale_mm();
-    fit.rival_mm = pose_ ? pose_->rival_mm : 0;
-    fit.rival_support = pose_ ? pose_->rival_support() : 0;
+    fit.rival_mm = rival_mm_;
+    fit.rival_support = rival_support_;
     for (const meshing::Segment& segment : segments_)
         fit.length_mm += (samples_.col(segment.ends[1]) - samples_.col(segment.ends[0])).norm();
     return fit;

@@ -42,6 +42,7 @@ public:
     [[nodiscard]] PoseClaim pose_claim() const override { return PoseClaim::NearStart; }
     /// The rigid placement that brings most points to the lines at rest (search_curve_pose).
     [[nodiscard]] Alignment pose(const Eigen::Isometry3d& start, Observer& observer) override;
+    [[nodiscard]] bool take_over(const UpdateResult& last) override;
 
     /// Pulls on the tissue of the lines, across them alone. The scale of the robust weights falls from three times the
     /// median distance in the first round. Throws InvalidInput when no point lies near a line.
@@ -54,11 +55,11 @@ private:
     const CurveOptions& options_;
     double energy_;  // mN mm
     CurvePoints data_;
-    Eigen::Matrix3Xd samples_;                // of the lines, those in the model, moving frame
-    std::vector<meshing::Location> places_;   // of the samples
-    std::vector<meshing::Segment> segments_;  // between them
-    FallingScale scale_;                      // of the robust weights
-    std::optional<ChosenPose> pose_;          // where one was searched
+    Eigen::Matrix3Xd samples_;                 // of the lines, those in the model, moving frame
+    std::vector<meshing::Location> places_;    // of the samples
+    std::vector<meshing::Segment> segments_;   // between them
+    FallingScale scale_;                       // of the robust weights
+    double rival_mm_ = 0, rival_support_ = 0;  // as CurveFit's, where a pose was searched
 
     void take_lines(const std::vector<Eigen::Matrix3Xd>& lines);
     void join_samples(int first, int last);

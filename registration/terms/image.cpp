@@ -160,6 +160,11 @@ std::optional<Eigen::Isometry3d> ImageTerm::rigid_motion() const {
     return deforms ? std::nullopt : std::optional(motion);
 }
 
+bool ImageTerm::take_over(const UpdateResult& last) {
+    has_placed_ = last.pulls.prior_moves == PriorMoves::WithData;
+    return !shows_echoes();
+}
+
 const std::vector<ImageTerm::PulledMatch>& ImageTerm::pulled(const State& state) {
     const Eigen::Isometry3d back = state.placement.inverse();
     memory_.pulled.resize(found_.matches.size());

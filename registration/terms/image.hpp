@@ -90,6 +90,8 @@ public:
     /// headers are far off or a rigid motion explains nearly all; the placement then follows the tissue in view. Throws
     /// InvalidInput when too few blocks were found.
     [[nodiscard]] Alignment pose(const Eigen::Isometry3d& start, Observer& observer) override;
+    /// False of ultrasound: its doubts are about the poses that a search tells apart.
+    [[nodiscard]] bool take_over(const UpdateResult& last) override;
     [[nodiscard]] bool has_placed() const override { return has_placed_; }
     [[nodiscard]] int searches() const override { return search_.count(); }
     [[nodiscard]] bool gains() const override { return search_.gains(); }

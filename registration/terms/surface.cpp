@@ -72,9 +72,17 @@ double SurfaceTerm::final_scale_mm() const {
 }
 
 Alignment SurfaceTerm::pose(const Eigen::Isometry3d& /*start*/, Observer& observer) {
-    pose_ = search_surface_pose(meshing::SurfaceTree(surface_.at_rest), surface_.at_rest, data_, alignment_, observer);
-    tell_what_headers_decide(pose_.pose, "the points", observer);
-    return {pose_.pose.chosen.placement, pose_.pose.chosen.typical_distance_mm(pose_.scale_mm)};
+    const SurfacePose found =
+        search_surface_pose(meshing::SurfaceTree(surface_.at_rest), surface_.at_rest, data_, alignment_, observer);
+    tell_what_headers_decide(found.pose, "the points", observer);
+    pose_ = {found.scale_mm > 0, found.pose.rival_mm, found.pose.rival_support()};
+    return {found.pose.chosen.placement, found.pose.chosen.typical_distance_mm(found.scale_mm)};
+}
+
+bool SurfaceTerm::take_over(const UpdateResult& last) {
+    if (!last.surface) return false;
+    pose_ = {last.surface->pose_searched, last.surface->rival_mm, last.surface->rival_support};
+    return true;
 }
 
 std::vector<SurfaceTerm::Match> SurfaceTerm::matches(const State& state, double reach_mm) const {
@@ -167,9 +175,9 @@ SurfaceFit SurfaceTerm::fit(const State& state) const {
     fit.inlier_share = inliers / double(found.size());
     fit.residual_mm = inliers > 0 ? std::sqrt(squared / inliers) : limit;
     fit.coverage = area / surface_.area();
-    fit.pose_searched = pose_.scale_mm > 0;
-    fit.rival_mm = pose_.pose.rival_mm;
-    fit.rival_support = pose_.pose.rival_support();
+    fit.pose_searched = pose_.searched;
+    fit.rival_mm = pose_.rival_mm;
+    fit.rival_support = pose_.rival_support;
     return fit;
 }
 

@@ -51,6 +51,7 @@ public:
     [[nodiscard]] HardlyTold hardly_told() const override { return hardly_told_motions.surface; }
     /// The rigid placement, searched for all over the organ. Throws Cancelled.
     [[nodiscard]] Alignment pose(const Eigen::Isometry3d& start, Observer& observer) override;
+    [[nodiscard]] bool take_over(const UpdateResult& last) override;
 
     /// Pulls of the points on the surface of the deformed mesh, along the normals alone. Throws InvalidInput when no
     /// point lies near the model.
@@ -65,6 +66,12 @@ private:
         double distance_mm = 0;                            // along it, from the surface to the point
     };
 
+    /// What the search for the placement told.
+    struct PoseFound {
+        bool searched = false;
+        double rival_mm = 0, rival_support = 0;
+    };
+
     const PreparedModel& prepared_;
     const SurfaceOptions& options_;
     const AlignmentOptions& alignment_;
@@ -72,7 +79,7 @@ private:
     OrganSurface surface_;
     double energy_;       // mN mm that one standard deviation weighs
     FallingScale scale_;  // of the robust weights
-    SurfacePose pose_;
+    PoseFound pose_;
     bool inward_;  // the normals that were given, where the headers place the points
 
     [[nodiscard]] bool normals_point_inwards() const;

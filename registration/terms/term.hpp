@@ -67,6 +67,10 @@ public:
     /// The rigid placement, near `start` where the claim is no more than that. Throws InvalidInput, Cancelled.
     [[nodiscard]] virtual Alignment pose(const Eigen::Isometry3d& start, Observer& observer);
 
+    /// Takes over what a search for the placement told an earlier update, in which its data were nearly the same. False
+    /// where the search must be made again.
+    [[nodiscard]] virtual bool take_over(const UpdateResult& /*last*/) { return true; }
+
     /// What its data tell badly of the placement.
     [[nodiscard]] virtual HardlyTold hardly_told() const { return {}; }
 

@@ -111,6 +111,10 @@ Alignment Terms::pose(Observer& observer) {
     return best.pose(start, observer);
 }
 
+bool Terms::take_over(const UpdateResult& last) {
+    return std::all_of(terms_.begin(), terms_.end(), [&](const auto& term) { return term->take_over(last); });
+}
+
 int Terms::searches() const {
     int most = 0;
     for (const auto& term : terms_) most = std::max(most, term->searches());

@@ -40,6 +40,8 @@ public:
 
     /// The rigid placement by the term that claims most, from where one of a lesser claim shifts the organ.
     [[nodiscard]] Alignment pose(Observer& observer);
+    /// In its place, what the search for it told an earlier update. False where some term must search again.
+    [[nodiscard]] bool take_over(const UpdateResult& last);
     [[nodiscard]] int searches() const;
     [[nodiscard]] bool gains() const;
     /// The sum, springs in the order of their origins.

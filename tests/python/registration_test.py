@@ -117,6 +117,17 @@ class Registration(unittest.TestCase):
             with self.assertRaisesRegex(tissuewarp.InvalidInput, "rigid"):
                 self.updater.update(labels=FIXED_LABELS, start=bad)
 
+    def test_updates_go_on_from_the_last(self):
+        again = self.updater.update(labels=FIXED_LABELS, last=self.result)
+        self.assertTrue(again.began_at_last, again.why_begun_anew)
+        self.assertFalse(self.result.began_at_last)
+        apart = numpy.linalg.norm(again.transform(self.places) - self.result.transform(self.places), axis=1)
+        self.assertLess(apart.mean(), 0.1)
+        pairs = tissuewarp.PointPairs([CENTRE], [CENTRE + SHIFT])
+        other = self.updater.update(points=pairs, last=self.result)
+        self.assertFalse(other.began_at_last)
+        self.assertIn("other kinds of data", other.why_begun_anew)
+
     def test_images_alone(self):
         edge = tissuewarp.suggested_edge_length_without_labels(MOVING_LABELS)
         self.assertGreater(edge, tissuewarp.suggested_edge_length(MOVING_LABELS))

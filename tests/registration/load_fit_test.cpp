@@ -101,7 +101,9 @@ TEST(LoadFit, IsTheMeanUnderThePriorOfSmoothLoads) {
     const detail::Posterior with(prepared, seen), without(prepared, unseen);
     const detail::LoadShapes shapes(detail::principal_bends(prepared, 8).loads, without, energy);
     const detail::LoadFit fit(shapes, with);
-    const VectorXd shown = with.inverse(pulls), found = shown + fit.answers(fit.coefficients(shown, size));
+    const VectorXd shown = with.inverse(pulls), found = shown + fit.answers(fit.coefficients(fit.work(shown), size));
+    const VectorXd acting = fit.coefficients(fit.work(shown), 0.3 * size), both = shown + fit.answers(acting);
+    EXPECT_LT((fit.work_without(acting, fit.work(both)) - fit.work(shown)).norm(), 1e-9 * fit.work(shown).norm());
 
     const MatrixXd answers = without.inverse(units),
                    loads = shapes.scale() * detail::principal_bends(prepared, 8).loads;
@@ -128,12 +130,12 @@ TEST(LoadFit, IsTheMeanUnderThePriorOfSmoothLoads) {
         const Eigen::LLT<MatrixXd> root(c);
         return -0.5 * targets.dot(root.solve(targets)) - root.matrixLLT().diagonal().array().log().sum();
     };
-    const double likeliest = fit.likeliest_size(shown);
+    const double likeliest = fit.likeliest_size(fit.work(shown));
     EXPECT_GT(density(likeliest), density(likeliest * std::sqrt(2.0)));
     EXPECT_GT(density(likeliest), density(likeliest / std::sqrt(2.0)));
-    EXPECT_EQ(fit.likeliest_size(shown, {likeliest / 8, 1e-3}), likeliest / 8);  // certain beforehand
-    EXPECT_EQ(fit.likeliest_size(shown, {likeliest / 8, 1e3}), likeliest);       // as good as unknown
-    const double between_both = fit.likeliest_size(shown, {likeliest / 8, 0.5});
+    EXPECT_EQ(fit.likeliest_size(fit.work(shown), {likeliest / 8, 1e-3}), likeliest / 8);  // certain beforehand
+    EXPECT_EQ(fit.likeliest_size(fit.work(shown), {likeliest / 8, 1e3}), likeliest);       // as good as unknown
+    const double between_both = fit.likeliest_size(fit.work(shown), {likeliest / 8, 0.5});
     EXPECT_LE(between_both, likeliest);
     EXPECT_GT(between_both, likeliest / 8);
 }

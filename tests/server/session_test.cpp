@@ -232,29 +232,59 @@ TEST(Session, WhoSendsNoMessagesIsLetGo) {
     EXPECT_EQ(kept.dropped, std::vector<std::uint32_t>{3});
 }
 
+TEST(Session, UpdatesGoOnFromTheLastUnlessToldOtherwise) {
+    Kept kept;
+    Session session(test::block(), {}, kept);
+    send_pairs(session, 4);
+    session.receive(1, request(update(1)));
+    EXPECT_EQ(kept.answer(1).at("began").at("at_last"), false);
+    send_pairs(session, 4.5);
+    session.receive(1, request(update(2)));
+    EXPECT_EQ(kept.answer(2).at("began").at("at_last"), true);
+    json anew = update(3);
+    anew["begin_anew"] = true;
+    session.receive(1, request(anew));
+    EXPECT_EQ(kept.answer(3).at("began").at("at_last"), false);
+    send_pairs(session, 30);
+    session.receive(1, request(update(4)));
+    EXPECT_THAT(kept.answer(4).at("began").at("why_not"), HasSubstr("moved"));
+    json other = update(5);
+    other["align"] = false;
+    session.receive(1, request(other));
+    EXPECT_EQ(kept.answer(5).at("began").at("at_last"), false);
+}
+
 TEST(Session, ALogGoesOnWithTheSameBits) {
     const tissuewarp::test::TemporaryFolder folder;
     const SessionOptions options{{}, folder / "log", {}};
     const ServedPatient patient = test::block();
-    Bytes organ;
+    const auto ask = [&](Session& session, Kept& kept, int number, double shift) {
+        send_pairs(session, shift);
+        session.receive(1, request(update(number)));
+        return kept.answer(number);
+    };
+    json third;
     {
         Kept kept;
         Session session(patient, options, kept);
-        send_pairs(session, 4);
-        session.receive(1, request(update(1)));
-        organ = kept.shown("organ").bytes;
+        for (int n = 1; n <= 2; ++n) ask(session, kept, n, 4 + 0.5 * n);
+        third = ask(session, kept, 3, 5.5);
+        EXPECT_EQ(third.at("began").at("at_last"), true);
     }
-    Kept kept;
-    Session session(patient, options, kept);
-    EXPECT_EQ(kept.shown("organ").bytes, organ);
-    session.receive(1, request({{"do", "info"}, {"sequence", 5}}));
-    EXPECT_THAT(kept.answer(5).at("why"), HasSubstr("state 2"));
+    {
+        Kept kept;
+        Session session(patient, options, kept);
+        EXPECT_EQ(kept.answer(0).at("digest"), third.at("digest"));
+        EXPECT_EQ(ask(session, kept, 4, 6).at("began").at("at_last"), true);
+        session.receive(1, request({{"do", "info"}, {"sequence", 5}}));
+        EXPECT_THAT(kept.answer(5).at("why"), HasSubstr("state 8"));
+    }
     int updates = 0;
-    replay(patient, {}, options.log, [&](long long, bool same) {
-        EXPECT_TRUE(same);
+    replay(patient, {}, options.log, [&](long long number, bool same) {
+        EXPECT_TRUE(same) << number;
         ++updates;
     });
-    EXPECT_EQ(updates, 1);
+    EXPECT_EQ(updates, 4);
 }
 
 Products doubted() {
