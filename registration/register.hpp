@@ -14,8 +14,8 @@ UpdateResult register_model(const PreparedModel& prepared, Terms& terms, LoadFin
                             const UpdateOptions& options, Observer& observer);
 
 /// The same from where an earlier result ended: `placement` is its, in the frame of the terms' data, `options` and
-/// terms are those of a short course (go_on.hpp). Precondition: the terms have taken over what the search for the
-/// placement told.
+/// terms are those of a short course (course/go_on.hpp). Precondition: the terms have taken over what the search for
+/// the placement told.
 UpdateResult register_on(const UpdateResult& last, const Eigen::Isometry3d& placement, const PreparedModel& prepared,
                          Terms& terms, LoadFinder& loads, tled::Engine& engine, const UpdateOptions& options,
                          Observer& observer);

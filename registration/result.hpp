@@ -181,7 +181,8 @@ struct UpdateResult {
     bool cut_short = false;     ///< by the time budget: the last round was not reached
     std::vector<Doubt> doubts;  ///< empty when there are none
     Beginning beginning;
-    std::shared_ptr<const detail::CarriedOn> carried_on;  ///< beside this result, what updates go on from (go_on.hpp)
+    std::shared_ptr<const detail::CarriedOn>
+        carried_on;  ///< beside this result, what updates go on from (course/go_on.hpp)
 };
 
 }  // namespace tissuewarp::registration

@@ -13,6 +13,7 @@ inline constexpr const char* alignment = "rigid alignment";
 inline constexpr const char* correspondence = "correspondence";
 inline constexpr const char* equilibrium = "equilibrium";
 inline constexpr const char* unknown_loads = "unknown loads";
+inline constexpr const char* judgement = "judgement";       ///< how data and result agree
 inline constexpr const char* in_vain = "going on in vain";  ///< of an update that then began anew
 }  // namespace stages
 

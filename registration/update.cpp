@@ -3,8 +3,8 @@
 #include "core/stopwatch.hpp"
 #include "imaging/labels.hpp"
 #include "registration/boundary/surroundings.hpp"
+#include "registration/course/go_on.hpp"
 #include "registration/engine_choice.hpp"
-#include "registration/go_on.hpp"
 #include "registration/pose/start_pose.hpp"
 #include "registration/register.hpp"
 #include "registration/surroundings/rigid_surroundings.hpp"
@@ -42,7 +42,7 @@ struct Updater::Impl {
     std::shared_ptr<const PreparedModel> prepared;
     UpdateOptions options, short_options;  // of whole courses, and of those that go on from a result
     std::unique_ptr<tled::Engine> solver;
-    std::vector<detail::ImageTools> image_tools;  // for the image of the model and each of its contrasts
+    detail::SharedTools tools;
     detail::LoadFinder load_finder;
 
     Impl(std::shared_ptr<const PreparedModel> model, const UpdateOptions& given, std::unique_ptr<tled::Engine> engine,
@@ -51,13 +51,13 @@ struct Updater::Impl {
           options(given),
           short_options(detail::short_course(given)),
           solver(std::move(engine)),
-          image_tools(image_tools_of(*prepared, options, observer)),
+          tools{image_tools_of(*prepared, options, observer), nullptr},
           load_finder(*prepared, options.tissue) {}
 
     UpdateResult update(const Intraoperative& given, Observer& observer) {
         Stopwatch stopwatch;
         const Intraoperative seen = seen_by_model(given);
-        detail::Terms terms = detail::terms_of(*prepared, seen, options, image_tools);
+        detail::Terms terms = detail::terms_of(*prepared, seen, options, tools);
         const double seconds = stopwatch.lap();
         UpdateResult result = in_fixed_frame(
             detail::register_model(*prepared, terms, load_finder, *solver, options, observer), given, seconds);
@@ -73,7 +73,7 @@ struct Updater::Impl {
         Stopwatch stopwatch;
         const Intraoperative seen = seen_by_model(given);
         try {
-            detail::Terms terms = detail::terms_of(*prepared, seen, short_options, image_tools);
+            detail::Terms terms = detail::terms_of(*prepared, seen, short_options, tools);
             const double seconds = stopwatch.lap();
             if (!terms.take_over(last)) throw BeginAnew{"the placement must be sought for such data"};
             const Eigen::Isometry3d placement = start_of(given).inverse() * last.alignment.placement;

@@ -39,8 +39,8 @@ public:
     /// The same from where an update of this model ended, in a fraction of the time: the placement is not sought, few
     /// rounds are taken, and loads are found with the springs of the last search for them. Where the outcome does not
     /// agree with `last` and with what is seen (why_begin_anew), or none can be found from there, the update is made
-    /// from its beginning, and `beginning` says why. Throws what update() throws; InvalidInput where `last` is of another
-    /// model.
+    /// from its beginning, and `beginning` says why. Throws what update() throws; InvalidInput where `last` is of
+    /// another model.
     UpdateResult go_on(const UpdateResult& last, const Intraoperative& seen, Observer& observer = silent_observer());
 
 private:

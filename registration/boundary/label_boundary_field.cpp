@@ -4,13 +4,18 @@
 #include "imaging/labels.hpp"
 #include "imaging/sampling.hpp"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <optional>
-#include <set>
-#include <tuple>
+#include <utility>
+#include <vector>
 
 namespace tissuewarp::registration {
 
@@ -28,16 +33,60 @@ struct Indicator {
     explicit Indicator(Volume smoothed) : volume(std::move(smoothed)), sampler(volume) {}
 };
 
-/// `smoothing` in voxels.
-std::unique_ptr<Indicator> indicator(const Volume& mask, const imaging::LabelStatistics& box, double smoothing) {
-    const int margin = static_cast<int>(std::ceil(4 * smoothing)) + 2;
+/// Voxels from `lower` to before `upper`.
+struct Box {
+    std::array<int, 3> lower{std::numeric_limits<int>::max(), std::numeric_limits<int>::max(),
+                             std::numeric_limits<int>::max()},
+        upper{0, 0, 0};
+
+    void add(const Box& other) {
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            lower[axis] = std::min(lower[axis], other.lower[axis]);
+            upper[axis] = std::max(upper[axis], other.upper[axis]);
+        }
+    }
+};
+using Boxes = std::map<int, Box>;
+
+/// About each label but 0.
+Boxes boxes_of(const Volume& map) {
+    const auto& size = map.geometry.size;
+    const auto add_slices = [&](const tbb::blocked_range<int>& slices, Boxes boxes) {
+        for (int k = slices.begin(); k < slices.end(); ++k)
+            for (int j = 0; j < size[1]; ++j) {
+                const auto* row = map.data<std::int32_t>() + map.offset(0, j, k);
+                for (int i = 0; i < size[0];) {
+                    const int first = i, label = row[i];
+                    while (i < size[0] && row[i] == label) ++i;
+                    if (label != 0) boxes[label].add({{first, j, k}, {i, j + 1, k + 1}});
+                }
+            }
+        return boxes;
+    };
+    const auto together = [](Boxes boxes, const Boxes& more) {
+        for (const auto& [label, box] : more) boxes[label].add(box);
+        return boxes;
+    };
+    return tbb::parallel_reduce(tbb::blocked_range<int>(0, size[2]), Boxes(), add_slices, together);
+}
+
+/// What is smoothed of a map: a label, or where it is 0 all of them.
+struct Part {
+    int label = 0;
+    Box box;
+    double smoothing = 0;  // voxels
+};
+
+std::unique_ptr<Indicator> indicator(const Volume& map, const Part& part) {
+    const int margin = static_cast<int>(std::ceil(4 * part.smoothing)) + 2;
     std::array<int, 3> lower{}, upper{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
-        lower[axis] = std::max(0, box.lower[axis] - margin);
-        upper[axis] = std::min(mask.geometry.size[axis], box.upper[axis] + margin);
+        lower[axis] = std::max(0, part.box.lower[axis] - margin);
+        upper[axis] = std::min(map.geometry.size[axis], part.box.upper[axis] + margin);
     }
-    const Volume part = imaging::crop(mask, lower, upper);
-    return std::make_unique<Indicator>(imaging::smooth(part, smoothing * part.geometry.spacing.minCoeff()));
+    const Volume there = imaging::crop(map, lower, upper);
+    const Volume mask = part.label == 0 ? imaging::mask_of_all(there) : imaging::mask_of(there, part.label);
+    return std::make_unique<Indicator>(imaging::smooth(mask, part.smoothing * mask.geometry.spacing.minCoeff()));
 }
 
 }  // namespace
@@ -76,22 +125,21 @@ LabelBoundaryField::LabelBoundaryField(const Volume& label_map, const std::map<i
     : impl_(std::make_unique<Impl>()) {
     const Volume map = label_map.as(CV_32S);
     const double voxel_mm = map.geometry.spacing.minCoeff();
-    const auto statistics = imaging::label_statistics(map);
-    imaging::LabelStatistics everything;
-    everything.lower = map.geometry.size;
-    for (const auto& [label, box] : statistics) {
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            everything.lower[axis] = std::min(everything.lower[axis], box.lower[axis]);
-            everything.upper[axis] = std::max(everything.upper[axis], box.upper[axis]);
-        }
+    const Boxes boxes = boxes_of(map);
+    if (boxes.empty()) throw InvalidInput("the label map is empty: there is no boundary to match");
+    std::vector<Part> parts(1);
+    parts[0].smoothing = options.most_smoothing;
+    for (const auto& [label, box] : boxes) {
+        parts[0].box.add(box);
         const auto thickness = thickness_mm.find(label);
         if (thickness == thickness_mm.end()) continue;
         const double bearable = options.smoothing_share * thickness->second / voxel_mm;
-        const double smoothing = std::clamp(bearable, options.least_smoothing, options.most_smoothing);
-        impl_->of_label[label] = indicator(imaging::mask_of(map, label), box, smoothing);
+        parts.push_back({label, box, std::clamp(bearable, options.least_smoothing, options.most_smoothing)});
     }
-    if (statistics.empty()) throw InvalidInput("the label map is empty: there is no boundary to match");
-    impl_->of_all = indicator(imaging::mask_of_all(map), everything, options.most_smoothing);
+    std::vector<std::unique_ptr<Indicator>> indicators(parts.size());
+    tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t n) { indicators[n] = indicator(map, parts[n]); });
+    impl_->of_all = std::move(indicators[0]);
+    for (std::size_t n = 1; n < parts.size(); ++n) impl_->of_label[parts[n].label] = std::move(indicators[n]);
     impl_->step = options.step_voxels * voxel_mm;
 }
 

@@ -9,6 +9,10 @@
 #include "registration/pose/label_distance.hpp"
 #include "registration/pose/label_rivals.hpp"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_invoke.h>
+#include <tbb/parallel_reduce.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -26,19 +30,27 @@ using Counts = std::map<int, std::int64_t>;
 
 constexpr LabelFitLimits limits = label_fit_limits;
 
+Counts sum_of(Counts counts, const Counts& more) {
+    for (const auto& [label, voxels] : more) counts[label] += voxels;
+    return counts;
+}
+
 /// Voxels of each label.
 Counts voxels_of(const Volume& labels) {
-    Counts counts;
     const auto* value = labels.data<std::int32_t>();
-    const std::int64_t end = labels.geometry.voxel_count();
-    for (std::int64_t n = 0; n < end;) {
-        const int label = value[n];
-        std::int64_t same = n + 1;
-        while (same < end && value[same] == label) ++same;
-        if (label != 0) counts[label] += same - n;
-        n = same;
-    }
-    return counts;
+    const auto count_runs = [&](const tbb::blocked_range<std::int64_t>& range, Counts counts) {
+        for (std::int64_t n = range.begin(); n < range.end();) {
+            const int label = value[n];
+            std::int64_t same = n + 1;
+            while (same < range.end() && value[same] == label) ++same;
+            if (label != 0) counts[label] += same - n;
+            n = same;
+        }
+        return counts;
+    };
+    constexpr std::int64_t piece = 1 << 18;
+    return tbb::parallel_reduce(tbb::blocked_range<std::int64_t>(0, labels.geometry.voxel_count(), piece), Counts(),
+                                count_runs, sum_of);
 }
 
 /// Area (mm²) of labelled voxels at the faces of the image.
@@ -134,19 +146,22 @@ public:
         : resected_(prepared.options.resected),
           moving_(prepared.labels.as(CV_32S)),
           fixed_(fixed.as(CV_32S)),
-          in_moving_(voxels_of(moving_)),
-          in_fixed_(voxels_of(fixed_)),
           coarse_(coarsened(fixed_, limits.grid_mm)),
-          shown_(labels_of_model(result.deformation, moving_, coarse_.geometry)),
-          after_(overlap(shown_, coarse_)),
-          voxel_mm_(std::max(coarse_.geometry.spacing.maxCoeff(), moving_.geometry.spacing.maxCoeff())) {}
+          voxel_mm_(std::max(coarse_.geometry.spacing.maxCoeff(), moving_.geometry.spacing.maxCoeff())) {
+        tbb::parallel_invoke([&] { in_moving_ = voxels_of(moving_); }, [&] { in_fixed_ = voxels_of(fixed_); },
+                             [&] { before_ = dice_of_all(shown_by(at_rest(result))); },
+                             [&] {
+                                 shown_ = shown_by(result.deformation);
+                                 after_ = overlap(shown_, coarse_);
+                             });
+    }
 
-    [[nodiscard]] std::vector<Doubt> doubts(const UpdateResult& result) const {
+    [[nodiscard]] std::vector<Doubt> doubts() const {
         std::vector<Doubt> doubts;
         doubt_vanished(in_moving_, in_fixed_, resected_, doubts);
         for (const auto& [label, fit] : after_)
             if (label != 0 && is_in_both(label)) doubt_fit(label, fit, doubts);
-        doubt_worse(result, doubts);
+        doubt_worse(doubts);
         doubt_cut(doubts);
         return doubts;
     }
@@ -166,8 +181,17 @@ private:
     Volume moving_, fixed_;
     Counts in_moving_, in_fixed_;
     Volume coarse_, shown_;  // fixed labels and those of the model, on one grid
+    double before_ = 0;      // Dice of all labels together, unregistered
     std::map<int, Overlap> after_;
     double voxel_mm_;
+
+    static Deformation at_rest(const UpdateResult& result) {
+        const meshing::TetMesh& mesh = result.deformation.mesh;
+        return {mesh, Eigen::Matrix3Xd::Zero(3, mesh.nodes.cols()), Eigen::Isometry3d::Identity()};
+    }
+    [[nodiscard]] Volume shown_by(const Deformation& deformation) const {
+        return labels_of_model(deformation, moving_, coarse_.geometry);
+    }
 
     [[nodiscard]] bool is_in_both(int label) const { return in_moving_.contains(label) && in_fixed_.contains(label); }
 
@@ -197,15 +221,12 @@ private:
                               severity});
     }
 
-    void doubt_worse(const UpdateResult& result, std::vector<Doubt>& doubts) const {
-        const meshing::TetMesh& mesh = result.deformation.mesh;
-        const Deformation at_rest{mesh, Eigen::Matrix3Xd::Zero(3, mesh.nodes.cols()), Eigen::Isometry3d::Identity()};
-        const double before = dice_of_all(labels_of_model(at_rest, moving_, coarse_.geometry)),
-                     after = after_.at(0).dice;
-        if (after < before - limits.most_worse)
-            doubts.push_back({"labels.worse", after, before,
-                              "all labels together overlap less than before the registration: Dice " + to_text(before) +
-                                  " → " + to_text(after),
+    void doubt_worse(std::vector<Doubt>& doubts) const {
+        const double after = after_.at(0).dice;
+        if (after < before_ - limits.most_worse)
+            doubts.push_back({"labels.worse", after, before_,
+                              "all labels together overlap less than before the registration: Dice " +
+                                  to_text(before_) + " → " + to_text(after),
                               "leave them where the headers place them, or check the labels"});
     }
 
@@ -278,7 +299,7 @@ std::string why_nothing_matches(const Volume& moving, const Volume& fixed) {
 std::vector<Doubt> doubts_of_labels(const PreparedModel& prepared, const Volume& fixed, const UpdateOptions& options,
                                     const UpdateResult& result) {
     const LabelFits fits(prepared, fixed, result);
-    std::vector<Doubt> doubts = fits.doubts(result);
+    std::vector<Doubt> doubts = fits.doubts();
     const double most_mm = label_pose_limits.most_distance_mm;
     if (result.alignment.mean_distance_mm > most_mm)
         doubts.push_back({"alignment.apart", result.alignment.mean_distance_mm, most_mm,

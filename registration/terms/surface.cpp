@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace tissuewarp::registration::detail {
 
@@ -44,19 +45,20 @@ std::vector<Doubt> doubts_of(const SurfaceFit& fit, double deviation_mm) {
     return doubts;
 }
 
-SurfaceTerm::SurfaceTerm(const PreparedModel& prepared, const SurfacePoints& surface, const SurfaceOptions& options,
-                         const AlignmentOptions& alignment, double energy)
+SurfaceTerm::SurfaceTerm(const PreparedModel& prepared, std::shared_ptr<const OrganSurface> organ,
+                         const SurfacePoints& points, const SurfaceOptions& options, const AlignmentOptions& alignment,
+                         double energy)
     : prepared_(prepared),
       options_(options),
       alignment_(alignment),
-      data_(surface_data(surface)),
-      surface_(prepared),
+      data_(surface_data(points)),
+      surface_(std::move(organ)),
       energy_(energy),
       inward_(normals_point_inwards()) {}
 
 bool SurfaceTerm::normals_point_inwards() const {
     if (!data_.oriented) return false;
-    const meshing::SurfaceTree tree(surface_.at_rest);
+    const meshing::SurfaceTree tree(surface_->at_rest);
     Eigen::Index near = 0, inward = 0;
     for (Eigen::Index n = 0; n < data_.count(); ++n) {
         const auto hit = tree.closest(data_.points.col(n), surface_doubt_limits.headers_reach_mm);
@@ -73,7 +75,7 @@ double SurfaceTerm::final_scale_mm() const {
 
 Alignment SurfaceTerm::pose(const Eigen::Isometry3d& /*start*/, Observer& observer) {
     const SurfacePose found =
-        search_surface_pose(meshing::SurfaceTree(surface_.at_rest), surface_.at_rest, data_, alignment_, observer);
+        search_surface_pose(meshing::SurfaceTree(surface_->at_rest), surface_->at_rest, data_, alignment_, observer);
     tell_what_headers_decide(found.pose, "the points", observer);
     pose_ = {found.scale_mm > 0, found.pose.rival_mm, found.pose.rival_support()};
     return {found.pose.chosen.placement, found.pose.chosen.typical_distance_mm(found.scale_mm)};
@@ -86,7 +88,7 @@ bool SurfaceTerm::take_over(const UpdateResult& last) {
 }
 
 std::vector<SurfaceTerm::Match> SurfaceTerm::matches(const State& state, double reach_mm) const {
-    const meshing::SurfaceTree tree(surface_.deformed(state.displacement));
+    const meshing::SurfaceTree tree(surface_->deformed(state.displacement));
     const Eigen::Isometry3d back = state.placement.inverse();
     const double least_cosine = std::cos(options_.max_angle_deg * EIGEN_PI / 180);
     std::vector<Match> result(static_cast<std::size_t>(data_.count()));
@@ -111,7 +113,7 @@ Pull SurfaceTerm::pull_of(const Match& match, double area, double weight, const 
                           double most_step_mm) const {
     const meshing::TetMesh& mesh = prepared_.model.mesh;
     Pull pull;
-    pull.at = surface_.location(match.hit.triangle, match.hit.barycentric, mesh);
+    pull.at = surface_->location(match.hit.triangle, match.hit.barycentric, mesh);
     const double deviation = std::max(data_.deviation_mm, least_deviation_mm);
     const double stiffness =
         weight * energy_ / (deviation * deviation) * area / (options_.patch_mm * options_.patch_mm);
@@ -174,7 +176,7 @@ SurfaceFit SurfaceTerm::fit(const State& state) const {
     }
     fit.inlier_share = inliers / double(found.size());
     fit.residual_mm = inliers > 0 ? std::sqrt(squared / inliers) : limit;
-    fit.coverage = area / surface_.area();
+    fit.coverage = area / surface_->area();
     fit.pose_searched = pose_.searched;
     fit.rival_mm = pose_.rival_mm;
     fit.rival_support = pose_.rival_support;

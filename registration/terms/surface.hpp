@@ -10,6 +10,7 @@
 #include "registration/terms/organ_surface.hpp"
 #include "registration/terms/term.hpp"
 
+#include <memory>
 #include <vector>
 
 namespace tissuewarp::registration::detail {
@@ -43,8 +44,8 @@ class SurfaceTerm : public Term {
 public:
     /// `energy` is the strain energy (mN mm) that weighs as much as one standard deviation. Throws InvalidInput for
     /// points that cannot be used.
-    SurfaceTerm(const PreparedModel& prepared, const SurfacePoints& surface, const SurfaceOptions& options,
-                const AlignmentOptions& alignment, double energy);
+    SurfaceTerm(const PreparedModel& prepared, std::shared_ptr<const OrganSurface> organ, const SurfacePoints& points,
+                const SurfaceOptions& options, const AlignmentOptions& alignment, double energy);
 
     [[nodiscard]] Shows shows() const override { return Shows::Parts; }
     [[nodiscard]] PoseClaim pose_claim() const override { return PoseClaim::Anywhere; }
@@ -76,7 +77,7 @@ private:
     const SurfaceOptions& options_;
     const AlignmentOptions& alignment_;
     SurfaceData data_;
-    OrganSurface surface_;
+    std::shared_ptr<const OrganSurface> surface_;
     double energy_;       // mN mm that one standard deviation weighs
     FallingScale scale_;  // of the robust weights
     PoseFound pose_;

@@ -152,15 +152,17 @@ void Terms::judge(const State& state, UpdateResult& result) {
 }
 
 Terms terms_of(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options,
-               std::vector<ImageTools>& image_tools) {
-    require_usable(prepared, seen, image_tools.size());
+               SharedTools& tools) {
+    require_usable(prepared, seen, tools.images.size());
     const double energy = strain_energy_unit(prepared, options.tissue);
     std::vector<std::unique_ptr<Term>> terms;
     if (seen.labels) terms.push_back(std::make_unique<LabelTerm>(prepared, *seen.labels, options));
-    if (seen.image) add_images(terms, prepared, seen, options, image_tools, energy);
-    if (seen.surface)
-        terms.push_back(
-            std::make_unique<SurfaceTerm>(prepared, *seen.surface, options.surface, options.alignment, energy));
+    if (seen.image) add_images(terms, prepared, seen, options, tools.images, energy);
+    if (seen.surface) {
+        if (!tools.organ) tools.organ = std::make_shared<const OrganSurface>(prepared);
+        terms.push_back(std::make_unique<SurfaceTerm>(prepared, tools.organ, *seen.surface, options.surface,
+                                                      options.alignment, energy));
+    }
     if (seen.points) terms.push_back(std::make_unique<PointTerm>(prepared, *seen.points, options.points, energy));
     if (seen.curves) terms.push_back(std::make_unique<CurveTerm>(prepared, *seen.curves, options.curves, energy));
     if (!prepared.options.anchors.empty()) terms.push_back(std::make_unique<AnchorTerm>(prepared, energy));

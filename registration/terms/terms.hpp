@@ -5,6 +5,7 @@
 #include "registration/loads/load_finder.hpp"
 #include "registration/matching/dense/image_engine.hpp"
 #include "registration/prepare.hpp"
+#include "registration/terms/organ_surface.hpp"
 #include "registration/terms/term.hpp"
 
 #include <memory>
@@ -60,11 +61,16 @@ private:
     [[nodiscard]] Term& best_placed() const;
 };
 
+/// What the updates of one model share.
+struct SharedTools {
+    std::vector<ImageTools> images;             ///< for the image of the model and each of its contrasts
+    std::shared_ptr<const OrganSurface> organ;  ///< made where points of a surface are first seen
+};
+
 /// Terms of what was seen, of what the model has about it and of the loads stated, with what is expected of tissue that
-/// no datum shows. Model, data and options outlive them; `image_tools`: one for the image of the model and each of its
-/// contrasts. Throws InvalidInput when there is nothing to register to, an image but no model of one, no label in
-/// common, or data that cannot be used.
+/// no datum shows. Model, data, options and tools outlive them. Throws InvalidInput when there is nothing to register
+/// to, an image but no model of one, no label in common, or data that cannot be used.
 Terms terms_of(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options,
-               std::vector<ImageTools>& image_tools);
+               SharedTools& tools);
 
 }  // namespace tissuewarp::registration::detail

@@ -1,6 +1,6 @@
 /// Updates that go on from the last one: as good as those from their beginning while an organ bends bit by bit, and
 /// made from the beginning where what is seen does not agree with the last one.
-#include "registration/go_on.hpp"
+#include "registration/course/go_on.hpp"
 
 #include "core/errors.hpp"
 #include "registration/field.hpp"

@@ -1,4 +1,4 @@
-#include "registration/go_on.hpp"
+#include "registration/course/go_on.hpp"
 
 #include "registration/doubts.hpp"
 

@@ -31,7 +31,9 @@ inline constexpr GoOnLimits go_on_limits{};
 
 /// The rounds of such an update.
 struct GoOnCourse {
-    int rounds = 2;                  ///< that look for what they match. By hand
+    /// That look for what they match. Chosen on labels of the brain shift and the liver's surface
+    /// (docs/lab/performance.md).
+    int rounds = 3;
     int load_rounds = 4;             ///< at most, each under loads found anew. By hand
     double settled_loads_mm = 0.05;  ///< a change of the loads that moves tissue by less is the last. By hand
     double most_growth = 2;          ///< over the change before: they do not lead to loads that data show. By hand
