@@ -62,6 +62,7 @@ const std::map<std::string, std::set<std::string>> rooms_of_registration{
     {"matching", {"field", "springs"}},
     {"pose", {"io"}},
     {"loads", {"pose", "springs"}},
+    {"course", {"loads", "pose"}},
     {"terms", {"boundary", "evaluation", "io", "loads", "matching", "pose", "resection", "springs"}},
     {"uncertainty", {"field", "loads", "pose", "springs"}},
     {"stretch", {"boundary", "evaluation", "pose", "terms"}},
