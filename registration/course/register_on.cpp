@@ -16,7 +16,7 @@ void stand_where_ended(Course& course, const UpdateResult& last, const Eigen::Is
     course.at.state.placement = placement;
     course.at.state.displacement = last.deformation.displacement;
     course.at.result.alignment = last.alignment;
-    course.let_act(last.carried_on->loads);
+    if (course.terms.unknown_loads()) course.let_act(last.carried_on->loads);
 }
 
 /// Loads that acted already change with what data show; where they change ever more, data pull by too different

@@ -41,8 +41,7 @@ FoundLoads found_beside(const FoundLoads& acting, const Eigen::Matrix3Xd& displa
         search.fit.work_without(acting.coefficients, search.kind->forces.transpose() * displacement.reshaped());
     const double size = search.fit.likeliest_size(work, search.expected);
     const Eigen::VectorXd next = search.fit.coefficients(work, size);
-    constexpr double half =
-        0.5;  // a round answers loads by less than (K + K_d)⁻¹ B a: full steps swing about what is right
+    constexpr double half = 0.5;  // a round answers loads by less than linear tissue: full steps swing about the end
     return {size, acting.coefficients + half * (next - acting.coefficients), acting.search};
 }
 
