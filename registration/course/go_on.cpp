@@ -10,8 +10,8 @@ namespace tissuewarp::registration::detail {
 
 namespace {
 
-double farthest(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to) {
-    return std::sqrt((to - from).colwise().squaredNorm().maxCoeff());
+double root_mean_square(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to) {
+    return std::sqrt((to - from).colwise().squaredNorm().mean());
 }
 
 bool grew(const AmountSeen& from, const AmountSeen& to, double most) {
@@ -59,7 +59,8 @@ std::optional<std::string> why_begin_anew(const UpdateResult& last, const Update
     if (grew(carried.seen, amount_seen(now), limits.most_growth))
         return "much more is seen than when the placement was sought";
     const Eigen::Matrix3Xd nodes = now.deformation.deformed_nodes();
-    const double step = farthest(last.deformation.deformed_nodes(), nodes), motion = farthest(carried.nodes, nodes);
+    const double step = root_mean_square(last.deformation.deformed_nodes(), nodes),
+                 motion = root_mean_square(carried.nodes, nodes);
     if (step > limits.most_step_mm) return "tissue has moved by " + to_text(step) + " mm";
     if (motion > limits.most_motion_mm)
         return "tissue has moved by " + to_text(motion) + " mm since the placement was sought";

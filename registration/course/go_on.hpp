@@ -16,8 +16,9 @@ namespace tissuewarp::registration::detail {
 
 /// When the result of an update that went on from an earlier one is not taken.
 struct GoOnLimits {
-    /// From the earlier result: farther than the last rounds look for what they match, tissue may have been drawn to
-    /// something else. By hand, as the search range of the last round.
+    /// From the earlier result, root mean square over the nodes: farther than the last rounds look for what they match,
+    /// tissue may have been drawn to something else. By hand, as the search range of the last round. Not the most of a
+    /// node: where no datum is near, noise of few points moves tissue so far.
     double most_step_mm = 4;
     /// From the update that last sought the placement: poses and loads are of what was seen then. By hand.
     double most_motion_mm = 15;
@@ -37,6 +38,7 @@ struct GoOnCourse {
     int load_rounds = 4;             ///< at most, each under loads found anew. By hand
     double settled_loads_mm = 0.05;  ///< a change of the loads that moves tissue by less is the last. By hand
     double most_growth = 2;          ///< over the change before: they do not lead to loads that data show. By hand
+    double most_load_change_mm = 3;  ///< as much at once does not either. By hand
 };
 inline constexpr GoOnCourse go_on_course{};
 

@@ -5,7 +5,6 @@
 #include "registration/course/go_on.hpp"
 #include "registration/register.hpp"
 
-#include <limits>
 #include <utility>
 
 namespace tissuewarp::registration::detail {
@@ -19,23 +18,26 @@ void stand_where_ended(Course& course, const UpdateResult& last, const Eigen::Is
     if (course.terms.unknown_loads()) course.let_act(last.carried_on->loads);
 }
 
-/// Loads that acted already change with what data show; where they change ever more, data pull by too different
-/// springs, and loads are sought by those.
+void seek_loads(Course& course) {
+    course.find_loads();
+    course.settle_loads();
+}
+
+/// Loads that acted already change with what data show; where they change by far or ever more, data pull by too
+/// different springs, and loads are sought by those.
 void let_loads_follow(Course& course) {
-    double before_mm = std::numeric_limits<double>::infinity();
-    for (int done = 0; course.found.search && !course.at.result.cut_short && done < go_on_course.load_rounds; ++done) {
+    if (!course.found.search || course.at.result.cut_short) return;
+    if (!course.found.search->may_be_followed) return seek_loads(course);
+    double most_mm = go_on_course.most_load_change_mm;
+    for (int done = 0; !course.at.result.cut_short && done < go_on_course.load_rounds; ++done) {
         FoundLoads next = found_beside(course.found, course.at.state.displacement);
         const double change_mm = difference_mm(next, course.found);
         const bool settled = change_mm < go_on_course.settled_loads_mm;
-        if (!settled && change_mm > go_on_course.most_growth * before_mm) {
-            course.find_loads();
-            course.settle_loads();
-            return;
-        }
+        if (!settled && change_mm > most_mm) return seek_loads(course);
         course.let_act(std::move(next));
         course.solve(course.schedule.last());
         if (settled) return;
-        before_mm = change_mm;
+        most_mm = go_on_course.most_growth * change_mm;
     }
 }
 

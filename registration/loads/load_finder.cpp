@@ -21,8 +21,8 @@ Eigen::VectorXd forces_of(const std::vector<tled::Spring>& springs, Eigen::Index
 }  // namespace
 
 LoadSearch::LoadSearch(std::shared_ptr<const KindOfLoads> of, const SizePrior& expected_size,
-                       const Posterior& with_data)
-    : kind(std::move(of)), expected(expected_size), fit(kind->known, with_data) {}
+                       const Posterior& with_data, bool followed)
+    : kind(std::move(of)), expected(expected_size), fit(kind->known, with_data), may_be_followed(followed) {}
 
 Eigen::Matrix3Xd FoundLoads::forces() const {
     if (!search) return {};
@@ -87,7 +87,8 @@ FoundLoads LoadFinder::found(LoadKind kind, const PreparedModel& model, const La
     if (kind == LoadKind::Bends)
         expected = {expected_bend_mm(model) / of_kind->known.deviation_mm(), bend_draws.log_deviation};
     const Posterior posterior(model, with_data(pulls));
-    const auto search = std::make_shared<const LoadSearch>(std::move(of_kind), expected, posterior);
+    const bool followed = kind == LoadKind::Weight || &model == &prepared_;
+    const auto search = std::make_shared<const LoadSearch>(std::move(of_kind), expected, posterior, followed);
     const Eigen::VectorXd work = search->fit.work(
         posterior.inverse(forces_of(pulls.of(Origin::Datum), 3 * Eigen::Index{model.rest.node_count})));
     const double size = search->fit.likeliest_size(work, expected);

@@ -32,14 +32,18 @@ struct KindOfLoads {
 
 /// How loads were found of data that pull by some springs, to find others of data that pull by similar ones.
 struct LoadSearch {
-    /// `expected` is the size that is expected beforehand.
-    LoadSearch(std::shared_ptr<const KindOfLoads> of, const SizePrior& expected, const Posterior& with_data);
+    /// `expected` is the size that is expected beforehand; `followed` as below.
+    LoadSearch(std::shared_ptr<const KindOfLoads> of, const SizePrior& expected, const Posterior& with_data,
+               bool followed);
     LoadSearch(const LoadSearch&) = delete;
     LoadSearch& operator=(const LoadSearch&) = delete;
 
     std::shared_ptr<const KindOfLoads> kind;
     SizePrior expected;
     LoadFit fit;
+    /// Whether found_beside() leads to loads that data show. Not of bends that were found on a coarser model: it is
+    /// stiffer, and where no datum is what the model itself does beyond it would be taken for more loads.
+    bool may_be_followed;
 };
 
 struct FoundLoads {

@@ -305,7 +305,9 @@ class Logs(unittest.TestCase):
         with server.client() as client:
             self.newest_organ(client)
             client.send_points("fixed_points", fixed)
-            again = client.update(points_sd_mm=0.5)
+            self.assertIn("began", client.update(points_sd_mm=0.5))  # from the last one, or why not
+            again = client.update(points_sd_mm=0.5, begin_anew=True)
+            self.assertFalse(again["began"]["at_last"])
             self.assertEqual(again["digest"], first["digest"])
             self.assertEqual(client.newest("organ")["points"], organ["points"])
             self.assertGreater(again["state"], first["state"])
