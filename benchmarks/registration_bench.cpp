@@ -7,8 +7,8 @@
 // image out, the model prepared: on the processor (the default) through the displacement field of all voxels, on a GPU
 // through GpuWarp, whose voxels outside the mesh follow the placement. Then N updates go on each from the last one,
 // while the patient moves at random by half a millimetre along each axis from one to the next (but for a held head) and
-// every tenth point of a surface is another one's; a second line tells their times and errors. On a processor newer than
-// the OpenBLAS set OPENBLAS_CORETYPE, as the program does by itself: factors take three times as long without.
+// every tenth point of a surface is another one's; a second line tells their times and errors. On a processor newer
+// than the OpenBLAS set OPENBLAS_CORETYPE, as the program does by itself: factors take three times as long without.
 
 #include "core/errors.hpp"
 #include "imaging/image_io.hpp"

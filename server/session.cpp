@@ -58,8 +58,13 @@ void Session::go_on() {
     if (!last) return;
     updates_ = last->number;
     outbox_.note(fmt::format("the log goes to state {}; update {} is computed again", scene_.state(), last->number));
-    compute_again(patient_, options_.targets, options_.log, results, results.begin_of_last,
-                  [&](const Job&, const std::shared_ptr<const Products>& products) { last_ = products; });
+    try {
+        compute_again(patient_, options_.targets, options_.log, results, results.begin_of_last,
+                      [&](const Job&, const std::shared_ptr<const Products>& products) { last_ = products; });
+    } catch (const Error& problem) {  // another device, say: the next update begins anew
+        last_.reset();
+        outbox_.note(fmt::format("what the log's updates gave cannot be computed again: {}", problem.what()));
+    }
     if (last_ && results.last == last->number)
         tell(*last, *last_, {});
     else

@@ -68,6 +68,27 @@ public:
         }
         return result;
     }
+    /// Three vessels, and points along them half a millimetre off.
+    [[nodiscard]] Curves vessels(unsigned seed) const {
+        std::mt19937_64 generator(seed);
+        std::normal_distribution<double> normal;
+        Curves result;
+        result.deviation_mm = 0.5;
+        result.fixed.resize(3, 120);
+        for (int line = 0; line < 3; ++line) {
+            Matrix3Xd along(3, 40);
+            for (int n = 0; n < 40; ++n) {
+                const double t = n / 20.0 - 1;
+                Vector3d way = 0.7 * t * Vector3d::Unit(line);
+                way[(line + 1) % 3] = 0.3 * t * t - 0.2 * line + 0.1;
+                along.col(n) = organ_.centre + way.cwiseProduct(organ_.semi_axes);
+                const Vector3d error(normal(generator), normal(generator), normal(generator));
+                result.fixed.col(40 * line + n) = now(along.col(n)) + 0.5 * error;
+            }
+            result.moving.push_back(along);
+        }
+        return result;
+    }
     /// Places within.
     [[nodiscard]] Matrix3Xd targets() const {
         std::vector<Vector3d> places;
@@ -120,6 +141,10 @@ Intraoperative pairs_of(const BendingOrgan& bent, unsigned seed) {
     return {.points = bent.pairs(25, seed)};
 }
 
+Intraoperative vessels_of(const BendingOrgan& bent, unsigned seed) {
+    return {.curves = bent.vessels(seed)};
+}
+
 class GoingOn : public ::testing::TestWithParam<Seen> {
 protected:
     Updater updater{organ(), on_cpu()};
@@ -151,6 +176,7 @@ TEST_P(GoingOn, BeginsAnewWhereTissueHasJumped) {
     if (far.labels) far.labels->geometry.origin += shift;
     if (far.surface) far.surface->points.colwise() += shift;
     if (far.points) far.points->fixed.colwise() += shift;
+    if (far.curves) far.curves->fixed.colwise() += shift;
     const UpdateResult now = updater.go_on(last, far), anew = updater.update(far);
     EXPECT_FALSE(now.beginning.at_last);
     EXPECT_THAT(now.beginning.why, HasSubstr(" mm"));
@@ -169,7 +195,8 @@ TEST_P(GoingOn, KnowsTheFrameOfTheStart) {
     EXPECT_LT((a - b).colwise().norm().maxCoeff(), 0.5);  // labels are resampled on another grid
 }
 
-INSTANTIATE_TEST_SUITE_P(Data, GoingOn, ::testing::Values(Seen(labels_of), Seen(surface_of), Seen(pairs_of)));
+INSTANTIATE_TEST_SUITE_P(Data, GoingOn,
+                         ::testing::Values(Seen(labels_of), Seen(surface_of), Seen(pairs_of), Seen(vessels_of)));
 
 class GoOn : public ::testing::Test {
 protected:

@@ -81,6 +81,20 @@ TEST(ImageUpdate, FollowsADeformationThroughTheWholeOrgan) {
     EXPECT_TRUE(result.doubts.empty());
 }
 
+// The patient has moved by a millimetre since, the image has other noise.
+TEST(ImageUpdate, GoesOnFromTheLastOne) {
+    const auto prepared = std::make_shared<const PreparedModel>(textured_model());
+    Updater updater(prepared, quick());
+    const Eigen::Isometry3d before = shapes::motion(2, {0, 0, 1}, {1, 0, 1}),
+                            now = shapes::motion(2.5, {0, 0, 1}, {2, 0, 1});
+    const UpdateResult last = updater.update({.image = after(*prepared, before)});
+    const UpdateResult next = updater.go_on(last, {.image = after(*prepared, now, 0.02)}),
+                       anew = updater.update({.image = after(*prepared, now, 0.02)});
+    EXPECT_TRUE(next.beginning.at_last) << next.beginning.why;
+    EXPECT_LT(next.rounds.size(), anew.rounds.size());
+    EXPECT_LT(summarise(node_errors(next, now)).mean, summarise(node_errors(anew, now)).mean + 0.05);
+}
+
 struct Collapse {
     double mean_error_mm = 0;
     std::vector<std::string> doubts;

@@ -153,6 +153,11 @@ TEST(UltrasoundUpdate, FindsTheOrganAndSaysHowItCompared) {
     tissuewarp::test::Noted observer;
     const UpdateResult result = update(one.model, seen, options, observer);
     EXPECT_NE(observer.notes.find("ultrasound"), std::string::npos) << observer.notes;
+    // Its doubts are about poses that a search tells apart: no update goes on without one.
+    const UpdateResult next =
+        Updater(std::shared_ptr<const PreparedModel>(std::shared_ptr<void>(), &one.model), options).go_on(result, seen);
+    EXPECT_FALSE(next.beginning.at_last);
+    EXPECT_NE(next.beginning.why.find("must be sought"), std::string::npos) << next.beginning.why;
     Deformation before = result.deformation;
     before.displacement.setZero();
     before.placement.setIdentity();
