@@ -44,9 +44,9 @@ def crc64(data):
     return crc
 
 
-def pack(kind, device, body):
-    """Header and body of a message."""
-    return HEADER.pack(1, kind.encode(), device.encode()[:20], 0, len(body), crc64(body)) + body
+def pack(kind, device, body, seconds=0):
+    """Header and body of a message, of this time (s since 1970, or 0)."""
+    return HEADER.pack(1, kind.encode(), device.encode()[:20], int(seconds * 2**32), len(body), crc64(body)) + body
 
 
 def turned(place):
@@ -173,13 +173,17 @@ class Client:
         self.close()
 
     def send(self, kind, device, body):
-        self.socket.sendall(pack(kind, device, body))
+        self.socket.sendall(pack(kind, device, body, time.time()))
 
     def send_points(self, device, points):
         self.send("POINT", device, pack_points(points))
 
     def send_surface(self, points, device="fixed_surface"):
         self.send("POLYDATA", device, pack_mesh(points))
+
+    def send_touch(self, place, device="stylus"):
+        """Where the tip of a tracked stylus is; a touch after the request "gather"."""
+        self.send("TRANSFORM", device, pack_transform(((1, 0, 0), (0, 1, 0), (0, 0, 1)), place))
 
     def send_curves(self, device, lines):
         """Lists of places."""

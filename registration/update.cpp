@@ -51,7 +51,7 @@ struct Updater::Impl {
           options(given),
           short_options(detail::short_course(given)),
           solver(std::move(engine)),
-          tools{image_tools_of(*prepared, options, observer), nullptr},
+          tools{image_tools_of(*prepared, options, observer), nullptr, nullptr},
           load_finder(*prepared, options.tissue) {}
 
     UpdateResult update(const Intraoperative& given, Observer& observer) {

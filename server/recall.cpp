@@ -73,12 +73,11 @@ void Recalled::take(const Entry& entry) {
     const Frame frame = frame_of(entry.payload);
     const Message message = decode(frame);
     const auto* text = std::get_if<Text>(&message);
-    if (!text) return scene.take(frame.header.device, message);
+    if (!text) return scene.take(frame.header.device, message, seconds_of(frame.header));
     const Request request = parse_request(text->text);
     if (request.what == Request::Do::Follow) follow = {request, text->text};
     if (request.what == Request::Do::Stop) follow.reset();
-    if (request.what != Request::Do::Forget) return;
-    for (const std::string& name : request.names) scene.forget(name);
+    apply(request, scene);
 }
 
 Job Recalled::job(const Entry& entry) const {

@@ -13,14 +13,16 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::array<std::pair<const char*, Request::Do>, 8> verbs{{{"update", Request::Do::Update},
-                                                                    {"follow", Request::Do::Follow},
-                                                                    {"stop", Request::Do::Stop},
-                                                                    {"cancel", Request::Do::Cancel},
-                                                                    {"forget", Request::Do::Forget},
-                                                                    {"info", Request::Do::Info},
-                                                                    {"load", Request::Do::Load},
-                                                                    {"save", Request::Do::Save}}};
+constexpr std::array<std::pair<const char*, Request::Do>, 10> verbs{{{"update", Request::Do::Update},
+                                                                     {"follow", Request::Do::Follow},
+                                                                     {"stop", Request::Do::Stop},
+                                                                     {"cancel", Request::Do::Cancel},
+                                                                     {"gather", Request::Do::Gather},
+                                                                     {"pause", Request::Do::Pause},
+                                                                     {"forget", Request::Do::Forget},
+                                                                     {"info", Request::Do::Info},
+                                                                     {"load", Request::Do::Load},
+                                                                     {"save", Request::Do::Save}}};
 
 [[noreturn]] void refuse(const std::string& key, const json& value, const std::string& wanted) {
     throw InvalidInput("\"" + key + "\" is " + value.dump(-1, ' ', true, json::error_handler_t::replace) +
@@ -30,7 +32,7 @@ constexpr std::array<std::pair<const char*, Request::Do>, 8> verbs{{{"update", R
 Request::Do verb_of(const json& value) {
     for (const auto& [name, what] : verbs)
         if (value == name) return what;
-    refuse("do", value, "update, follow, stop, cancel, forget, info, load or save");
+    refuse("do", value, "update, follow, stop, cancel, gather, pause, forget, info, load or save");
 }
 
 double number(const std::string& key, const json& value, double least, double most) {
@@ -64,6 +66,15 @@ std::vector<std::string> sent(const std::string& key, const json& value) {
     return result;
 }
 
+/// As they are, since they name points and not devices.
+std::vector<std::string> ids(const std::string& key, const json& value) {
+    constexpr std::size_t most = 1000;
+    if (!value.is_array() || value.size() > most) refuse(key, value, "a list of at most 1000 ids");
+    std::vector<std::string> result;
+    for (const json& entry : value) result.push_back(text(key, entry));
+    return result;
+}
+
 void take_option(Request& request, const std::string& key, const json& value) {
     if (key == "surface_sd_mm")
         request.deviations.surface_mm = number(key, value, 1e-3, 100);
@@ -83,11 +94,17 @@ void take_option(Request& request, const std::string& key, const json& value) {
         request.error_estimate = truth(key, value);
     else if (key == "begin_anew")
         request.begin_anew = truth(key, value);
+    else if (key == "id")
+        request.gathering.id = text(key, value);
+    else if (key == "spacing_mm")
+        request.gathering.spacing_mm = number(key, value, 0.1, 50);
+    else if (key == "keep_s")
+        request.gathering.keep_s = number(key, value, 0, 1e5);
     else
         throw InvalidInput("there is no \"" + key.substr(0, 60) +
-                           "\" in a request; keys are do, sequence, use, send, names, file, surface_sd_mm, "
-                           "points_sd_mm, curves_sd_mm, rounds, tolerance_mm, fade_mm, align, error_estimate and "
-                           "begin_anew");
+                           "\" in a request; keys are do, sequence, use, send, names, ids, file, surface_sd_mm, "
+                           "points_sd_mm, curves_sd_mm, rounds, tolerance_mm, fade_mm, align, error_estimate, "
+                           "begin_anew, id, spacing_mm and keep_s");
 }
 
 /// Nested without end it would take the stack of whoever frees it.
@@ -120,6 +137,8 @@ Request parse_request(const std::string& given) {
             request.use = texts(key, value);
         else if (key == "names")
             request.names = texts(key, value);
+        else if (key == "ids")
+            request.ids = ids(key, value);
         else if (key == "send")
             request.send = sent(key, value);
         else if (key == "file")
@@ -127,7 +146,26 @@ Request parse_request(const std::string& given) {
         else
             take_option(request, key, value);
     }
+    request.gathering.device = request.names.empty() ? "stylus" : request.names.front();
     return request;
+}
+
+void apply(const Request& request, Scene& scene) {
+    switch (request.what) {
+        case Request::Do::Gather:
+            return scene.gather(request.gathering);
+        case Request::Do::Pause:
+            return scene.gather({});
+        case Request::Do::Forget:
+            if (!request.ids.empty() && !request.names.empty())
+                throw InvalidInput(
+                    "\"ids\" are of single touches and \"names\" of all that have a name; give one of them");
+            if (!request.ids.empty()) scene.forget_touched(request.ids);
+            for (const std::string& name : request.names) scene.forget(name);
+            return;
+        default:
+            return;
+    }
 }
 
 std::filesystem::path file_in(const std::filesystem::path& folder, const std::string& name) {

@@ -10,8 +10,8 @@ namespace tissuewarp::server {
 namespace {
 
 constexpr const char* names_text =
-    "moving_points, fixed_points, targets (POINT), fixed_surface, moving_curves, fixed_curves (POLYDATA), fixed, "
-    "fixed_2 to fixed_9, fixed_labels (IMAGE) and start (TRANSFORM)";
+    "moving_points, fixed_points, targets, touched (POINT), fixed_surface, moving_curves, fixed_curves (POLYDATA), "
+    "fixed, fixed_2 to fixed_9, fixed_labels (IMAGE), start and a stylus that was named to gather (TRANSFORM)";
 
 [[noreturn]] void refuse(const std::string& name, const char* kind) {
     throw InvalidInput("no " + std::string(kind) + " is called '" + name + "'; names are " + names_text);
@@ -38,13 +38,17 @@ std::string plain_name(const std::string& device) {
     return name;
 }
 
-void Scene::take_points(const std::string& name, const NamedPoints& points) {
+void Scene::take_points(const std::string& name, const NamedPoints& points, double seconds) {
     if (name == "moving_points")
         moving_points_ = points;
     else if (name == "fixed_points")
         fixed_points_ = points;
     else if (name == "targets")
         targets_ = points;
+    else if (name == "touched" && points.empty())
+        touched_.clear();
+    else if (name == "touched")
+        touched_.put(points, seconds);
     else
         refuse(name, "POINT");
 }
@@ -74,17 +78,28 @@ void Scene::take_image(const std::string& name, const imaging::Volume& image) {
     images_[name] = image;
 }
 
-void Scene::take(const std::string& device, const Message& message) {
+void Scene::gather(const Gathering& gathering) {
+    if (gathering.device == "start") throw InvalidInput("'start' is where the organ lies; a stylus has another name");
+    gathering_ = gathering;
+}
+
+bool Scene::take_transform(const std::string& name, const Eigen::Isometry3d& transform, double seconds) {
+    if (name == gathering_.device) return touched_.pass(transform.translation(), seconds, gathering_);
+    if (name != "start") refuse(name, "TRANSFORM");
+    start_ = transform;
+    return true;
+}
+
+void Scene::take(const std::string& device, const Message& message, double seconds) {
     const std::string name = plain_name(device);
     if (const auto* points = std::get_if<NamedPoints>(&message))
-        take_points(name, *points);
+        take_points(name, *points, seconds);
     else if (const auto* mesh = std::get_if<PolyData>(&message))
         take_mesh(name, *mesh);
     else if (const auto* image = std::get_if<imaging::Volume>(&message))
         take_image(name, *image);
     else if (const auto* transform = std::get_if<Eigen::Isometry3d>(&message)) {
-        if (name != "start") refuse(name, "TRANSFORM");
-        start_ = *transform;
+        if (!take_transform(name, *transform, seconds)) return;
     } else
         return;
     ++state_;
@@ -96,10 +111,17 @@ void Scene::forget(const std::string& device) {
         start_.reset();
     else if (name == "fixed" || name == "fixed_labels" || is_contrast(name))
         images_.erase(name);
-    else if (name.ends_with("points") || name == "targets")
-        take_points(name, {});
+    else if (name.ends_with("points") || name == "targets" || name == "touched")
+        take_points(name, {}, 0);
     else
         take_mesh(name, {});
+    ++state_;
+}
+
+void Scene::forget_touched(const std::vector<std::string>& ids) {
+    TouchedPatch left = touched_;
+    for (const std::string& id : ids) left.withdraw(id);
+    touched_ = std::move(left);
     ++state_;
 }
 
@@ -107,6 +129,7 @@ std::vector<std::string> Scene::data() const {
     std::vector<std::string> names;
     for (const auto& [name, image] : images_) names.push_back(name);
     if (surface_) names.emplace_back("fixed_surface");
+    if (!touched_.empty()) names.emplace_back("touched");
     if (!fixed_points_.empty()) names.emplace_back("fixed_points");
     if (fixed_curves_) names.emplace_back("fixed_curves");
     return names;
@@ -142,6 +165,19 @@ registration::PointPairs Scene::pairs() const {
     return result;
 }
 
+/// What was touched has no normals, and then the whole surface has none.
+registration::SurfacePoints Scene::surface(bool patch, bool touched) const {
+    if (!touched) return {surface_->points, surface_->normals};
+    registration::SurfacePoints all;
+    all.points = touched_.points();
+    all.normals.resize(3, 0);
+    if (!patch) return all;
+    const Eigen::Matrix3Xd alone = std::move(all.points);
+    all.points.resize(3, surface_->points.cols() + alone.cols());
+    all.points << surface_->points, alone;
+    return all;
+}
+
 registration::Intraoperative Scene::seen(const std::vector<std::string>& use, const Deviations& deviations) const {
     const std::vector<std::string> there = data();
     for (const std::string& name : use)
@@ -162,7 +198,10 @@ registration::Intraoperative Scene::seen(const std::vector<std::string>& use, co
         else
             seen.contrasts.push_back(image);
     }
-    if (wanted("fixed_surface")) seen.surface = {surface_->points, surface_->normals, deviations.surface_mm};
+    if (wanted("fixed_surface") || wanted("touched")) {
+        seen.surface = surface(wanted("fixed_surface"), wanted("touched"));
+        seen.surface->deviation_mm = deviations.surface_mm;
+    }
     if (wanted("fixed_points")) {
         seen.points = pairs();
         seen.points->deviation_mm = deviations.points_mm;

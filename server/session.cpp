@@ -119,7 +119,7 @@ void Session::take(const Received& received) {
 
 void Session::take_in(const Received& received, const Message& message) {
     const long long before = scene_.state();
-    scene_.take(received.frame.header.device, message);
+    scene_.take(received.frame.header.device, message, seconds_of(received.frame.header));
     if (scene_.state() == before) return;
     remember(received);
     follow();
@@ -170,14 +170,23 @@ void Session::obey(const Received& received, const std::string& text) {
             case Request::Do::Cancel:
                 cancel("another request cancelled it");
                 return refuse(received.client, request, "ok", "what was running is cancelled");
+            case Request::Do::Gather:
+            case Request::Do::Pause:
+                apply(request, scene_);
+                remember(received);
+                return refuse(received.client, request, "ok",
+                              request.what == Request::Do::Gather
+                                  ? fmt::format("what '{}' touches is gathered from here on", request.gathering.device)
+                                  : "touches are not gathered from here on");
             case Request::Do::Forget:
-                for (const std::string& name : request.names) scene_.forget(name);
+                apply(request, scene_);
                 remember(received);
                 follow();
                 return refuse(received.client, request, "ok", fmt::format("state {}", scene_.state()));
             case Request::Do::Info:
                 return refuse(received.client, request, "ok",
-                              fmt::format("state {}, data: {}", scene_.state(), fmt::join(scene_.data(), ", ")));
+                              fmt::format("state {}, data: {}; points touched: {}", scene_.state(),
+                                          fmt::join(scene_.data(), ", "), scene_.touched().size()));
             case Request::Do::Load:
             case Request::Do::Save:
                 return touch_file(received, request);

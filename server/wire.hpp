@@ -27,6 +27,11 @@ struct Header {
     std::uint64_t crc = 0;  ///< of the body
 };
 
+/// By the sender's clock, of the years since 1970; 0: it does not say.
+inline double seconds_of(const Header& header) {
+    return double(header.timestamp) / 4294967296.0;
+}
+
 /// One message, header and body.
 struct Frame {
     Header header;

@@ -55,6 +55,10 @@ SingleBlasThread::~SingleBlasThread() {
     if (--alive == 0) set_threads(threads_before);
 }
 
+bool SingleBlasThread::holds() const {
+    return counts_ || threads() == 1;
+}
+
 SerialOpenMp::SerialOpenMp() : levels_before_(active_levels()) {
     set_active_levels(0);
 }

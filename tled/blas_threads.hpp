@@ -20,6 +20,9 @@ public:
     SingleBlasThread(const SingleBlasThread&) = delete;
     SingleBlasThread& operator=(const SingleBlasThread&) = delete;
 
+    /// Whether calls of the BLAS take one thread now, so that several may be made at once.
+    [[nodiscard]] bool holds() const;
+
 private:
     bool counts_;
 };

@@ -4,14 +4,10 @@
 #include "imaging/labels.hpp"
 #include "imaging/sampling.hpp"
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -33,58 +29,16 @@ struct Indicator {
     explicit Indicator(Volume smoothed) : volume(std::move(smoothed)), sampler(volume) {}
 };
 
-/// Voxels from `lower` to before `upper`.
-struct Box {
-    std::array<int, 3> lower{std::numeric_limits<int>::max(), std::numeric_limits<int>::max(),
-                             std::numeric_limits<int>::max()},
-        upper{0, 0, 0};
-
-    void add(const Box& other) {
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            lower[axis] = std::min(lower[axis], other.lower[axis]);
-            upper[axis] = std::max(upper[axis], other.upper[axis]);
-        }
-    }
-};
-using Boxes = std::map<int, Box>;
-
-/// About each label but 0.
-Boxes boxes_of(const Volume& map) {
-    const auto& size = map.geometry.size;
-    const auto add_slices = [&](const tbb::blocked_range<int>& slices, Boxes boxes) {
-        for (int k = slices.begin(); k < slices.end(); ++k)
-            for (int j = 0; j < size[1]; ++j) {
-                const auto* row = map.data<std::int32_t>() + map.offset(0, j, k);
-                for (int i = 0; i < size[0];) {
-                    const int first = i, label = row[i];
-                    while (i < size[0] && row[i] == label) ++i;
-                    if (label != 0) boxes[label].add({{first, j, k}, {i, j + 1, k + 1}});
-                }
-            }
-        return boxes;
-    };
-    const auto together = [](Boxes boxes, const Boxes& more) {
-        for (const auto& [label, box] : more) boxes[label].add(box);
-        return boxes;
-    };
-    return tbb::parallel_reduce(tbb::blocked_range<int>(0, size[2]), Boxes(), add_slices, together);
-}
-
 /// What is smoothed of a map: a label, or where it is 0 all of them.
 struct Part {
     int label = 0;
-    Box box;
+    imaging::LabelExtent box;
     double smoothing = 0;  // voxels
 };
 
 std::unique_ptr<Indicator> indicator(const Volume& map, const Part& part) {
     const int margin = static_cast<int>(std::ceil(4 * part.smoothing)) + 2;
-    std::array<int, 3> lower{}, upper{};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-        lower[axis] = std::max(0, part.box.lower[axis] - margin);
-        upper[axis] = std::min(map.geometry.size[axis], part.box.upper[axis] + margin);
-    }
-    const Volume there = imaging::crop(map, lower, upper);
+    const Volume there = imaging::trimmed(map, part.box, margin);
     const Volume mask = part.label == 0 ? imaging::mask_of_all(there) : imaging::mask_of(there, part.label);
     return std::make_unique<Indicator>(imaging::smooth(mask, part.smoothing * mask.geometry.spacing.minCoeff()));
 }
@@ -121,16 +75,17 @@ struct LabelBoundaryField::Impl {
     }
 };
 
-LabelBoundaryField::LabelBoundaryField(const Volume& label_map, const std::map<int, double>& thickness_mm)
+LabelBoundaryField::LabelBoundaryField(const Volume& map, const std::map<int, double>& thickness_mm)
+    : LabelBoundaryField(map, imaging::label_extents(map), thickness_mm) {}
+
+LabelBoundaryField::LabelBoundaryField(const Volume& map, const imaging::LabelExtents& extents,
+                                       const std::map<int, double>& thickness_mm)
     : impl_(std::make_unique<Impl>()) {
-    const Volume map = label_map.as(CV_32S);
     const double voxel_mm = map.geometry.spacing.minCoeff();
-    const Boxes boxes = boxes_of(map);
-    if (boxes.empty()) throw InvalidInput("the label map is empty: there is no boundary to match");
+    if (extents.empty()) throw InvalidInput("the label map is empty: there is no boundary to match");
     std::vector<Part> parts(1);
-    parts[0].smoothing = options.most_smoothing;
-    for (const auto& [label, box] : boxes) {
-        parts[0].box.add(box);
+    parts[0] = {0, imaging::extent_of_all(extents), options.most_smoothing};
+    for (const auto& [label, box] : extents) {
         const auto thickness = thickness_mm.find(label);
         if (thickness == thickness_mm.end()) continue;
         const double bearable = options.smoothing_share * thickness->second / voxel_mm;

@@ -1,7 +1,7 @@
 #pragma once
 /// The boundaries of a label map, to a fraction of a voxel.
 
-#include "imaging/volume.hpp"
+#include "imaging/label_extents.hpp"
 
 #include <Eigen/Core>
 
@@ -29,6 +29,9 @@ public:
     /// thinner than 1.35 standard deviations is nowhere half there, and has no boundary left. Throws InvalidInput for
     /// an empty map.
     LabelBoundaryField(const imaging::Volume& label_map, const std::map<int, double>& thickness_mm);
+    /// The same of a map whose labels are known to lie there.
+    LabelBoundaryField(const imaging::Volume& label_map, const imaging::LabelExtents& extents,
+                       const std::map<int, double>& thickness_mm);
     ~LabelBoundaryField();
     LabelBoundaryField(LabelBoundaryField&&) noexcept;
     LabelBoundaryField& operator=(LabelBoundaryField&&) noexcept;

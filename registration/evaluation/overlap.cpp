@@ -4,8 +4,11 @@
 #include "meshing/search/point_tree.hpp"
 #include "registration/evaluation/percentile.hpp"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_for_each.h>
 #include <tbb/parallel_invoke.h>
+#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <array>
@@ -51,37 +54,36 @@ private:
     Region* last_ = nullptr;  // neighbours in the grid ask for the same one
 };
 
-std::map<int, Region> regions_of(const Volume& labels) {
+/// Of one slice and its faces to the next.
+std::map<int, Region> regions_of_slice(const Volume& labels, int k) {
     Regions regions;
     const Geometry& grid = labels.geometry;
     const std::int64_t per_row = grid.size[0], per_slice = per_row * grid.size[1];
     long long labelled = 0;
-    for (int k = 0; k < grid.size[2]; ++k) {
-        for (int j = 0; j < grid.size[1]; ++j) {
-            const std::int64_t first = labels.offset(0, j, k);
-            const auto* row = labels.data<std::int32_t>() + first;
-            // Beyond the grid itself: no face.
-            const auto* beside = j + 1 < grid.size[1] ? row + per_row : row;
-            const auto* above = k + 1 < grid.size[2] ? row + per_slice : row;
-            for (int i = 0; i < grid.size[0]; ++i) {
-                const int here = row[i];
-                if (here != 0) {
-                    ++regions[here].voxels;
-                    ++labelled;
-                }
-                const std::array<int, 3> next{row[std::min(i + 1, grid.size[0] - 1)], beside[i], above[i]};
-                if (next[0] == here && next[1] == here && next[2] == here) continue;
-                for (int axis = 0; axis < 3; ++axis) {
-                    const int there = next[static_cast<std::size_t>(axis)];
-                    if (there == here) continue;
-                    Eigen::Vector3d centre(i, j, k);
-                    centre[axis] += 0.5;
-                    centre = centre.cwiseProduct(grid.spacing);
-                    const std::int64_t place = 3 * (first + i) + axis;
-                    if (here != 0) regions[here].add(place, centre);
-                    if (there != 0) regions[there].add(place, centre);
-                    if (here == 0 || there == 0) regions[0].add(place, centre);
-                }
+    for (int j = 0; j < grid.size[1]; ++j) {
+        const std::int64_t first = labels.offset(0, j, k);
+        const auto* row = labels.data<std::int32_t>() + first;
+        // Beyond the grid itself: no face.
+        const auto* beside = j + 1 < grid.size[1] ? row + per_row : row;
+        const auto* above = k + 1 < grid.size[2] ? row + per_slice : row;
+        for (int i = 0; i < grid.size[0]; ++i) {
+            const int here = row[i];
+            if (here != 0) {
+                ++regions[here].voxels;
+                ++labelled;
+            }
+            const std::array<int, 3> next{row[std::min(i + 1, grid.size[0] - 1)], beside[i], above[i]};
+            if (next[0] == here && next[1] == here && next[2] == here) continue;
+            for (int axis = 0; axis < 3; ++axis) {
+                const int there = next[static_cast<std::size_t>(axis)];
+                if (there == here) continue;
+                Eigen::Vector3d centre(i, j, k);
+                centre[axis] += 0.5;
+                centre = centre.cwiseProduct(grid.spacing);
+                const std::int64_t place = 3 * (first + i) + axis;
+                if (here != 0) regions[here].add(place, centre);
+                if (there != 0) regions[there].add(place, centre);
+                if (here == 0 || there == 0) regions[0].add(place, centre);
             }
         }
     }
@@ -89,9 +91,24 @@ std::map<int, Region> regions_of(const Volume& labels) {
     return std::move(regions).taken();
 }
 
+std::map<int, Region> regions_of(const Volume& labels) {
+    std::vector<std::map<int, Region>> slices(static_cast<std::size_t>(labels.geometry.size[2]));
+    tbb::parallel_for(0, labels.geometry.size[2],
+                      [&](int k) { slices[static_cast<std::size_t>(k)] = regions_of_slice(labels, k); });
+    std::map<int, Region> regions;
+    for (const auto& slice : slices)
+        for (const auto& [label, part] : slice) {
+            Region& region = regions[label];
+            region.centres.insert(region.centres.end(), part.centres.begin(), part.centres.end());
+            region.places.insert(region.places.end(), part.places.begin(), part.places.end());
+            region.voxels += part.voxels;
+        }
+    return regions;
+}
+
 /// From each face of a region to the nearest of another, mm. Of faces of both no tree is asked: most are, where labels
 /// nearly agree.
-std::vector<double> distances(const Region& from, const Region& to, const meshing::PointTree& tree) {
+std::vector<double> distances(const Region& from, const Region& to) {
     std::vector<double> result(from.places.size(), 0.0);
     std::vector<std::size_t> apart;
     auto same = to.places.begin();
@@ -99,6 +116,8 @@ std::vector<double> distances(const Region& from, const Region& to, const meshin
         while (same != to.places.end() && *same < from.places[n]) ++same;
         if (same == to.places.end() || *same != from.places[n]) apart.push_back(n);
     }
+    if (apart.empty()) return result;
+    const meshing::PointTree tree(to.centres);
     tbb::parallel_for(std::size_t{0}, apart.size(),
                       [&](std::size_t n) { result[apart[n]] = tree.distance(from.centres[apart[n]]); });
     return result;
@@ -111,8 +130,7 @@ void measure_surfaces(const Region& a, const Region& b, Overlap& overlap) {
         return;
     }
     std::vector<double> to_b, to_a;
-    tbb::parallel_invoke([&] { to_b = distances(a, b, meshing::PointTree(b.centres)); },
-                         [&] { to_a = distances(b, a, meshing::PointTree(a.centres)); });
+    tbb::parallel_invoke([&] { to_b = distances(a, b); }, [&] { to_a = distances(b, a); });
     const auto mean = [](const std::vector<double>& d) {
         return std::accumulate(d.begin(), d.end(), 0.0) / static_cast<double>(d.size());
     };
@@ -122,17 +140,25 @@ void measure_surfaces(const Region& a, const Region& b, Overlap& overlap) {
 
 /// Voxels that have the same label in both, and under key 0 any label.
 std::map<int, long long> voxels_in_both(const Volume& a, const Volume& b) {
-    std::map<int, long long> common;
+    using Counts = std::map<int, long long>;
     const auto *in_a = a.data<std::int32_t>(), *in_b = b.data<std::int32_t>();
-    const std::int64_t count = a.geometry.voxel_count();
-    for (std::int64_t n = 0; n < count;) {  // by runs, since a map is slow to ask
-        const std::int64_t first = n;
-        while (n < count && in_a[n] == in_a[first] && in_b[n] == in_b[first]) ++n;
-        if (in_a[first] == 0 || in_b[first] == 0) continue;
-        common[0] += n - first;
-        if (in_a[first] == in_b[first]) common[in_a[first]] += n - first;
-    }
-    return common;
+    const auto count = [&](const tbb::blocked_range<std::int64_t>& voxels, Counts common) {
+        for (std::int64_t n = voxels.begin(); n < voxels.end();) {  // by runs, since a map is slow to ask
+            const std::int64_t first = n;
+            while (n < voxels.end() && in_a[n] == in_a[first] && in_b[n] == in_b[first]) ++n;
+            if (in_a[first] == 0 || in_b[first] == 0) continue;
+            common[0] += n - first;
+            if (in_a[first] == in_b[first]) common[in_a[first]] += n - first;
+        }
+        return common;
+    };
+    const auto together = [](Counts common, const Counts& more) {
+        for (const auto& [label, voxels] : more) common[label] += voxels;
+        return common;
+    };
+    constexpr std::int64_t piece = 1 << 16;
+    return tbb::parallel_reduce(tbb::blocked_range<std::int64_t>(0, a.geometry.voxel_count(), piece), Counts(), count,
+                                together);
 }
 
 }  // namespace
@@ -153,10 +179,12 @@ std::map<int, Overlap> overlap(const Volume& labels, const Volume& reference) {
     std::map<int, Overlap> result;
     for (const auto& [label, region_b] : regions_b) {
         const Region& region_a = regions_a[label];
-        Overlap& entry = result[label];
-        entry.dice = 2.0 * static_cast<double>(common[label]) / static_cast<double>(region_a.voxels + region_b.voxels);
-        measure_surfaces(region_a, region_b, entry);
+        result[label].dice =
+            2.0 * static_cast<double>(common[label]) / static_cast<double>(region_a.voxels + region_b.voxels);
     }
+    tbb::parallel_for_each(result, [&](auto& entry) {
+        measure_surfaces(regions_a.at(entry.first), regions_b.at(entry.first), entry.second);
+    });
     return result;
 }
 

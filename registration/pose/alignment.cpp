@@ -10,21 +10,26 @@ namespace tissuewarp::registration {
 
 Alignment align_labels(const imaging::Volume& moving_labels, const imaging::Volume& fixed_labels,
                        const AlignmentOptions& options, Observer& observer) {
-    const detail::LabelDistance cost(moving_labels.as(CV_32S), fixed_labels.as(CV_32S), options.samples);
+    detail::LabelBoundaries moving(moving_labels), fixed(fixed_labels);
+    return detail::align_labels(moving, fixed, options, observer);
+}
+
+Alignment detail::align_labels(LabelBoundaries& moving, LabelBoundaries& fixed, const AlignmentOptions& options,
+                               Observer& observer) {
+    const LabelDistance cost(moving, fixed, options.samples);
     const Eigen::Vector3d fixed_centroid = cost.backward.points().rowwise().mean();
     const auto search_from = [&](const Eigen::Isometry3d& start) -> Alignment {
         const auto moved_on = [&](const Eigen::Affine3d& map, double trim, int stride) {
             return cost(map * Eigen::Affine3d(start.matrix()), trim, stride);
         };
-        const Alignment found = detail::search_pose(moved_on, start * cost.forward.points(), fixed_centroid,
-                                                    detail::PoseFreedom::Similarity, options, observer);
+        const Alignment found = search_pose(moved_on, start * cost.forward.points(), fixed_centroid,
+                                            PoseFreedom::Similarity, options, observer);
         return {found.placement * start, found.mean_distance_mm};
     };
     const Alignment found = search_from(Eigen::Isometry3d::Identity());
-    if (found.mean_distance_mm < detail::label_rival_options.look_above_mm) return found;
-    const detail::LabelRivals rivals =
-        detail::label_rivals(moving_labels, fixed_labels, found.placement, options, observer);
-    if (!detail::is_better_rival(rivals.turned_mm, rivals.found_mm)) return found;
+    if (found.mean_distance_mm < label_rival_options.look_above_mm) return found;
+    const LabelRivals rivals = label_rivals(moving, fixed, found.placement, options, observer);
+    if (!is_better_rival(rivals.turned_mm, rivals.found_mm)) return found;
     return search_from(rivals.turned);
 }
 

@@ -27,6 +27,14 @@ struct LabelPoseOptions {
 Alignment align_labels(const imaging::Volume& moving_labels, const imaging::Volume& fixed_labels,
                        const AlignmentOptions& options = {}, Observer& observer = silent_observer());
 
+namespace detail {
+class LabelBoundaries;
+
+/// The same of maps whose boundaries are kept.
+Alignment align_labels(LabelBoundaries& moving, LabelBoundaries& fixed, const AlignmentOptions& options = {},
+                       Observer& observer = silent_observer());
+}  // namespace detail
+
 /// The placement of a whole moving surface (outward triangles) on points of a part of the fixed one, from anywhere: see
 /// surface_pose.hpp. `mean_distance_mm` is the typical distance of those points that fit. Throws InvalidInput on
 /// points or surfaces that cannot be used.

@@ -2,7 +2,7 @@
 /// How far the boundaries of two label maps lie apart under a map of space.
 
 #include "imaging/sampling.hpp"
-#include "imaging/volume.hpp"
+#include "registration/pose/label_boundaries.hpp"
 
 #include <Eigen/Geometry>
 
@@ -10,13 +10,11 @@
 
 namespace tissuewarp::registration::detail {
 
-/// The map on a grid of whole multiples of its spacings, at most about `spacing_mm`, where these are finer; int32.
-imaging::Volume coarsened(const imaging::Volume& labels, double spacing_mm);
-
-/// Boundary points of one image and the distance maps of the other, per label.
+/// Boundary points of one map and the distances to the boundaries of the other, label by label.
 class BoundaryDistances {
 public:
-    BoundaryDistances(const imaging::Volume& points_from, const imaging::Volume& maps_from,
+    /// At most about `samples` points. Both outlive this, and have made these labels.
+    BoundaryDistances(const LabelBoundaries& points_from, const LabelBoundaries& distances_from,
                       const std::vector<int>& labels, int samples);
 
     /// Mean of min(|distance|, trim) over every `stride`-th point after a map of space.
@@ -26,10 +24,16 @@ public:
     [[nodiscard]] const Eigen::Matrix3Xd& points() const { return points_.front(); }
 
 private:
-    std::vector<imaging::Volume> maps_;
+    std::vector<const imaging::Geometry*> grids_;  // of each label's distances
     std::vector<imaging::LinearSampler> samplers_;
     std::vector<Eigen::Matrix3Xd> points_;
 
+    /// Of some of one label's points.
+    struct Share {
+        std::size_t label;
+        Eigen::Index first, last;
+    };
+    [[nodiscard]] double sum(const Share& share, const Eigen::Affine3d& map, double trim, int stride) const;
     [[nodiscard]] double outside(std::size_t label, const Eigen::Vector3d& point) const;
 };
 
@@ -39,8 +43,9 @@ private:
 struct LabelDistance {
     BoundaryDistances forward, backward;
 
-    /// `samples`: boundary points, half from each map (int32). Throws InvalidInput when the maps share no label.
-    LabelDistance(const imaging::Volume& moving, const imaging::Volume& fixed, int samples);
+    /// `samples`: boundary points, half from each map. The maps outlive this and make what it needs. Throws
+    /// InvalidInput when they share no label.
+    LabelDistance(LabelBoundaries& moving, LabelBoundaries& fixed, int samples);
 
     /// mm, truncated at `trim`, of every `stride`-th sample.
     [[nodiscard]] double operator()(const Eigen::Affine3d& map, double trim, int stride) const {
@@ -48,7 +53,7 @@ struct LabelDistance {
     }
 
 private:
-    LabelDistance(const imaging::Volume& moving, const imaging::Volume& fixed, const std::vector<int>& labels,
+    LabelDistance(const LabelBoundaries& moving, const LabelBoundaries& fixed, const std::vector<int>& labels,
                   int samples);
 };
 

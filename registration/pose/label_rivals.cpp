@@ -33,9 +33,9 @@ bool is_better_rival(double rival_mm, double than_mm) {
     return rival_mm < label_rival_options.better * than_mm && rival_mm < than_mm - label_rival_options.better_mm;
 }
 
-LabelRivals label_rivals(const imaging::Volume& moving, const imaging::Volume& fixed,
-                         const Eigen::Isometry3d& placement, const AlignmentOptions& options, Observer& observer) {
-    const LabelDistance distance(moving.as(CV_32S), fixed.as(CV_32S), label_rival_options.samples);
+LabelRivals label_rivals(LabelBoundaries& moving, LabelBoundaries& fixed, const Eigen::Isometry3d& placement,
+                         const AlignmentOptions& options, Observer& observer) {
+    const LabelDistance distance(moving, fixed, label_rival_options.samples);
     const Eigen::Matrix3Xd& points = distance.forward.points();
     const Eigen::Vector3d centre = points.rowwise().mean(), fixed_centre = distance.backward.points().rowwise().mean();
     LabelRivals rivals;

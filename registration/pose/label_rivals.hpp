@@ -2,8 +2,8 @@
 /// Whether labels would fit better turned round or in a mirror.
 
 #include "core/observer.hpp"
-#include "imaging/volume.hpp"
 #include "registration/options.hpp"
+#include "registration/pose/label_boundaries.hpp"
 
 #include <Eigen/Geometry>
 
@@ -36,8 +36,7 @@ struct LabelRivals {
 /// Searches from all rotations that turn a cube into itself, and from all of its reflections, about the middle of the
 /// moving map. `placement`: moving → fixed, as it was found. Throws InvalidInput when the maps share no label,
 /// Cancelled.
-LabelRivals label_rivals(const imaging::Volume& moving, const imaging::Volume& fixed,
-                         const Eigen::Isometry3d& placement, const AlignmentOptions& options,
-                         Observer& observer = silent_observer());
+LabelRivals label_rivals(LabelBoundaries& moving, LabelBoundaries& fixed, const Eigen::Isometry3d& placement,
+                         const AlignmentOptions& options, Observer& observer = silent_observer());
 
 }  // namespace tissuewarp::registration::detail

@@ -124,11 +124,12 @@ FreeStretch search_from(const LabelDistance& cost, const Eigen::Isometry3d& turn
 
 FreeStretch find_free_stretch(const imaging::Volume& moving_labels, const imaging::Volume& fixed_labels, double most,
                               const AlignmentOptions* alignment, Observer& observer) {
-    const LabelDistance cost(moving_labels.as(CV_32S), fixed_labels.as(CV_32S), rules.samples);
+    LabelBoundaries moving(moving_labels), fixed(fixed_labels);
+    const LabelDistance cost(moving, fixed, rules.samples);
     const FreeStretch straight = search_from(cost, Eigen::Isometry3d::Identity(), most);
     observer.checkpoint("free stretch", 0.5);
     if (!alignment || straight.mean_distance_mm < label_rival_options.look_above_mm) return straight;
-    const Alignment aligned = align_labels(moving_labels, fixed_labels, *alignment, observer);
+    const Alignment aligned = align_labels(moving, fixed, *alignment, observer);
     const FreeStretch turned = search_from(cost, aligned.placement, most);
     return is_better_rival(turned.mean_distance_mm, straight.mean_distance_mm) ? turned : straight;
 }

@@ -6,12 +6,9 @@
 #include "registration/evaluation.hpp"
 #include "registration/evaluation/model_labels.hpp"
 #include "registration/pose/alignment.hpp"
-#include "registration/pose/label_distance.hpp"
 #include "registration/pose/label_rivals.hpp"
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_invoke.h>
-#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <array>
@@ -25,51 +22,27 @@ namespace tissuewarp::registration::detail {
 
 namespace {
 
+using imaging::LabelExtent;
+using imaging::LabelExtents;
 using imaging::Volume;
-using Counts = std::map<int, std::int64_t>;
 
 constexpr LabelFitLimits limits = label_fit_limits;
 
-Counts sum_of(Counts counts, const Counts& more) {
-    for (const auto& [label, voxels] : more) counts[label] += voxels;
-    return counts;
-}
-
-/// Voxels of each label.
-Counts voxels_of(const Volume& labels) {
-    const auto* value = labels.data<std::int32_t>();
-    const auto count_runs = [&](const tbb::blocked_range<std::int64_t>& range, Counts counts) {
-        for (std::int64_t n = range.begin(); n < range.end();) {
-            const int label = value[n];
-            std::int64_t same = n + 1;
-            while (same < range.end() && value[same] == label) ++same;
-            if (label != 0) counts[label] += same - n;
-            n = same;
-        }
-        return counts;
-    };
-    constexpr std::int64_t piece = 1 << 18;
-    return tbb::parallel_reduce(tbb::blocked_range<std::int64_t>(0, labels.geometry.voxel_count(), piece), Counts(),
-                                count_runs, sum_of);
-}
-
 /// Area (mm²) of labelled voxels at the faces of the image.
-double cut_area(const Volume& labels) {
-    const auto& grid = labels.geometry;
-    const auto* value = labels.data<std::int32_t>();
+double cut_area(const LabelBoundaries& map) {
+    const auto& grid = map.labels().geometry;
+    const LabelExtent box = extent_of_all(map.extents());
     double area = 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-        const std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
         const double face = grid.voxel_volume() / grid.spacing[static_cast<Eigen::Index>(axis)];
-        for (const int at : {0, grid.size[axis] - 1})
-            for (int a = 0; a < grid.size[u]; ++a)
-                for (int b = 0; b < grid.size[v]; ++b) {
-                    std::array<int, 3> index{};
-                    index[axis] = at;
-                    index[u] = a;
-                    index[v] = b;
-                    if (value[labels.offset(index[0], index[1], index[2])] != 0) area += face;
-                }
+        for (const int at : {0, grid.size[axis] - 1}) {
+            if (at < box.lower[axis] || at >= box.upper[axis]) continue;
+            LabelExtent slice = box;
+            slice.lower[axis] = at;
+            slice.upper[axis] = at + 1;
+            const Volume there = imaging::trimmed(map.labels(), slice, 0);
+            area += face * cv::countNonZero(there.voxels.reshape(1, 1));
+        }
     }
     return area;
 }
@@ -79,35 +52,35 @@ std::string name_of_label(int label) {
 }
 
 /// Labels that one of the maps lacks.
-void doubt_vanished(const Counts& moving, const Counts& fixed, const std::vector<int>& resected,
+void doubt_vanished(const LabelExtents& moving, const LabelExtents& fixed, const std::vector<int>& resected,
                     std::vector<Doubt>& doubts) {
     const auto doubt = [&](int label, std::int64_t voxels, const char* text, const char* remedy) {
         doubts.push_back({"label.vanished", double(voxels), 0, name_of_label(label) + text, remedy,
                           voxels < limits.fewest_voxels ? Severity::Notice : Severity::Doubt});
     };
-    for (const auto& [label, voxels] : moving)
+    for (const auto& [label, extent] : moving)
         if (!fixed.contains(label))
-            doubt(label, voxels,
+            doubt(label, extent.voxels,
                   " is in the moving labels only: its tissue is where mechanics alone put it, and what is there in the "
                   "fixed labels pulls at the others",
                   "segment it in both, or merge it with what is around it; check the label tables");
-    for (const auto& [label, voxels] : fixed)
+    for (const auto& [label, extent] : fixed)
         if (std::find(resected.begin(), resected.end(), label) != resected.end())
-            doubt(label, voxels,
+            doubt(label, extent.voxels,
                   " is said to be resected, and the fixed labels show it: what is left of it does not move",
                   "give what is left a number of its own in both maps");
         else if (!moving.contains(label))
-            doubt(label, voxels, " is in the fixed labels only: no tissue belongs there",
+            doubt(label, extent.voxels, " is in the fixed labels only: no tissue belongs there",
                   "segment it in both, or leave it out; check the label tables");
 }
 
 /// The moving labels under the rigid motion that brings all of them together, whatever their numbers, to the fixed.
 Volume where_all_labels_together_fit(const Volume& moving, const Volume& fixed, const imaging::Geometry& grid) {
-    const Alignment found = align_labels(imaging::mask_of_all(moving), imaging::mask_of_all(fixed));
+    const Alignment found = registration::align_labels(imaging::mask_of_all(moving), imaging::mask_of_all(fixed));
     Volume placed = moving;
     placed.geometry.origin = found.placement * moving.geometry.origin;
     placed.geometry.direction = found.placement.linear() * moving.geometry.direction;
-    return imaging::resample(placed, grid, imaging::Interpolation::Nearest);
+    return imaging::resample(placed, grid, imaging::Interpolation::Nearest).as(CV_32S);
 }
 
 /// Which label of the fixed map a label lies on, of those that lie on another than their own; both on one grid.
@@ -117,12 +90,12 @@ std::map<int, int> exchanged_labels(const Volume& shown, const Volume& fixed) {
         const int a = shown.data<std::int32_t>()[n], b = fixed.data<std::int32_t>()[n];
         if (a != 0 && b != 0) common[{a, b}] += 2;
     }
-    const Counts in_shown = voxels_of(shown), in_fixed = voxels_of(fixed);
+    const LabelExtents in_shown = imaging::label_extents(shown), in_fixed = imaging::label_extents(fixed);
     std::map<int, int> pairs;
     for (auto& [pair, dice] : common) {
         const auto [a, b] = pair;
         const double own = common.contains({a, a}) ? common.at({a, a}) : 0;
-        const double all = double(in_shown.at(a) + in_fixed.at(b));
+        const double all = double(in_shown.at(a).voxels + in_fixed.at(b).voxels);
         if (a != b && dice > limits.least_dice * all && dice > own) pairs[a] = b;
     }
     return pairs;
@@ -139,17 +112,51 @@ std::string text_of_exchange(const std::map<int, int>& pairs) {
 
 constexpr const char* exchange_remedy = "give the same tissue the same number in both maps";
 
-/// How well the model's own labels fit.
+/// The voxels that a deformed mesh reaches.
+LabelExtent box_of(const Eigen::Matrix3Xd& nodes, const imaging::Geometry& grid) {
+    const Eigen::Matrix3Xd index = grid.point_to_index() * (nodes.colwise() - grid.origin);
+    const Eigen::Vector3d least = index.rowwise().minCoeff(), most = index.rowwise().maxCoeff();
+    LabelExtent box{1};
+    for (int axis = 0; axis < 3; ++axis) {
+        const auto a = static_cast<std::size_t>(axis);
+        const double size = grid.size[a];
+        box.lower[a] = static_cast<int>(std::clamp(std::floor(least[axis]), 0.0, size));
+        box.upper[a] = static_cast<int>(std::clamp(std::ceil(most[axis]) + 1, 0.0, size));
+    }
+    return box;
+}
+
+LabelExtent about_both(const LabelExtent& a, const LabelExtent& b) {
+    LabelExtent box = a;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+        if (b.lower[axis] < b.upper[axis]) {
+            box.lower[axis] = std::min(a.lower[axis], b.lower[axis]);
+            box.upper[axis] = std::max(a.upper[axis], b.upper[axis]);
+        }
+    return box;
+}
+
+/// As far as the image goes.
+LabelExtent grown(LabelExtent box, double by_mm, const imaging::Geometry& grid) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        const int by = static_cast<int>(std::ceil(by_mm / grid.spacing[static_cast<Eigen::Index>(axis)]));
+        box.lower[axis] = std::max(0, box.lower[axis] - by);
+        box.upper[axis] = std::min(grid.size[axis], box.upper[axis] + by);
+    }
+    return box;
+}
+
+/// How well the model's own labels fit, on a coarser grid about them and the fixed ones.
 class LabelFits {
 public:
-    LabelFits(const PreparedModel& prepared, const Volume& fixed, const UpdateResult& result)
+    LabelFits(const PreparedModel& prepared, LabelBoundaries& moving, LabelBoundaries& fixed,
+              const UpdateResult& result)
         : resected_(prepared.options.resected),
-          moving_(prepared.labels.as(CV_32S)),
-          fixed_(fixed.as(CV_32S)),
-          coarse_(coarsened(fixed_, limits.grid_mm)),
-          voxel_mm_(std::max(coarse_.geometry.spacing.maxCoeff(), moving_.geometry.spacing.maxCoeff())) {
-        tbb::parallel_invoke([&] { in_moving_ = voxels_of(moving_); }, [&] { in_fixed_ = voxels_of(fixed_); },
-                             [&] { before_ = dice_of_all(shown_by(at_rest(result))); },
+          moving_(moving),
+          fixed_(fixed),
+          coarse_(coarsened(fixed.labels(), compared_part(result), limits.grid_mm)),
+          voxel_mm_(std::max(coarse_.geometry.spacing.maxCoeff(), moving.labels().geometry.spacing.maxCoeff())) {
+        tbb::parallel_invoke([&] { before_ = dice_of_all(shown_by(at_rest(result))); },
                              [&] {
                                  shown_ = shown_by(result.deformation);
                                  after_ = overlap(shown_, coarse_);
@@ -158,7 +165,7 @@ public:
 
     [[nodiscard]] std::vector<Doubt> doubts() const {
         std::vector<Doubt> doubts;
-        doubt_vanished(in_moving_, in_fixed_, resected_, doubts);
+        doubt_vanished(moving_.extents(), fixed_.extents(), resected_, doubts);
         for (const auto& [label, fit] : after_)
             if (label != 0 && is_in_both(label)) doubt_fit(label, fit, doubts);
         doubt_worse(doubts);
@@ -170,16 +177,17 @@ public:
     [[nodiscard]] std::map<int, int> exchanged() const {
         std::map<int, int> pairs = exchanged_labels(shown_, coarse_);
         if (!pairs.empty()) return pairs;
-        return exchanged_labels(where_all_labels_together_fit(moving_, fixed_, coarse_.geometry), coarse_);
+        return exchanged_labels(where_all_labels_together_fit(moving_.labels(), fixed_.labels(), coarse_.geometry),
+                                coarse_);
     }
 
-    [[nodiscard]] const Volume& moving() const { return moving_; }
-    [[nodiscard]] const Volume& fixed() const { return fixed_; }
+    [[nodiscard]] LabelRivals rivals(const UpdateOptions& options, const Eigen::Isometry3d& placement) const {
+        return label_rivals(moving_, fixed_, placement, options.alignment);
+    }
 
 private:
     std::vector<int> resected_;  // labels that are in no model
-    Volume moving_, fixed_;
-    Counts in_moving_, in_fixed_;
+    LabelBoundaries &moving_, &fixed_;
     Volume coarse_, shown_;  // fixed labels and those of the model, on one grid
     double before_ = 0;      // Dice of all labels together, unregistered
     std::map<int, Overlap> after_;
@@ -190,16 +198,27 @@ private:
         return {mesh, Eigen::Matrix3Xd::Zero(3, mesh.nodes.cols()), Eigen::Isometry3d::Identity()};
     }
     [[nodiscard]] Volume shown_by(const Deformation& deformation) const {
-        return labels_of_model(deformation, moving_, coarse_.geometry);
+        return labels_of_model(deformation, moving_.labels(), coarse_.geometry);
+    }
+    [[nodiscard]] LabelExtent compared_part(const UpdateResult& result) const {
+        const imaging::Geometry& grid = fixed_.labels().geometry;
+        const LabelExtent before = box_of(result.deformation.mesh.nodes, grid),
+                          after = box_of(result.deformation.deformed_nodes(), grid);
+        const LabelExtent all = about_both(about_both(extent_of_all(fixed_.extents()), before), after);
+        return grown(all, 2 * limits.grid_mm, grid);  // beyond the grid boundaries have no faces
     }
 
-    [[nodiscard]] bool is_in_both(int label) const { return in_moving_.contains(label) && in_fixed_.contains(label); }
+    [[nodiscard]] bool is_in_both(int label) const {
+        return moving_.extents().contains(label) && fixed_.extents().contains(label);
+    }
 
     /// Of more voxels of the comparison's grid than a speck.
     [[nodiscard]] bool is_speck(int label) const {
         const double least = limits.fewest_voxels * coarse_.geometry.voxel_volume();
-        return double(in_moving_.at(label)) * moving_.geometry.voxel_volume() < least &&
-               double(in_fixed_.at(label)) * fixed_.geometry.voxel_volume() < least;
+        const auto is_small = [&](const LabelBoundaries& map) {
+            return double(map.extents().at(label).voxels) * map.labels().geometry.voxel_volume() < least;
+        };
+        return is_small(moving_) && is_small(fixed_);
     }
 
     void doubt_fit(int label, const Overlap& fit, std::vector<Doubt>& doubts) const {
@@ -241,12 +260,10 @@ private:
     }
 
     void doubt_cut(std::vector<Doubt>& doubts) const {
-        const auto share = [](const Volume& labels, const Counts& counts) {
-            double voxels = 0;
-            for (const auto& [label, count] : counts) voxels += double(count);
-            return cut_area(labels) / (6 * std::pow(voxels * labels.geometry.voxel_volume(), 2.0 / 3));
+        const auto share = [](const LabelBoundaries& map) {
+            return cut_area(map) / (6 * std::pow(labelled_volume(map.extents(), map.labels().geometry), 2.0 / 3));
         };
-        const double more = share(fixed_, in_fixed_) - share(moving_, in_moving_);
+        const double more = share(fixed_) - share(moving_);
         if (std::abs(more) <= limits.most_cut) return;
         const std::string cut = more > 0 ? "fixed" : "moving", whole = more > 0 ? "moving" : "fixed";
         doubts.push_back({"labels.cut_off", std::abs(more), limits.most_cut,
@@ -264,7 +281,7 @@ std::optional<Doubt> doubt_of_pairing(const LabelFits& fits) {
 }
 
 std::optional<Doubt> doubt_of_pose(const LabelFits& fits, const UpdateOptions& options, const UpdateResult& result) {
-    const LabelRivals rivals = label_rivals(fits.moving(), fits.fixed(), result.alignment.placement, options.alignment);
+    const LabelRivals rivals = fits.rivals(options, result.alignment.placement);
     const double found = rivals.found_mm, best = std::min(found, rivals.turned_mm);
     if (is_better_rival(rivals.mirrored_mm, best))
         return Doubt{"labels.mirrored", rivals.mirrored_mm, label_rival_options.better * best,
@@ -289,16 +306,16 @@ bool is_misplaced(const std::vector<Doubt>& doubts) {
 
 }  // namespace
 
-std::string why_nothing_matches(const Volume& moving, const Volume& fixed) {
-    const Volume from = moving.as(CV_32S), to = coarsened(fixed.as(CV_32S), limits.grid_mm);
-    const std::string exchange =
-        text_of_exchange(exchanged_labels(where_all_labels_together_fit(from, fixed.as(CV_32S), to.geometry), to));
+std::string why_nothing_matches(const LabelBoundaries& moving, const LabelBoundaries& fixed) {
+    const Volume to = coarsened(fixed.labels(), limits.grid_mm);
+    const std::string exchange = text_of_exchange(
+        exchanged_labels(where_all_labels_together_fit(moving.labels(), fixed.labels(), to.geometry), to));
     return exchange.empty() ? "check that the images show the same organ" : exchange + "; " + exchange_remedy;
 }
 
-std::vector<Doubt> doubts_of_labels(const PreparedModel& prepared, const Volume& fixed, const UpdateOptions& options,
-                                    const UpdateResult& result) {
-    const LabelFits fits(prepared, fixed, result);
+std::vector<Doubt> doubts_of_labels(const PreparedModel& prepared, LabelBoundaries& moving, LabelBoundaries& fixed,
+                                    const UpdateOptions& options, const UpdateResult& result) {
+    const LabelFits fits(prepared, moving, fixed, result);
     std::vector<Doubt> doubts = fits.doubts();
     const double most_mm = label_pose_limits.most_distance_mm;
     if (result.alignment.mean_distance_mm > most_mm)

@@ -1,8 +1,8 @@
 #pragma once
 /// What is said against a registration to labels: label by label, and why, as far as labels tell.
 
-#include "imaging/volume.hpp"
 #include "registration/options.hpp"
+#include "registration/pose/label_boundaries.hpp"
 #include "registration/prepare.hpp"
 #include "registration/result.hpp"
 
@@ -34,13 +34,13 @@ struct LabelPoseLimits {
 };
 inline constexpr LabelPoseLimits label_pose_limits{};
 
-/// Doubts of the labels that model and `fixed` show after a registration; where there are some, rivals of the placement
-/// and of the pairing of labels are sought for the cause, which takes as long as several alignments. `result` holds
-/// alignment and deformation.
-std::vector<Doubt> doubts_of_labels(const PreparedModel& prepared, const imaging::Volume& fixed,
+/// Doubts of the labels that the model, whose `moving` are, and `fixed` show after a registration; where there are
+/// some, rivals of the placement and of the pairing of labels are sought for the cause, which takes as long as several
+/// alignments. `result` holds alignment and deformation.
+std::vector<Doubt> doubts_of_labels(const PreparedModel& prepared, LabelBoundaries& moving, LabelBoundaries& fixed,
                                     const UpdateOptions& options, const UpdateResult& result);
 
 /// The likely cause and remedy where labels have no boundary in common: numbers that are exchanged, if any.
-std::string why_nothing_matches(const imaging::Volume& moving, const imaging::Volume& fixed);
+std::string why_nothing_matches(const LabelBoundaries& moving, const LabelBoundaries& fixed);
 
 }  // namespace tissuewarp::registration::detail

@@ -1,6 +1,5 @@
 #include "registration/terms/labels.hpp"
 
-#include "imaging/labels.hpp"
 #include "registration/doubts.hpp"
 #include "registration/pose/alignment.hpp"
 #include "registration/terms/label_doubts.hpp"
@@ -14,14 +13,14 @@ namespace tissuewarp::registration::detail {
 
 namespace {
 
-const imaging::Volume& with_common_labels(const imaging::Volume& fixed, const PreparedModel& prepared) {
-    for (const int label : imaging::labels_in(fixed.as(CV_32S)))
-        if (prepared.model.materials.contains(label)) return fixed;
+void require_common_labels(const LabelBoundaries& fixed, const PreparedModel& prepared) {
+    for (const auto& [label, extent] : fixed.extents())
+        if (prepared.model.materials.contains(label)) return;
     throw InvalidInput("the fixed label map holds none of the labels of the model; check the label tables");
 }
 
-double labelled_volume(const imaging::Volume& labels) {
-    return cv::countNonZero(imaging::mask_of_all(labels).voxels.reshape(1, 1)) * labels.geometry.voxel_volume();
+double volume_of(const LabelBoundaries& map) {
+    return labelled_volume(map.extents(), map.labels().geometry);
 }
 
 double largest_poisson_ratio(const tled::MaterialTable& materials) {
@@ -32,22 +31,26 @@ double largest_poisson_ratio(const tled::MaterialTable& materials) {
 
 }  // namespace
 
-LabelTerm::LabelTerm(const PreparedModel& prepared, const imaging::Volume& fixed_labels, const UpdateOptions& options)
+LabelTerm::LabelTerm(const PreparedModel& prepared, std::shared_ptr<LabelBoundaries> moving,
+                     const imaging::Volume& fixed_labels, const UpdateOptions& options)
     : prepared_(prepared),
-      labels_(with_common_labels(fixed_labels, prepared)),
+      moving_(std::move(moving)),
+      fixed_(fixed_labels),
       options_(options),
-      boundaries_(fixed_labels, prepared.interfaces.thickness(prepared.model.mesh)),
-      neighbours_(prepared.interfaces.neighbours()) {}
+      boundaries_(fixed_labels, fixed_.extents(), prepared.interfaces.thickness(prepared.model.mesh)),
+      neighbours_(prepared.interfaces.neighbours()) {
+    require_common_labels(fixed_, prepared);
+}
 
 Alignment LabelTerm::pose(const Eigen::Isometry3d& /*start*/, Observer& observer) {
-    return align_labels(prepared_.labels, labels_, options_.alignment, observer);
+    return align_labels(*moving_, fixed_, options_.alignment, observer);
 }
 
 Contribution LabelTerm::linearise(const RoundPlan& plan, const State& state, Observer& /*observer*/) {
     const Interfaces& interfaces = prepared_.interfaces;
     const Eigen::Matrix3Xd normals = interfaces.normals(prepared_.model.mesh.nodes + state.displacement);
-    std::vector<Match> matches =
-        match_interfaces(prepared_, boundaries_, labels_.geometry, state, normals, plan, options_.max_angle_deg);
+    std::vector<Match> matches = match_interfaces(prepared_, boundaries_, fixed_.labels().geometry, state, normals,
+                                                  plan, options_.max_angle_deg);
     leave_out_strays(matches, interfaces, neighbours_, prepared_.model.mesh.nodes, state.displacement, normals);
     weigh(matches, neighbours_, plan.scale_mm);
     bound(matches, plan.most_step_mm);
@@ -60,9 +63,9 @@ Contribution LabelTerm::linearise(const RoundPlan& plan, const State& state, Obs
     }
     if (last_.matched == 0)
         throw InvalidInput("no boundary of the model was found in the fixed labels within " + to_text(plan.range_mm) +
-                           " mm; " + why_nothing_matches(prepared_.labels, labels_));
+                           " mm; " + why_nothing_matches(*moving_, fixed_));
     Contribution result = last_;
-    result.springs = pulled_by(label_kind(prepared_.labels.geometry, labels_.geometry),
+    result.springs = pulled_by(label_kind(prepared_.labels.geometry, fixed_.labels().geometry),
                                matched_springs(interfaces, matches, normals, state.displacement, prepared_.options));
     const auto holds = pulled_by(Origin::Hold, holding_springs(interfaces, state.displacement, prepared_.options));
     std::copy(holds.begin(), holds.end(), std::back_inserter(result.springs));
@@ -82,10 +85,10 @@ void LabelTerm::judge(const State& /*state*/, UpdateResult& result) {
             {"labels.apart", last_.mean_residual_mm, most_residual,
              "the surfaces still differ by " + to_text(last_.mean_residual_mm) + " mm on average, more than a voxel",
              "look where the labels differ; allow more rounds, or softer tissue"});
-    std::vector<Doubt> about_labels = doubts_of_labels(prepared_, labels_, options_, result);
+    std::vector<Doubt> about_labels = doubts_of_labels(prepared_, *moving_, fixed_, options_, result);
     const bool cut = std::any_of(about_labels.begin(), about_labels.end(),
                                  [](const Doubt& doubt) { return doubt.code == "labels.cut_off"; });
-    const double growth = labelled_volume(labels_) / labelled_volume(prepared_.labels);
+    const double growth = volume_of(fixed_) / volume_of(*moving_);
     const double poisson = largest_poisson_ratio(prepared_.model.materials);
     if (std::abs(growth - 1) > limits.most_growth && poisson > limits.resisting_poisson)
         result.doubts.push_back({"labels.volume_changed", growth, limits.most_growth,
@@ -98,7 +101,8 @@ void LabelTerm::judge(const State& /*state*/, UpdateResult& result) {
 }
 
 std::optional<Doubt> doubt_of_growth(const imaging::Volume& moving, const imaging::Volume& fixed, double most_growth) {
-    const double growth = labelled_volume(fixed) / labelled_volume(moving);
+    const double growth = labelled_volume(imaging::label_extents(fixed), fixed.geometry) /
+                          labelled_volume(imaging::label_extents(moving), moving.geometry);
     if (growth <= most_growth && growth >= 1 / most_growth) return std::nullopt;
     return Doubt{"labels.volume_changed", growth, growth > 1 ? most_growth : 1 / most_growth,
                  "the labelled volume changed by the factor " + to_text(growth) + ", more than such tissue can",

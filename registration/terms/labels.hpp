@@ -2,6 +2,7 @@
 /// A segmented intraoperative volume: interface nodes of the deformed mesh belong on the boundaries of its labels.
 
 #include "registration/boundary/label_boundary_field.hpp"
+#include "registration/pose/label_boundaries.hpp"
 #include "registration/options.hpp"
 #include "registration/prepare.hpp"
 #include "registration/terms/datum_kind.hpp"
@@ -20,8 +21,10 @@ inline constexpr LabelDoubtLimits label_doubt_limits{};
 
 class LabelTerm : public Term {
 public:
-    /// Model, labels and options outlive this. Throws InvalidInput where the labels hold none of the model's.
-    LabelTerm(const PreparedModel& prepared, const imaging::Volume& fixed_labels, const UpdateOptions& options);
+    /// Model and options outlive this; `moving` is of the model's labels. Throws InvalidInput where the fixed ones hold
+    /// none of the model's.
+    LabelTerm(const PreparedModel& prepared, std::shared_ptr<LabelBoundaries> moving,
+              const imaging::Volume& fixed_labels, const UpdateOptions& options);
 
     [[nodiscard]] Shows shows() const override { return Shows::Boundary; }
     [[nodiscard]] PoseClaim pose_claim() const override { return PoseClaim::WholeSurface; }
@@ -34,9 +37,10 @@ public:
 
 private:
     const PreparedModel& prepared_;
-    const imaging::Volume& labels_;  // fixed
+    std::shared_ptr<LabelBoundaries> moving_;
+    LabelBoundaries fixed_;
     const UpdateOptions& options_;
-    LabelBoundaryField boundaries_;             // of these
+    LabelBoundaryField boundaries_;             // of the fixed labels
     std::vector<std::vector<int>> neighbours_;  // of interface nodes
     Contribution last_;                         // without its springs
 };

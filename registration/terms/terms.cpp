@@ -156,7 +156,10 @@ Terms terms_of(const PreparedModel& prepared, const Intraoperative& seen, const 
     require_usable(prepared, seen, tools.images.size());
     const double energy = strain_energy_unit(prepared, options.tissue);
     std::vector<std::unique_ptr<Term>> terms;
-    if (seen.labels) terms.push_back(std::make_unique<LabelTerm>(prepared, *seen.labels, options));
+    if (seen.labels) {
+        if (!tools.labels) tools.labels = std::make_shared<LabelBoundaries>(prepared.labels);
+        terms.push_back(std::make_unique<LabelTerm>(prepared, tools.labels, *seen.labels, options));
+    }
     if (seen.image) add_images(terms, prepared, seen, options, tools.images, energy);
     if (seen.surface) {
         if (!tools.organ) tools.organ = std::make_shared<const OrganSurface>(prepared);

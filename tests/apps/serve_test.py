@@ -133,6 +133,18 @@ class Serving(unittest.TestCase):
         self.assertLess(furthest(self.client.newest("organ")["points"], deformed_nodes(verb / "record.h5")), 0.05)
         self.assert_same_doubts(answer, verb)
 
+    def test_a_stylus_gives_what_the_points_of_its_touches_give(self):
+        points = numpy.loadtxt(surface_of(self.phantom), delimiter=",", skiprows=1).tolist()
+        self.client.answer(self.client.request("gather", names=["StylusTip"], spacing_mm=0.1))
+        for place in points:
+            self.client.send_touch(place, "StylusTip")
+        self.assertEqual(self.client.answer(self.client.request("pause"))["status"], "ok")
+        self.assertIn(f"points touched: {len(points)}", self.client.answer(self.client.request("info"))["why"])
+        touched = self.client.update(surface_sd_mm=0.3, begin_anew=True, use=["touched"])
+        self.client.answer(self.client.request("forget", names=["touched"]))
+        self.client.send_surface(points)
+        self.assertEqual(self.client.update(surface_sd_mm=0.3, begin_anew=True)["digest"], touched["digest"])
+
     # Of bytes in the axes of the file: i runs along -L, j along -P.
     grid = ("B", (SIZE,) * 3, (1, 1, 1), (FIXED_AFFINE[:3, 3] * [-1, -1, 1]).tolist(), ((-1, 0, 0), (0, -1, 0), (0, 0, 1)))
 

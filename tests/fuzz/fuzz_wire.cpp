@@ -35,7 +35,8 @@ std::vector<Bytes> right_messages() {
     };
     NamedPoints points;
     for (int n = 0; n < 5; ++n) points.push_back({"p" + std::to_string(n), "", Eigen::Vector3d(n, 2 * n, 3)});
-    for (const char* device : {"moving_points", "fixed_points", "targets"}) add("POINT", device, encode(points));
+    for (const char* device : {"moving_points", "fixed_points", "targets", "touched"})
+        add("POINT", device, encode(points));
     PolyData mesh;
     mesh.points = Eigen::Matrix3Xd::Random(3, 12);
     mesh.normals = mesh.points.colwise().normalized();
@@ -50,10 +51,11 @@ std::vector<Bytes> right_messages() {
         image.voxels.setTo(1);
         add("IMAGE", type == CV_8UC1 ? "fixed_labels" : "fixed", encode(image));
     }
-    add("TRANSFORM", "start", encode(Eigen::Isometry3d::Identity()));
+    for (const char* device : {"start", "stylus"}) add("TRANSFORM", device, encode(Eigen::Isometry3d::Identity()));
     add("STATUS", "x", encode(Status{1, "name", "text"}));
     for (const char* text :
          {R"({"do":"update","sequence":3,"use":["fixed_points"],"send":["field"],"points_sd_mm":0.5})",
+          R"({"do":"gather","id":"left","spacing_mm":2,"keep_s":60})", R"({"do":"forget","ids":["p1","left"]})",
           R"({"do":"load","file":"a.nii","names":["fixed"],"align":true})"})
         add("STRING", "request", encode(Text{text}));
     Writer second;  // a body of version 2
@@ -134,9 +136,9 @@ bool take(const Bytes& message, const Limits& limits, Scene& scene, Random& rand
     for (const Frame& frame : frames) {
         const Message said = decode(frame);
         if (const auto* text = std::get_if<Text>(&said))
-            parse_request(text->text);
+            apply(parse_request(text->text), scene);
         else
-            scene.take(frame.header.device, said);
+            scene.take(frame.header.device, said, seconds_of(frame.header));
         if (!scene.data().empty()) static_cast<void>(scene.seen({}, {}));
     }
     return !frames.empty();

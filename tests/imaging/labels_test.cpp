@@ -1,5 +1,6 @@
 #include "imaging/labels.hpp"
 #include "core/errors.hpp"
+#include "imaging/label_extents.hpp"
 #include "test_volumes.hpp"
 
 #include <gmock/gmock.h>
@@ -150,6 +151,36 @@ TEST(Labels, RequiredLabelsAreNamedWhenAbsent) {
     const std::string message = message_of<InvalidInput>([] { require_labels(two_boxes(), {5, 7}, "preop labels"); });
     EXPECT_EQ(message, "preop labels: label 7 is absent; present are 5, 9");
     EXPECT_THROW(require_labels(Volume(test::plain_grid({3, 3, 3}), CV_8U), {}, "labels"), InvalidInput);
+}
+
+TEST(LabelExtents, AreThoseOfTheStatistics) {
+    const Volume labels = two_boxes();
+    const auto statistics = label_statistics(labels);
+    for (const int depth : {CV_8U, CV_8S, CV_16U, CV_16S, CV_32S}) {
+        const LabelExtents extents = label_extents(labels.as(depth));
+        ASSERT_EQ(extents.size(), statistics.size());
+        for (const auto& [label, expected] : statistics) {
+            EXPECT_EQ(extents.at(label).voxels, expected.voxels);
+            EXPECT_EQ(extents.at(label).lower, expected.lower);
+            EXPECT_EQ(extents.at(label).upper, expected.upper);
+        }
+    }
+    const LabelExtent all = extent_of_all(label_extents(labels));
+    EXPECT_EQ(all.voxels, 72 + 8 + 1);
+    EXPECT_THAT(all.lower, ElementsAre(2, 0, 4));
+    EXPECT_THAT(all.upper, ElementsAre(16, 16, 16));
+    EXPECT_EQ(extent_of_all({}).voxels, 0);
+    EXPECT_THROW(label_extents(labels.as(CV_32F)), InvalidInput);
+}
+
+TEST(LabelExtents, ATrimmedMapKeepsItsPlaces) {
+    const Volume labels = two_boxes();
+    const Volume cut = trimmed(labels.as(CV_8U), label_extents(labels).at(9), 3);
+    EXPECT_THAT(cut.geometry.size, ElementsAre(8, 5, 8));  // the image ends before a margin of three in y
+    const Eigen::Vector3d there = cut.geometry.index(labels.geometry.point({11, 1, 11}));
+    EXPECT_LT((there - Eigen::Vector3d(4, 1, 4)).norm(), 1e-9);
+    EXPECT_EQ(cut.data<int>()[cut.offset(4, 1, 4)], 9);
+    EXPECT_EQ(label_extents(cut).at(9).voxels, 8);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include "registration/pose/alignment.hpp"
 
 #include "imaging/filters.hpp"
+#include "imaging/label_extents.hpp"
 #include "tests/support/label_shapes.hpp"
 
 #include <gtest/gtest.h>
@@ -33,6 +34,13 @@ TEST_P(KnownMotions, AreFoundToAVoxel) {
     const Alignment found = align_labels(moving, fixed);
     EXPECT_LT(pose_error(found.placement, GetParam()), 0.89);  // 0.80 at most, of voxels of 1.5 mm
     EXPECT_LT(found.mean_distance_mm, 0.38);
+}
+
+/// The background that lies about it.
+TEST(Alignment, IsThatOfTheOrganHoweverWideItsImages) {
+    const auto wide = organ_labels({}), seen = organ_labels({}, shapes::motion(8, {1, 2, 3}, {6, -3, 2}));
+    const auto cut = imaging::trimmed(wide.as(CV_8U), extent_of_all(imaging::label_extents(wide)), 3);
+    EXPECT_LT(pose_error(align_labels(cut, seen).placement, align_labels(wide, seen).placement), 0.05);
 }
 
 TEST(Alignment, ABallIsNotTurned) {

@@ -37,8 +37,33 @@ TEST(Request, WhatItMayNotSay) {
              {R"({"do": "update", "tolerance_mm": null})", "tolerance_mm"},
              {R"({"do": "update", "colour": 1})", "there is no \"colour\""},
              {R"({"do": "update", "send": ["everything"]})", "warped and field"},
+             {R"({"do": "gather", "spacing_mm": 0})", "0.1 to 50"},
+             {R"({"do": "gather", "keep_s": -1})", "keep_s"},
+             {R"({"do": "forget", "ids": "a"})", "list of at most 1000"},
              {R"({"do": "update", "use": [[[[[[[[1]]]]]]]]})", "nested"}})
         EXPECT_THAT([&] { parse_request(text); }, ThrowsMessage<InvalidInput>(HasSubstr(word))) << text;
+}
+
+TEST(Request, WhatAStylusTouchesIsGatheredUntilAPause) {
+    Scene scene;
+    const auto ask = [&](const char* text) { apply(parse_request(text), scene); };
+    const auto touch = [&](const char* device, double x) {
+        scene.take(device, Eigen::Isometry3d(Eigen::Translation3d(x, 0, 0)));
+    };
+    ask(R"({"do": "gather", "names": ["Stylus Tip"], "id": "Left lobe", "spacing_mm": 2})");
+    for (int n = 0; n < 8; ++n) touch("Stylus-Tip", n);
+    EXPECT_EQ(scene.touched().size(), 4);
+    ask(R"({"do": "gather", "id": "right"})");
+    touch("stylus", 90);
+    ask(R"({"do": "pause"})");
+    EXPECT_THROW(touch("stylus", 95), InvalidInput);
+    EXPECT_THAT([&] { ask(R"({"do": "forget", "ids": ["left lobe"]})"); },
+                ThrowsMessage<InvalidInput>(HasSubstr("'left lobe'")));
+    EXPECT_THROW(ask(R"({"do": "forget", "ids": ["right"], "names": ["touched"]})"), InvalidInput);
+    ask(R"({"do": "forget", "ids": ["Left lobe"]})");
+    EXPECT_EQ(scene.touched().points(), Eigen::Vector3d(90, 0, 0));
+    ask(R"({"do": "forget", "names": ["touched"]})");
+    EXPECT_TRUE(scene.touched().empty());
 }
 
 TEST(Request, FilesLieInTheFolderAlone) {

@@ -287,6 +287,49 @@ TEST(Session, ALogGoesOnWithTheSameBits) {
     EXPECT_EQ(updates, 4);
 }
 
+/// A stylus is drawn over the side of the block that lies at x = 44 now, to and fro.
+void draw_stylus(Session& session, double seconds) {
+    for (int i = 0; i <= 18; ++i)
+        for (int j = 0; j <= 18; ++j) {
+            const Eigen::Vector3d place(44, 2 + 2 * (i % 2 ? 18 - j : j), 2 + 2 * i);
+            Frame passed = frame("TRANSFORM", "stylus", encode(Eigen::Isometry3d(Eigen::Translation3d(place))));
+            passed.header.timestamp = static_cast<std::uint64_t>((seconds + 0.02 * (19 * i + j)) * 4294967296.0);
+            session.receive(1, std::move(passed));
+        }
+}
+
+TEST(Session, WhatAStylusTouchesIsRegisteredToAndReplayed) {
+    const tissuewarp::test::TemporaryFolder folder;
+    const SessionOptions options{{}, folder / "log", {}};
+    const ServedPatient patient = test::block();
+    {
+        Kept kept;
+        Session session(patient, options, kept);
+        session.receive(1, request({{"do", "gather"}, {"sequence", 1}, {"id", "side"}, {"spacing_mm", 1.5}}));
+        EXPECT_EQ(kept.answer(1).at("status"), "ok");
+        draw_stylus(session, 1000);
+        json side = update(2);
+        side["align"] = false;
+        session.receive(1, request(side));
+        EXPECT_EQ(kept.answer(2).at("state"), 361);
+        const auto organ = std::get<PolyData>(kept.shown("organ").message);
+        EXPECT_NEAR(organ.points.row(0).maxCoeff(), 44, 0.3);
+        draw_stylus(session, 1000.5);  // says nothing new
+        session.receive(1, request({{"do", "info"}, {"sequence", 3}}));
+        EXPECT_THAT(kept.answer(3).at("why"), HasSubstr("state 361, data: touched; points touched: 361"));
+        session.receive(1, request({{"do", "pause"}, {"sequence", 4}}));
+        session.receive(1, request({{"do", "forget"}, {"sequence", 5}, {"ids", {"side"}}}));
+        session.receive(1, request(update(6)));
+        EXPECT_THAT(kept.answer(6).at("why"), HasSubstr("nothing to register"));
+    }
+    int updates = 0;
+    replay(patient, {}, options.log, [&](long long, bool same) {
+        EXPECT_TRUE(same);
+        ++updates;
+    });
+    EXPECT_EQ(updates, 1);
+}
+
 Products doubted() {
     Products products;
     products.result.deformation =

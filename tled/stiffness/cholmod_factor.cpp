@@ -3,11 +3,12 @@
 #include <cholmod.h>
 
 #include <algorithm>
-#include <optional>
+#include <memory>
 #include <string>
 
 #include "core/errors.hpp"
 #include "tled/blas_threads.hpp"
+#include "tled/stiffness/supernodes.hpp"
 
 namespace tissuewarp::tled::detail {
 
@@ -63,14 +64,22 @@ Eigen::SparseMatrix<double> node_graph(const Eigen::SparseMatrix<double>& lower,
     return graph;
 }
 
+Supernodes supernodes_of(const cholmod_factor& L) {
+    const auto copied = [&](const void* values, std::size_t count) {
+        return std::vector<int>(static_cast<const int*>(values), static_cast<const int*>(values) + count);
+    };
+    return {copied(L.super, L.nsuper + 1), copied(L.pi, L.nsuper + 1), copied(L.px, L.nsuper + 1),
+            copied(L.s, L.ssize)};
+}
+
 }  // namespace
 
 struct CholmodFactor::Impl {
     mutable cholmod_common common{};
     cholmod_factor* symbolic = nullptr;
     cholmod_factor* L = nullptr;
+    std::shared_ptr<const SupernodeTree> tree;
     mutable cholmod_dense *x = nullptr, *y = nullptr, *e = nullptr;  // workspaces of cholmod_solve2
-    bool small = false;                                              // too little work for two BLAS threads
     double solves_per_factor = 0;
 
     Impl() {
@@ -94,9 +103,25 @@ struct CholmodFactor::Impl {
     Impl(const Impl&) = delete;
     Impl& operator=(const Impl&) = delete;
 
+    /// False where the matrix is not positive definite.
+    [[nodiscard]] bool factorised(const Eigen::SparseMatrix<double>& lower) {
+        const SingleBlasThread single;
+        if (single.holds()) {
+            cholmod_change_factor(CHOLMOD_REAL, 1, 1, 1, 1, L, &common);
+            require_success("factorise");
+            return tree->factorise(lower, static_cast<double*>(L->x));
+        }
+        cholmod_sparse matrix = view(lower);
+        const SerialOpenMp serial;
+        cholmod_factorize(&matrix, L, &common);
+        require_success("factorise");
+        return common.status != CHOLMOD_NOT_POSDEF;
+    }
+
     [[nodiscard]] Eigen::MatrixXd solved(const Eigen::MatrixXd& b) const {
+        const SingleBlasThread single;
+        if (single.holds()) return tree->solve(static_cast<const double*>(L->x), b);
         cholmod_dense right = view(b);
-        const SingleBlasThread single;  // a triangular solve is bound by memory
         const SerialOpenMp serial;
         cholmod_solve2(CHOLMOD_A, L, &right, nullptr, &x, nullptr, &y, &e, &common);
         require_success("solve with");
@@ -148,8 +173,9 @@ CholmodFactor::CholmodFactor(const Eigen::SparseMatrix<double>& lower, const std
     cholmod_sparse matrix = view(lower);
     impl_->symbolic = cholmod_analyze_p(&matrix, order.data(), nullptr, 0, &common);
     impl_->require_success("analyse");
-    constexpr double small_flops = 1e11;  // some seconds on one core; on busy cores spinning costs twenty times that
-    impl_->small = common.fl < small_flops;
+    impl_->tree = std::make_shared<const SupernodeTree>(supernodes_of(*impl_->symbolic),
+                                                        static_cast<const int*>(impl_->symbolic->Perm),
+                                                        static_cast<int>(lower.cols()));
     constexpr double operations_per_entry = 30;  // of a factorisation in the time in which a solve reads an entry twice
     impl_->solves_per_factor = common.fl / (operations_per_entry * common.lnz);
 }
@@ -163,23 +189,17 @@ CholmodFactor CholmodFactor::analysis() const {
     auto copy = std::make_unique<Impl>();
     copy->symbolic = cholmod_copy_factor(impl_->symbolic, &copy->common);
     copy->require_success("copy the analysis of");
-    copy->small = impl_->small;
+    copy->tree = impl_->tree;
     copy->solves_per_factor = impl_->solves_per_factor;
     return CholmodFactor(std::move(copy));
 }
 
 bool CholmodFactor::factorize(const Eigen::SparseMatrix<double>& lower) {
-    cholmod_sparse matrix = view(lower);
     cholmod_free_factor(&impl_->L, &impl_->common);
     impl_->common.status = CHOLMOD_OK;
     impl_->L = cholmod_copy_factor(impl_->symbolic, &impl_->common);
     impl_->require_success("copy the analysis of");
-    const SerialOpenMp serial;
-    std::optional<SingleBlasThread> single;
-    if (impl_->small) single.emplace();
-    cholmod_factorize(&matrix, impl_->L, &impl_->common);
-    impl_->require_success("factorise");
-    return impl_->common.status != CHOLMOD_NOT_POSDEF;
+    return impl_->factorised(lower);
 }
 
 Eigen::VectorXd CholmodFactor::solve(const Eigen::VectorXd& b) const {
