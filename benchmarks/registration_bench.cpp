@@ -4,8 +4,8 @@
 // DATA holds phantom-brainshift, phantom-brain-sag, phantom-liver and lung-ct; PART selects cases whose name holds it.
 // Errors are at the landmarks or, where there is a true field, at its points in the mask; FOLDER gets them point by
 // point, as CSV. With --repeats every update runs N times, and a line per case tells the time from data in to warped
-// image out, the model prepared: on the processor (the default) through the displacement field of all voxels, on a GPU
-// through GpuWarp, whose voxels outside the mesh follow the placement. Then N updates go on each from the last one,
+// image out, the model prepared: on the processor (the default) by warp_by_mesh(), on a GPU by GpuWarp; voxels outside
+// the mesh follow the placement. Then N updates go on each from the last one,
 // while the patient moves at random by half a millimetre along each axis from one to the next (but for a held head) and
 // every tenth point of a surface is another one's; a second line tells their times and errors. On a processor newer
 // than the OpenBLAS set OPENBLAS_CORETYPE, as the program does by itself: factors take three times as long without.
@@ -305,7 +305,7 @@ public:
         if (gpu_)
             gpu_->warp(deformation.displacement, deformation.placement, warped_);
         else
-            warped_ = warp_image(moving_, displacement_fixed_to_moving(deformation, grid_));
+            warped_ = warp_by_mesh(moving_, deformation, grid_);
     }
 
 private:

@@ -1,9 +1,9 @@
 #include "imaging/label_extents.hpp"
 
 #include "core/errors.hpp"
-#include "imaging/filters.hpp"
 
 #include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
@@ -18,6 +18,50 @@ void add(LabelExtent& extent, const LabelExtent& more) {
         extent.upper[axis] = std::max(extent.upper[axis], more.upper[axis]);
     }
     extent.voxels += more.voxels;
+}
+
+/// call(T()) for the type of the voxels.
+template <class Call>
+auto with_integers(const Volume& labels, const Call& call) {
+    constexpr const char* remedy = "label map: voxels must be integers of one component; read it with read_labels";
+    if (labels.empty() || labels.channels() != 1) throw InvalidInput(remedy);
+    switch (labels.voxels.depth()) {
+        case CV_8U:
+            return call(std::uint8_t());
+        case CV_8S:
+            return call(std::int8_t());
+        case CV_16U:
+            return call(std::uint16_t());
+        case CV_16S:
+            return call(std::int16_t());
+        case CV_32S:
+            return call(std::int32_t());
+        default:
+            throw InvalidInput(remedy);
+    }
+}
+
+Geometry grid_of(const Geometry& image, const LabelExtent& box, const std::array<int, 3>& step) {
+    Geometry grid = image;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        if (box.lower[axis] < 0 || box.upper[axis] > image.size[axis] || box.lower[axis] >= box.upper[axis])
+            throw InvalidInput("label map: a box without voxels, or beyond the image");
+        grid.size[axis] = (box.upper[axis] - box.lower[axis] + step[axis] - 1) / step[axis];
+        grid.spacing[static_cast<Eigen::Index>(axis)] *= step[axis];
+    }
+    grid.origin = image.point(Eigen::Vector3d(box.lower[0], box.lower[1], box.lower[2]));
+    return grid;
+}
+
+/// row(from, to) for every row of a part: its first voxel in the map, and its place in the part.
+template <typename T, class Row>
+void each_row(const Volume& labels, const LabelExtent& box, const std::array<int, 3>& step, const Geometry& part,
+              const Row& row) {
+    tbb::parallel_for(0, part.size[2], [&](int k) {
+        for (int j = 0; j < part.size[1]; ++j)
+            row(labels.data<T>() + labels.offset(box.lower[0], box.lower[1] + j * step[1], box.lower[2] + k * step[2]),
+                part.size[0] * (j + std::int64_t{part.size[1]} * k));
+    });
 }
 
 template <typename T>
@@ -45,22 +89,7 @@ LabelExtents extents_of(const Volume& labels) {
 }  // namespace
 
 LabelExtents label_extents(const Volume& labels) {
-    if (labels.empty() || labels.channels() != 1)
-        throw InvalidInput("label map: voxels must be integers of one component; read it with read_labels");
-    switch (labels.voxels.depth()) {
-        case CV_8U:
-            return extents_of<std::uint8_t>(labels);
-        case CV_8S:
-            return extents_of<std::int8_t>(labels);
-        case CV_16U:
-            return extents_of<std::uint16_t>(labels);
-        case CV_16S:
-            return extents_of<std::int16_t>(labels);
-        case CV_32S:
-            return extents_of<std::int32_t>(labels);
-        default:
-            throw InvalidInput("label map: voxels must be integers of one component; read it with read_labels");
-    }
+    return with_integers(labels, [&](auto type) { return extents_of<decltype(type)>(labels); });
 }
 
 LabelExtent extent_of_all(const LabelExtents& extents) {
@@ -69,13 +98,38 @@ LabelExtent extent_of_all(const LabelExtents& extents) {
     return all;
 }
 
-Volume trimmed(const Volume& labels, const LabelExtent& box, int margin) {
-    std::array<int, 3> lower{}, upper{};
+LabelExtent grown(LabelExtent box, const std::array<int, 3>& margin, const Geometry& grid) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
-        lower[axis] = std::max(0, box.lower[axis] - margin);
-        upper[axis] = std::min(labels.geometry.size[axis], box.upper[axis] + margin);
+        box.lower[axis] = std::max(0, box.lower[axis] - margin[axis]);
+        box.upper[axis] = std::min(grid.size[axis], box.upper[axis] + margin[axis]);
     }
-    return crop(labels, lower, upper).as(CV_32S);
+    return box;
+}
+
+Volume part_of(const Volume& labels, const LabelExtent& box, const std::array<int, 3>& step) {
+    Volume part(grid_of(labels.geometry, box, step), CV_32SC1);
+    with_integers(labels, [&](auto type) {
+        each_row<decltype(type)>(labels, box, step, part.geometry, [&](const auto* from, std::int64_t to) {
+            auto* row = part.data<std::int32_t>() + to;
+            for (int i = 0; i < part.geometry.size[0]; ++i) row[i] = static_cast<std::int32_t>(from[i * step[0]]);
+        });
+        return 0;
+    });
+    return part;
+}
+
+Volume mask_in(const Volume& labels, const LabelExtent& box, int label) {
+    constexpr std::array<int, 3> every{1, 1, 1};
+    Volume mask(grid_of(labels.geometry, box, every), CV_8UC1);
+    with_integers(labels, [&](auto type) {
+        each_row<decltype(type)>(labels, box, every, mask.geometry, [&](const auto* from, std::int64_t to) {
+            auto* row = mask.data<std::uint8_t>() + to;
+            for (int i = 0; i < mask.geometry.size[0]; ++i)
+                row[i] = label == 0 ? from[i] != 0 : static_cast<std::int32_t>(from[i]) == label;
+        });
+        return 0;
+    });
+    return mask;
 }
 
 }  // namespace tissuewarp::imaging

@@ -24,8 +24,14 @@ LabelExtents label_extents(const Volume& labels);
 /// Of all labels together; no voxels where there are none.
 LabelExtent extent_of_all(const LabelExtents& extents);
 
-/// The map as int32, cut to a box and `margin` voxels about it, as far as the image goes. Precondition: the box holds
-/// voxels.
-Volume trimmed(const Volume& labels, const LabelExtent& box, int margin);
+/// The box and `margin` voxels about it along each axis, as far as the image goes.
+LabelExtent grown(LabelExtent box, const std::array<int, 3>& margin, const Geometry& grid);
+
+/// The map as int32, of a box every `step`-th voxel along each axis, beginning with the first. Throws InvalidInput for
+/// a box without voxels or not in the image.
+Volume part_of(const Volume& labels, const LabelExtent& box, const std::array<int, 3>& step = {1, 1, 1});
+
+/// uint8 mask of one label in a box, or of every label where it is 0. Throws InvalidInput as above.
+Volume mask_in(const Volume& labels, const LabelExtent& box, int label);
 
 }  // namespace tissuewarp::imaging

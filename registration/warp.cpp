@@ -1,13 +1,17 @@
 #include "registration/warp.hpp"
 
 #include "core/errors.hpp"
+#include "registration/field/rasterisation.hpp"
 #include "registration/field/uninitialised.hpp"
+#include "registration/field/voxel_sampler.hpp"
 
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <string>
+#include <vector>
 
 namespace tissuewarp::registration {
 
@@ -25,57 +29,8 @@ void require_inputs(const Volume& moving, const Volume& field, const char* what)
     imaging::require_valid(field.geometry, "field");
 }
 
-/// Half a voxel beyond the outermost centres still belongs to the image, as in imaging::resample.
-bool holds(const Geometry& grid, const Eigen::Vector3d& index) {
-    for (int axis = 0; axis < 3; ++axis)
-        if (!(index[axis] >= -0.5 - 1e-6 && index[axis] <= grid.size[axis] - 0.5 + 1e-6)) return false;
-    return true;
-}
-
-/// The moving voxel grid, read at continuous indices.
-template <class T>
-struct Sampler {
-    const Volume& image;
-    int channels = image.channels();
-    std::array<std::int64_t, 3> stride{channels, channels* std::int64_t{image.geometry.size[0]},
-                                       channels* std::int64_t{image.geometry.size[0]} * image.geometry.size[1]};
-
-    void nearest(const Eigen::Vector3d& index, T* target) const {
-        const T* voxel = image.data<T>();
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            const int rounded = static_cast<int>(std::floor(index[static_cast<Eigen::Index>(axis)] + 0.5));
-            voxel += stride[axis] * std::clamp(rounded, 0, image.geometry.size[axis] - 1);
-        }
-        std::copy_n(voxel, channels, target);
-    }
-
-    void linear(const Eigen::Vector3d& index, T* target) const {
-        const T* corner = image.data<T>();
-        std::array<std::int64_t, 3> next;  // to the neighbour along each axis, 0 where there is none
-        std::array<double, 3> f;
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            const int last = image.geometry.size[axis] - 1;
-            const double clamped =
-                std::min(std::max(index[static_cast<Eigen::Index>(axis)], 0.0), static_cast<double>(last));
-            const int lower = static_cast<int>(clamped);
-            f[axis] = clamped - lower;
-            corner += stride[axis] * lower;
-            next[axis] = lower < last ? stride[axis] : 0;
-        }
-        const auto row = [&](const T* p) {
-            const double left = p[0];
-            return left + f[0] * (p[next[0]] - left);
-        };
-        const auto slice = [&](const T* p) {
-            const double near = row(p);
-            return near + f[1] * (row(p + next[1]) - near);
-        };
-        for (int c = 0; c < channels; ++c) {
-            const double near = slice(corner + c);
-            target[c] = cv::saturate_cast<T>(near + f[2] * (slice(corner + c + next[2]) - near));
-        }
-    }
-};
+using detail::holds;
+using detail::VoxelSampler;
 
 enum class Kernel { Nearest, Linear };
 
@@ -84,7 +39,7 @@ void pull(const Volume& moving, const Volume& field, Kernel kernel, double outsi
     const Geometry& grid = field.geometry;
     const Eigen::Matrix3d to_index = moving.geometry.point_to_index();
     const Eigen::Vector3d step = to_index * grid.index_to_point().col(0);
-    const Sampler<T> sampler{moving};
+    const VoxelSampler<T> sampler{moving};
     const T outside_value = cv::saturate_cast<T>(outside);
     tbb::parallel_for(0, grid.size[1] * grid.size[2], [&](int row) {
         const int j = row % grid.size[1], k = row / grid.size[1];
@@ -104,34 +59,86 @@ void pull(const Volume& moving, const Volume& field, Kernel kernel, double outsi
     });
 }
 
-Volume warp(const Volume& moving, const Volume& field, Kernel kernel, double outside) {
-    Volume result = detail::uninitialised(field.geometry, moving.voxels.type());
-    switch (moving.voxels.depth()) {
+/// call(T()) for the type of the voxels.
+template <class Call>
+void with_voxels(const Volume& image, const Call& call) {
+    switch (image.voxels.depth()) {
         case CV_8U:
-            pull<std::uint8_t>(moving, field, kernel, outside, result);
-            break;
+            return call(std::uint8_t());
         case CV_8S:
-            pull<std::int8_t>(moving, field, kernel, outside, result);
-            break;
+            return call(std::int8_t());
         case CV_16U:
-            pull<std::uint16_t>(moving, field, kernel, outside, result);
-            break;
+            return call(std::uint16_t());
         case CV_16S:
-            pull<std::int16_t>(moving, field, kernel, outside, result);
-            break;
+            return call(std::int16_t());
         case CV_32S:
-            pull<std::int32_t>(moving, field, kernel, outside, result);
-            break;
+            return call(std::int32_t());
         case CV_32F:
-            pull<float>(moving, field, kernel, outside, result);
-            break;
+            return call(float());
         case CV_64F:
-            pull<double>(moving, field, kernel, outside, result);
-            break;
+            return call(double());
         default:
             throw InvalidInput("warp: voxels of half precision; convert them to float32");
     }
+}
+
+Volume warp(const Volume& moving, const Volume& field, Kernel kernel, double outside) {
+    Volume result = detail::uninitialised(field.geometry, moving.voxels.type());
+    with_voxels(moving, [&](auto type) { pull<decltype(type)>(moving, field, kernel, outside, result); });
     return result;
+}
+
+template <class T>
+void read(const VoxelSampler<T>& sampler, const Eigen::Vector3d& index, T outside, T* target) {
+    if (holds(sampler.image.geometry, index))
+        sampler.linear(index, target);
+    else
+        std::fill_n(target, sampler.channels, outside);
+}
+
+/// Voxels in the mesh, of the lowest element where several hold one, and which they are.
+template <class T>
+std::vector<std::uint8_t> pull_inside(const VoxelSampler<T>& sampler, const Deformation& deformation, T outside,
+                                      Volume& result) {
+    const Geometry &grid = result.geometry, &moving = sampler.image.geometry;
+    const Eigen::Matrix3Xd from = moving.point_to_index() * (deformation.mesh.nodes.colwise() - moving.origin);
+    const Eigen::Matrix3Xd to = grid.point_to_index() * (deformation.deformed_nodes().colwise() - grid.origin);
+    std::vector<std::uint8_t> inside(static_cast<std::size_t>(grid.voxel_count()));
+    detail::rasterise(to, deformation.mesh.tets, grid.size, [&](int tet, const Eigen::Vector4d& barycentric_step) {
+        const Eigen::Matrix<double, 3, 4> corners = from(Eigen::all, deformation.mesh.tets.col(tet));
+        const Eigen::Vector3d step = corners * barycentric_step;
+        return [&, corners, step](const detail::TetRow& row) {
+            const Eigen::Vector3d start = corners * row.at_first;
+            const std::int64_t first = result.offset(row.first, row.j, row.k);
+            for (int n = 0; n <= row.last - row.first; ++n) {
+                std::uint8_t& seen = inside[static_cast<std::size_t>(first + n)];
+                if (seen) continue;
+                seen = 1;
+                T* target = result.data<T>() + sampler.channels * (first + n);
+                read(sampler, start + n * step, outside, target);
+            }
+        };
+    });
+    return inside;
+}
+
+/// The other voxels, where a rigid motion takes them from.
+template <class T>
+void pull_outside(const VoxelSampler<T>& sampler, const Eigen::Isometry3d& to_moving,
+                  const std::vector<std::uint8_t>& inside, T outside, Volume& result) {
+    const Geometry &grid = result.geometry, &moving = sampler.image.geometry;
+    const Eigen::Matrix3d to_index = moving.point_to_index() * to_moving.linear();
+    const Eigen::Vector3d step = to_index * grid.index_to_point().col(0);
+    tbb::parallel_for(0, grid.size[1] * grid.size[2], [&](int row) {
+        const int j = row % grid.size[1], k = row / grid.size[1];
+        const Eigen::Vector3d start =
+            moving.point_to_index() * (to_moving * grid.point(Eigen::Vector3d(0, j, k)) - moving.origin);
+        const std::int64_t first = result.offset(0, j, k);
+        for (int i = 0; i < grid.size[0]; ++i) {
+            if (inside[static_cast<std::size_t>(first + i)]) continue;
+            read(sampler, start + i * step, outside, result.data<T>() + sampler.channels * (first + i));
+        }
+    });
 }
 
 }  // namespace
@@ -146,6 +153,22 @@ Volume warp_labels(const Volume& moving_labels, const Volume& fixed_to_moving) {
     if (moving_labels.voxels.depth() >= CV_32F)
         throw InvalidInput("warp_labels: labels are floating-point; read them with read_labels");
     return warp(moving_labels, fixed_to_moving, Kernel::Nearest, 0.0);
+}
+
+Volume warp_by_mesh(const Volume& moving, const Deformation& deformation, const Geometry& fixed_grid, double outside) {
+    if (moving.empty()) throw InvalidInput("warp_by_mesh: the moving image is empty; give one with voxels");
+    imaging::require_valid(moving.geometry, "moving image");
+    imaging::require_valid(fixed_grid, "fixed grid");
+    if (!deformation.displacement.allFinite() || !deformation.placement.matrix().allFinite())
+        throw InvalidInput("warp_by_mesh: a displacement or the placement is not finite");
+    Volume result = detail::uninitialised(fixed_grid, moving.voxels.type());
+    with_voxels(moving, [&](auto type) {
+        const VoxelSampler<decltype(type)> sampler{moving};
+        const auto value = cv::saturate_cast<decltype(type)>(outside);
+        const std::vector<std::uint8_t> inside = pull_inside(sampler, deformation, value, result);
+        pull_outside(sampler, deformation.placement.inverse(), inside, value, result);
+    });
+    return result;
 }
 
 }  // namespace tissuewarp::registration

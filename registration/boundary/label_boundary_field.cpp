@@ -1,7 +1,6 @@
 #include "registration/boundary/label_boundary_field.hpp"
 
 #include "imaging/filters.hpp"
-#include "imaging/labels.hpp"
 #include "imaging/sampling.hpp"
 
 #include <tbb/parallel_for.h>
@@ -38,8 +37,7 @@ struct Part {
 
 std::unique_ptr<Indicator> indicator(const Volume& map, const Part& part) {
     const int margin = static_cast<int>(std::ceil(4 * part.smoothing)) + 2;
-    const Volume there = imaging::trimmed(map, part.box, margin);
-    const Volume mask = part.label == 0 ? imaging::mask_of_all(there) : imaging::mask_of(there, part.label);
+    const Volume mask = mask_in(map, grown(part.box, {margin, margin, margin}, map.geometry), part.label);
     return std::make_unique<Indicator>(imaging::smooth(mask, part.smoothing * mask.geometry.spacing.minCoeff()));
 }
 

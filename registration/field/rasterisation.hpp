@@ -100,15 +100,25 @@ RasterCount rasterise(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tet
                    .min(Eigen::Array3d(size[0] - 1.0, size[1] - 1.0, size[2] - 1.0));
         return corners;
     };
-    for (int tet = 0; tet < static_cast<int>(tets.cols()); ++tet) {
+    struct Reach {
+        int sign, first_slab, last_slab;
+    };
+    std::vector<Reach> reaches(static_cast<std::size_t>(tets.cols()));
+    tbb::parallel_for(0, static_cast<int>(tets.cols()), [&](int tet) {
         Eigen::Array3d first, last;
         BarycentricMap map;
         const double volume = map.set(bounds(tet, first, last));
-        if (volume < 0.0) ++count.inverted;
-        if (volume == 0.0) ++count.flat;
-        if (volume == 0.0 || !(first <= last).all()) continue;
-        for (int slab = static_cast<int>(first[2]) / slab_slices; slab <= static_cast<int>(last[2]) / slab_slices;
-             ++slab)
+        Reach& reach = reaches[static_cast<std::size_t>(tet)];
+        reach = {(volume > 0.0) - (volume < 0.0), 0, -1};
+        if (volume == 0.0 || !(first <= last).all()) return;
+        reach.first_slab = static_cast<int>(first[2]) / slab_slices;
+        reach.last_slab = static_cast<int>(last[2]) / slab_slices;
+    });
+    for (int tet = 0; tet < static_cast<int>(tets.cols()); ++tet) {
+        const Reach& reach = reaches[static_cast<std::size_t>(tet)];
+        count.inverted += reach.sign < 0;
+        count.flat += reach.sign == 0;
+        for (int slab = reach.first_slab; slab <= reach.last_slab; ++slab)
             tets_of[static_cast<std::size_t>(slab)].push_back(tet);
     }
     tbb::parallel_for(0, slabs, [&](int slab) {

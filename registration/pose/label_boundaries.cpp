@@ -20,11 +20,15 @@ using imaging::Geometry;
 using imaging::LabelExtent;
 using imaging::Volume;
 
-constexpr double beyond_mm = 20;  // of the labels: farther off distances grow by those to the grid
+constexpr double beyond_mm = 60;  // of the labels: farther off distances grow by those to the grid. By hand
 
-/// Voxels of the map in one of the coarser grid: whole, so that labels keep their places.
-int coarsening(const Geometry& grid, int axis, double spacing_mm) {
-    return std::max(1, static_cast<int>(std::floor(spacing_mm / grid.spacing[axis])));
+/// Voxels of the map in one of the coarser grid, along each axis: whole, so that labels keep their places.
+std::array<int, 3> coarsening(const Geometry& grid, double spacing_mm) {
+    std::array<int, 3> step{};
+    for (int axis = 0; axis < 3; ++axis)
+        step[static_cast<std::size_t>(axis)] =
+            std::max(1, static_cast<int>(std::floor(spacing_mm / grid.spacing[axis])));
+    return step;
 }
 
 Volume mask(const Volume& labels, int label) {
@@ -67,23 +71,20 @@ Eigen::Matrix3Xd faces_of(const Volume& mask) {
 }  // namespace
 
 Volume coarsened(const Volume& labels, double spacing_mm) {
-    Geometry grid = labels.geometry;
-    for (int axis = 0; axis < 3; ++axis) {
-        const int factor = coarsening(grid, axis, spacing_mm);
-        int& size = grid.size[static_cast<std::size_t>(axis)];
-        size = (size + factor - 1) / factor;
-        grid.spacing[axis] *= factor;
-    }
-    return imaging::resample(labels, grid, imaging::Interpolation::Nearest).as(CV_32S);
+    return coarsened(labels, {0, {0, 0, 0}, labels.geometry.size}, spacing_mm);
 }
 
-Volume coarsened(const Volume& labels, const LabelExtent& box, double spacing_mm) {
-    std::array<int, 3> lower = box.lower;
-    for (int axis = 0; axis < 3; ++axis) {
-        int& first = lower[static_cast<std::size_t>(axis)];
-        first -= first % coarsening(labels.geometry, axis, spacing_mm);
-    }
-    return coarsened(imaging::crop(labels, lower, box.upper), spacing_mm);
+Volume coarsened(const Volume& labels, LabelExtent box, double spacing_mm) {
+    const std::array<int, 3> step = coarsening(labels.geometry, spacing_mm);
+    for (std::size_t axis = 0; axis < 3; ++axis) box.lower[axis] -= box.lower[axis] % step[axis];
+    return part_of(labels, box, step);
+}
+
+std::array<int, 3> voxels_of(double length_mm, const Geometry& grid) {
+    std::array<int, 3> count{};
+    for (int axis = 0; axis < 3; ++axis)
+        count[static_cast<std::size_t>(axis)] = static_cast<int>(std::ceil(length_mm / grid.spacing[axis]));
+    return count;
 }
 
 double labelled_volume(const imaging::LabelExtents& extents, const Geometry& grid) {
@@ -94,21 +95,16 @@ LabelBoundaries::LabelBoundaries(const Volume& labels) : labels_(labels), extent
 
 Volume LabelBoundaries::coarse_about_all() const {
     const Geometry& grid = labels_.geometry;
-    LabelExtent box = extent_of_all(extents_);
-    for (int axis = 0; axis < 3; ++axis) {
-        const auto a = static_cast<std::size_t>(axis);
-        const int margin = static_cast<int>(std::ceil(beyond_mm / grid.spacing[axis]));
-        box.lower[a] = std::max(0, box.lower[a] - margin);
-        box.upper[a] = std::min(grid.size[a], box.upper[a] + margin);
-    }
-    return coarsened(labels_, box, LabelPoseOptions().map_spacing_mm);
+    return coarsened(labels_, grown(extent_of_all(extents_), voxels_of(beyond_mm, grid), grid),
+                     LabelPoseOptions().map_spacing_mm);
 }
 
 LabelBoundaries::Boundary LabelBoundaries::boundary(const Volume& coarse, int label) const {
     const Volume inside = mask(coarse, label);
     if (cv::countNonZero(inside.voxels.reshape(1, 1)) == 0) return {};
     const LabelExtent extent = label == of_all ? extent_of_all(extents_) : extents_.at(label);
-    return {imaging::signed_distance(inside), faces_of(mask(imaging::trimmed(labels_, extent, 1), label))};
+    return {imaging::signed_distance(inside),
+            faces_of(mask_in(labels_, grown(extent, {1, 1, 1}, labels_.geometry), label))};
 }
 
 void LabelBoundaries::make(const std::vector<int>& labels) {

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include <array>
 #include <map>
 #include <vector>
 
@@ -14,7 +15,10 @@ namespace tissuewarp::registration::detail {
 /// The map on a grid of whole multiples of its spacings, at most about `spacing_mm`, where these are finer; int32.
 imaging::Volume coarsened(const imaging::Volume& labels, double spacing_mm);
 /// The same of a part of the map, with the voxels that the whole would have there. Precondition: the box holds voxels.
-imaging::Volume coarsened(const imaging::Volume& labels, const imaging::LabelExtent& box, double spacing_mm);
+imaging::Volume coarsened(const imaging::Volume& labels, imaging::LabelExtent box, double spacing_mm);
+
+/// At least so many voxels along each axis as a length is.
+std::array<int, 3> voxels_of(double length_mm, const imaging::Geometry& grid);
 
 /// mm³ of all labels.
 double labelled_volume(const imaging::LabelExtents& extents, const imaging::Geometry& grid);
@@ -31,7 +35,7 @@ public:
     [[nodiscard]] const imaging::LabelExtents& extents() const { return extents_; }
 
     struct Boundary {
-        imaging::Volume distance;  ///< signed, mm, on a grid of about 2 mm, as far as labels reach and 20 mm beyond
+        imaging::Volume distance;  ///< signed, mm, on a grid of about 2 mm, as far as labels reach and 60 mm beyond
         Eigen::Matrix3Xd faces;    ///< centres of those between voxels, 3 × F, LPS mm
     };
     /// Makes those that are not there yet, of labels that the map holds. One thread at a time.

@@ -40,8 +40,7 @@ double cut_area(const LabelBoundaries& map) {
             LabelExtent slice = box;
             slice.lower[axis] = at;
             slice.upper[axis] = at + 1;
-            const Volume there = imaging::trimmed(map.labels(), slice, 0);
-            area += face * cv::countNonZero(there.voxels.reshape(1, 1));
+            area += face * cv::countNonZero(mask_in(map.labels(), slice, 0).voxels.reshape(1, 1));
         }
     }
     return area;
@@ -136,16 +135,6 @@ LabelExtent about_both(const LabelExtent& a, const LabelExtent& b) {
     return box;
 }
 
-/// As far as the image goes.
-LabelExtent grown(LabelExtent box, double by_mm, const imaging::Geometry& grid) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-        const int by = static_cast<int>(std::ceil(by_mm / grid.spacing[static_cast<Eigen::Index>(axis)]));
-        box.lower[axis] = std::max(0, box.lower[axis] - by);
-        box.upper[axis] = std::min(grid.size[axis], box.upper[axis] + by);
-    }
-    return box;
-}
-
 /// How well the model's own labels fit, on a coarser grid about them and the fixed ones.
 class LabelFits {
 public:
@@ -205,7 +194,7 @@ private:
         const LabelExtent before = box_of(result.deformation.mesh.nodes, grid),
                           after = box_of(result.deformation.deformed_nodes(), grid);
         const LabelExtent all = about_both(about_both(extent_of_all(fixed_.extents()), before), after);
-        return grown(all, 2 * limits.grid_mm, grid);  // beyond the grid boundaries have no faces
+        return grown(all, voxels_of(2 * limits.grid_mm, grid), grid);  // beyond the grid boundaries have no faces
     }
 
     [[nodiscard]] bool is_in_both(int label) const {

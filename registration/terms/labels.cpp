@@ -31,19 +31,23 @@ double largest_poisson_ratio(const tled::MaterialTable& materials) {
 
 }  // namespace
 
-LabelTerm::LabelTerm(const PreparedModel& prepared, std::shared_ptr<LabelBoundaries> moving,
+LabelTools::LabelTools(const PreparedModel& prepared)
+    : moving(prepared.labels),
+      neighbours(prepared.interfaces.neighbours()),
+      thickness_mm(prepared.interfaces.thickness(prepared.model.mesh)) {}
+
+LabelTerm::LabelTerm(const PreparedModel& prepared, std::shared_ptr<LabelTools> tools,
                      const imaging::Volume& fixed_labels, const UpdateOptions& options)
     : prepared_(prepared),
-      moving_(std::move(moving)),
+      tools_(std::move(tools)),
       fixed_(fixed_labels),
       options_(options),
-      boundaries_(fixed_labels, fixed_.extents(), prepared.interfaces.thickness(prepared.model.mesh)),
-      neighbours_(prepared.interfaces.neighbours()) {
+      boundaries_(fixed_labels, fixed_.extents(), tools_->thickness_mm) {
     require_common_labels(fixed_, prepared);
 }
 
 Alignment LabelTerm::pose(const Eigen::Isometry3d& /*start*/, Observer& observer) {
-    return align_labels(*moving_, fixed_, options_.alignment, observer);
+    return align_labels(tools_->moving, fixed_, options_.alignment, observer);
 }
 
 Contribution LabelTerm::linearise(const RoundPlan& plan, const State& state, Observer& /*observer*/) {
@@ -51,8 +55,8 @@ Contribution LabelTerm::linearise(const RoundPlan& plan, const State& state, Obs
     const Eigen::Matrix3Xd normals = interfaces.normals(prepared_.model.mesh.nodes + state.displacement);
     std::vector<Match> matches = match_interfaces(prepared_, boundaries_, fixed_.labels().geometry, state, normals,
                                                   plan, options_.max_angle_deg);
-    leave_out_strays(matches, interfaces, neighbours_, prepared_.model.mesh.nodes, state.displacement, normals);
-    weigh(matches, neighbours_, plan.scale_mm);
+    leave_out_strays(matches, interfaces, tools_->neighbours, prepared_.model.mesh.nodes, state.displacement, normals);
+    weigh(matches, tools_->neighbours, plan.scale_mm);
     bound(matches, plan.most_step_mm);
     last_ = {};
     last_.candidates = static_cast<int>(matches.size());
@@ -63,7 +67,7 @@ Contribution LabelTerm::linearise(const RoundPlan& plan, const State& state, Obs
     }
     if (last_.matched == 0)
         throw InvalidInput("no boundary of the model was found in the fixed labels within " + to_text(plan.range_mm) +
-                           " mm; " + why_nothing_matches(*moving_, fixed_));
+                           " mm; " + why_nothing_matches(tools_->moving, fixed_));
     Contribution result = last_;
     result.springs = pulled_by(label_kind(prepared_.labels.geometry, fixed_.labels().geometry),
                                matched_springs(interfaces, matches, normals, state.displacement, prepared_.options));
@@ -85,10 +89,10 @@ void LabelTerm::judge(const State& /*state*/, UpdateResult& result) {
             {"labels.apart", last_.mean_residual_mm, most_residual,
              "the surfaces still differ by " + to_text(last_.mean_residual_mm) + " mm on average, more than a voxel",
              "look where the labels differ; allow more rounds, or softer tissue"});
-    std::vector<Doubt> about_labels = doubts_of_labels(prepared_, *moving_, fixed_, options_, result);
+    std::vector<Doubt> about_labels = doubts_of_labels(prepared_, tools_->moving, fixed_, options_, result);
     const bool cut = std::any_of(about_labels.begin(), about_labels.end(),
                                  [](const Doubt& doubt) { return doubt.code == "labels.cut_off"; });
-    const double growth = volume_of(fixed_) / volume_of(*moving_);
+    const double growth = volume_of(fixed_) / volume_of(tools_->moving);
     const double poisson = largest_poisson_ratio(prepared_.model.materials);
     if (std::abs(growth - 1) > limits.most_growth && poisson > limits.resisting_poisson)
         result.doubts.push_back({"labels.volume_changed", growth, limits.most_growth,

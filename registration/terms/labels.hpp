@@ -2,8 +2,8 @@
 /// A segmented intraoperative volume: interface nodes of the deformed mesh belong on the boundaries of its labels.
 
 #include "registration/boundary/label_boundary_field.hpp"
-#include "registration/pose/label_boundaries.hpp"
 #include "registration/options.hpp"
+#include "registration/pose/label_boundaries.hpp"
 #include "registration/prepare.hpp"
 #include "registration/terms/datum_kind.hpp"
 #include "registration/terms/term.hpp"
@@ -19,12 +19,20 @@ struct LabelDoubtLimits {
 };
 inline constexpr LabelDoubtLimits label_doubt_limits{};
 
+/// What updates of one model share.
+struct LabelTools {
+    LabelBoundaries moving;                    ///< of the model's labels
+    std::vector<std::vector<int>> neighbours;  ///< of interface nodes
+    std::map<int, double> thickness_mm;        ///< of each label
+
+    explicit LabelTools(const PreparedModel& prepared);
+};
+
 class LabelTerm : public Term {
 public:
-    /// Model and options outlive this; `moving` is of the model's labels. Throws InvalidInput where the fixed ones hold
-    /// none of the model's.
-    LabelTerm(const PreparedModel& prepared, std::shared_ptr<LabelBoundaries> moving,
-              const imaging::Volume& fixed_labels, const UpdateOptions& options);
+    /// Model and options outlive this. Throws InvalidInput where the fixed labels hold none of the model's.
+    LabelTerm(const PreparedModel& prepared, std::shared_ptr<LabelTools> tools, const imaging::Volume& fixed_labels,
+              const UpdateOptions& options);
 
     [[nodiscard]] Shows shows() const override { return Shows::Boundary; }
     [[nodiscard]] PoseClaim pose_claim() const override { return PoseClaim::WholeSurface; }
@@ -37,12 +45,11 @@ public:
 
 private:
     const PreparedModel& prepared_;
-    std::shared_ptr<LabelBoundaries> moving_;
+    std::shared_ptr<LabelTools> tools_;
     LabelBoundaries fixed_;
     const UpdateOptions& options_;
-    LabelBoundaryField boundaries_;             // of the fixed labels
-    std::vector<std::vector<int>> neighbours_;  // of interface nodes
-    Contribution last_;                         // without its springs
+    LabelBoundaryField boundaries_;  // of the fixed labels
+    Contribution last_;              // without its springs
 };
 
 /// Of the labelled volume, where it grew by more than the factor or shrank by more than one over it.

@@ -157,7 +157,7 @@ Terms terms_of(const PreparedModel& prepared, const Intraoperative& seen, const 
     const double energy = strain_energy_unit(prepared, options.tissue);
     std::vector<std::unique_ptr<Term>> terms;
     if (seen.labels) {
-        if (!tools.labels) tools.labels = std::make_shared<LabelBoundaries>(prepared.labels);
+        if (!tools.labels) tools.labels = std::make_shared<LabelTools>(prepared);
         terms.push_back(std::make_unique<LabelTerm>(prepared, tools.labels, *seen.labels, options));
     }
     if (seen.image) add_images(terms, prepared, seen, options, tools.images, energy);

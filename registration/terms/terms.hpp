@@ -4,8 +4,8 @@
 #include "registration/intraoperative.hpp"
 #include "registration/loads/load_finder.hpp"
 #include "registration/matching/dense/image_engine.hpp"
-#include "registration/pose/label_boundaries.hpp"
 #include "registration/prepare.hpp"
+#include "registration/terms/labels.hpp"
 #include "registration/terms/organ_surface.hpp"
 #include "registration/terms/term.hpp"
 
@@ -66,7 +66,7 @@ private:
 struct SharedTools {
     std::vector<ImageTools> images;             ///< for the image of the model and each of its contrasts
     std::shared_ptr<const OrganSurface> organ;  ///< made where points of a surface are first seen
-    std::shared_ptr<LabelBoundaries> labels;    ///< of the model, made where labels are first seen
+    std::shared_ptr<LabelTools> labels;         ///< made where labels are first seen
 };
 
 /// Terms of what was seen, of what the model has about it and of the loads stated, with what is expected of tissue that

@@ -173,14 +173,41 @@ TEST(LabelExtents, AreThoseOfTheStatistics) {
     EXPECT_THROW(label_extents(labels.as(CV_32F)), InvalidInput);
 }
 
-TEST(LabelExtents, ATrimmedMapKeepsItsPlaces) {
+TEST(LabelExtents, APartKeepsItsPlaces) {
     const Volume labels = two_boxes();
-    const Volume cut = trimmed(labels.as(CV_8U), label_extents(labels).at(9), 3);
-    EXPECT_THAT(cut.geometry.size, ElementsAre(8, 5, 8));  // the image ends before a margin of three in y
-    const Eigen::Vector3d there = cut.geometry.index(labels.geometry.point({11, 1, 11}));
+    const LabelExtent box = grown(label_extents(labels).at(9), {3, 3, 3}, labels.geometry);
+    const Volume part = part_of(labels.as(CV_8U), box);
+    EXPECT_THAT(part.geometry.size, ElementsAre(8, 5, 8));  // the image ends before a margin of three in y
+    const Eigen::Vector3d there = part.geometry.index(labels.geometry.point({11, 1, 11}));
     EXPECT_LT((there - Eigen::Vector3d(4, 1, 4)).norm(), 1e-9);
-    EXPECT_EQ(cut.data<int>()[cut.offset(4, 1, 4)], 9);
-    EXPECT_EQ(label_extents(cut).at(9).voxels, 8);
+    EXPECT_EQ(part.data<int>()[part.offset(4, 1, 4)], 9);
+    EXPECT_EQ(label_extents(part).at(9).voxels, 8);
+    EXPECT_THROW(part_of(labels, {1, {0, 0, 0}, {21, 1, 1}}), InvalidInput);
+    EXPECT_THROW(part_of(labels, {1, {3, 0, 0}, {3, 1, 1}}), InvalidInput);
+}
+
+TEST(LabelExtents, EveryNthVoxel) {
+    const Volume labels = two_boxes();
+    const Volume part = part_of(labels, {1, {1, 0, 2}, {20, 20, 20}}, {3, 2, 4});
+    EXPECT_THAT(part.geometry.size, ElementsAre(7, 10, 5));
+    for (int k = 0; k < 5; ++k)
+        for (int j = 0; j < 10; ++j)
+            for (int i = 0; i < 7; ++i) {
+                const int expected = labels.data<int>()[labels.offset(1 + 3 * i, 2 * j, 2 + 4 * k)];
+                ASSERT_EQ(part.data<int>()[part.offset(i, j, k)], expected);
+            }
+    const Eigen::Vector3d last = labels.geometry.index(part.geometry.point({6, 9, 4}));
+    EXPECT_LT((last - Eigen::Vector3d(19, 18, 18)).norm(), 1e-9);
+}
+
+TEST(LabelExtents, AMaskInABox) {
+    const Volume labels = two_boxes();
+    const LabelExtent all{1, {0, 0, 0}, {20, 20, 20}};
+    for (const int label : {5, 9, 7, 300}) {
+        const Volume expected = mask_of(labels, label), mask = mask_in(labels.as(CV_8U), all, label);
+        EXPECT_EQ(cv::norm(mask.voxels.reshape(1, 1), expected.voxels.reshape(1, 1), cv::NORM_INF), 0) << label;
+    }
+    EXPECT_EQ(cv::countNonZero(mask_in(labels, all, 0).voxels.reshape(1, 1)), 72 + 8 + 1);
 }
 
 }  // namespace

@@ -3,9 +3,11 @@
 #include "core/errors.hpp"
 #include "imaging/image_io.hpp"
 #include "imaging/labels.hpp"
+#include "meshing/point_location.hpp"
 #include "registration/field.hpp"
 #include "shapes.hpp"
 #include "tests/support/folders.hpp"
+#include "tests/support/label_shapes.hpp"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -145,6 +147,45 @@ TEST(WarpImage, DoesNotDependOnTheNumberOfThreads) {
         warped[threads - 1] = warp_image(moving, field);
     }
     EXPECT_EQ(std::memcmp(warped[0].voxels.data, warped[1].voxels.data, warped[0].voxels.total() * sizeof(float)), 0);
+}
+
+/// Voxels in the mesh are those of the field's warp, all others those of the placement's.
+TEST(WarpByMesh, IsTheFieldsWarpInTheMeshAndThePlacementsOutside) {
+    const Geometry moving_grid = test::oblique_grid({0, 0, 0}, {50, 52, 48}, {1.2, 1.1, 1.3});
+    Volume moving(moving_grid, CV_16SC1);
+    for_each_voxel(moving, [&](const Eigen::Vector3d& index, std::int64_t n) {
+        const Eigen::Vector3d p = moving_grid.point(index);
+        moving.data<std::int16_t>()[n] = static_cast<std::int16_t>(500 * std::sin(0.2 * p[0]) + 10 * p[1] - 7 * p[2]);
+    });
+    Deformation deformation =
+        test::deformed_by(test::box_at({-12, -11, -10}, {24, 22, 20}, {6, 6, 6}), [](const Eigen::Vector3d& X) {
+            return Eigen::Vector3d(0.03 * X[1], 1.5 * std::cos(0.1 * X[0]), 0.002 * X[0] * X[2]);
+        });
+    deformation.placement = shapes::motion(11, {1, 2, -1}, {3, -2, 4});
+    const Geometry fixed_grid = test::plain_grid({44, 40, 42}, 1.0, {-20, -22, -15});
+    const Volume warped = warp_by_mesh(moving, deformation, fixed_grid, -99);
+    const Volume expected = warp_image(moving, displacement_fixed_to_moving(deformation, fixed_grid), -99);
+    Deformation rigid = deformation;
+    rigid.displacement.setZero();
+    const Volume placed = warp_image(moving, displacement_fixed_to_moving(rigid, fixed_grid), -99);
+    const meshing::PointLocator locator(deformation.deformed_mesh());
+    int inside = 0, outside = 0;
+    for_each_voxel(warped, [&](const Eigen::Vector3d& index, std::int64_t n) {
+        const bool in_mesh = locator.find(fixed_grid.point(index)).has_value();
+        ++(in_mesh ? inside : outside);
+        ASSERT_NEAR(warped.data<std::int16_t>()[n], (in_mesh ? expected : placed).data<std::int16_t>()[n], 1);
+    });
+    EXPECT_GT(inside, 8000);
+    EXPECT_GT(outside, 8000);
+}
+
+TEST(WarpByMesh, RefusesWhatIsNotFinite) {
+    Deformation deformation =
+        test::deformed_by(test::box_at({0, 0, 0}, {9, 9, 9}, {1, 1, 1}),
+                          [](const Eigen::Vector3d&) { return Eigen::Vector3d::Constant(std::nan("")); });
+    const Volume moving(test::plain_grid({5, 5, 5}), CV_8UC1);
+    EXPECT_THROW(warp_by_mesh(moving, deformation, moving.geometry), InvalidInput);
+    EXPECT_THROW(warp_by_mesh({}, deformation, moving.geometry), InvalidInput);
 }
 
 }  // namespace
