@@ -12,9 +12,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -106,9 +108,64 @@ std::map<int, Region> regions_of(const Volume& labels) {
     return regions;
 }
 
-/// From each face of a region to the nearest of another, mm. Of faces of both no tree is asked: most are, where labels
-/// nearly agree.
-std::vector<double> distances(const Region& from, const Region& to) {
+/// Which faces of a grid are those of a region.
+class FaceSet {
+public:
+    FaceSet(const Region& region, const Geometry& grid)
+        : grid_(grid), bits_(static_cast<std::size_t>(3 * grid.voxel_count() / 64 + 1)) {
+        for (const std::int64_t place : region.places) word(place) |= bit(place);
+    }
+
+    /// From the face at a place to the nearest, mm; nothing where that lies farther than a few voxels.
+    [[nodiscard]] std::optional<double> distance(std::int64_t place, const Eigen::Vector3d& centre) const {
+        constexpr int farthest = 4;
+        const std::int64_t voxel = place / 3, row = grid_.size[0];
+        const std::array<int, 3> at{int(voxel % row), int(voxel / row % grid_.size[1]),
+                                    int(voxel / row / grid_.size[1])};
+        double squared = std::numeric_limits<double>::infinity();
+        for (int reach = 0; reach <= farthest; ++reach) {
+            look(at, reach, centre, squared);
+            const double beyond = (reach + 0.5) * grid_.spacing.minCoeff();  // of faces that were not looked at
+            if (squared <= beyond * beyond) return std::sqrt(squared);
+        }
+        return std::nullopt;
+    }
+
+private:
+    const Geometry& grid_;
+    std::vector<std::uint64_t> bits_;
+
+    [[nodiscard]] std::uint64_t& word(std::int64_t place) { return bits_[static_cast<std::size_t>(place / 64)]; }
+    [[nodiscard]] static std::uint64_t bit(std::int64_t place) { return std::uint64_t{1} << (place % 64); }
+    [[nodiscard]] bool holds(std::int64_t place) const {
+        return (bits_[static_cast<std::size_t>(place / 64)] & bit(place)) != 0;
+    }
+
+    /// At the faces of voxels `reach` steps away along the axis where they are farthest.
+    void look(const std::array<int, 3>& at, int reach, const Eigen::Vector3d& from, double& squared) const {
+        const auto first = [&](std::size_t axis) { return std::max(0, at[axis] - reach); };
+        const auto last = [&](std::size_t axis) { return std::min(grid_.size[axis] - 1, at[axis] + reach); };
+        for (int k = first(2); k <= last(2); ++k)
+            for (int j = first(1); j <= last(1); ++j) {
+                const bool whole = std::abs(k - at[2]) == reach || std::abs(j - at[1]) == reach;
+                for (int i = first(0); i <= last(0); i += whole || reach == 0 ? 1 : 2 * reach) {
+                    if (!whole && std::abs(i - at[0]) != reach) continue;
+                    const std::int64_t place = 3 * (i + grid_.size[0] * (j + std::int64_t{grid_.size[1]} * k));
+                    for (int axis = 0; axis < 3; ++axis) {
+                        if (!holds(place + axis)) continue;
+                        Eigen::Vector3d centre(i, j, k);
+                        centre[axis] += 0.5;
+                        squared = std::min(squared, (centre.cwiseProduct(grid_.spacing) - from).squaredNorm());
+                    }
+                }
+            }
+    }
+};
+
+/// From each face of a region to the nearest of another, mm. Most are of both or lie a voxel apart, where labels nearly
+/// agree; those that lie farther are asked of a tree.
+std::vector<double> distances(const Region& from, const Region& to, const Geometry& grid) {
+    constexpr double far = -1;
     std::vector<double> result(from.places.size(), 0.0);
     std::vector<std::size_t> apart;
     auto same = to.places.begin();
@@ -117,20 +174,27 @@ std::vector<double> distances(const Region& from, const Region& to) {
         if (same == to.places.end() || *same != from.places[n]) apart.push_back(n);
     }
     if (apart.empty()) return result;
+    const FaceSet faces(to, grid);
+    tbb::parallel_for(std::size_t{0}, apart.size(), [&](std::size_t n) {
+        const std::size_t face = apart[n];
+        result[face] = faces.distance(from.places[face], from.centres[face]).value_or(far);
+    });
+    std::erase_if(apart, [&](std::size_t face) { return result[face] != far; });
+    if (apart.empty()) return result;
     const meshing::PointTree tree(to.centres);
     tbb::parallel_for(std::size_t{0}, apart.size(),
                       [&](std::size_t n) { result[apart[n]] = tree.distance(from.centres[apart[n]]); });
     return result;
 }
 
-void measure_surfaces(const Region& a, const Region& b, Overlap& overlap) {
+void measure_surfaces(const Region& a, const Region& b, const Geometry& grid, Overlap& overlap) {
     if (a.places.empty() && b.places.empty() && overlap.dice == 1.0) return;  // both fill the image
     if (a.places.empty() || b.places.empty()) {
         overlap.mean_surface_distance_mm = overlap.hausdorff_95_mm = std::numeric_limits<double>::infinity();
         return;
     }
     std::vector<double> to_b, to_a;
-    tbb::parallel_invoke([&] { to_b = distances(a, b); }, [&] { to_a = distances(b, a); });
+    tbb::parallel_invoke([&] { to_b = distances(a, b, grid); }, [&] { to_a = distances(b, a, grid); });
     const auto mean = [](const std::vector<double>& d) {
         return std::accumulate(d.begin(), d.end(), 0.0) / static_cast<double>(d.size());
     };
@@ -183,7 +247,7 @@ std::map<int, Overlap> overlap(const Volume& labels, const Volume& reference) {
             2.0 * static_cast<double>(common[label]) / static_cast<double>(region_a.voxels + region_b.voxels);
     }
     tbb::parallel_for_each(result, [&](auto& entry) {
-        measure_surfaces(regions_a.at(entry.first), regions_b.at(entry.first), entry.second);
+        measure_surfaces(regions_a.at(entry.first), regions_b.at(entry.first), reference.geometry, entry.second);
     });
     return result;
 }

@@ -8,8 +8,6 @@
 #include "registration/pose/alignment.hpp"
 #include "registration/pose/label_rivals.hpp"
 
-#include <tbb/parallel_invoke.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -143,14 +141,11 @@ public:
         : resected_(prepared.options.resected),
           moving_(moving),
           fixed_(fixed),
+          mesh_(result.deformation.mesh),
           coarse_(coarsened(fixed.labels(), compared_part(result), limits.grid_mm)),
-          voxel_mm_(std::max(coarse_.geometry.spacing.maxCoeff(), moving.labels().geometry.spacing.maxCoeff())) {
-        tbb::parallel_invoke([&] { before_ = dice_of_all(shown_by(at_rest(result))); },
-                             [&] {
-                                 shown_ = shown_by(result.deformation);
-                                 after_ = overlap(shown_, coarse_);
-                             });
-    }
+          shown_(shown_by(result.deformation)),
+          after_(overlap(shown_, coarse_)),
+          voxel_mm_(std::max(coarse_.geometry.spacing.maxCoeff(), moving.labels().geometry.spacing.maxCoeff())) {}
 
     [[nodiscard]] std::vector<Doubt> doubts() const {
         std::vector<Doubt> doubts;
@@ -177,15 +172,11 @@ public:
 private:
     std::vector<int> resected_;  // labels that are in no model
     LabelBoundaries &moving_, &fixed_;
+    const meshing::TetMesh& mesh_;
     Volume coarse_, shown_;  // fixed labels and those of the model, on one grid
-    double before_ = 0;      // Dice of all labels together, unregistered
     std::map<int, Overlap> after_;
     double voxel_mm_;
 
-    static Deformation at_rest(const UpdateResult& result) {
-        const meshing::TetMesh& mesh = result.deformation.mesh;
-        return {mesh, Eigen::Matrix3Xd::Zero(3, mesh.nodes.cols()), Eigen::Isometry3d::Identity()};
-    }
     [[nodiscard]] Volume shown_by(const Deformation& deformation) const {
         return labels_of_model(deformation, moving_.labels(), coarse_.geometry);
     }
@@ -231,10 +222,13 @@ private:
 
     void doubt_worse(std::vector<Doubt>& doubts) const {
         const double after = after_.at(0).dice;
-        if (after < before_ - limits.most_worse)
-            doubts.push_back({"labels.worse", after, before_,
-                              "all labels together overlap less than before the registration: Dice " +
-                                  to_text(before_) + " → " + to_text(after),
+        if (after >= 1 - limits.most_worse) return;
+        const Deformation at_rest{mesh_, Eigen::Matrix3Xd::Zero(3, mesh_.nodes.cols()), Eigen::Isometry3d::Identity()};
+        const double before = dice_of_all(shown_by(at_rest));
+        if (after < before - limits.most_worse)
+            doubts.push_back({"labels.worse", after, before,
+                              "all labels together overlap less than before the registration: Dice " + to_text(before) +
+                                  " → " + to_text(after),
                               "leave them where the headers place them, or check the labels"});
     }
 

@@ -37,7 +37,7 @@ TEST_P(KnownMotions, AreFoundToAVoxel) {
     detail::LabelBoundaries of_moving(moving), of_fixed(fixed);
     const detail::LabelDistance distance(of_moving, of_fixed, AlignmentOptions().samples);
     const double truth_mm = distance(Eigen::Affine3d(GetParam().matrix()), AlignmentOptions().trim_mm, 1);
-    EXPECT_LT(found.mean_distance_mm, truth_mm);  // voxels' faces fit no better where the organ truly is
+    EXPECT_LE(found.mean_distance_mm, truth_mm);  // voxels' faces fit no better where the organ truly is
     EXPECT_LT(found.mean_distance_mm, 0.38);
 }
 

@@ -26,6 +26,7 @@ namespace {
 
 constexpr int tile = 64;                  // columns of a tile
 constexpr int tall = 192;                 // its rows, where rows are shared out
+constexpr int stretch = 512;              // rows of a tile that earlier supernodes are subtracted from at once
 constexpr double tiled_operations = 4e6;  // of a supernode whose tiles are shared out: a millisecond
 constexpr double least_branch = 2e6;      // operations of a branch that one thread takes as a whole
 constexpr double branches = 200;          // about, of a tree
@@ -238,32 +239,40 @@ struct Front {
     [[nodiscard]] int tiles() const { return pieces(all.columns(s), tile); }
     [[nodiscard]] int width(int t) const { return std::min(tile, all.columns(s) - t * tile); }
 
-    /// In tile t, less the products of rows of an earlier supernode, from `begin` on and of those before `end`.
-    void subtract(int from, int begin, int end, int t) const;
+    [[nodiscard]] int stretches() const { return pieces(height(), stretch); }
+
+    /// In tile t and a stretch of the rows, less the products of rows of an earlier supernode, from `begin` on and of
+    /// those before `end`.
+    void subtract(int from, int begin, int end, int t, int part) const;
     /// Tiles from left to right: factorise, divide what is below, subtract from those to the right.
     [[nodiscard]] bool factorise() const;
 };
 
-void Front::subtract(int from, int begin, int end, int t) const {
+void Front::subtract(int from, int begin, int end, int t, int part) const {
     const int *rows = all.rows(from), *own = all.rows(s), first = all.begin(s) + t * tile;
-    begin = int(std::lower_bound(rows + begin, rows + end, first) - rows);
-    end = int(std::lower_bound(rows + begin, rows + end, first + width(t)) - rows);
-    const int below = all.height(from), m = below - begin, n = end - begin;
+    const auto row_from = [&](int row) { return int(std::lower_bound(rows + begin, rows + end, row) - rows); };
+    const int left = row_from(first), right = row_from(first + width(t)), n = right - left;
     if (n == 0) return;
+    end = all.height(from);
+    const int next = (part + 1) * stretch,
+              top = std::max(left, row_from(own[part * stretch])),  // nothing above the diagonal
+        m = (next < height() ? row_from(own[next]) : end) - top;
+    if (m <= 0) return;
     thread_local std::vector<double> product;  // kept: its pages cost as much as what is done with them
     thread_local std::vector<int> place;       // of rows in this front
     product.resize(std::size_t(m) * std::size_t(n));
     place.resize(std::size_t(m));
-    for (int r = 0, at = 0; r < m; ++r, ++at) {
-        if (own[at] != rows[begin + r]) at = int(std::lower_bound(own + at, own + height(), rows[begin + r]) - own);
+    for (int r = 0, at = part * stretch; r < m; ++r, ++at) {
+        if (own[at] != rows[top + r]) at = int(std::lower_bound(own + at, own + height(), rows[top + r]) - own);
         place[std::size_t(r)] = at;
     }
-    const double* block = values + all.values_of(from) + begin;
-    multiply(1, block, below, block, below, 0, product.data(), m, m, n, all.columns(from));
+    const double* block = values + all.values_of(from);
+    const int ld = all.height(from);
+    multiply(1, block + top, ld, block + left, ld, 0, product.data(), m, m, n, all.columns(from));
     for (int c = 0; c < n; ++c) {
-        double* column = at(0, rows[begin + c] - all.begin(s));
+        double* column = at(0, rows[left + c] - all.begin(s));
         const double* there = product.data() + std::size_t(c) * std::size_t(m);
-        for (int r = c; r < m; ++r) column[place[std::size_t(r)]] -= there[r];
+        for (int r = std::max(0, left + c - top); r < m; ++r) column[place[std::size_t(r)]] -= there[r];
     }
 }
 
@@ -294,10 +303,10 @@ bool SupernodeTree::factorise(const Eigen::SparseMatrix<double>& lower, double* 
     leaves_to_roots([&](int s) {
         if (!definite) return;
         const Front front{supernodes_, values, s, work_[std::size_t(s)] > tiled_operations};
-        each(front.shared, front.tiles(), [&](int t) {
+        each(front.shared, front.tiles() * front.stretches(), [&](int n) {
             for (int u = first_update_[std::size_t(s)]; u < first_update_[std::size_t(s) + 1]; ++u) {
                 const Update& update = updates_[std::size_t(u)];
-                front.subtract(update.from, update.begin, update.end, t);
+                front.subtract(update.from, update.begin, update.end, n / front.stretches(), n % front.stretches());
             }
         });
         if (!front.factorise()) definite = false;
