@@ -43,7 +43,10 @@ public:
         const std::scoped_lock lock(mutex_);
         dropped.push_back(client);
     }
-    void note(const std::string&) override {}
+    void note(const std::string& text) override {
+        const std::scoped_lock lock(mutex_);
+        notes.push_back(text);
+    }
 
     /// From now on updates wait before they compute.
     void close_gate() {
@@ -83,6 +86,7 @@ public:
     }
 
     std::vector<std::uint32_t> dropped;
+    std::vector<std::string> notes;
 
 private:
     void keep(const Parcel& parcel) {
@@ -252,6 +256,36 @@ TEST(Session, UpdatesGoOnFromTheLastUnlessToldOtherwise) {
     other["align"] = false;
     session.receive(1, request(other));
     EXPECT_EQ(kept.answer(5).at("began").at("at_last"), false);
+}
+
+/// Nobody computes on a GPU that is not there.
+TEST(Session, AServerStartsWhoseLogCannotBeComputedAgain) {
+    const tissuewarp::test::TemporaryFolder folder;
+    const SessionOptions options{{}, folder / "log", {}};
+    ServedPatient patient = test::block();
+    {
+        Kept kept;
+        Session session(patient, options, kept);
+        send_pairs(session, 4);
+        session.receive(1, request(update(1)));
+        EXPECT_EQ(kept.answer(1).at("status"), "ok");
+    }
+    patient.update.device = registration::Device::Gpu;
+    patient.update.gpu_index = 99;
+    {
+        Kept kept;
+        Session session(patient, options, kept);
+        session.receive(1, request({{"do", "info"}, {"sequence", 2}}));
+        EXPECT_THAT(kept.answer(2).at("why"), HasSubstr("fixed_points"));
+        EXPECT_THAT(kept.notes, ::testing::Contains(HasSubstr("cannot be computed again")));
+        session.receive(1, request(update(3)));
+        EXPECT_EQ(kept.answer(3).at("status"), "failed");
+    }
+    patient.update = test::block().update;
+    Kept kept;
+    Session session(patient, options, kept);
+    session.receive(1, request(update(4)));
+    EXPECT_EQ(kept.answer(4).at("status"), "ok");
 }
 
 TEST(Session, ALogGoesOnWithTheSameBits) {
