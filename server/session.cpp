@@ -4,6 +4,7 @@
 #include "server/recall.hpp"
 
 #include <fmt/format.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 
@@ -28,7 +29,9 @@ Session::Session(ServedPatient patient, SessionOptions options, Outbox& outbox)
     outbox_.show(shown({1, "", "ready; nothing was seen yet"}));
     if (journal_) go_on();
     taking_ = std::thread([this] { take_messages(); });
-    computing_ = std::thread([this] { compute_jobs(); });
+    // Work that asks for the concurrency hears of the limit of whoever makes the session; a thread begins without one.
+    const int threads = tbb::this_task_arena::max_concurrency();
+    computing_ = std::thread([this, threads] { tbb::task_arena(threads).execute([this] { compute_jobs(); }); });
 }
 
 Session::~Session() {
