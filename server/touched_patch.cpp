@@ -30,9 +30,10 @@ bool TouchedPatch::pass(const Eigen::Vector3d& position, double seconds, const G
     const auto is_young = [&](const Touch& touch) { return seconds < touch.seconds + still_s; };
     const auto says_it_already = [&](const Touch& touch) { return is_near(touch) && is_young(touch); };
     if (std::any_of(touches_.begin(), touches_.end(), says_it_already)) return false;
-    std::erase_if(touches_, [&](const Touch& touch) {
-        return is_near(touch) || (gathering.keep_s > 0 && touch.seconds + gathering.keep_s < seconds);
-    });
+    const auto is_faded = [&](const Touch& touch) {
+        return gathering.keep_s > 0 && touch.seconds > 0 && touch.seconds + gathering.keep_s < seconds;
+    };
+    std::erase_if(touches_, [&](const Touch& touch) { return is_near(touch) || is_faded(touch); });
     require_room(1);
     touches_.push_back({gathering.id, position, seconds});
     return true;

@@ -21,8 +21,8 @@ class TouchedPatch {
 public:
     /// A place that the stylus passed, by the sender's clock (s; 0: not known). Where a touch of the last second lies
     /// within the spacing nothing changes; older ones there give way, since tissue moves. Touches that are too old for
-    /// `keep_s` are gone. Returns whether anything changed. Throws InvalidInput for a time that is not known where
-    /// touches shall fade, and for a patch that is full.
+    /// `keep_s` are gone, but for those whose time is not known. Returns whether anything changed. Throws InvalidInput
+    /// for a time that is not known where touches shall fade, and for a patch that is full.
     bool pass(const Eigen::Vector3d& position, double seconds, const Gathering& gathering);
 
     /// Adds touches whose ids are the points' names, or moves those that have them. Throws InvalidInput for two of one

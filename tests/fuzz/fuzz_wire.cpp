@@ -51,12 +51,13 @@ std::vector<Bytes> right_messages() {
         image.voxels.setTo(1);
         add("IMAGE", type == CV_8UC1 ? "fixed_labels" : "fixed", encode(image));
     }
-    for (const char* device : {"start", "stylus"}) add("TRANSFORM", device, encode(Eigen::Isometry3d::Identity()));
+    add("STRING", "request", encode(Text{R"({"do":"gather","id":"left","spacing_mm":2,"keep_s":60})"}));
+    for (const char* device : {"start", "stylus"})
+        seeds.push_back(framed("TRANSFORM", device, encode(Eigen::Isometry3d::Identity()), std::uint64_t{1000} << 32));
     add("STATUS", "x", encode(Status{1, "name", "text"}));
     for (const char* text :
          {R"({"do":"update","sequence":3,"use":["fixed_points"],"send":["field"],"points_sd_mm":0.5})",
-          R"({"do":"gather","id":"left","spacing_mm":2,"keep_s":60})", R"({"do":"forget","ids":["p1","left"]})",
-          R"({"do":"load","file":"a.nii","names":["fixed"],"align":true})"})
+          R"({"do":"forget","ids":["p1","left"]})", R"({"do":"load","file":"a.nii","names":["fixed"],"align":true})"})
         add("STRING", "request", encode(Text{text}));
     Writer second;  // a body of version 2
     second.u16(12);

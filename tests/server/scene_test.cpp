@@ -125,6 +125,9 @@ TEST(Scene, OldTouchesFadeWhereThatIsAskedFor) {
     const Eigen::Matrix3Xd points = scene.seen({}, {}).surface->points;
     ASSERT_EQ(points.cols(), 11);
     EXPECT_EQ(points.row(0).minCoeff(), 20);
+    scene.take("touched", named({{"of no time", 300}}));
+    scene.take("stylus", tip(0), 2000);
+    EXPECT_EQ(scene.touched().size(), 2) << "what says no time stays until it is withdrawn";
 }
 
 TEST(Scene, TouchesAreMovedAndWithdrawnById) {
