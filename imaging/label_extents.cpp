@@ -1,6 +1,7 @@
 #include "imaging/label_extents.hpp"
 
 #include "core/errors.hpp"
+#include "imaging/voxel_type.hpp"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -20,25 +21,11 @@ void add(LabelExtent& extent, const LabelExtent& more) {
     extent.voxels += more.voxels;
 }
 
-/// call(T()) for the type of the voxels.
 template <class Call>
 auto with_integers(const Volume& labels, const Call& call) {
-    constexpr const char* remedy = "label map: voxels must be integers of one component; read it with read_labels";
-    if (labels.empty() || labels.channels() != 1) throw InvalidInput(remedy);
-    switch (labels.voxels.depth()) {
-        case CV_8U:
-            return call(std::uint8_t());
-        case CV_8S:
-            return call(std::int8_t());
-        case CV_16U:
-            return call(std::uint16_t());
-        case CV_16S:
-            return call(std::int16_t());
-        case CV_32S:
-            return call(std::int32_t());
-        default:
-            throw InvalidInput(remedy);
-    }
+    if (labels.empty() || labels.channels() != 1)
+        throw InvalidInput("label map: voxels must be integers of one component; read it with read_labels");
+    return with_integer_type(labels, "label map", call);
 }
 
 Geometry grid_of(const Geometry& image, const LabelExtent& box, const std::array<int, 3>& step) {

@@ -1,5 +1,6 @@
 #include "core/errors.hpp"
 #include "imaging/filters.hpp"
+#include "imaging/voxel_type.hpp"
 
 #include <tbb/parallel_for.h>
 
@@ -95,31 +96,8 @@ void resample_as(const Volume& image, Volume& result, Interpolation interpolatio
 Volume resample(const Volume& image, const Geometry& grid, Interpolation interpolation, double outside) {
     if (image.empty()) throw InvalidInput("resample: the image is empty; give one with voxels");
     Volume result(grid, image.voxels.type());
-    switch (image.voxels.depth()) {
-        case CV_8U:
-            resample_as<std::uint8_t>(image, result, interpolation, outside);
-            break;
-        case CV_8S:
-            resample_as<std::int8_t>(image, result, interpolation, outside);
-            break;
-        case CV_16U:
-            resample_as<std::uint16_t>(image, result, interpolation, outside);
-            break;
-        case CV_16S:
-            resample_as<std::int16_t>(image, result, interpolation, outside);
-            break;
-        case CV_32S:
-            resample_as<std::int32_t>(image, result, interpolation, outside);
-            break;
-        case CV_32F:
-            resample_as<float>(image, result, interpolation, outside);
-            break;
-        case CV_64F:
-            resample_as<double>(image, result, interpolation, outside);
-            break;
-        default:
-            throw InvalidInput("resample: voxels of half precision; convert them to float32");
-    }
+    with_voxel_type(image, "resample",
+                    [&](auto type) { resample_as<decltype(type)>(image, result, interpolation, outside); });
     return result;
 }
 

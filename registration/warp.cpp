@@ -1,6 +1,7 @@
 #include "registration/warp.hpp"
 
 #include "core/errors.hpp"
+#include "imaging/voxel_type.hpp"
 #include "registration/field/rasterisation.hpp"
 #include "registration/field/uninitialised.hpp"
 #include "registration/field/voxel_sampler.hpp"
@@ -59,32 +60,10 @@ void pull(const Volume& moving, const Volume& field, Kernel kernel, double outsi
     });
 }
 
-/// call(T()) for the type of the voxels.
-template <class Call>
-void with_voxels(const Volume& image, const Call& call) {
-    switch (image.voxels.depth()) {
-        case CV_8U:
-            return call(std::uint8_t());
-        case CV_8S:
-            return call(std::int8_t());
-        case CV_16U:
-            return call(std::uint16_t());
-        case CV_16S:
-            return call(std::int16_t());
-        case CV_32S:
-            return call(std::int32_t());
-        case CV_32F:
-            return call(float());
-        case CV_64F:
-            return call(double());
-        default:
-            throw InvalidInput("warp: voxels of half precision; convert them to float32");
-    }
-}
-
 Volume warp(const Volume& moving, const Volume& field, Kernel kernel, double outside) {
     Volume result = detail::uninitialised(field.geometry, moving.voxels.type());
-    with_voxels(moving, [&](auto type) { pull<decltype(type)>(moving, field, kernel, outside, result); });
+    imaging::with_voxel_type(moving, "warp",
+                             [&](auto type) { pull<decltype(type)>(moving, field, kernel, outside, result); });
     return result;
 }
 
@@ -162,7 +141,7 @@ Volume warp_by_mesh(const Volume& moving, const Deformation& deformation, const 
     if (!deformation.displacement.allFinite() || !deformation.placement.matrix().allFinite())
         throw InvalidInput("warp_by_mesh: a displacement or the placement is not finite");
     Volume result = detail::uninitialised(fixed_grid, moving.voxels.type());
-    with_voxels(moving, [&](auto type) {
+    imaging::with_voxel_type(moving, "warp", [&](auto type) {
         const VoxelSampler<decltype(type)> sampler{moving};
         const auto value = cv::saturate_cast<decltype(type)>(outside);
         const std::vector<std::uint8_t> inside = pull_inside(sampler, deformation, value, result);
