@@ -28,6 +28,7 @@ struct RunVerb {
     void operator()(const apps::MeshOptions& options) const { apps::run_mesh(options); }
     void operator()(const apps::WarpOptions& options) const { apps::run_warp(options); }
     void operator()(const apps::ConvertOptions& options) const { apps::run_convert(options); }
+    void operator()(const apps::CompoundOptions& options) const { apps::run_compound(options); }
     void operator()(const apps::EvaluateOptions& options) const { apps::run_evaluate(options); }
     void operator()(const apps::InfoOptions& options) const { apps::run_info(options); }
     void operator()(const apps::BenchOptions& options) const { apps::run_bench(options); }

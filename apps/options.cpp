@@ -28,6 +28,7 @@ struct Parser {
     MeshOptions mesh;
     WarpOptions warp;
     ConvertOptions convert;
+    CompoundOptions compound;
     EvaluateOptions evaluate;
     InfoOptions info;
     BenchOptions bench;
@@ -55,6 +56,7 @@ struct Parser {
         declare_warp(verbs.emplace_back(app, "warp", "Carry an image, labels, points or a surface along"), warp);
         declare_convert(verbs.emplace_back(app, "convert", "Turn a transform or field into another program's"),
                         convert);
+        declare_compound(verbs.emplace_back(app, "compound", "Make a volume of a tracked ultrasound sweep"), compound);
         declare_evaluate(verbs.emplace_back(app, "evaluate", "Score label maps, landmarks, curves and fields"),
                          evaluate);
         declare_info(verbs.emplace_back(app, "info", "Print what a file holds, or the devices of this machine"), info,
@@ -106,6 +108,7 @@ struct Parser {
         }
         if (name == "warp") return warp;
         if (name == "convert") return convert;
+        if (name == "compound") return compound;
         if (name == "evaluate") return evaluate;
         if (name == "bench") return bench;
         if (name == "simulate") return simulate;
@@ -164,8 +167,8 @@ struct Parser {
     }
 
     static std::vector<std::string> verb_names() {
-        return {"register", "prepare", "update",   "serve",   "mesh",      "warp",  "convert", "evaluate",
-                "info",     "bench",   "simulate", "explain", "calibrate", "study", "cohort"};
+        return {"register", "prepare", "update", "serve",    "mesh",    "warp",      "convert", "compound",
+                "evaluate", "info",    "bench",  "simulate", "explain", "calibrate", "study",   "cohort"};
     }
 };
 
@@ -192,11 +195,11 @@ Command parse_command_line(std::vector<std::string> arguments) {
         throw HelpRequest{parser.app.version() + "\n"};
     } catch (const CLI::ParseError& error) {
         const bool no_verb = parser.app.get_subcommands().empty();
-        throw InvalidInput(no_verb
-                               ? "give a verb: register, prepare, update, serve, mesh, warp, convert, evaluate, info, "
-                                 "bench, simulate, explain, calibrate, study or cohort; see 'tissuewarp --help'"
-                               : fmt::format("{}; see 'tissuewarp {} --help-all'", error.what(),
-                                             parser.app.get_subcommands().front()->get_name()));
+        throw InvalidInput(
+            no_verb ? "give a verb: register, prepare, update, serve, mesh, warp, convert, compound, "
+                      "evaluate, info, bench, simulate, explain, calibrate, study or cohort; see 'tissuewarp --help'"
+                    : fmt::format("{}; see 'tissuewarp {} --help-all'", error.what(),
+                                  parser.app.get_subcommands().front()->get_name()));
     }
     return parser.result();
 }

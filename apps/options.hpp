@@ -153,6 +153,14 @@ struct ConvertOptions {
     bool matrix = false;   ///< four rows of four numbers, not ITK's text
 };
 
+struct CompoundOptions {
+    CommonOptions common;
+    std::filesystem::path input, output, calibration;
+    std::string to = "Reference";   ///< coordinate system of the patient
+    std::string axes = "ras";       ///< its axes
+    double spacing = 0.5, gap = 3;  ///< mm
+};
+
 struct EvaluateOptions {
     CommonOptions common;
     std::filesystem::path labels, reference_labels, label_names, displacement, inverse, mask, json;
@@ -232,8 +240,8 @@ struct StudyOptions {
 };
 
 using Command = std::variant<RegisterOptions, PrepareModelOptions, UpdatePatientOptions, ServeOptions, MeshOptions,
-                             WarpOptions, ConvertOptions, EvaluateOptions, InfoOptions, BenchOptions, SimulateOptions,
-                             ExplainOptions, CalibrateOptions, StudyOptions, CohortOptions>;
+                             WarpOptions, ConvertOptions, CompoundOptions, EvaluateOptions, InfoOptions, BenchOptions,
+                             SimulateOptions, ExplainOptions, CalibrateOptions, StudyOptions, CohortOptions>;
 
 /// The text that --help or --version asked for; not an error.
 struct HelpRequest {

@@ -36,15 +36,19 @@ std::pair<study::Family, std::vector<std::string>> family_of(std::vector<std::st
 }
 
 /// "ultrasound:7-9": organs that navigation puts near to where they are, seen by ultrasound alone.
+/// "tracked-ultrasound:7-9": the same by frames of a probe in a hand.
 /// "faint-ultrasound:7-9": the same of bent organs, whose echoes the first image explains less.
 void take_ultrasound(std::vector<std::string>& problems, study::CoverageOptions& plan) {
-    constexpr std::string_view clear = "ultrasound:", faint = "faint-ultrasound:";
+    constexpr std::string_view clear = "ultrasound:", tracked = "tracked-ultrasound:", faint = "faint-ultrasound:";
     constexpr study::Misplacement of_navigation{4, 4};
     if (problems.size() != 1) return;
     std::string& problem = problems.front();
     if (problem.starts_with(clear))
         problem.replace(0, clear.size(), "phantom:");
-    else if (problem.starts_with(faint)) {
+    else if (problem.starts_with(tracked)) {
+        problem.replace(0, tracked.size(), "phantom:");
+        plan.phantom.echoes.tracked = true;
+    } else if (problem.starts_with(faint)) {
         problem.replace(0, faint.size(), "bent:");
         plan.phantom.echoes = study::faint_echoes;
     } else

@@ -27,6 +27,7 @@ void complete_update(RegisterOptions& o);
 void declare_mesh(Verb& verb, MeshOptions& o, std::vector<std::string>& mesh_lengths);
 void declare_warp(Verb& verb, WarpOptions& o);
 void declare_convert(Verb& verb, ConvertOptions& o);
+void declare_compound(Verb& verb, CompoundOptions& o);
 void declare_evaluate(Verb& verb, EvaluateOptions& o);
 void declare_info(Verb& verb, InfoOptions& o, std::vector<std::string>& info_files);
 void declare_bench(Verb& verb, BenchOptions& o);

@@ -66,6 +66,22 @@ void declare_convert(Verb& verb, ConvertOptions& o) {
     verb.common(o.common);
 }
 
+void declare_compound(Verb& verb, CompoundOptions& o) {
+    verb.app().footer(
+        "Example:\n  tissuewarp compound sweep.mha -o ultrasound.nii.gz\n"
+        "  tissuewarp compound sweep.mha -o ultrasound.nii.gz --calibration PlusDeviceSet.xml --to Tracker");
+    verb.path("input", o.input, "Tracked frames as Plus and 3D Slicer write them: .mha, .mhd")->required();
+    verb.path("-o,--output", o.output, "Volume to write: .nii.gz, .nii, .nrrd, .mha")->required();
+    verb.text("--to", o.to, "Coordinate system of the patient, in which the volume shall lie");
+    verb.choice("--axes", o.axes, {"ras", "lps"}, "Axes of that system");
+    verb.path("--calibration", o.calibration,
+              "From pixels to mm of the probe, where the sweep has no ImageToProbe, or another: 16 numbers, or a "
+              "configuration of Plus");
+    verb.number("--spacing", o.spacing, "MM", 0.05, 10.0, "Voxels of the volume (mm)");
+    verb.number("--gap", o.gap, "MM", 0.0, 100.0, "Frames farther apart have nothing between them (mm)");
+    verb.common(o.common);
+}
+
 void declare_evaluate(Verb& verb, EvaluateOptions& o) {
     CLI::Option* labels = verb.path("--labels", o.labels, "Label map to score, for instance warped_labels.nii.gz");
     CLI::Option* reference = verb.path("--reference-labels", o.reference_labels, "Label map that is the truth");

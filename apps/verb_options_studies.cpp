@@ -87,7 +87,8 @@ void declare_study(Verb& verb, StudyOptions& o) {
         ->type_name("FOLDER");
     verb.list("--problems", o.problems, "NAME",
               "Of cube, brain, brainshift, liver, phantom:SEED; dial: phantom:FIRST-LAST; coverage: that, "
-              "bent:FIRST-LAST, ultrasound:FIRST-LAST, faint-ultrasound:FIRST-LAST, resected:FIRST-LAST, "
+              "bent:FIRST-LAST, ultrasound:FIRST-LAST, tracked-ultrasound:FIRST-LAST, faint-ultrasound:FIRST-LAST, "
+              "resected:FIRST-LAST, "
               "unresected:FIRST-LAST, sought:FIRST-LAST, turned:FIRST-LAST, organ:FIRST-LAST or found:FIRST-LAST")
         ->delimiter(',');
     verb.list("--evidence", o.evidence, "KIND",

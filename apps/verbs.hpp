@@ -12,6 +12,7 @@ void run_serve(const ServeOptions& options);
 void run_mesh(const MeshOptions& options);
 void run_warp(const WarpOptions& options);
 void run_convert(const ConvertOptions& options);
+void run_compound(const CompoundOptions& options);
 void run_evaluate(const EvaluateOptions& options);
 void run_info(const InfoOptions& options);
 void run_bench(const BenchOptions& options);

@@ -161,7 +161,7 @@ class Lost(ConnectionError):
 class Client:
     def __init__(self, host="127.0.0.1", port=18944, timeout=60):
         self.socket = socket.create_connection((host, port), timeout)
-        self.timeout, self.sequence, self.buffer, self.seen = timeout, 0, b"", {}
+        self.timeout, self.sequence, self.buffer, self.seen = timeout, 0, bytearray(), {}
 
     def close(self):
         self.socket.close()
@@ -204,24 +204,35 @@ class Client:
         return self.sequence
 
     def receive(self, timeout=None):
-        """The next message: type, device, content. Throws TimeoutError, Lost."""
+        """The next message: type, device, content. Throws TimeoutError, after which it may be called again, and
+        Lost."""
         end = time.monotonic() + (self.timeout if timeout is None else timeout)
-        head = self._take(HEADER.size, end)
-        _, kind, device, _, count, crc = HEADER.unpack(head)
+        self._fill(HEADER.size, end)
+        _, kind, device, stamp, count, crc = HEADER.unpack_from(self.buffer)
         if count > MOST_BYTES:
             raise Lost(f"a message of {count} bytes")
-        body = self._take(count, end)
+        self._fill(HEADER.size + count, end)
+        body = bytes(memoryview(self.buffer)[HEADER.size:HEADER.size + count])
+        del self.buffer[:HEADER.size + count]
         if crc64(body) != crc:
             raise Lost("the checksum of a message is not that of its bytes")
         kind, device = _text(kind), _text(device)
         content = unpack(kind, body)
-        self.seen[device, kind] = content
+        self.seen.pop((device, kind), None)
+        self.seen[device, kind] = content, stamp / 2**32
         return kind, device, content
 
     def newest(self, device, kind=None):
         """What was last received from a device, or None."""
-        return next((content for (name, of), content in reversed(self.seen.items())
-                     if name == device and kind in (None, of)), None)
+        return self._seen(device, kind)[0]
+
+    def time_of(self, device, kind=None):
+        """When the server had that, seconds since 1970: what is of one update has the "time" of its answer."""
+        return self._seen(device, kind)[1]
+
+    def _seen(self, device, kind):
+        return next((seen for (name, of), seen in reversed(self.seen.items())
+                     if name == device and kind in (None, of)), (None, None))
 
     def answer(self, sequence):
         """Receives until the server has answered this request."""
@@ -240,7 +251,7 @@ class Client:
                 wanted.discard((device, kind))
         return answer
 
-    def _take(self, count, end):
+    def _fill(self, count, end):
         while len(self.buffer) < count:
             left = end - time.monotonic()
             if left <= 0:
@@ -250,5 +261,3 @@ class Client:
             if not more:
                 raise Lost("the server ended the connection")
             self.buffer += more
-        taken, self.buffer = self.buffer[:count], self.buffer[count:]
-        return taken

@@ -230,14 +230,14 @@ Volume displacement_fixed_to_moving(const Deformation& given, const Geometry& fi
 struct PointTransform::Impl {
     Deformation deformation;
     meshing::PointLocator locator;
-    detail::Continuation continuation;
+    detail::LazyContinuation continuation;  // points of the organ alone need none
 
     Impl(const Deformation& given, const FieldOptions& options)
         : deformation(given.with_placement(given.far_motion())),
           locator(deformation.mesh),
-          continuation(forward_continuation(deformation, options.fade_mm)) {}
+          continuation([this, options] { return forward_continuation(deformation, options.fade_mm); }) {}
 
-    [[nodiscard]] Eigen::Vector3d operator()(const Eigen::Vector3d& point) const {
+    [[nodiscard]] Eigen::Vector3d operator()(const Eigen::Vector3d& point) {
         const auto location = locator.find(point);
         const Eigen::Vector3d displacement =
             location ? Eigen::Vector3d(deformation.displacement(Eigen::all, deformation.mesh.tets.col(location->tet)) *

@@ -37,7 +37,7 @@ imaging::Volume displacement_near_mesh(const Deformation& deformation, const ima
 imaging::Volume displacement_fixed_to_moving(const Deformation& deformation, const imaging::Geometry& fixed_grid,
                                              const FieldOptions& options = {}, Observer& observer = silent_observer());
 
-/// The forward map at arbitrary points, the continuation included.
+/// The forward map at arbitrary points, the continuation included, which is made for the first that needs it.
 class PointTransform {
 public:
     explicit PointTransform(const Deformation& deformation, const FieldOptions& options = {});

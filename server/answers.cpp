@@ -47,6 +47,7 @@ std::string answer(const Job& job, const Products& products, long long sequence,
                 {"sequence", sequence},
                 {"status", products.doubted() ? "doubted" : "ok"},
                 {"update", job.number},
+                {"time", products.time_s},
                 {"state", job.state},
                 {"newest_state", newest_state},
                 {"outdated", newest_state > job.state},
@@ -84,16 +85,17 @@ Status status_of_failure(const Job& job, const std::string& why) {
     return {status_error, "no result", fmt::format("state {} gave none, what is shown is older: {}", job.state, why)};
 }
 
-Parcel parcel(const std::string& key, std::string_view type, std::string_view device, const Bytes& body) {
-    return {key, std::make_shared<const Bytes>(framed(type, device, body))};
+Parcel parcel(const std::string& key, std::string_view type, std::string_view device, const Bytes& body,
+              double time_s) {
+    return {key, std::make_shared<const Bytes>(framed(type, device, body, timestamp_of(time_s)))};
 }
 
-Parcel shown(const Status& status) {
-    return parcel("status", "STATUS", device_name, encode(status));
+Parcel shown(const Status& status, double time_s) {
+    return parcel("status", "STATUS", device_name, encode(status), time_s);
 }
 
-Parcel said(const std::string& text) {
-    return parcel("", "STRING", device_name, encode(Text{text}));
+Parcel said(const std::string& text, double time_s) {
+    return parcel("", "STRING", device_name, encode(Text{text}), time_s);
 }
 
 }  // namespace tissuewarp::server

@@ -23,9 +23,9 @@ Status status_of(const Job& job, const Products& products, long long newest_stat
 /// Of an update without a result: what was shown before is shown still, and is of an older state.
 Status status_of_failure(const Job& job, const std::string& why);
 
-/// Messages as they are sent; a key as Parcel's.
-Parcel parcel(const std::string& key, std::string_view type, std::string_view device, const Bytes& body);
-Parcel shown(const Status& status);
-Parcel said(const std::string& text);
+/// Messages as they are sent; a key as Parcel's. All of one update have its time, which its answer names.
+Parcel parcel(const std::string& key, std::string_view type, std::string_view device, const Bytes& body, double time_s);
+Parcel shown(const Status& status, double time_s = now_s());
+Parcel said(const std::string& text, double time_s = now_s());
 
 }  // namespace tissuewarp::server

@@ -17,6 +17,25 @@ namespace tissuewarp::server {
 namespace {
 
 using namespace registration;
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// Adds its own lifetime to the stages of an update.
+class Stage {
+public:
+    Stage(const char* name, Products& products) : name_(name), products_(products) {}
+    ~Stage() { add_time(products_.result.times, name_, seconds_since(start_)); }
+    Stage(const Stage&) = delete;
+    Stage& operator=(const Stage&) = delete;
+
+private:
+    const char* name_;
+    Products& products_;
+    Clock::time_point start_ = Clock::now();
+};
 
 std::string sureness(const Products& products, const std::optional<ErrorEstimate>& estimate) {
     if (products.doubted()) return "doubted";
@@ -102,13 +121,14 @@ void Computer::use_options(const Request& request, Observer& observer) {
 
 void Computer::estimate_errors(Products& products, Observer& observer) const {
     if (!products.request.error_estimate) return;
+    const Stage stage("error estimate", products);
     products.uncertainty = uncertainty(*patient_.model, products.result, {}, observer);
     for (Doubt& doubt : doubts_of(*products.uncertainty, products.request.tolerance_mm))
         products.result.doubts.push_back(std::move(doubt));
 }
 
 Products Computer::compute(const Job& job, const Products* last, Observer& observer) {
-    const auto start = std::chrono::steady_clock::now();
+    const auto start = Clock::now();
     use_options(job.request, observer);
     Products products;
     products.request = job.request;
@@ -117,37 +137,47 @@ Products Computer::compute(const Job& job, const Products* last, Observer& obser
         goes_on ? updater_->go_on(last->result, job.seen, observer) : updater_->update(job.seen, observer);
     estimate_errors(products, observer);
     if (products.result.beginning.at_last && products.doubted() && !last->doubted()) {
+        const double in_vain = seconds_since(start);
         products.result = updater_->update(job.seen, observer);
         products.result.beginning.why = "its errors were doubted";
+        add_time(products.result.times, stages::in_vain, in_vain);
         estimate_errors(products, observer);
     }
     if (job.seen.image && !patient_.image.empty()) {
+        const Stage stage("surroundings", products);
         Deformation& deformation = products.result.deformation;
         deformation.surroundings =
             rigid_surroundings(deformation, patient_.image, *job.seen.image, {job.request.fade_mm}, observer);
     }
-    products.organ = organ_of(products);
-    products.targets = targets_of(products, job.targets, job.request.fade_mm);
+    {
+        const Stage stage("organ and targets", products);
+        products.organ = organ_of(products);
+        products.targets = targets_of(products, job.targets, job.request.fade_mm);
+    }
+    if (!job.request.send.empty()) make_images(products, job, observer);
+    products.digest = digest_of(products.result.deformation);
+    products.seconds = seconds_since(start);
+    products.time_s = now_s();
+    return products;
+}
+
+void Computer::make_images(Products& products, const Job& job, Observer& observer) const {
+    const Stage stage("images", products);
     const auto wanted = [&](const char* name) {
         return std::find(job.request.send.begin(), job.request.send.end(), name) != job.request.send.end();
     };
-    if (wanted("warped") || wanted("field")) {
-        const imaging::Geometry& moving = patient_.image.empty() ? patient_.labels.geometry : patient_.image.geometry;
-        const Deformation& deformation = products.result.deformation;
-        const imaging::Geometry grid = output_grid(job, moving, deformation.placement);
-        products.field = displacement_fixed_to_moving(deformation, grid, {job.request.fade_mm}, observer);
-        unfold_fixed_to_moving(products.field, deformation);
-        if (wanted("warped")) {
-            if (patient_.image.empty()) throw InvalidInput("the patient was prepared without an image to warp");
-            products.warped = warp_image(patient_.image, products.field);
-            if (const imaging::Volume& resected = patient_.model->resected; !resected.empty())
-                leave_gap(products.warped, gap_after(deformation, resected, products.field));
-        }
-        if (!wanted("field")) products.field = {};
+    const imaging::Geometry& moving = patient_.image.empty() ? patient_.labels.geometry : patient_.image.geometry;
+    const Deformation& deformation = products.result.deformation;
+    const imaging::Geometry grid = output_grid(job, moving, deformation.placement);
+    products.field = displacement_fixed_to_moving(deformation, grid, {job.request.fade_mm}, observer);
+    unfold_fixed_to_moving(products.field, deformation);
+    if (wanted("warped")) {
+        if (patient_.image.empty()) throw InvalidInput("the patient was prepared without an image to warp");
+        products.warped = warp_image(patient_.image, products.field);
+        if (const imaging::Volume& resected = patient_.model->resected; !resected.empty())
+            leave_gap(products.warped, gap_after(deformation, resected, products.field));
     }
-    products.digest = digest_of(products.result.deformation);
-    products.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    return products;
+    if (!wanted("field")) products.field = {};
 }
 
 }  // namespace tissuewarp::server

@@ -31,6 +31,7 @@ struct Products {
     imaging::Volume warped, field;  ///< where they were asked for
     std::string digest;             ///< of displacement and placement: the same bits, the same digest
     double seconds = 0;
+    double time_s = 0;  ///< when they were ready, seconds of the years since 1970: the time of their messages
     /// Some doubt says that the result looks as results look that failed.
     [[nodiscard]] bool doubted() const { return registration::count_of_severe(result.doubts) > 0; }
 };
@@ -53,6 +54,8 @@ private:
     void use_options(const Request& request, Observer& observer);
     /// With the estimate of its errors, where it is asked for, and its doubts.
     void estimate_errors(Products& products, Observer& observer) const;
+    /// The warped image and the field, where they are asked for.
+    void make_images(Products& products, const Job& job, Observer& observer) const;
 
     ServedPatient patient_;
     std::optional<Request> made_for_;  // the options of the updater

@@ -22,6 +22,9 @@ namespace {
 
 constexpr std::size_t bytes_at_once = 256 * 1024;  // from or to one client, then it is the next one's turn
 constexpr double least_bytes_per_second = 100e3;   // of a message, beyond Limits::silence_s
+// More than this the system does not take for one client before it has left: what waits there gets old, and no newer
+// state can take its place.
+constexpr int unsent_bytes = 64 * 1024;
 
 union Address {
     sockaddr any;
@@ -160,6 +163,7 @@ void Hub::accept_clients(Session& session) {
         const int on = 1;
         ::setsockopt(file, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
         ::setsockopt(file, SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on);
+        ::setsockopt(file, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent_bytes, sizeof unsent_bytes);
         const auto [client, added] = clients_.try_emplace(++last_client_, file, options_.limits);
         for (const std::string& key : shown_order_) client->second.outgoing.add(newest_.at(key));
     }

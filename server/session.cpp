@@ -78,18 +78,15 @@ void Session::receive(std::uint32_t client, Frame frame) {
     waiting_bytes_ += frame.body.size();
     {
         const std::scoped_lock lock(mutex_);
-        inbox_.push_back({client, std::move(frame)});
+        inbox_.push_back({client, std::move(frame), false});
     }
     arrived_.notify_one();
 }
 
 void Session::left(std::uint32_t client) {
     const std::scoped_lock lock(mutex_);
-    std::erase_if(inbox_, [&](const Received& received) {
-        const bool theirs = received.client == client && received.frame.header.type == "STRING";
-        if (theirs) waiting_bytes_ -= received.frame.body.size();
-        return theirs;
-    });
+    for (Received& received : inbox_)
+        if (received.client == client) received.sender_left = true;
 }
 
 void Session::take_messages() {
@@ -159,6 +156,7 @@ void Session::obey(const Received& received, const std::string& text) {
         request = parse_request(text);
         switch (request.what) {
             case Request::Do::Update:
+                if (received.sender_left) return;
                 return begin(received.client, request, text, false);
             case Request::Do::Follow:
                 follow_ = {request, text};
@@ -288,17 +286,20 @@ void Session::finish(const Job& job, Products made, const std::vector<std::strin
 /// What it is worth is said before it is shown.
 void Session::tell(const Job& job, const Products& products, const std::vector<std::string>& notes) {
     const long long newest = newest_state_;
-    outbox_.show(shown(status_of(job, products, newest)));
-    if (job.client > 0) outbox_.send(job.client, said(answer(job, products, job.request.sequence, newest, notes)));
-    outbox_.show({"answer", said(answer(job, products, 0, newest, notes)).bytes}, job.client);
-    outbox_.show(parcel("organ", "POLYDATA", "organ", encode(products.organ)));
-    if (!products.targets.empty()) outbox_.show(parcel("targets", "POINT", "targets_now", encode(products.targets)));
-    if (job.client > 0) {
-        if (!products.warped.empty())
-            outbox_.send(job.client, parcel("warped", "IMAGE", "warped", encode(products.warped)));
-        if (!products.field.empty())
-            outbox_.send(job.client, parcel("field", "IMAGE", "field", encode(products.field)));
-    }
+    const double time = products.time_s;
+    outbox_.show(shown(status_of(job, products, newest), time));
+    if (job.client > 0)
+        outbox_.send(job.client, said(answer(job, products, job.request.sequence, newest, notes), time));
+    outbox_.show({"answer", said(answer(job, products, 0, newest, notes), time).bytes}, job.client);
+    outbox_.show(parcel("organ", "POLYDATA", "organ", encode(products.organ), time));
+    if (!products.targets.empty())
+        outbox_.show(parcel("targets", "POINT", "targets_now", encode(products.targets), time));
+    const auto send_image = [&](const char* name, const imaging::Volume& image) {
+        if (!image.empty()) outbox_.send(job.client, parcel(name, "IMAGE", name, encode(image), time));
+    };
+    if (job.client == 0) return;
+    send_image("warped", products.warped);
+    send_image("field", products.field);
 }
 
 }  // namespace tissuewarp::server

@@ -49,7 +49,7 @@ public:
 
     /// A message of a client; clients are counted from 1.
     void receive(std::uint32_t client, Frame frame);
-    /// A client has gone: its updates need no answer.
+    /// A client has gone: updates that it asked for are not begun; whatever else it said holds.
     void left(std::uint32_t client);
     /// Of messages that wait to be taken in.
     [[nodiscard]] std::uint64_t waiting_bytes() const { return waiting_bytes_; }
@@ -58,6 +58,7 @@ private:
     struct Received {
         std::uint32_t client = 0;
         Frame frame;
+        bool sender_left = false;
     };
     struct Running;
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <chrono>
 
 namespace tissuewarp::server {
 
@@ -109,6 +110,10 @@ ByteView content_of(const Header& header, ByteView body) {
     if (extended < extended_bytes || extended + metadata_header + metadata > body.size())
         throw BadMessage("its extended header and metadata are longer than the message");
     return body.subspan(extended, body.size() - extended - metadata_header - metadata);
+}
+
+double now_s() {
+    return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
 Bytes framed(std::string_view type, std::string_view device, ByteView body, std::uint64_t timestamp) {

@@ -32,6 +32,14 @@ inline double seconds_of(const Header& header) {
     return double(header.timestamp) / 4294967296.0;
 }
 
+/// Of a header, from seconds of the years since 1970.
+inline std::uint64_t timestamp_of(double seconds) {
+    return static_cast<std::uint64_t>(seconds * 4294967296.0);
+}
+
+/// Of the years since 1970.
+double now_s();
+
 /// One message, header and body.
 struct Frame {
     Header header;

@@ -36,6 +36,7 @@ struct Misplacement {
 struct EchoOptions {
     double least_own = 0.25, most_own = 0.25;  ///< log amplitude of scatterers that the first image does not show
     double least_shared = 1, most_shared = 1;  ///< of echoes from what it shows, over those of a clear sweep
+    bool tracked = false;  ///< frames of a probe in a hand, compounded, with errors of tracking and calibration
 };
 /// As faint as real sweeps of a brain are: UltrasoundSearch explains 5 to 35 % of them.
 inline constexpr EchoOptions faint_echoes{0.3, 1.0, 0.2, 0.8};
@@ -73,7 +74,7 @@ struct PhantomImages {
 /// An image before, and ultrasound during the operation.
 struct PhantomUltrasound {
     imaging::Volume moving;                             ///< as of magnetic resonance, float32
-    imaging::Volume fixed;                              ///< of a tracked sweep, compounded; 0 outside of the fan
+    imaging::Volume fixed;                              ///< 0 outside of the fan
     std::function<bool(const Eigen::Vector3d&)> shows;  ///< whether a place (fixed frame) lies in the fan
 };
 

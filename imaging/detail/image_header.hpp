@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,17 @@ struct ImageHeader {
     std::vector<Segment> segments;  ///< of a segmentation of 3D Slicer
     std::vector<std::string> notes;
 };
+
+/// Of a MetaImage whose third axis counts frames.
+struct SweepHeader {
+    StoredVoxels voxels;
+    std::string orientation, type;              ///< fields UltrasoundImageOrientation and UltrasoundImageType, or empty
+    std::map<std::string, std::string> frames;  ///< fields of single frames
+};
+
+/// Throws InvalidInput on a file without fields of frames and on another size than columns × rows × frames, and IoError
+/// on a damaged header.
+SweepHeader read_meta_sweep_header(const std::filesystem::path& path);
 
 /// Throws InvalidInput on what is no volume or has no place in a patient, and IoError on a damaged header.
 ImageHeader read_nifti_image_header(const std::filesystem::path& path);

@@ -152,8 +152,28 @@ void read_scaling(const fs::path& path, const TextHeader& header, ImageHeader& i
 
 }  // namespace
 
+SweepHeader read_meta_sweep_header(const fs::path& path) {
+    const TextHeader header = read_meta_header(path);
+    if (header.comments.empty())
+        throw unusable(path, "its header has no fields of frames (Seq_Frame0000_…); give a sequence as Plus writes it");
+    std::vector<double> sizes = numbers_in(header.value("dimsize"));
+    values_of(path, sizes);
+    if (sizes.size() == 4 && sizes[2] == 1.0) sizes.erase(sizes.begin() + 2);
+    if (sizes.size() != 3)
+        throw unusable(path,
+                       "its size " + text_of(sizes) + " is not that of plane frames; give columns x rows x frames");
+    ImageHeader image;
+    read_layout(path, header, sizes, image);
+    return {image.voxels, header.value("ultrasoundimageorientation"), header.value("ultrasoundimagetype"),
+            header.comments};
+}
+
 ImageHeader read_meta_image_header(const fs::path& path) {
     const TextHeader header = read_meta_header(path);
+    if (!header.comments.empty())
+        throw unusable(path,
+                       "it holds frames of a tracked probe, each with a place of its own, and is no volume; make "
+                       "one with tissuewarp compound");
     std::vector<double> sizes = numbers_in(header.value("dimsize"));
     values_of(path, sizes);
     require_three_dimensions(path, sizes);

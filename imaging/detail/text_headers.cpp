@@ -15,12 +15,17 @@ namespace tissuewarp::imaging::detail {
 
 namespace {
 
-constexpr std::size_t longest_header = 1 << 20;  // 1 MiB of text: garbage without line ends must stop somewhere
+// 1 MiB of text: garbage without line ends must stop somewhere. Sweeps have some kB for each frame.
+constexpr std::size_t longest_header = 1 << 20, longest_header_of_sweep = 1 << 26;
+constexpr std::string_view frame_prefix = "Seq_Frame";
 
 /// The first lines of a file, one after the other.
 class HeadLines {
 public:
-    explicit HeadLines(const std::filesystem::path& path) : head_(longest_header, '\0') {
+    explicit HeadLines(const std::filesystem::path& path, std::size_t longest = longest_header) {
+        std::error_code failure;
+        const auto whole = std::filesystem::file_size(path, failure);
+        head_.resize(failure ? longest : static_cast<std::size_t>(std::min<std::uintmax_t>(longest, whole)));
         std::ifstream file(path, std::ios::binary);
         if (!file) throw IoError("cannot open '" + path.string() + "'; check the path and its rights");
         file.read(head_.data(), static_cast<std::streamsize>(head_.size()));
@@ -150,12 +155,18 @@ TextHeader read_nrrd_header(const std::filesystem::path& path) {
 
 TextHeader read_meta_header(const std::filesystem::path& path) {
     HeadLines lines(path);
+    if (lines.text().find(frame_prefix) != std::string::npos) lines = HeadLines(path, longest_header_of_sweep);
     TextHeader header;
     for (std::string line; lines.next(line);) {
         const std::size_t equals = line.find('=');
         if (equals == std::string::npos) break;
-        const std::string key = lower_case(trimmed(line.substr(0, equals)));
-        header.set(path, key, trimmed(line.substr(equals + 1)));
+        const std::string name = trimmed(line.substr(0, equals)), key = lower_case(name),
+                          value = trimmed(line.substr(equals + 1));
+        if (name.starts_with(frame_prefix)) {
+            header.comments[name] = value;
+            continue;
+        }
+        header.set(path, key, value);
         if (key != "elementdatafile") continue;
         header.bytes = lines.taken();
         if (is_list(header.fields[key])) header.listed_files = lines.rest();

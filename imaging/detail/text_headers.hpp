@@ -9,10 +9,11 @@
 namespace tissuewarp::imaging::detail {
 
 struct TextHeader {
-    std::map<std::string, std::string> fields;    ///< keys in lower case
-    std::map<std::string, std::string> comments;  ///< NRRD's free pairs "key:=value", keys as written
-    std::vector<std::string> listed_files;        ///< lines behind "LIST"
-    std::size_t bytes = 0;                        ///< length of the header, where attached data begin
+    std::map<std::string, std::string> fields;  ///< keys in lower case
+    /// Keys as written: NRRD's free pairs "key:=value", and of a MetaImage the fields of single frames, "Seq_Frame…".
+    std::map<std::string, std::string> comments;
+    std::vector<std::string> listed_files;  ///< lines behind "LIST"
+    std::size_t bytes = 0;                  ///< length of the header, where attached data begin
 
     /// Takes a field. Throws IoError where the header has its key with another value.
     void set(const std::filesystem::path& path, const std::string& key, const std::string& value);

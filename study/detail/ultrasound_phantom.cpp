@@ -1,7 +1,9 @@
 #include "study/detail/ultrasound_phantom.hpp"
 
+#include "imaging/compounding.hpp"
 #include "study/detail/phantom_data.hpp"
 #include "study/detail/texture.hpp"
+#include "study/detail/tracked_frames.hpp"
 #include "study/detail/ultrasound_beam.hpp"
 
 #include <array>
@@ -124,7 +126,7 @@ imaging::Geometry grid_of(const Sweep& sweep, double voxel_mm) {
 
 PhantomUltrasound drawn_ultrasound(const TrueTissue& tissue, const EchoOptions& options, Random& random) {
     constexpr double moving_voxel_mm = 1.25, fixed_voxel_mm = 0.8, noise = 3, most_turn_deg = 15;
-    constexpr double distortion_mm = 0.3, distortion_length_mm = 25;
+    constexpr double distortion_mm = 0.3, distortion_length_mm = 25, compounded_voxel_mm = 0.5;
     const Anatomy anatomy(tissue, options, random);
     const SmoothNoise distortion(distortion_mm, distortion_length_mm, random);
     const Eigen::Matrix3Xd after = surface_samples(tissue, 60, random);
@@ -146,6 +148,10 @@ PhantomUltrasound drawn_ultrasound(const TrueTissue& tissue, const EchoOptions& 
         return anatomy.echo(tissue.backward(place).value_or(back * place), back.linear() * sweep.beam(x));
     });
     result.fixed = scanned(echoes, sweep, random);
+    if (options.tracked) {
+        const imaging::Sweep frames = tracked_frames(result.fixed, sweep, {}, random);
+        result.fixed = imaging::compound(frames, {.spacing_mm = compounded_voxel_mm}).volume.as(CV_32F);
+    }
     result.shows = [sweep](const Vector3d& x) { return sweep.shows(x); };
     return result;
 }

@@ -4,6 +4,7 @@ import pathlib
 
 import numpy
 
+from compound_test import Sweep, plus_configuration
 from phantom import CENTRE_LPS, FIXED_AFFINE, FIXED_AXES, MOVING_AFFINE, MOVING_AXES, SHIFT_LPS, ellipsoid, save
 
 
@@ -102,6 +103,10 @@ def write_folder(folder):
     write_points(folder)
     (folder / "navigation.txt").write_text("1 0 0 -2\n0 1 0 1.5\n0 0 1 -1\n0 0 0 1\n")
     (folder / "ultrasound.csv").write_text((folder / "ultrasound.csv").read_text().replace(",0.0000\n", ",1\n"))
+    sweep = Sweep(1)
+    sweep.save(folder / "sweep.mha")
+    sweep.save(folder / "uncalibrated.mha", calibrated=False)
+    (folder / "plus.xml").write_text(plus_configuration(sweep))
     for organ in ("brainshift", "liver"):
         data = folder / "data" / organ
         data.mkdir(parents=True)

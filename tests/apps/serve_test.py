@@ -46,6 +46,24 @@ class Server:
         return self.process.returncode, error
 
 
+class Receiving(unittest.TestCase):
+    """The client, against a server that is slow."""
+
+    def test_a_message_that_comes_late_is_not_lost(self):
+        with socket.create_server(("127.0.0.1", 0)) as listener:
+            with Client(port=listener.getsockname()[1]) as client:
+                server, _ = listener.accept()
+                with server:
+                    message = pack("STRING", "slow", pack_text("here it is"), 1234.5)
+                    server.sendall(message[:60])
+                    for _ in range(2):
+                        self.assertRaises(TimeoutError, client.receive, 0.05)
+                    server.sendall(message[60:] + pack("STRING", "next", pack_text("and more")))
+                    self.assertEqual(client.receive(), ("STRING", "slow", "here it is"))
+                    self.assertEqual(client.receive(), ("STRING", "next", "and more"))
+                    self.assertEqual(client.time_of("slow"), 1234.5)
+
+
 def lps_pairs(phantom):
     table = numpy.loadtxt(pairs_of(phantom), delimiter=",", skiprows=1)
     names = [f"p{n}" for n in range(len(table))]
@@ -107,6 +125,7 @@ class Serving(unittest.TestCase):
         self.assertEqual(answer["status"], "ok", answer)
         self.assertFalse(answer["outdated"])
         organ = self.client.newest("organ")
+        self.assertAlmostEqual(self.client.time_of("organ"), answer["time"], delta=1e-6)
         verb = self.updated("--fixed-points", pairs_of(self.phantom), "--points-sd", 0.5)
         self.assertLess(furthest(organ["points"], deformed_nodes(verb / "record.h5")), 0.02)
         errors = organ["arrays"]

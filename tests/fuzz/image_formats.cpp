@@ -2,6 +2,7 @@
 
 #include "core/errors.hpp"
 #include "imaging/image_io.hpp"
+#include "imaging/sweep.hpp"
 #include "tests/fuzz/format.hpp"
 #include "tests/fuzz/image_reading.hpp"
 
@@ -210,6 +211,33 @@ std::vector<Seed> meta_seeds(const std::filesystem::path& folder) {
     return seeds;
 }
 
+/// Three frames of a tracked probe, by two ways.
+std::vector<Seed> sweep_seeds(const std::filesystem::path&) {
+    const std::string head =
+        "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nDimSize = 6 5 4\n"
+        "ElementSpacing = 1 1 1\nElementType = MET_UCHAR\nUltrasoundImageOrientation = UN\n"
+        "UltrasoundImageType = BRIGHTNESS\n";
+    std::string direct = head, chained = head;
+    for (int n = 0; n < 4; ++n) {
+        const std::string frame = "Seq_Frame000" + std::to_string(n) + "_", way = " 0 0 0.5 0 -7.5 0 0 1 ";
+        direct += frame + "ImageToReferenceTransform = 0.5 0 0 12" + way + std::to_string(n) + " 0 0 0 1\n" + frame +
+                  "ImageToReferenceTransformStatus = " + (n == 1 ? "INVALID\n" : "OK\n");
+        chained += frame + "ImageToProbeTransform = 0.1 0 0 0 0 0.1 0 0 0 0 0.1 0 0 0 0 1\n" + frame +
+                   "ProbeToTrackerTransform = 1 0 0 3 0 1 0 4 0 0 1 " + std::to_string(n) + " 0 0 0 1\n" + frame +
+                   "ReferenceToTrackerTransform = 0 1 0 3 -1 0 0 4 0 0 1 2 0 0 0 1\n" + frame + "ImageStatus = OK\n";
+    }
+    const std::string end = "ElementDataFile = LOCAL\n";
+    return {
+        single("direct.mha", direct + end + raw_labels()),
+        {{{"chained.mha", {chained + "CompressedData = True\n" + end, raw_labels(), Packing::Zlib}}}, "chained.mha"}};
+}
+
+void read_frames(const std::filesystem::path& path, Digest& digest) {
+    const imaging::Sweep sweep = imaging::read_sweep(path);
+    digest.voxels(sweep.pixels);
+    for (const imaging::SweepFrame& frame : sweep.frames) digest.matrix(frame.to_patient.matrix());
+}
+
 }  // namespace
 
 void read_image(const std::filesystem::path& path, Digest& digest) {
@@ -228,7 +256,8 @@ void read_image(const std::filesystem::path& path, Digest& digest) {
 std::vector<Format> image_formats() {
     return {{"nifti", nifti_seeds, read_image, nifti_fields},
             {"nrrd", nrrd_seeds, read_image},
-            {"meta-image", meta_seeds, read_image}};
+            {"meta-image", meta_seeds, read_image},
+            {"sweep", sweep_seeds, read_frames}};
 }
 
 }  // namespace tissuewarp::fuzz

@@ -6,6 +6,7 @@
 #include "registration/field.hpp"
 #include "registration/update.hpp"
 #include "tests/registration/shapes.hpp"
+#include "tests/registration/textured_phantom.hpp"
 #include "tests/support/label_shapes.hpp"
 
 #include <gmock/gmock.h>
@@ -38,6 +39,11 @@ public:
             result.data<std::int32_t>()[offset] = inside ? (ball ? 2 : 1) : 0;
         });
         return result;
+    }
+    [[nodiscard]] imaging::Volume image(unsigned seed) const {
+        const test::Texture texture;
+        return test::sampled(
+            shapes::organ_labels(organ_).geometry, [&](const Vector3d& y) { return texture(before(y)); }, 0.05, seed);
     }
     /// Points of a share of its surface, a millimetre off.
     [[nodiscard]] SurfacePoints surface(double share, unsigned seed) const {
@@ -123,6 +129,16 @@ std::shared_ptr<const PreparedModel> organ() {
     return std::make_shared<const PreparedModel>(prepare(shapes::organ_labels({}), options));
 }
 
+/// Which knows what a first image shows.
+std::shared_ptr<const PreparedModel> textured_organ() {
+    auto model = std::make_shared<PreparedModel>(*organ());
+    ImageModelOptions image;
+    image.features.count = 800;
+    image.blocks.grid_spacing_mm = model->labels.geometry.spacing[0];
+    prepare_image(*model, test::sampled(model->labels.geometry, test::Texture()), image);
+    return model;
+}
+
 UpdateOptions on_cpu() {
     UpdateOptions options;
     options.device = Device::Cpu;
@@ -141,13 +157,16 @@ Intraoperative pairs_of(const BendingOrgan& bent, unsigned seed) {
     return {.points = bent.pairs(25, seed)};
 }
 
+Intraoperative image_of(const BendingOrgan& bent, unsigned seed) {
+    return {.image = bent.image(seed)};
+}
 Intraoperative vessels_of(const BendingOrgan& bent, unsigned seed) {
     return {.curves = bent.vessels(seed)};
 }
 
 class GoingOn : public ::testing::TestWithParam<Seen> {
 protected:
-    Updater updater{organ(), on_cpu()};
+    Updater updater{textured_organ(), on_cpu()};
 };
 
 // Six steps of 0.7 mm, with other noise in each.
@@ -174,6 +193,7 @@ TEST_P(GoingOn, BeginsAnewWhereTissueHasJumped) {
     Intraoperative far = seen(BendingOrgan(0), 2);
     const Vector3d shift(9, -5, 4);
     if (far.labels) far.labels->geometry.origin += shift;
+    if (far.image) far.image->geometry.origin += shift;
     if (far.surface) far.surface->points.colwise() += shift;
     if (far.points) far.points->fixed.colwise() += shift;
     if (far.curves) far.curves->fixed.colwise() += shift;
@@ -196,7 +216,8 @@ TEST_P(GoingOn, KnowsTheFrameOfTheStart) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Data, GoingOn,
-                         ::testing::Values(Seen(labels_of), Seen(surface_of), Seen(pairs_of), Seen(vessels_of)));
+                         ::testing::Values(Seen(labels_of), Seen(surface_of), Seen(pairs_of), Seen(vessels_of),
+                                           Seen(image_of)));
 
 class GoOn : public ::testing::Test {
 protected:

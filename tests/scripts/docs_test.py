@@ -186,7 +186,7 @@ class NumbersOfTheCode(unittest.TestCase):
 
 
 class Options(unittest.TestCase):
-    VERBS = {"register": ["register-options.md"], "mesh": ["mesh.md"], "warp": ["warp.md"], "convert": ["convert.md"],
+    VERBS = {"register": ["register-options.md"], "mesh": ["mesh.md"], "warp": ["warp.md"], "convert": ["convert.md"], "compound": ["compound.md"],
              "evaluate": ["evaluate.md"], "info": ["info.md"], "simulate": ["simulate.md"],
              "explain": ["explain.md"], "calibrate": ["calibrate.md"], "study": ["study.md", "study-coverage.md"],
              "bench": ["bench.md"], "cohort": ["cohort.md"], "serve": ["serve.md"]}

@@ -1,5 +1,6 @@
 /// Connections that misbehave, over sockets: each costs itself alone.
 #include "server/hub.hpp"
+#include "server/answers.hpp"
 #include "tests/server/block.hpp"
 
 #include <gmock/gmock.h>
@@ -51,6 +52,16 @@ public:
                 if (frame.header.type == "STRING") texts.push_back(std::get<Text>(decode(frame)).text);
         }
         return texts;
+    }
+    /// Texts, up to and with this one.
+    std::vector<std::string> texts_until(const std::string& last) {
+        std::vector<std::string> all;
+        do {
+            const std::vector<std::string> more = texts(1);
+            if (more.empty()) break;
+            all.insert(all.end(), more.begin(), more.end());
+        } while (all.back() != last);
+        return all;
     }
     /// Whether the other end ends it.
     bool ends() {
@@ -145,6 +156,24 @@ TEST(Hub, WhoNeverReadsIsLetGoAndDelaysNobody) {
     other.send(info());
     EXPECT_EQ(other.texts(1).size(), 1u);
     EXPECT_THAT(serving.told("did not read"), HasSubstr("client 1"));
+}
+
+TEST(Hub, WhoReadsLateGetsTheNewestState) {
+    Serving serving({});
+    Peer late(serving.hub.port()), other(serving.hub.port());
+    late.send(info());
+    EXPECT_EQ(late.texts(1).size(), 1u);
+    const std::string padding(40'000, '.');
+    constexpr int count = 200;  // 8 MB, which the system would keep, each of them old
+    for (int n = 1; n <= count; ++n) {
+        serving.hub.show(parcel("organ", "STRING", "organ", encode(Text{std::to_string(n) + padding}), now_s()));
+        EXPECT_EQ(other.texts(1).size(), 1u) << n;
+    }
+    serving.hub.show(said("end"));
+    const std::vector<std::string> texts = late.texts_until("end");
+    EXPECT_LT(texts.size(), 30u);  // 1 MB: of two systems' buffers
+    ASSERT_GE(texts.size(), 2u);
+    EXPECT_EQ(texts[texts.size() - 2], std::to_string(count) + padding);
 }
 
 TEST(Hub, MessagesBeyondTheRateWaitAndAreNotLost) {

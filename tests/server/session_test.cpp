@@ -23,6 +23,7 @@ struct Got {
     std::string type, device;
     Message message;
     Bytes bytes;
+    double seconds = 0;  ///< when, as its header has it
 };
 
 /// Keeps what is sent, and may hold whoever sends it.
@@ -33,10 +34,10 @@ public:
         keep(parcel);
         std::unique_lock lock(mutex_);
         const Message& message = got_.back().message;
-        if (const auto* status = std::get_if<Status>(&message); status && status->code == 6 && gate_) {
+        if (const auto* status = std::get_if<Status>(&message); status && status->code == gate_) {
             at_gate_ = true;
             changed_.notify_all();
-            changed_.wait(lock, [&] { return !gate_; });
+            changed_.wait(lock, [&] { return gate_ == 0; });
         }
     }
     void drop(std::uint32_t client, const std::string&) override {
@@ -48,10 +49,11 @@ public:
         notes.push_back(text);
     }
 
-    /// From now on updates wait before they compute.
-    void close_gate() {
+    /// From now on whoever shows a status of this code waits: an update before it computes, or at 2 the thread that
+    /// takes messages in when it refuses one.
+    void close_gate(int code = 6) {
         const std::scoped_lock lock(mutex_);
-        gate_ = true;
+        gate_ = code;
         at_gate_ = false;
     }
     void wait_at_gate() {
@@ -60,7 +62,7 @@ public:
     }
     void open_gate() {
         const std::scoped_lock lock(mutex_);
-        gate_ = false;
+        gate_ = 0;
         changed_.notify_all();
     }
 
@@ -93,7 +95,7 @@ private:
         const Header header = parse_header(ByteView(*parcel.bytes).first(header_bytes), {.text_bytes = 1 << 17});
         Frame frame{header, {parcel.bytes->begin() + header_bytes, parcel.bytes->end()}};
         const std::scoped_lock lock(mutex_);
-        got_.push_back({header.type, header.device, decode(frame), frame.body});
+        got_.push_back({header.type, header.device, decode(frame), frame.body, seconds_of(header)});
         changed_.notify_all();
     }
     template <class Is>
@@ -115,7 +117,8 @@ private:
     std::mutex mutex_;
     std::condition_variable changed_;
     std::vector<Got> got_;
-    bool gate_ = false, at_gate_ = false;
+    int gate_ = 0;
+    bool at_gate_ = false;
 };
 
 Frame frame(const char* type, const char* device, Bytes body) {
@@ -163,6 +166,11 @@ TEST(Session, AnUpdateTellsItsStateBeforeItsOrgan) {
     const auto targets = std::get<NamedPoints>(kept.shown("targets_now").message);
     EXPECT_LT((targets[0].position - Eigen::Vector3d(24, 20, 42)).norm(), 0.7);
     EXPECT_THAT(targets[0].group, HasSubstr("95 %"));
+    for (const char* device : {"organ", "targets_now"})
+        EXPECT_NEAR(kept.shown(device).seconds, answer.at("time").get<double>(), 1e-6) << device;
+    EXPECT_NEAR(answer.at("time").get<double>(), now_s(), 60);
+    for (const char* stage : {"equilibrium", "error estimate", "organ and targets"})
+        EXPECT_GT(answer.at("seconds").at(stage), 0) << stage;
     const std::vector<std::string> order = kept.order();
     const auto place = [&](const char* type) { return std::find(order.begin(), order.end(), type) - order.begin(); };
     EXPECT_LT(place("STRING"), place("POLYDATA"));
@@ -200,6 +208,25 @@ TEST(Session, ANewerRequestTakesThePlaceOfAnOlder) {
     EXPECT_EQ(kept.answer(1).at("status"), "cancelled");
     EXPECT_EQ(kept.answer(2).at("status"), "superseded");
     EXPECT_EQ(kept.answer(3).at("status"), "ok");
+}
+
+TEST(Session, OfAClientThatLeftOnlyUpdatesAreDropped) {
+    Kept kept;
+    Session session(test::block(), {}, kept);
+    json follow = update(1);
+    follow["do"] = "follow";
+    session.receive(1, request(follow));
+    kept.answer(1);
+    kept.close_gate(2);
+    session.receive(2, request(update(2)));  // there are no data yet: it is refused
+    kept.wait_at_gate();
+    session.receive(1, request({{"do", "stop"}, {"sequence", 3}}));
+    send_pairs(session, 4);
+    session.receive(1, request(update(4)));
+    session.left(1);
+    session.receive(2, request(update(5)));
+    kept.open_gate();
+    EXPECT_EQ(kept.answer(5).at("update"), 1);
 }
 
 TEST(Session, UpdatesFollowTheData) {

@@ -45,6 +45,39 @@ TEST(UltrasoundPhantom, IsMisplacedByNoMoreThanAsked) {
     EXPECT_LT(apart.maxCoeff(), 4 + 0.07 * 160);
 }
 
+/// Of what one volume has where the other shows something, over the values' variation.
+double share_of_variance(const imaging::Volume& of, const imaging::Volume& by) {
+    const imaging::LinearSampler other(by);
+    double n = 0, a = 0, b = 0, aa = 0, bb = 0, ab = 0;
+    for (std::int64_t voxel = 0; voxel < of.geometry.voxel_count(); ++voxel) {
+        const auto [nx, ny, nz] = of.geometry.size;
+        const double value = of.data<float>()[voxel];
+        const Eigen::Vector3d place =
+            of.geometry.point({double(voxel % nx), double(voxel / nx % ny), double(voxel / nx / ny)});
+        if (value == 0 || !other.contains(place)) continue;
+        const double shown = other.value(place);
+        if (shown < 1) continue;
+        n += 1, a += value, b += shown, aa += value * value, bb += shown * shown, ab += value * shown;
+    }
+    const double covariance = ab - a * b / n;
+    return covariance * covariance / ((aa - a * a / n) * (bb - b * b / n));
+}
+
+TEST(UltrasoundPhantom, TrackedFramesShowTheSameALittleElsewhere) {
+    PhantomOptions tracked = bent();
+    tracked.echoes.tracked = true;
+    const PhantomUltrasound whole = random_phantom(11, bent()).ultrasound(),
+                            frames = random_phantom(11, tracked).ultrasound();
+    EXPECT_EQ(cv::norm(whole.moving.voxels, frames.moving.voxels, cv::NORM_INF), 0);
+    const auto litres = [](const imaging::Volume& v) {
+        return cv::countNonZero(v.voxels.reshape(1, 1)) * v.geometry.spacing.prod();
+    };
+    EXPECT_NEAR(litres(frames.fixed), litres(whole.fixed), 0.15 * litres(whole.fixed));
+    const double share = share_of_variance(frames.fixed, whole.fixed);
+    EXPECT_GT(share, 0.5);  // what a place that is half a millimetre off leaves of speckle
+    EXPECT_LT(share, 0.98);
+}
+
 TEST(UltrasoundPhantom, FaintEchoesAreOtherEchoesOfTheSameTissue) {
     PhantomOptions faint = bent();
     faint.echoes = {0.25, 0.25, 0.2, 0.2};
