@@ -123,15 +123,19 @@ private:
     }
 };
 
-std::shared_ptr<const PreparedModel> organ() {
+PreparedModel prepared_organ() {
     PrepareOptions options;
     options.meshing.edge_length = 8;
-    return std::make_shared<const PreparedModel>(prepare(shapes::organ_labels({}), options));
+    return prepare(shapes::organ_labels({}), options);
+}
+
+std::shared_ptr<const PreparedModel> organ() {
+    return std::make_shared<const PreparedModel>(prepared_organ());
 }
 
 /// Which knows what a first image shows.
 std::shared_ptr<const PreparedModel> textured_organ() {
-    auto model = std::make_shared<PreparedModel>(*organ());
+    auto model = std::make_shared<PreparedModel>(prepared_organ());
     ImageModelOptions image;
     image.features.count = 800;
     image.blocks.grid_spacing_mm = model->labels.geometry.spacing[0];
