@@ -12,7 +12,10 @@ namespace tissuewarp::apps {
 
 void run_study(const StudyOptions& options) {
     static const std::map<std::string, void (*)(const StudyOptions&)> studies{
-        {"accuracy-time", run_accuracy_time_study}, {"coverage", run_coverage_study}, {"dial", run_dial_study}};
+        {"accuracy-time", run_accuracy_time_study},
+        {"coverage", run_coverage_study},
+        {"dial", run_dial_study},
+        {"patient", run_patient_study}};
     const auto study = studies.find(options.name);
     if (study == studies.end()) {
         std::string names;

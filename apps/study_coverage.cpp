@@ -84,7 +84,9 @@ study::Evidence evidence_of(const std::string& name) {
     throw InvalidInput(fmt::format("--evidence '{}' is no kind of data; there are: {}", name, fmt::join(names, ", ")));
 }
 
-study::CoverageOptions plan_of(const StudyOptions& options, Observer& observer) {
+}  // namespace
+
+study::CoverageOptions coverage_plan(const StudyOptions& options, Observer& observer) {
     study::CoverageOptions plan;
     plan.update = on_device(options.device);
     std::vector<std::string> wanted = options.problems;
@@ -106,6 +108,8 @@ study::CoverageOptions plan_of(const StudyOptions& options, Observer& observer) 
     return plan;
 }
 
+namespace {
+
 std::vector<study::CoverageRow> measured(const StudyOptions& options, const study::CoverageOptions& plan,
                                          ProgressLine& progress) {
     try {
@@ -121,7 +125,7 @@ std::vector<study::CoverageRow> measured(const StudyOptions& options, const stud
 void run_coverage_study(const StudyOptions& options) {
     if (options.output.empty()) throw InvalidInput("give --output, the folder that keeps each phantom's measurements");
     ProgressLine progress(options.common);
-    const study::CoverageOptions plan = plan_of(options, progress);
+    const study::CoverageOptions plan = coverage_plan(options, progress);
     progress.begin("registering phantoms", 0.0, 1.0);
     const auto coverage = study::coverage_of(measured(options, plan, progress));
     progress.clear();

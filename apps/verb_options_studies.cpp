@@ -82,7 +82,7 @@ void declare_cohort(Verb& verb, CohortOptions& o) {
 
 void declare_study(Verb& verb, StudyOptions& o) {
     verb.app().footer("Example:\n  tissuewarp study accuracy-time --quick --output out/study");
-    verb.text("name", o.name, "accuracy-time, coverage or dial")->required();
+    verb.text("name", o.name, "accuracy-time, coverage, dial or patient")->required();
     verb.path("-o,--output", o.output, "Folder for measurements and page; a study interrupted there goes on")
         ->type_name("FOLDER");
     verb.list("--problems", o.problems, "NAME",

@@ -69,7 +69,8 @@ def write_images(folder):
         save(labels, affine, folder / f"{name}_labels.nii.gz")
         save((labels > 0).astype(numpy.uint8), affine,
              folder / ("tissue_before.nii.gz" if name == "preop" else "tissue_now.nii.gz"))
-    for source, copy in (("preop.nii.gz", "preop_t2.nii.gz"), ("preop_labels.nii.gz", "vessels.nii.gz")):
+    for source, copy in (("preop.nii.gz", "preop_t2.nii.gz"), ("intraop.nii.gz", "ultrasound.nii.gz"),
+                         ("preop_labels.nii.gz", "vessels.nii.gz")):
         (folder / copy).write_bytes((folder / source).read_bytes())
 
 

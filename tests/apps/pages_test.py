@@ -1,6 +1,6 @@
 """Every command of the README and of the pages for users, as it stands there, on small files of the names that they use.
 
-What is replaced is said here: registrations get a coarse mesh and two rounds, heads of scenes a cube. Programs of the
+What is replaced is said here: registrations get a coarse mesh and two rounds, heads of scenes a cube, ultrasound an image that shows the same organ. Programs of the
 repository are not run again; each is named with the test that runs it."""
 
 import pathlib
@@ -84,6 +84,8 @@ class Pages(unittest.TestCase):
             if "--moving-mesh" in words:
                 self.mesh_of_gmsh(words[words.index("--moving-mesh") + 1])
             return run(*words, *self.quick(words), folder=self.folder)
+        if verb == "compound":
+            words = [word.replace("ultrasound.nii.gz", "compounded.nii.gz") for word in words]
         if verb in ("simulate", "explain"):
             words = [re.sub(r"^(brain-shift|liver|resection)", "cube", word) for word in words]
             if "--init" in words:
