@@ -14,6 +14,11 @@ import socket
 import struct
 import time
 
+try:
+    import numpy
+except ImportError:
+    numpy = None
+
 HEADER = struct.Struct(">H12s20sQQQ")
 POINT = struct.Struct(">64s32s4B3ff20s")
 IMAGE = struct.Struct(">HBBBB3H12f3H3H")
@@ -37,11 +42,36 @@ _TABLE = _crc_table()
 
 
 def crc64(data):
-    """ECMA-182, most significant bit first, from 0."""
-    crc = 0
-    for byte in data:
+    """ECMA-182, most significant bit first, from 0. Images are long: with NumPy, where it is there, in lanes."""
+    crc, at = _crc64_of_lanes(data) if numpy and len(data) > 1 << 20 else (0, 0)
+    for byte in memoryview(data)[at:]:
         crc = ((crc << 8) & 0xFFFFFFFFFFFFFFFF) ^ _TABLE[(crc >> 56) ^ byte]
     return crc
+
+
+def _crc64_of_lanes(data, lanes=4096):
+    """Of the first bytes, and how many these are: lanes of equal length beside each other, each from 0. What comes
+    before a lane is moved past it by a linear map, that of as many zeros."""
+    length = len(data) // lanes
+    table = numpy.array(_TABLE, numpy.uint64)
+    shift, top = numpy.uint64(8), numpy.uint64(56)
+
+    def run(crc, rows):
+        for row in rows:
+            crc = (crc << shift) ^ table[(crc >> top) ^ row]
+        return crc
+
+    rows = numpy.frombuffer(data, numpy.uint8, lanes * length).reshape(lanes, length).T
+    parts = run(numpy.zeros(lanes, numpy.uint64), numpy.ascontiguousarray(rows))
+    past = [int(v) for v in run(numpy.uint64(1) << numpy.arange(64, dtype=numpy.uint64), [0] * length)]
+    crc = 0
+    for part in parts:
+        moved = int(part)
+        for bit in range(64):
+            if crc >> bit & 1:
+                moved ^= past[bit]
+        crc = moved
+    return crc, lanes * length
 
 
 def pack(kind, device, body, seconds=0):

@@ -9,6 +9,7 @@ import struct
 import subprocess
 import sys
 import unittest
+import unittest.mock
 
 import h5py
 import nibabel
@@ -19,7 +20,7 @@ from phantom import CENTRE_LPS, FIXED_AFFINE, MOVING_AFFINE, PROGRAM, SHIFT_LPS,
 from points_test import pairs_of, save_points
 
 sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "python"))
-from tissuewarp_client import Client, Lost, pack, pack_points, pack_text  # noqa: E402
+from tissuewarp_client import Client, Lost, crc64, pack, pack_points, pack_text  # noqa: E402
 
 
 class Server:
@@ -48,6 +49,14 @@ class Server:
 
 class Receiving(unittest.TestCase):
     """The client, against a server that is slow."""
+
+    def test_long_messages_have_the_checksum_of_short_ones(self):
+        random = numpy.random.default_rng(3)
+        for size in ((1 << 20) + 1, (1 << 20) + 4095, 1_500_000):
+            data = random.bytes(size)
+            with unittest.mock.patch("tissuewarp_client.numpy", None):
+                byte_by_byte = crc64(data)
+            self.assertEqual(crc64(data), byte_by_byte, size)
 
     def test_a_message_that_comes_late_is_not_lost(self):
         with socket.create_server(("127.0.0.1", 0)) as listener:
