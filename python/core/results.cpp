@@ -127,9 +127,12 @@ void bind_fields(py::module_& module) {
     module.def(
         "hold_surroundings",
         [](UpdateResult& result, const imaging::Volume& moving, const imaging::Volume& fixed) {
-            result.deformation.surroundings = registration::rigid_surroundings(result.deformation, moving, fixed);
+            observed(py::none(), [&](Observer& observer) {
+                registration::Deformation& deformation = result.deformation;
+                deformation.surroundings = registration::rigid_surroundings(deformation, moving, fixed, {}, observer);
+            });
         },
-        py::arg("result"), py::arg("moving"), py::arg("fixed"), py::call_guard<py::gil_scoped_release>());
+        py::arg("result"), py::arg("moving"), py::arg("fixed"));
     module.def(
         "field_moving_to_fixed",
         [](const UpdateResult& result, const imaging::Geometry& grid) {

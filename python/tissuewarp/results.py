@@ -128,7 +128,8 @@ class Result:
 
     def hold_surroundings(self, moving, fixed) -> None:
         """Bone stays bone: from now on fields, warp() and points outside the organ follow what the grey images before
-        (moving) and during the operation (fixed) both show to have moved as one rigid body around it."""
+        (moving) and during the operation (fixed) both show to have moved as one rigid body around it. The logger "tissuewarp"
+        is told (INFO) where the organ slid along it."""
         _core.hold_surroundings(self._core, as_image(moving)._volume, as_image(fixed)._volume)
         self._transform = self._kept = None
         self.inverse = Inverse(self)

@@ -233,6 +233,34 @@ class Calls(unittest.TestCase):
             tissuewarp.prepare(image(speck, MOVING_LABELS.origin), edge_length=EDGE)
         self.assertTrue(logs.output)
 
+    def test_an_organ_that_slid_is_logged(self):
+        """A ball that turned in its shell of bone by 15°."""
+        at = numpy.stack(numpy.meshgrid(*[numpy.arange(62) * 2.0 - 61] * 3, indexing="ij")[::-1], axis=-1)
+        a = numpy.radians(15)
+        turn = numpy.array([[numpy.cos(a), -numpy.sin(a), 0], [numpy.sin(a), numpy.cos(a), 0], [0, 0, 1]])
+        random = numpy.random.default_rng(7)
+        waves = [(random.normal(size=3), random.uniform(0, 6)) for _ in range(32)]
+        waves = [(2 * numpy.pi / random.uniform(8, 24) * d / numpy.linalg.norm(d), phase) for d, phase in waves]
+
+        def texture(x):
+            return sum(numpy.cos(x @ wave + phase) for wave, phase in waves) / 8
+
+        def head(organ):
+            r = numpy.linalg.norm(at, axis=-1)
+            return numpy.select([r < 40, r < 43, r < 52, r < 58], [60 + 15 * texture(organ), 20, 120 + 40 * texture(at),
+                                                                  80 + 20 * texture(at)]).astype(numpy.float32)
+        labels = (numpy.linalg.norm(at, axis=-1) < 40).astype(numpy.uint8)
+        before, after, labels = (tissuewarp.Image(array, (2, 2, 2), (-61, -61, -61))
+                                 for array in (head(at), head(at @ turn), labels))
+        model = tissuewarp.prepare(labels, edge_length=12)
+        pairs = tissuewarp.PointPairs(model.mesh.nodes, model.mesh.nodes @ turn.T, deviation=0.1)
+        result = tissuewarp.update(model, points=pairs, device="cpu")
+        with self.assertLogs("tissuewarp", logging.INFO) as logs:
+            result.hold_surroundings(before, after)
+        self.assertIn("the organ slid", "".join(logs.output))
+        still = [48, 0, 0]
+        self.assertLess(numpy.linalg.norm(result.transform([still]) - still), 0.5)
+
     def test_exceptions_are_of_the_right_kind(self):
         model = tissuewarp.prepare(MOVING_LABELS, edge_length=EDGE)
         with self.assertRaisesRegex(ValueError, "label"):
