@@ -129,6 +129,7 @@ public:
         span.narrow(start.x(), step.x(), 0, changing_.cols - 1);
         span.narrow(start.y(), step.y(), 0, changing_.rows - 1);
         span.narrow(start.z(), step.z(), -reach_, reach_);
+        if (span.first > span.last) return;  // either may be far beyond the numbers that an int holds
         for (int i = static_cast<int>(span.first); i <= span.last; ++i) {
             const Eigen::Vector3d at = start + i * step;
             const double weight = 1.0 - std::abs(at.z()) / reach_;

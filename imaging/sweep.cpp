@@ -8,8 +8,10 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <iomanip>
 #include <regex>
 #include <set>
+#include <sstream>
 
 namespace tissuewarp::imaging {
 namespace fs = std::filesystem;
@@ -50,13 +52,18 @@ Eigen::Affine3d to_marked_far(const fs::path& path, const SweepHeader& header) {
     return turned;
 }
 
+std::string rounded(double mm) {
+    std::ostringstream text;
+    text << std::setprecision(3) << mm;
+    return text.str();
+}
+
 void require_pixels_of_a_probe(const fs::path& path, const Eigen::Affine3d& to_patient) {
     const Eigen::Vector3d column = to_patient.linear().col(0), row = to_patient.linear().col(1);
     const double across = column.norm(), along = row.norm();
     const auto plausible = [](double mm) { return mm >= smallest_pixel_mm && mm <= largest_pixel_mm; };
     if (!plausible(across) || !plausible(along) || std::abs(column.dot(row)) > most_skew * across * along)
-        throw detail::unusable(path, "its pixels are " + detail::all_digits(across) + " x " +
-                                         detail::all_digits(along) +
+        throw detail::unusable(path, "its pixels are " + rounded(across) + " x " + rounded(along) +
                                          " mm, or skewed, as no probe has them; the transform from Image must take "
                                          "pixels to mm");
 }

@@ -94,6 +94,17 @@ TEST(Compounding, BlackWithinTheFanIsSeen) {
     EXPECT_EQ(value_at(made.volume, sweep.frames[15].to_patient * Eigen::Vector3d(50, 40, 0)), 1);
 }
 
+TEST(Compounding, FramesMayLieNearlyAlongTheVoxels) {
+    for (const double tilt : {0.0, 1e-14, 1e-11, 1e-9}) {
+        Sweep sweep = freehand(20, 0.5, 2);
+        for (int n = 0; n < 20; ++n)
+            sweep.frames[static_cast<std::size_t>(n)].to_patient =
+                Eigen::Translation3d(0, 0, 0.5 * n) * Eigen::AngleAxisd(tilt, Eigen::Vector3d(1, 1, 1).normalized()) *
+                Eigen::Scaling(0.4, 0.4, 1.0);
+        EXPECT_GT(compound(sweep).seen_share, 0.5) << tilt;
+    }
+}
+
 TEST(Compounding, WhatIsNoSweepIsRefused) {
     Sweep still = freehand(5, 0.5, 1);
     for (SweepFrame& frame : still.frames) frame.to_patient = Eigen::Affine3d(Eigen::Scaling(0.4, 0.4, 1.0));
