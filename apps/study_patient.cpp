@@ -6,6 +6,7 @@
 #include "apps/silenced_stderr.hpp"
 #include "apps/study.hpp"
 #include "core/errors.hpp"
+#include "imaging/filters.hpp"
 #include "imaging/image_io.hpp"
 
 #include <fmt/format.h>
@@ -57,19 +58,30 @@ void write_lines(const std::vector<Eigen::Matrix3Xd>& lines, const fs::path& pat
     write_columns(columns, path);
 }
 
-void write(const study::Phantom& patient, bool seen_by_ultrasound, const OutputFolder& output) {
-    const SilencedStandardError silenced;
-    if (seen_by_ultrasound) {
-        const study::PhantomUltrasound images = patient.ultrasound();
-        imaging::write_volume(images.moving, output.path("preop.nii.gz"));
-        imaging::write_volume(images.fixed, output.path("intraop.nii.gz"));
-    } else {
-        const study::PhantomImages images = patient.images();
-        imaging::write_volume(images.moving, output.path("preop.nii.gz"));
-        imaging::write_volume(images.fixed, output.path("intraop.nii.gz"));
-    }
-    imaging::write_volume(patient.moving_labels, output.path("preop_labels.nii.gz"));
-    imaging::write_volume(patient.fixed_labels, output.path("intraop_labels.nii.gz"));
+/// Labels on the voxels of an image, as register wants them.
+void write_labels_on(const imaging::Volume& labels, const imaging::Geometry& grid, const fs::path& path) {
+    imaging::write_volume(imaging::resample(labels, grid, imaging::Interpolation::Nearest), path);
+}
+
+/// What ultrasound shows is seen by it alone; other data are of the whole organ.
+void write_ultrasound(const study::Phantom& patient, const OutputFolder& output) {
+    const study::PhantomUltrasound images = patient.ultrasound();
+    imaging::write_volume(images.moving, output.path("preop.nii.gz"));
+    imaging::write_volume(images.fixed, output.path("intraop.nii.gz"));
+    write_labels_on(patient.moving_labels, images.moving.geometry, output.path("preop_labels.nii.gz"));
+    std::vector<Eigen::Index> seen;
+    for (Eigen::Index n = 0; n < patient.targets.fixed.cols(); ++n)
+        if (images.shows(patient.targets.fixed.col(n))) seen.push_back(n);
+    write_pairs(patient.targets.moving(Eigen::all, seen), patient.targets.fixed(Eigen::all, seen),
+                output.path("landmarks.csv"));
+}
+
+void write_all(const study::Phantom& patient, const OutputFolder& output) {
+    const study::PhantomImages images = patient.images();
+    imaging::write_volume(images.moving, output.path("preop.nii.gz"));
+    imaging::write_volume(images.fixed, output.path("intraop.nii.gz"));
+    write_labels_on(patient.moving_labels, images.moving.geometry, output.path("preop_labels.nii.gz"));
+    write_labels_on(patient.fixed_labels, images.fixed.geometry, output.path("intraop_labels.nii.gz"));
     write_points(patient.surface.points, output.path("intraop_surface.csv"));
     write_pairs(patient.points.moving, patient.points.fixed, output.path("pairs.csv"));
     write_lines(patient.curves.moving, output.path("preop_vessels.csv"));
@@ -90,7 +102,10 @@ void run_patient_study(const StudyOptions& options) {
         progress.begin(fmt::format("drawing patient {}", seed), done / count, (done + 1) / count);
         const study::Phantom patient = study::random_phantom(seed, plan.phantom, progress);
         OutputFolder output(count > 1 ? options.output / std::to_string(seed) : options.output, is_patient_file);
-        write(patient, ultrasound, output);
+        {
+            const SilencedStandardError silenced;
+            ultrasound ? write_ultrasound(patient, output) : write_all(patient, output);
+        }
         output.commit();
         progress.clear();
         if (!options.common.quiet) fmt::print("{}: {}\n", output.folder().string(), patient.story);

@@ -51,8 +51,6 @@ UpdateOptions short_course(UpdateOptions options) {
     options.first_range_mm = options.last_range_mm;
     std::vector<int>& grids = options.image.dense_coarsening;
     if (!grids.empty()) grids = {grids.back()};
-    options.image.matching.skipped_levels = 1;
-    options.image.matching.search_mm = std::min(options.image.matching.search_mm, go_on_course.search_mm);
     return options;
 }
 

@@ -35,9 +35,6 @@ struct GoOnCourse {
     /// That look for what they match. Chosen on labels of the brain shift and the liver's surface
     /// (docs/lab/performance.md).
     int rounds = 3;
-    /// Of an image: the coarsest grid of blocks is left out, and on the next they are sought so far. Tissue that moved by
-    /// most_step_mm in the mean has places that moved farther. By hand.
-    double search_mm = 6;
     int load_rounds = 4;             ///< at most, each under loads found anew. By hand
     double settled_loads_mm = 0.05;  ///< a change of the loads that moves tissue by less is the last. By hand
     double most_growth = 2;          ///< over the change before: they do not lead to loads that data show. By hand
@@ -64,7 +61,7 @@ struct CarriedOn {
 bool same_kinds(const UpdateResult& last, const Intraoperative& seen);
 
 /// The options of a short course: few rounds that look no farther than the last one of a whole course, and of an image
-/// blocks near by and one dense search on the last grid.
+/// blocks and one dense search on the last grid.
 UpdateOptions short_course(UpdateOptions options);
 
 /// Why an update that went on from `last` to `now` must begin anew; nothing where it need not.

@@ -56,7 +56,6 @@ LocatedMatches ImageSearch::block_search(const State& state, Observer& observer)
     BlockMatchingOptions matching = options_.matching;
     matching.rotation = state.placement.linear();
     matching.finest = FinestGrid::UndescribedPoints;
-    matching.skipped_levels = std::min(matching.skipped_levels, blocks.options().levels - 1);
     return located(consistent_matches(search_blocks(blocks, fixed_.image.geometry, engine_.blocks(),
                                                     deformed(blocks.points(), state), matching, observer),
                                       options_.consistency));

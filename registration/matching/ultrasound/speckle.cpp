@@ -9,20 +9,28 @@ namespace tissuewarp::registration::detail {
 
 namespace {
 
-constexpr int apart = 3;  // voxels between places
+constexpr int apart = 3;  // strides between places
 
 struct Patch {
     double mean, deviation;
 };
 
+/// Voxels from one of a patch to the next along each axis.
+Voxel stride_of(const imaging::Geometry& grid, double mm) {
+    Voxel stride{};
+    for (std::size_t a = 0; a < 3; ++a)
+        stride[a] = std::max(1, static_cast<int>(std::lround(mm / grid.spacing[static_cast<Eigen::Index>(a)])));
+    return stride;
+}
+
 /// Of 27 voxels, all seen: about a plane through them.
-std::optional<Patch> patch_of(const SeenImage& image, int i, int j, int k) {
+std::optional<Patch> patch_of(const SeenImage& image, const Voxel& stride, int i, int j, int k) {
     double sum = 0, squares = 0;
     Eigen::Vector3d slope = Eigen::Vector3d::Zero();
     for (int c = -1; c <= 1; ++c)
         for (int b = -1; b <= 1; ++b)
             for (int a = -1; a <= 1; ++a) {
-                const std::int64_t n = image.image.offset(i + a, j + b, k + c);
+                const std::int64_t n = image.image.offset(i + a * stride[0], j + b * stride[1], k + c * stride[2]);
                 if (!image.seen.data<std::uint8_t>()[n]) return std::nullopt;
                 const double value = image.image.data<float>()[n];
                 sum += value;
@@ -42,13 +50,14 @@ double percentile(std::vector<double>& values, double share) {
 
 }  // namespace
 
-double speckle_of(const SeenImage& image) {
+double speckle_of(const SeenImage& image, const SpeckleOptions& options) {
     const auto& size = image.image.geometry.size;
+    const Voxel stride = stride_of(image.image.geometry, options.step_mm);
     std::vector<double> means, deviations;
-    for (int k = 1; k < size[2] - 1; k += apart)
-        for (int j = 1; j < size[1] - 1; j += apart)
-            for (int i = 1; i < size[0] - 1; i += apart)
-                if (const auto patch = patch_of(image, i, j, k)) {
+    for (int k = stride[2]; k < size[2] - stride[2]; k += apart * stride[2])
+        for (int j = stride[1]; j < size[1] - stride[1]; j += apart * stride[1])
+            for (int i = stride[0]; i < size[0] - stride[0]; i += apart * stride[0])
+                if (const auto patch = patch_of(image, stride, i, j, k)) {
                     means.push_back(patch->mean);
                     deviations.push_back(patch->deviation);
                 }
@@ -64,11 +73,11 @@ double speckle_of(const SeenImage& image) {
 bool is_speckled(const SeenImage& image, const SpeckleOptions& options) {
     const auto seen = cv::countNonZero(image.seen.voxels.reshape(1, 1));
     if (double(seen) > options.most_seen * double(image.seen.geometry.voxel_count())) return false;
-    return speckle_of(image) >= options.least_speckle;
+    return speckle_of(image, options) >= options.least_speckle;
 }
 
 bool has_more_speckle(const SeenImage& fixed, const SeenImage& moving, const SpeckleOptions& options) {
-    return speckle_of(fixed) >= options.least_over_moving * speckle_of(moving);
+    return speckle_of(fixed, options) >= options.least_over_moving * speckle_of(moving, options);
 }
 
 }  // namespace tissuewarp::registration::detail
