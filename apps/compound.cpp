@@ -35,6 +35,8 @@ void print(const CompoundOptions& options, const imaging::Sweep& sweep, const im
         "% of them seen\n",
         options.output.string(), sweep.frames.size(), first.linear().col(0).norm(), first.linear().col(1).norm(),
         made.median_step_mm, nx, ny, nz, options.spacing, 100 * made.seen_share);
+    fmt::print(
+        "register it with --similarity linear-combination: a mean of frames has little speckle to be known by\n");
 }
 
 }  // namespace

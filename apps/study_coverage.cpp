@@ -48,6 +48,7 @@ void take_ultrasound(std::vector<std::string>& problems, study::CoverageOptions&
     else if (problem.starts_with(tracked)) {
         problem.replace(0, tracked.size(), "phantom:");
         plan.phantom.echoes.tracked = true;
+        plan.update.image.similarity = registration::Similarity::LinearCombination;  // as `compound` advises
     } else if (problem.starts_with(faint)) {
         problem.replace(0, faint.size(), "bent:");
         plan.phantom.echoes = study::faint_echoes;
