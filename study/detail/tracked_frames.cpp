@@ -13,6 +13,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double pixel_mm = 0.3, least_step_mm = 0.3, most_step_mm = 0.9;
+constexpr double margin_mm = 3;
 constexpr double wander_mm = 0.15, tilt_deg = 0.25;  // deviations of what a frame adds to the one before
 
 Eigen::Isometry3d small_motion(double mm, double degrees, Random& random) {
@@ -25,12 +26,20 @@ Eigen::Isometry3d small_motion(double mm, double degrees, Random& random) {
 std::vector<Eigen::Isometry3d> hand_held(const Sweep& sweep, Random& random) {
     std::vector<Eigen::Isometry3d> places;
     Eigen::Isometry3d hand = Eigen::Isometry3d::Identity();
-    for (double y = -sweep.half_length_mm; y <= sweep.half_length_mm;
-         y += random.uniform(least_step_mm, most_step_mm)) {
+    const double end = sweep.half_length_mm - margin_mm;
+    for (double y = -end; y <= end; y += random.uniform(least_step_mm, most_step_mm)) {
         hand = hand * small_motion(wander_mm, tilt_deg, random);
         places.push_back(sweep.frame * Eigen::Translation3d(0, y, 0) * hand);
     }
     return places;
+}
+
+/// Whether a place in the plane of a frame lies in its own fan. That is smaller than the fan of the whole sweep: a hand
+/// that wanders must not leave what is drawn.
+bool in_own_fan(const Sweep& sweep, const Vector3d& place) {
+    const double r = std::hypot(place.x(), place.z()), angle = std::abs(std::atan2(place.x(), place.z()));
+    return r > sweep.first_mm + margin_mm && r < sweep.last_mm - margin_mm && angle < sweep.half_angle &&
+           r * std::sin(sweep.half_angle - angle) > margin_mm;
 }
 
 }  // namespace
@@ -59,10 +68,10 @@ imaging::Sweep tracked_frames(const imaging::Volume& scanned, const Sweep& sweep
         frames.frames.push_back({n, tracked * in_frame});
         tbb::parallel_for(0, size[1], [&](int row) {
             for (int column = 0; column < size[2]; ++column) {
-                const Vector3d at = place * in_frame * Vector3d(column, row, 0);
-                if (sweep.shows(at))
+                const Vector3d in_plane = in_frame * Vector3d(column, row, 0);
+                if (in_own_fan(sweep, in_plane))
                     frames.pixels.at<std::uint8_t>(n, row, column) =
-                        cv::saturate_cast<std::uint8_t>(std::max(1.0, shown.value(at)));
+                        cv::saturate_cast<std::uint8_t>(std::max(1.0, shown.value(place * in_plane)));
             }
         });
     }

@@ -72,7 +72,8 @@ TEST(UltrasoundPhantom, TrackedFramesShowTheSameALittleElsewhere) {
     const auto litres = [](const imaging::Volume& v) {
         return cv::countNonZero(v.voxels.reshape(1, 1)) * v.geometry.spacing.prod();
     };
-    EXPECT_NEAR(litres(frames.fixed), litres(whole.fixed), 0.15 * litres(whole.fixed));
+    EXPECT_LT(litres(frames.fixed), litres(whole.fixed));
+    EXPECT_GT(litres(frames.fixed), 0.55 * litres(whole.fixed));
     const double share = share_of_variance(frames.fixed, whole.fixed);
     EXPECT_GT(share, 0.5);  // what a place that is half a millimetre off leaves of speckle
     EXPECT_LT(share, 0.98);
