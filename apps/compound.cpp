@@ -23,6 +23,18 @@ imaging::Sweep read(const CompoundOptions& options) {
     return imaging::read_sweep(options.input, how);
 }
 
+/// A sweep cannot be acquired again.
+void require_other_file(const CompoundOptions& options, const imaging::Sweep& sweep) {
+    std::vector<std::filesystem::path> inputs = sweep.files;
+    inputs.push_back(options.input);
+    if (!options.calibration.empty()) inputs.push_back(options.calibration);
+    std::error_code ignored;
+    for (const std::filesystem::path& input : inputs)
+        if (std::filesystem::equivalent(input, options.output, ignored))
+            throw InvalidInput(
+                fmt::format("the output '{}' is a file of the input; give another name", options.output.string()));
+}
+
 void print(const CompoundOptions& options, const imaging::Sweep& sweep, const imaging::Compounded& made) {
     const Eigen::Affine3d& first = sweep.frames.front().to_patient;
     const auto [nx, ny, nz] = made.volume.geometry.size;
@@ -46,6 +58,7 @@ void run_compound(const CompoundOptions& options) {
     require_could_write_file(options.output);
     progress.begin("reading", 0.0, 0.2);
     const imaging::Sweep sweep = read(options);
+    require_other_file(options, sweep);
     progress.begin("compounding", 0.2, 0.9);
     const imaging::Compounded made = [&] {
         try {

@@ -14,14 +14,14 @@ struct CompoundingOptions {
 struct Compounded {
     Volume volume;              ///< type of the pixels; 0 where nothing was seen, at least 1 where something was
     double seen_share = 0;      ///< of its voxels
-    double median_step_mm = 0;  ///< from frame to frame, at their corners, across their planes
+    double median_step_mm = 0;  ///< from frame to frame, across them at their middle
     int gaps = 0;               ///< between frames, wider than the largest
 };
 
-/// Each voxel is the mean of the frames about it, bilinear in their planes, weighted by 1 − distance / reach across
-/// them: the reach of a frame is the step to the frames before and after it, so that between two of them values are
-/// interpolated. Pixels that have one value in all frames are the scanner's picture about the fan and are left out. The
-/// axes are those of LPS. Throws InvalidInput where frames span no volume, or one of more than 2²⁹ voxels.
+/// Each voxel is a weighted mean of the frames about it, bilinear in their planes: between two frames that follow each
+/// other a linear interpolation, and about each frame, within a voxel, those beside it too. Pixels whose value hardly
+/// ever changes are the scanner's picture about the fan and are left out. The axes are those of LPS. Throws
+/// InvalidInput where frames span no volume, or one of more than 2²⁹ voxels.
 Compounded compound(const Sweep& sweep, const CompoundingOptions& options = {}, Observer& observer = silent_observer());
 
 }  // namespace tissuewarp::imaging

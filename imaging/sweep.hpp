@@ -30,8 +30,9 @@ struct SweepFrame {
 };
 
 struct Sweep {
-    cv::Mat pixels;                  ///< frames × rows × columns, of 8 or 16 bits without sign
-    std::vector<SweepFrame> frames;  ///< those whose place is known
+    cv::Mat pixels;                            ///< frames × rows × columns, of 8 or 16 bits without sign
+    std::vector<SweepFrame> frames;            ///< those whose place is known
+    std::vector<std::filesystem::path> files;  ///< that hold the pixels
     std::vector<std::string> notes;
 
     [[nodiscard]] int rows() const { return pixels.size[1]; }
@@ -42,9 +43,9 @@ struct Sweep {
 /// Plus (XML). Throws IoError, and InvalidInput where there is none.
 Eigen::Affine3d read_calibration(const std::filesystem::path& path);
 
-/// Frames whose image or transforms are not OK are left out, with a note. Throws IoError on a damaged file, and
-/// InvalidInput on what is no sweep, no brightness, tells no way from the image to `to`, or has pixels whose size no
-/// probe has (0.005 to 2 mm).
+/// Frames whose image or transforms are not OK are left out, and those far from all others, with notes. Throws IoError
+/// on a damaged file, and InvalidInput on what is no sweep, no brightness, tells no way from the image to `to`, or has
+/// pixels (0.005 to 2 mm) or frames (500 mm) whose size no probe has.
 Sweep read_sweep(const std::filesystem::path& path, const SweepOptions& options = {});
 
 }  // namespace tissuewarp::imaging

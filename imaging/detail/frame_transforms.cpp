@@ -3,6 +3,7 @@
 #include "imaging/detail/header_checks.hpp"
 #include "imaging/detail/text_headers.hpp"
 
+#include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <deque>
@@ -18,15 +19,15 @@ bool is_ok(const std::string& status) {
 }
 
 /// The number of the frame and the name of the field, of "Seq_Frame0012_Name".
-std::optional<std::pair<std::size_t, std::string>> frame_field(const std::string& key) {
+std::optional<std::pair<int, std::string>> frame_field(const std::string& key) {
     if (!key.starts_with(frame_prefix)) return std::nullopt;
     constexpr std::size_t most_digits = 9;
     const std::size_t digits = frame_prefix.size(), end = key.find('_', digits);
     if (end == std::string::npos || end == digits || end - digits > most_digits) return std::nullopt;
-    std::size_t number = 0;
+    int number = 0;
     for (std::size_t n = digits; n < end; ++n) {
         if (!std::isdigit(static_cast<unsigned char>(key[n]))) return std::nullopt;
-        number = 10 * number + static_cast<std::size_t>(key[n] - '0');
+        number = 10 * number + (key[n] - '0');
     }
     return std::pair(number, key.substr(end + 1));
 }
@@ -37,16 +38,25 @@ Eigen::Affine3d affine_of(const std::filesystem::path& path, const std::string& 
     const std::vector<double> numbers = numbers_in(text);
     Eigen::Matrix4d matrix = Eigen::Matrix4d::Zero();
     if (numbers.size() == 16) matrix = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers.data());
+    if (matrix.topRows<3>().col(2).isZero(0)) {
+        const Eigen::Vector3d across = matrix.topRows<3>().col(0), along = matrix.topRows<3>().col(1);
+        matrix.topRows<3>().col(2) = across.cross(along) / std::sqrt(std::max(across.norm() * along.norm(), 1e-30));
+    }
     if (!matrix.allFinite() || matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1) ||
         std::abs(matrix.topLeftCorner<3, 3>().determinant()) < 1e-12)
         throw unreadable(path, "its " + what + " is '" + text +
-                                   "', no 16 numbers of an affine transform that can be inverted; correct the header");
+                                   "', no 16 numbers of an affine transform that can be inverted; correct it");
     return Eigen::Affine3d(matrix);
 }
 
-void FrameTransforms::add(const std::string& from, const std::string& to, const Eigen::Affine3d& transform) {
-    ways_[from].insert_or_assign(to, transform);
-    ways_[to].insert_or_assign(from, transform.inverse());
+bool FrameTransforms::add(const std::string& from, const std::string& to, const Eigen::Affine3d& transform) {
+    constexpr double most_off = 1e-3;  // files have six digits
+    if (const auto way = ways_.find(from); way != ways_.end())
+        if (const auto known = way->second.find(to); known != way->second.end())
+            return known->second.isApprox(transform, most_off);
+    ways_[from].emplace(to, transform);
+    ways_[to].emplace(from, transform.inverse());
+    return true;
 }
 
 std::optional<Eigen::Affine3d> FrameTransforms::between(const std::string& from, const std::string& to) const {
@@ -75,14 +85,14 @@ std::optional<std::pair<std::string, std::string>> systems_of(const std::string&
     return std::nullopt;
 }
 
-std::vector<FrameFields> frame_fields(const std::filesystem::path& path,
-                                      const std::map<std::string, std::string>& fields, int count) {
-    std::vector<FrameFields> frames(static_cast<std::size_t>(count));
+std::map<int, FrameFields> frame_fields(const std::filesystem::path& path,
+                                        const std::map<std::string, std::string>& fields, int count) {
+    std::map<int, FrameFields> frames;
     for (const auto& [key, value] : fields) {
         const auto field = frame_field(key);
         if (!field) continue;
         const auto& [number, name] = *field;
-        if (number >= frames.size())
+        if (number >= count)
             throw unreadable(
                 path, "its '" + key + "' is of a frame that it does not have; its frames are " + std::to_string(count));
         FrameFields& frame = frames[number];
@@ -92,7 +102,8 @@ std::vector<FrameFields> frame_fields(const std::filesystem::path& path,
         if (!systems) continue;
         const auto status = fields.find(key + std::string(status_suffix));
         if (status != fields.end() && !is_ok(status->second)) continue;
-        frame.transforms.add(systems->first, systems->second, affine_of(path, "'" + key + "'", value));
+        if (!frame.transforms.add(systems->first, systems->second, affine_of(path, "'" + key + "'", value)))
+            throw unreadable(path, "its '" + key + "' contradicts another transform between the same two; leave one");
     }
     return frames;
 }

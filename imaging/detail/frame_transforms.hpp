@@ -15,7 +15,8 @@ namespace tissuewarp::imaging::detail {
 /// Transforms between named coordinate systems, as one frame has them.
 class FrameTransforms {
 public:
-    void add(const std::string& from, const std::string& to, const Eigen::Affine3d& transform);
+    /// False where another way between the two is there.
+    [[nodiscard]] bool add(const std::string& from, const std::string& to, const Eigen::Affine3d& transform);
     /// The shortest way through them, forth or back; nothing where there is none.
     [[nodiscard]] std::optional<Eigen::Affine3d> between(const std::string& from, const std::string& to) const;
     /// The names of all systems.
@@ -30,12 +31,14 @@ struct FrameFields {
     FrameTransforms transforms;  ///< those that are OK
 };
 
-/// Of each frame, from fields "Seq_Frame0012_ProbeToReferenceTransform" and the like. Throws IoError for one that is
-/// not 16 numbers of an affine transform, or of a frame beyond `count`.
-std::vector<FrameFields> frame_fields(const std::filesystem::path& path,
-                                      const std::map<std::string, std::string>& fields, int count);
+/// Of the frames that fields "Seq_Frame0012_ProbeToReferenceTransform" and the like name, by number. Throws IoError for
+/// one that is not 16 numbers of an affine transform, for two that contradict each other, and of a frame beyond
+/// `count`.
+std::map<int, FrameFields> frame_fields(const std::filesystem::path& path,
+                                        const std::map<std::string, std::string>& fields, int count);
 
-/// Of 16 numbers, row by row. `what` names them in messages. Throws IoError where they are others, or no affine
+/// Of 16 numbers, row by row; where the third column is zero, as of calibrations of a plane, it becomes the normal.
+/// `what` names them in messages. Throws IoError where they are others, or no affine
 /// transform that can be inverted.
 Eigen::Affine3d affine_of(const std::filesystem::path& path, const std::string& what, const std::string& text);
 

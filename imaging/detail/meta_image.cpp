@@ -153,6 +153,9 @@ void read_scaling(const fs::path& path, const TextHeader& header, ImageHeader& i
 }  // namespace
 
 SweepHeader read_meta_sweep_header(const fs::path& path) {
+    const std::string name = lower_case(path.filename().string());
+    if (!name.ends_with(".mha") && !name.ends_with(".mhd"))
+        throw unusable(path, "a sweep is a sequence metafile (.mha, .mhd), as Plus and 3D Slicer write it; give one");
     const TextHeader header = read_meta_header(path);
     if (header.comments.empty())
         throw unusable(path, "its header has no fields of frames (Seq_Frame0000_…); give a sequence as Plus writes it");

@@ -163,7 +163,8 @@ TextHeader read_meta_header(const std::filesystem::path& path) {
         const std::string name = trimmed(line.substr(0, equals)), key = lower_case(name),
                           value = trimmed(line.substr(equals + 1));
         if (name.starts_with(frame_prefix)) {
-            header.comments[name] = value;
+            if (const auto [field, added] = header.comments.try_emplace(name, value); !added && field->second != value)
+                throw unreadable(path, "its header states '" + name + "' twice; leave the true one");
             continue;
         }
         header.set(path, key, value);

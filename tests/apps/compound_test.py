@@ -136,6 +136,14 @@ class Compounding(unittest.TestCase):
         self.assertEqual(result.returncode, 2)
         self.assertIn("Image, Probe, Reference, Tracker", result.stderr)
 
+    def test_the_input_is_not_written_over(self):
+        source = Sweep(14).save(self.folder / "s.mha")
+        before = source.read_bytes()
+        result = run("compound", source, "--output", self.folder / ".." / self.folder.name / "s.mha")
+        self.assertEqual(result.returncode, 2, result.stderr)
+        self.assertIn("another name", result.stderr)
+        self.assertEqual(source.read_bytes(), before)
+
     def test_frames_are_no_volume(self):
         source = Sweep(13).save(self.folder / "s.mha")
         for verb in (["info", source], ["register", "--moving", source, "--fixed", source, "--moving-labels", source,

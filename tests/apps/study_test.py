@@ -1,6 +1,7 @@
 """`tissuewarp study accuracy-time` in its reduced form: the shape of its fronts, not how fast they are."""
 
 import csv
+import json
 import math
 import os
 import pathlib
@@ -157,6 +158,46 @@ class Study(unittest.TestCase):
             names = [name.decode() for name in file["times/stage"][:]]
             runs = [row[2] for row, name in zip(seconds, names) if name == "" and row[0] == 0]
             self.assertAlmostEqual(sum(runs) / 2, float(self.rows[0]["median_s"]), delta=1e-5 * sum(runs))
+
+
+class Patients(unittest.TestCase):
+    """Drawn patients as files."""
+
+    def drawn(self, problem):
+        temporary = tempfile.TemporaryDirectory(prefix="tissuewarp-patient-")
+        self.addCleanup(temporary.cleanup)
+        output = pathlib.Path(temporary.name) / "patient"
+        result = run("study", "patient", "--problems", problem, "--output", output)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return output
+
+    def errors(self, patient, *seen):
+        result = run("register", "--moving", patient / "preop.nii.gz", "--moving-labels", patient / "preop_labels.nii.gz",
+                     *seen, "--landmarks", patient / "landmarks.csv", "--edge-length", "12", "--no-error-estimate",
+                     "--device", "cpu", "--output", patient / "out")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        scores = json.loads((patient / "out" / "report.json").read_text())["target_registration_error"]["all"]
+        return scores["before"]["mean"], scores["after"]["mean"]
+
+    def test_their_landmarks_tell_the_truth(self):
+        patient = self.drawn("bent:5")
+        before, after = self.errors(patient, "--fixed", patient / "intraop.nii.gz")
+        self.assertGreater(before, 4)
+        self.assertLess(after, 1)
+        before, after = self.errors(patient, "--fixed-surface", patient / "intraop_surface.csv", "--fixed-points",
+                                    patient / "pairs.csv")
+        self.assertLess(after, 0.5 * before)
+
+    def test_frames_of_ultrasound(self):
+        patient = self.drawn("tracked-ultrasound:2")
+        before, after = self.errors(patient, "--fixed", patient / "intraop.nii.gz", "--similarity", "linear-combination")
+        self.assertGreater(before, 2)
+        self.assertLess(after, 0.6 * before)
+
+    def test_several_have_folders_of_their_own(self):
+        patients = self.drawn("bent:5-6")
+        self.assertEqual(sorted(path.name for path in patients.iterdir()), ["5", "6"])
+        self.assertFalse((patients / "5" / "landmarks.csv").read_bytes() == (patients / "6" / "landmarks.csv").read_bytes())
 
 
 class StudyOptions(PhantomTest):

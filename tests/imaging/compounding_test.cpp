@@ -94,6 +94,69 @@ TEST(Compounding, BlackWithinTheFanIsSeen) {
     EXPECT_EQ(value_at(made.volume, sweep.frames[15].to_patient * Eigen::Vector3d(50, 40, 0)), 1);
 }
 
+TEST(Compounding, BetweenFramesIsALinearInterpolationAndInAGapNothing) {
+    Sweep sweep = freehand(6, 1, 1);
+    const std::array<double, 6> z{0, 2.9, 5.8, 9.8, 12.7, 15.6};  // 4 mm between the third and the fourth
+    for (int n = 0; n < 6; ++n) {
+        sweep.frames[static_cast<std::size_t>(n)].to_patient =
+            Eigen::Translation3d(0, 0, z[static_cast<std::size_t>(n)]) * Eigen::Scaling(0.4, 0.4, 1.0);
+        for (int r = 0; r < 80; ++r)
+            for (int c = 0; c < 100; ++c)
+                sweep.pixels.at<std::uint8_t>(n, r, c) =
+                    cv::saturate_cast<std::uint8_t>(60 + 10 * z[static_cast<std::size_t>(n)]);
+    }
+    const Compounded made = compound(sweep, {.spacing_mm = 0.5, .largest_gap_mm = 3});
+    EXPECT_EQ(made.gaps, 1);
+    for (const double at : {0.5, 1.5, 4.0, 5.5, 10.0, 11.5, 15.0})
+        EXPECT_NEAR(value_at(made.volume, {20, 16, at}), 60 + 10 * at, 1.5) << at;
+    for (const double at : {6.5, 7.0, 8.0, 9.0}) EXPECT_EQ(value_at(made.volume, {20, 16, at}), 0) << at;
+}
+
+// What lies across the frames near the pivot of a probe that tilts is as sharp as the frames there are close.
+TEST(Compounding, ATiltIsAsFineAsItsFramesAreAtEachDepth) {
+    const double degree = EIGEN_PI / 180;
+    const auto stripes = [](const Eigen::Vector3d& p) { return 128 + 60 * std::sin(p.x() * 1.571); };  // 4 mm wide
+    Eigen::Affine3d in_plane = Eigen::Affine3d::Identity();  // columns along y, rows along z, the depth
+    in_plane.linear() << 0, 0, 1, 0.5, 0, 0, 0, 0.5, 0;
+    for (const double step_deg : {0.5, 1.0, 1.3}) {
+        Sweep sweep;
+        const std::array<int, 3> size{41, 300, 60};
+        sweep.pixels = cv::Mat(3, size.data(), CV_8U, cv::Scalar(0));
+        for (int n = 0; n < 41; ++n) {
+            const Eigen::Affine3d pose =
+                Eigen::AngleAxisd(step_deg * (n - 20) * degree, Eigen::Vector3d::UnitY()) * in_plane;
+            sweep.frames.push_back({n, pose});
+            for (int r = 24; r < 300; ++r)
+                for (int c = 0; c < 60; ++c)
+                    sweep.pixels.at<std::uint8_t>(n, r, c) =
+                        cv::saturate_cast<std::uint8_t>(stripes(pose * Eigen::Vector3d(c, r, 0)));
+        }
+        const Volume volume = compound(sweep, {.spacing_mm = 0.5}).volume;
+        double off = 0;
+        int count = 0;
+        for (double depth = 14; depth < 30; depth += 0.5)
+            for (double angle = -8; angle < 8; angle += 0.7, ++count) {
+                const Eigen::Vector3d place(depth * std::sin(angle * degree), 15, depth * std::cos(angle * degree));
+                const Eigen::Vector3d index = volume.geometry.point_to_index() * (place - volume.geometry.origin);
+                const Eigen::Vector3d voxel = volume.geometry.point(index.array().round().matrix());
+                off += std::pow(value_at(volume, place) - stripes(voxel), 2);
+            }
+        EXPECT_LT(std::sqrt(off / count), 12) << step_deg;  // of 42
+    }
+}
+
+TEST(Compounding, AFrameThatWasBlankedShowsNothingOfThePicture) {
+    for (const bool left_out : {false, true}) {
+        Sweep sweep = freehand(40, 0.5, 4);
+        for (int r = 0; r < 80; ++r)
+            for (int c = 0; c < 100; ++c) sweep.pixels.at<std::uint8_t>(3, r, c) = 0;
+        if (left_out) sweep.frames.erase(sweep.frames.begin() + 3);
+        const Compounded made = compound(sweep, {.spacing_mm = 0.5});
+        for (std::int64_t n = 0; n < made.volume.geometry.voxel_count(); ++n)
+            ASSERT_NE(made.volume.data<std::uint8_t>()[n], 7) << left_out;
+    }
+}
+
 TEST(Compounding, FramesMayLieNearlyAlongTheVoxels) {
     for (const double tilt : {0.0, 1e-14, 1e-11, 1e-9}) {
         Sweep sweep = freehand(20, 0.5, 2);
@@ -109,6 +172,9 @@ TEST(Compounding, WhatIsNoSweepIsRefused) {
     Sweep still = freehand(5, 0.5, 1);
     for (SweepFrame& frame : still.frames) frame.to_patient = Eigen::Affine3d(Eigen::Scaling(0.4, 0.4, 1.0));
     EXPECT_THROW(compound(still), InvalidInput);  // all in one plane
+    for (SweepFrame& frame : still.frames)
+        frame.to_patient = Eigen::AngleAxisd(0.5, Eigen::Vector3d(1, 2, 1).normalized()) * frame.to_patient;
+    EXPECT_THROW(compound(still), InvalidInput);  // however it lies
     Sweep same = freehand(5, 0.5, 1);
     same.pixels.setTo(9);
     EXPECT_THROW(compound(same), InvalidInput);

@@ -164,13 +164,51 @@ TEST(Sweep, WhatIsNoBrightnessOrOfNoProbeIsRefused) {
     expect_refused(text, "no brightness");
     text = tracked();
     text.set(1, "ImageToProbe", pose(0, 0, 0, 0) * Eigen::Scaling(20.0, 20.0, 20.0));
-    expect_refused(text, "20 x 20 mm");
+    expect_refused(text, "frame 1 are 20 x 20 mm");
     text = tracked();
     text.set(1, "ImageToProbeTransform", "1 0 0 0 0 1 0 0 0 0 0 0 0 0 0 1");
     expect_refused(text, "can be inverted");
     text = tracked();
     text.set(7, "Timestamp", "3");
     expect_refused(text, "a frame that it does not have");
+    text = tracked();
+    text.set(1, "TrackerToProbe", pose(0.3, 10, 20, 30));
+    expect_refused(text, "contradicts another");
+    text = tracked();
+    text.fields["Frame1_ProbeToTrackerTransform"] = numbers(pose(0.3, 10, 20, 36));
+    expect_refused(text, "contradicts another");
+}
+
+TEST(Sweep, FramesFarFromAllOthersAreLeftOutAndNamed) {
+    SweepText text;
+    text.frames = 20;
+    for (int n = 0; n < 20; ++n) text.set(n, "ImageToReference", pose(0, n == 7 ? 400 : 0, 0, n) * calibration());
+    const TemporaryFolder folder;
+    const Sweep sweep = read_sweep(folder.written("s.mha", text.text()));
+    EXPECT_EQ(sweep.frames.size(), 19u);
+    ASSERT_EQ(sweep.notes.size(), 1u);
+    EXPECT_THAT(sweep.notes[0], HasSubstr("left out: 7"));
+}
+
+TEST(Sweep, ClaimsOfManyFramesCostNothing) {
+    SweepText text = tracked();
+    text.frames = 2;
+    std::string claim = text.text();
+    claim.replace(claim.find("DimSize = 4 3 2"), 15, "DimSize = 4 3 200000000");
+    const TemporaryFolder folder;
+    EXPECT_THROW(read_sweep(folder.written("s.mha", claim)), Error);
+}
+
+TEST(Sweep, ACalibrationOfThePlaneAloneWillDo) {
+    SweepText text = tracked();
+    Eigen::Affine3d flat = calibration();
+    flat.linear().col(2).setZero();
+    for (int n = 0; n < 2; ++n) text.set(n, "ImageToProbe", flat);
+    const TemporaryFolder folder;
+    const Eigen::Vector3d pixel(2, 1, 0);
+    const Sweep plane = read_sweep(folder.written("p.mha", text.text())),
+                whole = read_sweep(folder.written("w.mha", tracked().text()));
+    EXPECT_LT((plane.frames[1].to_patient * pixel - whole.frames[1].to_patient * pixel).norm(), 1e-4);
 }
 
 TEST(Sweep, IsNoVolume) {
@@ -207,6 +245,18 @@ TEST(Calibration, IsSixteenNumbersOrOfPlus) {
         read_calibration(folder.written("other.xml", "<Transform From=\"Image\" To=\"Tracker\" Matrix=\"1\">")),
         InvalidInput);
     EXPECT_THROW(read_calibration(folder / "none"), IoError);
+    const std::string element = "<Transform From='Image' To='Probe' Matrix='" + numbers(calibration()) + "'/>",
+                      other = "<Transform From=\"Image\" To=\"Probe\" Matrix=\"" + numbers(pose(0, 1, 2, 3)) + "\"/>";
+    EXPECT_TRUE(
+        read_calibration(folder.written("old.xml", "<!-- " + other + " -->" + element)).isApprox(calibration(), 1e-5));
+    EXPECT_THROW(read_calibration(folder.written("two.xml", other + element)), InvalidInput);
+    // Neither long nor many words are a trap.
+    const std::string word(200'000, 'A');
+    EXPECT_THROW(read_calibration(folder.written("long.xml", "<Transform From=\"" + word + "\" To=\"Probe\"/>")),
+                 InvalidInput);
+    std::string many;
+    for (int n = 0; n < 300'000; ++n) many += "<Transform ";
+    EXPECT_THROW(read_calibration(folder.written("many.xml", many)), InvalidInput);
 }
 
 }  // namespace
