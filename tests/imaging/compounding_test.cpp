@@ -146,14 +146,13 @@ TEST(Compounding, ATiltIsAsFineAsItsFramesAreAtEachDepth) {
 }
 
 TEST(Compounding, AFrameThatWasBlankedShowsNothingOfThePicture) {
+    const double whole = compound(freehand(40, 0.5, 4), {.spacing_mm = 0.5}).seen_share;
     for (const bool left_out : {false, true}) {
         Sweep sweep = freehand(40, 0.5, 4);
         for (int r = 0; r < 80; ++r)
             for (int c = 0; c < 100; ++c) sweep.pixels.at<std::uint8_t>(3, r, c) = 0;
         if (left_out) sweep.frames.erase(sweep.frames.begin() + 3);
-        const Compounded made = compound(sweep, {.spacing_mm = 0.5});
-        for (std::int64_t n = 0; n < made.volume.geometry.voxel_count(); ++n)
-            ASSERT_NE(made.volume.data<std::uint8_t>()[n], 7) << left_out;
+        EXPECT_NEAR(compound(sweep, {.spacing_mm = 0.5}).seen_share, whole, 0.02 * whole) << left_out;
     }
 }
 

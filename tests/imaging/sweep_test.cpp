@@ -166,7 +166,7 @@ TEST(Sweep, WhatIsNoBrightnessOrOfNoProbeIsRefused) {
     text.set(1, "ImageToProbe", pose(0, 0, 0, 0) * Eigen::Scaling(20.0, 20.0, 20.0));
     expect_refused(text, "frame 1 are 20 x 20 mm");
     text = tracked();
-    text.set(1, "ImageToProbeTransform", "1 0 0 0 0 1 0 0 0 0 0 0 0 0 0 1");
+    text.set(1, "ImageToProbeTransform", "1 0 0 0 1 0 0 0 0 0 1 0 0 0 0 1");
     expect_refused(text, "can be inverted");
     text = tracked();
     text.set(7, "Timestamp", "3");
