@@ -29,7 +29,7 @@ constexpr double most_skew = 0.1;  // cosine between rows and columns: calibrati
 
 void require_brightness(const fs::path& path, const SweepHeader& header) {
     if (!header.type.empty() && header.type != "BRIGHTNESS")
-        throw detail::unusable(path, "its frames are " + header.type + "; give brightness (B-mode)");
+        throw detail::unusable(path, "its frames are " + detail::shortened(header.type) + "; give brightness (B-mode)");
     const bool plain = header.voxels.type == detail::Scalar::UInt8 || header.voxels.type == detail::Scalar::UInt16;
     if (header.voxels.channels != 1 || !plain)
         throw detail::unusable(
@@ -46,8 +46,8 @@ Eigen::Affine3d to_marked_far(const fs::path& path, const SweepHeader& header) {
     const bool known = (word.size() == 2 || word.size() == 3) && (word[0] == 'M' || word[0] == 'U') &&
                        (word[1] == 'F' || word[1] == 'N');
     if (!known)
-        throw detail::unusable(
-            path, "UltrasoundImageOrientation '" + word + "' is none of brightness images; write MF, MN, UF or UN");
+        throw detail::unusable(path, "UltrasoundImageOrientation '" + detail::shortened(word) +
+                                         "' is none of brightness images; write MF, MN, UF or UN");
     const auto turn = [&](Eigen::Index axis) {
         turned.linear()(axis, axis) = -1;
         turned.translation()[axis] = header.voxels.size[static_cast<std::size_t>(axis)] - 1;
@@ -120,7 +120,7 @@ std::vector<std::string> transform_elements(const std::string& text) {
 std::string joined(const std::set<std::string>& names) {
     std::string text;
     for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-    return text.empty() ? "none" : text;
+    return text.empty() ? "none" : detail::shortened(text);
 }
 
 /// From pixels to the patient's system. A calibration that was given goes before what the file says.

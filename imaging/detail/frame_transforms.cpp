@@ -44,7 +44,7 @@ Eigen::Affine3d affine_of(const std::filesystem::path& path, const std::string& 
     }
     if (!matrix.allFinite() || matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1) ||
         std::abs(matrix.topLeftCorner<3, 3>().determinant()) < 1e-12)
-        throw unreadable(path, "its " + what + " is '" + text +
+        throw unreadable(path, "its " + shortened(what) + " is '" + shortened(text) +
                                    "', no 16 numbers of an affine transform that can be inverted; correct it");
     return Eigen::Affine3d(matrix);
 }
@@ -93,8 +93,8 @@ std::map<int, FrameFields> frame_fields(const std::filesystem::path& path,
         if (!field) continue;
         const auto& [number, name] = *field;
         if (number >= count)
-            throw unreadable(
-                path, "its '" + key + "' is of a frame that it does not have; its frames are " + std::to_string(count));
+            throw unreadable(path, "its '" + shortened(key) + "' is of a frame that it does not have; its frames are " +
+                                       std::to_string(count));
         FrameFields& frame = frames[number];
         if (name == "ImageStatus") frame.image_ok = is_ok(value);
         if (!name.ends_with(transform_suffix)) continue;
@@ -103,7 +103,8 @@ std::map<int, FrameFields> frame_fields(const std::filesystem::path& path,
         const auto status = fields.find(key + std::string(status_suffix));
         if (status != fields.end() && !is_ok(status->second)) continue;
         if (!frame.transforms.add(systems->first, systems->second, affine_of(path, "'" + key + "'", value)))
-            throw unreadable(path, "its '" + key + "' contradicts another transform between the same two; leave one");
+            throw unreadable(
+                path, "its '" + shortened(key) + "' contradicts another transform between the same two; leave one");
     }
     return frames;
 }

@@ -26,6 +26,11 @@ IoError unreadable(const fs::path& path, const std::string& cause) {
     return IoError(presentable("cannot read '" + path.string() + "': " + cause));
 }
 
+std::string shortened(const std::string& text) {
+    constexpr std::size_t longest = 200;
+    return text.size() <= longest ? text : text.substr(0, longest) + "…";
+}
+
 std::string all_digits(double value) {
     std::array<char, 32> text{};
     return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};

@@ -16,6 +16,9 @@ InvalidInput unusable(const std::filesystem::path& path, const std::string& caus
 /// "cannot read 'path': cause", of a file that breaks the rules of its format.
 IoError unreadable(const std::filesystem::path& path, const std::string& cause);
 
+/// The beginning of a text that a file holds, for a message.
+std::string shortened(const std::string& text);
+
 /// As many digits as tell the value from its neighbours.
 std::string all_digits(double value);
 

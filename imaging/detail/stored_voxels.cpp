@@ -1,7 +1,9 @@
 #include "imaging/detail/stored_voxels.hpp"
+#include "imaging/detail/header_checks.hpp"
 
 #include "core/errors.hpp"
 #include "imaging/detail/gzip.hpp"
+#include "imaging/detail/header_checks.hpp"
 #include "imaging/detail/wide_integers.hpp"
 
 #include <tbb/parallel_for.h>
@@ -34,7 +36,7 @@ std::uint64_t file_bytes(const fs::path& path, const fs::path& file) {
     std::error_code failure;
     const std::uint64_t bytes = fs::file_size(file, failure);
     if (failure)
-        throw IoError("cannot read '" + path.string() + "': its voxels are to be in '" + file.string() +
+        throw IoError("cannot read '" + path.string() + "': its voxels are to be in '" + shortened(file.string()) +
                       "', which cannot be read (" + failure.message() + "); put that file beside the header");
     return bytes;
 }

@@ -164,7 +164,7 @@ TextHeader read_meta_header(const std::filesystem::path& path) {
                           value = trimmed(line.substr(equals + 1));
         if (name.starts_with(frame_prefix)) {
             if (const auto [field, added] = header.comments.try_emplace(name, value); !added && field->second != value)
-                throw unreadable(path, "its header states '" + name + "' twice; leave the true one");
+                throw unreadable(path, "its header states '" + shortened(name) + "' twice; leave the true one");
             continue;
         }
         header.set(path, key, value);

@@ -219,7 +219,7 @@ std::vector<Seed> sweep_seeds(const std::filesystem::path&) {
         "UltrasoundImageType = BRIGHTNESS\n";
     std::string direct = head, chained = head;
     for (int n = 0; n < 4; ++n) {
-        const std::string frame = "Seq_Frame000" + std::to_string(n) + "_", way = " 0 0 0.5 0 -7.5 0 0 1 ";
+        const std::string frame = "Seq_Frame000" + std::to_string(n) + "_", way = " 0 0.5 0 -7.5 0 0 1 ";
         direct += frame + "ImageToReferenceTransform = 0.5 0 0 12" + way + std::to_string(n) + " 0 0 0 1\n" + frame +
                   "ImageToReferenceTransformStatus = " + (n == 1 ? "INVALID\n" : "OK\n");
         chained += frame + "ImageToProbeTransform = 0.1 0 0 0 0 0.1 0 0 0 0 0.1 0 0 0 0 1\n" + frame +
