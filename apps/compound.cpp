@@ -40,8 +40,10 @@ void print(const CompoundOptions& options, const imaging::Sweep& sweep, const im
     const auto [nx, ny, nz] = made.volume.geometry.size;
     for (const std::string& note : sweep.notes) fmt::print("note: {}\n", note);
     if (made.gaps > 0)
-        fmt::print("note: {} steps from frame to frame are wider than {:g} mm; nothing is shown between them\n",
-                   made.gaps, options.gap);
+        fmt::print(
+            "note: {} steps from frame to frame are wider than {:g} mm at their middle; where they are, nothing is "
+            "shown\n",
+            made.gaps, options.gap);
     fmt::print(
         "{}: {} frames of pixels of {:.3g} x {:.3g} mm, {:.2g} mm apart; {} x {} x {} voxels of {:g} mm, {:.0f} "
         "% of them seen\n",

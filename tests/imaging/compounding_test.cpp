@@ -85,6 +85,22 @@ TEST(Compounding, LeavesTheScannersPictureAndWideGapsOut) {
     for (std::int64_t n = 0; n < grid.voxel_count(); ++n) ASSERT_NE(made.volume.data<std::uint8_t>()[n], 7);
 }
 
+TEST(Compounding, SixteenBitsGiveWhatEightGive) {
+    const Sweep bytes = freehand(30, 0.5, 5);
+    Sweep words = bytes;
+    words.pixels = cv::Mat(3, bytes.pixels.size.p, CV_16U);
+    for (int n = 0; n < 30; ++n)
+        for (int r = 0; r < 80; ++r)
+            for (int c = 0; c < 100; ++c)
+                words.pixels.at<std::uint16_t>(n, r, c) =
+                    static_cast<std::uint16_t>(200 * bytes.pixels.at<std::uint8_t>(n, r, c));
+    const Volume of_bytes = compound(bytes).volume, of_words = compound(words).volume;
+    ASSERT_EQ(of_words.voxels.depth(), CV_16U);
+    ASSERT_EQ(of_words.geometry.size, of_bytes.geometry.size);
+    for (std::int64_t n = 0; n < of_bytes.geometry.voxel_count(); ++n)
+        ASSERT_NEAR(of_words.data<std::uint16_t>()[n], 200 * of_bytes.data<std::uint8_t>()[n], 101);
+}
+
 TEST(Compounding, BlackWithinTheFanIsSeen) {
     Sweep sweep = freehand(30, 0.5, 3);
     for (int n = 10; n < 20; ++n)
