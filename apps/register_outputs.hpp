@@ -8,8 +8,6 @@
 #include <tbb/task_group.h>
 #include <nlohmann/json_fwd.hpp>
 
-#include <string>
-
 namespace tissuewarp::apps {
 
 /// Puts files into the output folder, each in a task of its own, as soon as what they hold is known. `run` and `output`
@@ -29,8 +27,5 @@ report::Pictures draw_pictures(const RegistrationRun& run);
 
 /// report.json, preview.png and report.html.
 void write_reports(const nlohmann::json& report, const report::Pictures& pictures, const OutputFolder& output);
-
-/// What is printed at the end: stages, errors of landmarks, overlap, doubts.
-std::string summary_text(const RegistrationRun& run, double total_seconds);
 
 }  // namespace tissuewarp::apps

@@ -78,6 +78,17 @@ void require_pixels_of_a_probe(const fs::path& path, int number, const SweepHead
                                          "pixels to mm");
 }
 
+/// Calibrations start from the identity: who forgot one has pixels of a millimetre.
+void doubt_calibration(Sweep& sweep) {
+    constexpr double within_mm = 1e-5;  // files have six digits
+    const Eigen::Matrix3d axes = sweep.frames.front().to_patient.linear();
+    const auto is_unit = [&](Eigen::Index axis) { return std::abs(axes.col(axis).norm() - 1) < within_mm; };
+    if (is_unit(0) && is_unit(1))
+        sweep.notes.push_back(
+            "pixels are exactly 1 x 1 mm, as those of a probe that was never calibrated: check the "
+            "transform from Image");
+}
+
 /// The third axis becomes the unit normal, and RAS becomes LPS.
 Eigen::Affine3d in_patient(const Eigen::Affine3d& pixels_to_system, Axes axes) {
     Eigen::Affine3d placed = pixels_to_system;
@@ -216,6 +227,7 @@ Sweep read_sweep(const fs::path& path, const SweepOptions& options) {
     if (const std::size_t left_out = static_cast<std::size_t>(count) - sweep.frames.size(); left_out > 0)
         sweep.notes.push_back(std::to_string(left_out) + " of " + std::to_string(count) +
                               " frames are left out, whose image or place is not OK");
+    doubt_calibration(sweep);
     leave_out_strays(sweep);
     return sweep;
 }

@@ -105,6 +105,13 @@ std::vector<std::string> names_of_pattern(const std::filesystem::path& path, con
     return names;
 }
 
+/// Fields behind the last one, of a MetaImage whose voxels lie elsewhere, would change nothing without a word.
+void refuse_rest(const std::filesystem::path& path, const std::vector<std::string>& rest) {
+    if (rest.empty()) return;
+    throw unreadable(path, "its header goes on after 'ElementDataFile', which ends it, with '" +
+                               shortened(rest.front()) + "'; move that line up, or remove it");
+}
+
 }  // namespace
 
 std::string trimmed(const std::string& text) {
@@ -170,7 +177,10 @@ TextHeader read_meta_header(const std::filesystem::path& path) {
         header.set(path, key, value);
         if (key != "elementdatafile") continue;
         header.bytes = lines.taken();
-        if (is_list(header.fields[key])) header.listed_files = lines.rest();
+        if (is_list(value))
+            header.listed_files = lines.rest();
+        else if (lower_case(value) != "local")
+            refuse_rest(path, lines.rest());
         return header;
     }
     throw unreadable(path, "its header has no line 'ElementDataFile'; give a MetaImage file, whole");

@@ -14,6 +14,7 @@ namespace tissuewarp::imaging {
 namespace {
 
 using test::TemporaryFolder;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 std::string numbers(const Eigen::Affine3d& transform) {
@@ -219,6 +220,14 @@ TEST(Sweep, IsNoVolume) {
     } catch (const InvalidInput& problem) {
         EXPECT_THAT(problem.what(), HasSubstr("tissuewarp compound"));
     }
+}
+
+TEST(Sweep, PixelsOfAMillimetreAreDoubted) {
+    const TemporaryFolder folder;
+    SweepText text = tracked();
+    EXPECT_TRUE(read_sweep(folder.written("s.mha", text.text())).notes.empty());
+    for (int n = 0; n < text.frames; ++n) text.set(n, "ImageToProbe", Eigen::Affine3d::Identity());
+    EXPECT_THAT(read_sweep(folder.written("s.mha", text.text())).notes, ElementsAre(HasSubstr("never calibrated")));
 }
 
 TEST(Sweep, ManyFramesHaveALongHeader) {

@@ -230,6 +230,16 @@ TEST(MetaImage, HeadersThatStateAKeyTwiceAreRefusedWhereTheyDiffer) {
     expect_counted(read_volume(with("ElementSpacing = 2 3 4\nComment = a\nComment = b\n")));
 }
 
+TEST(MetaImage, FieldsBehindTheLastOneAreRefused) {
+    const TemporaryFolder folder;
+    write(folder / "a.raw", counted_bytes());
+    write(folder / "a.mhd", meta() + "a.raw\n\n");
+    expect_counted(read_volume(folder / "a.mhd"));
+    write(folder / "a.mhd", meta() + "a.raw\nOffset = 1 2 3\n");
+    EXPECT_THAT(message_of<IoError>([&] { read_volume(folder / "a.mhd"); }),
+                HasSubstr("goes on after 'ElementDataFile', which ends it, with 'Offset = 1 2 3'"));
+}
+
 TEST(MetaImage, PackedVoxelsThatTheHeaderDoesNotSayAreNamed) {
     const TemporaryFolder folder;
     const std::string zeros(60, '\0');
