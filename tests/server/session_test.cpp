@@ -285,6 +285,30 @@ TEST(Session, UpdatesGoOnFromTheLastUnlessToldOtherwise) {
     EXPECT_EQ(kept.answer(5).at("began").at("at_last"), false);
 }
 
+/// Pairs that are known to centimetres fit wherever an update goes on to: only the error estimate doubts them.
+TEST(Session, AnUpdateWhoseErrorsAreDoubtedIsMadeAnew) {
+    Kept kept;
+    Session session(test::block(), {}, kept);
+    send_pairs(session, 4);
+    json vague = update(1);
+    vague["points_sd_mm"] = 30;
+    vague["error_estimate"] = false;
+    session.receive(1, request(vague));
+    EXPECT_EQ(kept.answer(1).at("doubts"), json::array());
+    send_pairs(session, 4.5);
+    vague["sequence"] = 2;
+    session.receive(1, request(vague));
+    EXPECT_EQ(kept.answer(2).at("began").at("at_last"), true);
+    vague["sequence"] = 3;
+    vague["error_estimate"] = true;
+    session.receive(1, request(vague));
+    const json answer = kept.answer(3);
+    EXPECT_EQ(answer.at("began").at("at_last"), false);
+    EXPECT_EQ(answer.at("began").at("why_not"), "its errors were doubted");
+    EXPECT_GT(answer.at("seconds").at("going on in vain"), 0);
+    EXPECT_NE(answer.at("doubts"), json::array());
+}
+
 /// Nobody computes on a GPU that is not there.
 TEST(Session, AServerStartsWhoseLogCannotBeComputedAgain) {
     const tissuewarp::test::TemporaryFolder folder;
