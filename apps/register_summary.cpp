@@ -54,6 +54,16 @@ std::string distances_text(const Scores& scores) {
     return text;
 }
 
+std::string body_text(const registration::BodyMotion& body, const Eigen::Isometry3d& placement,
+                      const imaging::LabelNames& names) {
+    const Eigen::Isometry3d beside = placement.inverse() * body.motion;
+    return fmt::format(
+        "rigid neighbour {} moved on its own: turned by {:.1f}° against the organ; boundaries {:.2f} mm "
+        "apart\n",
+        imaging::label_title(body.label, names), Eigen::AngleAxisd(beside.linear()).angle() * 180 / EIGEN_PI,
+        body.apart_mm);
+}
+
 /// How well each kind of data is met.
 std::string fits_text(const RegistrationRun& run) {
     std::string text;
@@ -75,6 +85,8 @@ std::string fits_text(const RegistrationRun& run) {
     if (const auto& fit = run.result.contact)
         text += fmt::format("rigid neighbours: {} surface nodes touch, at most {:.2f} mm deep\n", fit->touching,
                             fit->deepest_mm);
+    for (const registration::BodyMotion& body : run.result.bodies)
+        text += body_text(body, run.result.deformation.placement, run.inputs.label_names);
     if (const auto& fit = run.result.anchors)
         text += fmt::format("anchors: {} nodes, moved by at most {:.2f} mm\n", fit->nodes, fit->largest_mm);
     return text;

@@ -105,20 +105,24 @@ json materials(const RegistrationRun& run) {
     return object;
 }
 
+json rows_of(const Eigen::Isometry3d& motion) {
+    json rows = json::array();
+    for (int row = 0; row < 4; ++row) {
+        const Eigen::Vector4d r = motion.matrix().row(row).transpose();
+        rows.push_back({r[0], r[1], r[2], r[3]});
+    }
+    return rows;
+}
+
 json alignment(const RegistrationRun& run) {
     const Eigen::Isometry3d& placement = run.result.alignment.placement;
-    json matrix = json::array();
-    for (int row = 0; row < 4; ++row) {
-        const Eigen::Vector4d r = placement.matrix().row(row).transpose();
-        matrix.push_back({r[0], r[1], r[2], r[3]});
-    }
     const Eigen::Matrix3d linear =
         run.stretched ? run.stretched->stretch.linear() : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
     json stretch = json::array();
     for (int row = 0; row < 3; ++row) stretch.push_back(vector(linear.row(row).transpose()));
     const double angle = Eigen::AngleAxisd(placement.linear()).angle() * 180 / 3.14159265358979323846;
     return {{"performed", !run.options.no_align},
-            {"matrix", matrix},
+            {"matrix", rows_of(placement)},
             {"rotation_deg", angle},
             {"translation_mm", vector(placement.translation())},
             {"free_stretch", stretch},
@@ -199,6 +203,9 @@ void add_fits(json& report, const registration::UpdateResult& result) {
                             {"length_mm", number(fit->length_mm)}};
     if (const auto& fit = result.contact)
         report["contact"] = {{"touching", fit->touching}, {"deepest_mm", number(fit->deepest_mm)}};
+    for (const registration::BodyMotion& body : result.bodies)
+        report["rigid_neighbours"].push_back(
+            {{"label", body.label}, {"matrix", rows_of(body.motion)}, {"apart_mm", number(body.apart_mm)}});
     if (const auto& fit = result.anchors)
         report["anchors"] = {{"nodes", fit->nodes}, {"largest_mm", number(fit->largest_mm)}};
 }

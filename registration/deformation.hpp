@@ -7,15 +7,17 @@
 #include <Eigen/Geometry>
 
 #include <optional>
+#include <vector>
 
 namespace tissuewarp::registration {
 
 /// How the surroundings of an organ moved: bone, for instance (rigid_surroundings.hpp).
 struct Surroundings {
     Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();  ///< moving → fixed
-    imaging::Volume rigid;  ///< voxels != 0 moved by it exactly, uint8, moving frame; elsewhere they move so far from
+    imaging::Volume rigid;  ///< voxels of 1 moved by it exactly, uint8, moving frame; where 0 they move so far from
                             ///< the organ
     bool slide = false;     ///< along the organ: beside it they go where its surface goes, not where its tissue goes
+    std::vector<Eigen::Isometry3d> bodies = {};  ///< moving → fixed: how voxels of 2, 3, … moved
 };
 
 /// y = placement · (X + u(X)): elastic displacement u in the preoperative (moving) frame, then a rigid motion into the

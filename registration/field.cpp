@@ -45,10 +45,13 @@ void require_usable(const Deformation& deformation, const FieldOptions& options)
         throw InvalidInput("deformation: the motion of the surroundings is not finite; give a rigid motion");
     if (deformation.surroundings->rigid.voxels.type() != CV_8UC1)
         throw InvalidInput("deformation: the mask of rigid surroundings must be of uint8; give rigid_surroundings()");
-}
-
-Volume rigid_mask(const Deformation& deformation) {
-    return deformation.surroundings ? deformation.surroundings->rigid : Volume();
+    for (const Eigen::Isometry3d& motion : deformation.surroundings->bodies)
+        if (!motion.matrix().allFinite())
+            throw InvalidInput("deformation: the motion of a rigid body is not finite; give a rigid motion");
+    if (double most = 0; cv::minMaxLoc(deformation.surroundings->rigid.voxels.reshape(1, 1), nullptr, &most),
+                         most > 1.0 + double(deformation.surroundings->bodies.size()))
+        throw InvalidInput("deformation: the mask of rigid surroundings holds " + std::to_string(int(most)) +
+                           ", of no body that is there; give rigid_surroundings()");
 }
 
 /// Displacements of the mesh's surface as what lies beside it has them, and within it of any value.
@@ -64,7 +67,7 @@ detail::Continuation forward_continuation(const Deformation& deformation, double
     const meshing::BoundarySurface boundary = meshing::boundary_surface(mesh);
     return {mesh.nodes, mesh.tets,
             boundary,   beside_surface(deformation, mesh.nodes, boundary, deformation.displacement),
-            fade_mm,    rigid_mask(deformation)};
+            fade_mm,    detail::held_before(deformation)};
 }
 
 /// Relative displacements on a grid, and which voxels the mesh covers.
@@ -211,7 +214,7 @@ Volume displacement_fixed_to_moving(const Deformation& given, const Geometry& fi
     detail::LazyContinuation backward([&] {
         return detail::Continuation(deformed, mesh.tets, boundary,
                                     beside_surface(deformation, deformed, boundary, inverse), options.fade_mm,
-                                    rigid_mask(deformation));
+                                    detail::held_after(deformation));
     });
     const Eigen::Matrix3d identity = Eigen::Matrix3d::Identity(), linear = to_moving.linear() - identity;
     if (deformation.surroundings) {  // tissue parts from them: the forward field leaves gaps, where it has no inverse

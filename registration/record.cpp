@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <limits>
 #include <optional>
 
 namespace tissuewarp::registration {
@@ -15,15 +14,21 @@ namespace tissuewarp::registration {
 namespace {
 
 constexpr const char* format = "tissuewarp registration record";
-constexpr int version = 4, oldest_version = 1;
-constexpr const char* resected = "resected";         // absent where no tissue is gone
-constexpr const char* slide = "surroundings/slide";  // absent where they do not
+constexpr int version = 5, oldest_version = 1;
+constexpr const char* resected = "resected";                   // absent where no tissue is gone
+constexpr const char* slide = "surroundings/slide";            // absent where they do not
+constexpr const char* values_of_runs = "surroundings/values";  // absent where no body moved on its own
 
-/// The version to write: older programs would leave no gap, or drag along what the organ slid along, and read
-/// everything else.
+std::string body_name(std::size_t n) {
+    return "surroundings/body " + std::to_string(n);
+}
+
+/// The version to write: older programs would leave no gap, drag along what the organ slid along, or leave bones with
+/// it that moved on their own, and read everything else.
 int version_of(const PreparedModel& prepared, const Deformation& deformation) {
-    constexpr int before_resection = 2, before_sliding = 3;
-    if (deformation.surroundings && deformation.surroundings->slide) return version;
+    constexpr int before_resection = 2, before_sliding = 3, before_bodies = 4;
+    if (deformation.surroundings && !deformation.surroundings->bodies.empty()) return version;
+    if (deformation.surroundings && deformation.surroundings->slide) return before_bodies;
     return prepared.resected.empty() ? before_resection : before_sliding;
 }
 
@@ -52,6 +57,9 @@ void require_consistent(const Deformation& deformation) {
     require_rigid(deformation.placement.matrix(), "the placement");
     if (deformation.surroundings)
         require_rigid(deformation.surroundings->motion.matrix(), "the motion of the surroundings");
+    if (deformation.surroundings)
+        for (const Eigen::Isometry3d& motion : deformation.surroundings->bodies)
+            require_rigid(motion.matrix(), "the motion of a rigid neighbour");
 }
 
 void write_matrix(Hdf5Output& file, const std::string& name, const Eigen::Isometry3d& motion) {
@@ -67,23 +75,33 @@ Eigen::Isometry3d read_matrix(const Hdf5Input& file, const std::string& name) {
     return motion;
 }
 
-/// The mask as lengths of runs of 0 and of 1 in turn, in the order of memory, beginning with 0.
+/// The mask as lengths of runs of one value in the order of memory. Without bodies of their own motion 0 and 1 take
+/// turns, beginning with 0; otherwise values are stored besides.
 void write_surroundings(Hdf5Output& file, const Surroundings& surroundings) {
     write_matrix(file, "surroundings/motion", surroundings.motion);
     detail::write_grid(file, "surroundings/grid", surroundings.rigid.geometry);
     if (surroundings.slide) file.scalar<int>(slide, 1, "1");
     const auto* voxel = surroundings.rigid.data<std::uint8_t>();
     const std::int64_t count = surroundings.rigid.geometry.voxel_count();
-    std::vector<int> runs;
-    bool value = false;
-    for (std::int64_t from = 0; from < count; value = !value) {
+    const bool with_bodies = !surroundings.bodies.empty();
+    std::vector<int> runs, values;
+    for (std::int64_t from = 0; from < count || runs.empty();) {
+        const bool first_of_turns = !with_bodies && runs.empty();
+        const int value = first_of_turns ? 0 : voxel[from];
         std::int64_t to = from;
-        while (to < count && (voxel[to] != 0) == value && to - from < std::numeric_limits<int>::max()) ++to;
+        while (to < count && voxel[to] == value) ++to;
         runs.push_back(static_cast<int>(to - from));
+        values.push_back(value);
         from = to;
     }
-    file.vector<int>("surroundings/runs", Eigen::VectorXi::Map(runs.data(), static_cast<Eigen::Index>(runs.size())),
-                     "voxel");
+    const auto column = [&](const char* name, const std::vector<int>& numbers, const char* units) {
+        file.vector<int>(name, Eigen::VectorXi::Map(numbers.data(), static_cast<Eigen::Index>(numbers.size())), units);
+    };
+    column("surroundings/runs", runs, "voxel");
+    if (!with_bodies) return;
+    column(values_of_runs, values, "1");
+    for (std::size_t n = 0; n < surroundings.bodies.size(); ++n)
+        write_matrix(file, body_name(n), surroundings.bodies[n]);
 }
 
 std::optional<Surroundings> read_surroundings(const Hdf5Input& file) {
@@ -91,18 +109,27 @@ std::optional<Surroundings> read_surroundings(const Hdf5Input& file) {
     Surroundings surroundings{read_matrix(file, "surroundings/motion"),
                               imaging::Volume(detail::read_grid(file, "surroundings/grid"), CV_8UC1),
                               file.holds(slide)};
+    while (file.holds(body_name(surroundings.bodies.size())))
+        surroundings.bodies.push_back(read_matrix(file, body_name(surroundings.bodies.size())));
+    const auto refuse = [] {
+        throw InvalidInput("the runs of the surroundings' mask do not fill its grid; the file is damaged");
+    };
+    const auto runs = file.vector<int>("surroundings/runs");
+    Eigen::VectorXi values(runs.size());
+    for (Eigen::Index n = 0; n < values.size(); ++n) values[n] = static_cast<int>(n % 2);
+    if (!surroundings.bodies.empty()) values = file.vector<int>(values_of_runs);
+    if (values.size() != runs.size()) refuse();
     auto* voxel = surroundings.rigid.data<std::uint8_t>();
     const std::int64_t count = surroundings.rigid.geometry.voxel_count();
     std::int64_t at = 0;
-    bool value = false;
-    for (const int length : file.vector<int>("surroundings/runs")) {
-        if (length < 0 || length > count - at)
-            throw InvalidInput("the runs of the surroundings' mask do not fill its grid; the file is damaged");
-        std::fill_n(voxel + at, length, static_cast<std::uint8_t>(value));
-        at += length;
-        value = !value;
+    for (Eigen::Index n = 0; n < runs.size(); ++n) {
+        if (runs[n] < 0 || runs[n] > count - at || values[n] < 0 ||
+            values[n] > 1 + static_cast<int>(surroundings.bodies.size()))
+            refuse();
+        std::fill_n(voxel + at, runs[n], static_cast<std::uint8_t>(values[n]));
+        at += runs[n];
     }
-    if (at != count) throw InvalidInput("the runs of the surroundings' mask do not fill its grid; the file is damaged");
+    if (at != count) refuse();
     return surroundings;
 }
 

@@ -1,7 +1,6 @@
 #include "registration/update.hpp"
 
 #include "core/stopwatch.hpp"
-#include "imaging/labels.hpp"
 #include "registration/boundary/surroundings.hpp"
 #include "registration/course/go_on.hpp"
 #include "registration/engine_choice.hpp"
@@ -56,8 +55,8 @@ struct Updater::Impl {
 
     UpdateResult update(const Intraoperative& given, Observer& observer) {
         Stopwatch stopwatch;
-        const Intraoperative seen = seen_by_model(given);
-        detail::Terms terms = detail::terms_of(*prepared, seen, options, tools);
+        Seen seen = seen_by_model(given, observer);
+        detail::Terms terms = detail::terms_of(*prepared, seen.data, options, tools, std::move(seen.bodies));
         const double seconds = stopwatch.lap();
         UpdateResult result = in_fixed_frame(
             detail::register_model(*prepared, terms, load_finder, *solver, options, observer), given, seconds);
@@ -71,9 +70,9 @@ struct Updater::Impl {
         if (last.carried_on->since >= detail::go_on_limits.most_in_a_row)
             throw BeginAnew{"so many updates went on that the placement is sought again"};
         Stopwatch stopwatch;
-        const Intraoperative seen = seen_by_model(given);
+        Seen seen = seen_by_model(given, observer);
         try {
-            detail::Terms terms = detail::terms_of(*prepared, seen, short_options, tools);
+            detail::Terms terms = detail::terms_of(*prepared, seen.data, short_options, tools, std::move(seen.bodies));
             const double seconds = stopwatch.lap();
             if (!terms.take_over(last)) throw BeginAnew{"the placement must be sought for such data"};
             const Eigen::Isometry3d placement = start_of(given).inverse() * last.alignment.placement;
@@ -108,9 +107,17 @@ private:
         result.carried_on = std::make_shared<const detail::CarriedOn>(std::move(carried));
     }
 
-    [[nodiscard]] Intraoperative seen_by_model(const Intraoperative& given) const {
-        return detail::without_neighbours(given.start ? detail::seen_from(given, *given.start) : given,
-                                          prepared->options.rigid_neighbours);
+    /// What the model is registered to, and bodies beside it.
+    struct Seen {
+        Intraoperative data;
+        std::vector<detail::SeenBody> bodies;
+    };
+    [[nodiscard]] Seen seen_by_model(const Intraoperative& given, Observer& observer) const {
+        Seen seen{given.start ? detail::seen_from(given, *given.start) : given, {}};
+        if (prepared->neighbours && seen.data.labels)
+            seen.bodies = detail::seen_bodies(*prepared->neighbours, *seen.data.labels, observer);
+        seen.data = detail::without_neighbours(seen.data, prepared->options.rigid_neighbours);
+        return seen;
     }
 
     [[nodiscard]] UpdateResult in_fixed_frame(UpdateResult result, const Intraoperative& given,
@@ -118,7 +125,7 @@ private:
         if (given.start) detail::return_to_fixed_frame(result, *given.start);
         if (prepared->neighbours)
             result.deformation.surroundings =
-                rigid_bodies(imaging::mask_of_all(prepared->neighbours->labels), result.deformation);
+                rigid_bodies(prepared->neighbours->labels, result.bodies, result.deformation);
         result.times.insert(result.times.begin() + 1, {stages::boundary_maps, boundary_maps_s});
         return result;
     }

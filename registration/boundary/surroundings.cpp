@@ -14,15 +14,6 @@ bool is_one_of(int label, const std::vector<int>& labels) {
     return std::find(labels.begin(), labels.end(), label) != labels.end();
 }
 
-/// The distance to midpoints between voxels is rough where the boundary is oblique to the grid: normals would be, too.
-imaging::Volume smooth_distance(const imaging::Volume& neighbours) {
-    imaging::Volume distance = imaging::signed_distance(imaging::mask_of_all(neighbours));
-    distance.geometry.spacing.setOnes();
-    distance = imaging::smooth(distance, detail::NeighbourOptions().smoothing_voxels);
-    distance.geometry = neighbours.geometry;
-    return distance;
-}
-
 }  // namespace
 
 void require_surroundings(const imaging::Volume& moving_labels, const PrepareOptions& options) {
@@ -55,6 +46,14 @@ void require_surroundings(const imaging::Volume& moving_labels, const PrepareOpt
 }
 
 namespace detail {
+
+imaging::Volume smooth_distance(const imaging::Volume& labels) {
+    imaging::Volume distance = imaging::signed_distance(imaging::mask_of_all(labels));
+    distance.geometry.spacing.setOnes();
+    distance = imaging::smooth(distance, NeighbourOptions().smoothing_voxels);
+    distance.geometry = labels.geometry;
+    return distance;
+}
 
 std::vector<int> not_meshed(const PrepareOptions& options) {
     std::vector<int> labels = options.rigid_neighbours;

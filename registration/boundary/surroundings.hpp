@@ -15,6 +15,10 @@ struct NeighbourOptions {
               ///< oblique to the grid its steps turn normals. Chosen by hand; data not recorded
 };
 
+/// mm to the nearest voxel ≠ 0 of a map of integers, negative within, float32: that to midpoints between voxels is
+/// rough where the boundary is oblique to the grid, and so would be normals.
+imaging::Volume smooth_distance(const imaging::Volume& labels);
+
 /// The bodies of these labels, none where no label is given. Precondition: require_surroundings.
 std::optional<RigidNeighbours> rigid_neighbours(const imaging::Volume& map, const std::vector<int>& labels);
 

@@ -1,7 +1,6 @@
 #include "registration/field/continuation.hpp"
 
 #include "imaging/filters.hpp"
-#include "imaging/mask_lookup.hpp"
 #include "meshing/search/surface_proximity.hpp"
 #include "registration/field/rasterisation.hpp"
 
@@ -19,7 +18,7 @@ using Vec4 = Eigen::Array4f;  // x, y, z and an unused fourth lane, so that one 
 constexpr ContinuationOptions options;
 
 /// Why a node is fixed; 0 is free.
-enum : std::uint8_t { in_mesh = 1, on_sheet, at_rest };
+enum : std::uint8_t { in_mesh = 1, on_sheet, in_body, at_rest };
 
 /// How the six neighbours of a free node beside the mesh are seen: a neighbour inside is replaced by the surface,
 /// `fraction` of the spacing away (Shortley and Weller 1938).
@@ -178,33 +177,49 @@ struct Continuation::Impl {
     double spacing;
     Level grid;
     meshing::SurfaceProximity surface;
-    imaging::MaskLookup rigid;
+    HeldBodies bodies;
 
     Impl(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tets, const meshing::BoundarySurface& boundary,
-         const Eigen::Matrix3Xd& values, double fade_mm, const imaging::Volume& at_rest, double finest_spacing_mm)
-        : spacing(spacing_for(nodes, fade_mm, finest_spacing_mm)),
-          grid(size_for(nodes, fade_mm), spacing),
+         const Eigen::Matrix3Xd& values, double fade_mm, const HeldBodies& held, double finest_spacing_mm)
+        : Impl(box_about(nodes, held.corners_of_moved()), nodes, tets, boundary, values, fade_mm, held,
+               finest_spacing_mm) {}
+
+    /// `box`: lower and upper corner of the organ and of bodies that moved.
+    Impl(const Eigen::Matrix<double, 3, 2>& box, const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tets,
+         const meshing::BoundarySurface& boundary, const Eigen::Matrix3Xd& values, double fade_mm,
+         const HeldBodies& held, double finest_spacing_mm)
+        : spacing(spacing_for(box, fade_mm, finest_spacing_mm)),
+          grid(size_for(box, fade_mm), spacing),
           surface(nodes, boundary, values, options.blend_spacings * spacing),
-          rigid(at_rest) {
-        lower = nodes.rowwise().minCoeff().array() - fade_mm - 2.0 * spacing;
+          bodies(held) {
+        lower = box.col(0).array() - fade_mm - 2.0 * spacing;
         const Eigen::Matrix3Xd index = (nodes.colwise() - lower) / spacing;
         fix_inside(index, tets, values);
         fix_thin_parts(index, boundary);
-        fix_rigid();
+        fix_bodies();
         fix_far(index, boundary, fade_mm);
         link_surface();
         solve(grid);
     }
 
-    static Eigen::Array3d extent_for(const Eigen::Matrix3Xd& nodes, double fade_mm) {
-        return (nodes.rowwise().maxCoeff() - nodes.rowwise().minCoeff()).array() + 2.0 * fade_mm;
+    static Eigen::Matrix<double, 3, 2> box_about(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix3Xd& others) {
+        Eigen::Matrix<double, 3, 2> box;
+        box << nodes.rowwise().minCoeff(), nodes.rowwise().maxCoeff();
+        for (const auto& point : others.colwise()) {
+            box.col(0) = box.col(0).cwiseMin(point);
+            box.col(1) = box.col(1).cwiseMax(point);
+        }
+        return box;
     }
-    static double spacing_for(const Eigen::Matrix3Xd& nodes, double fade_mm, double finest_spacing_mm) {
+    static Eigen::Array3d extent_for(const Eigen::Matrix<double, 3, 2>& box, double fade_mm) {
+        return (box.col(1) - box.col(0)).array() + 2.0 * fade_mm;
+    }
+    static double spacing_for(const Eigen::Matrix<double, 3, 2>& box, double fade_mm, double finest_spacing_mm) {
         return std::max(std::min(finest_spacing_mm, fade_mm / options.spacings_of_fade),
-                        std::cbrt(extent_for(nodes, fade_mm).prod() / options.most_nodes));
+                        std::cbrt(extent_for(box, fade_mm).prod() / options.most_nodes));
     }
-    [[nodiscard]] std::array<int, 3> size_for(const Eigen::Matrix3Xd& nodes, double fade_mm) const {
-        const Eigen::Array3d extent = extent_for(nodes, fade_mm) / spacing;
+    [[nodiscard]] std::array<int, 3> size_for(const Eigen::Matrix<double, 3, 2>& box, double fade_mm) const {
+        const Eigen::Array3d extent = extent_for(box, fade_mm) / spacing;
         const auto along = [&](int axis) { return static_cast<int>(std::ceil(extent[axis])) + 5; };
         return {along(0), along(1), along(2)};
     }
@@ -246,11 +261,16 @@ struct Continuation::Impl {
         for (const std::size_t n : thin) grid.fixed[n] = on_sheet;
     }
 
-    /// Grid nodes in rigid surroundings are at rest.
-    void fix_rigid() {
-        if (rigid.empty()) return;
+    /// Grid nodes in rigid bodies move with them.
+    void fix_bodies() {
+        if (bodies.empty()) return;
         tbb::parallel_for(std::size_t{0}, grid.fixed.size(), [&](std::size_t n) {
-            if (!grid.fixed[n] && rigid(point_of(index_of(n)))) grid.fixed[n] = at_rest;
+            if (grid.fixed[n]) return;
+            const Eigen::Vector3d point = point_of(index_of(n));
+            const std::uint8_t body = bodies.at(point);
+            if (body == 0) return;
+            grid.fixed[n] = in_body;
+            set(n, bodies.displacement(body, point));
         });
     }
 
@@ -363,8 +383,8 @@ struct Continuation::Impl {
 
 Continuation::Continuation(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tets,
                            const meshing::BoundarySurface& boundary, const Eigen::Matrix3Xd& values, double fade_mm,
-                           const imaging::Volume& rigid, double finest_spacing_mm)
-    : impl_(std::make_unique<Impl>(nodes, tets, boundary, values, fade_mm, rigid, finest_spacing_mm)) {}
+                           const HeldBodies& bodies, double finest_spacing_mm)
+    : impl_(std::make_unique<Impl>(nodes, tets, boundary, values, fade_mm, bodies, finest_spacing_mm)) {}
 Continuation::~Continuation() = default;
 Continuation::Continuation(Continuation&&) noexcept = default;
 Continuation& Continuation::operator=(Continuation&&) noexcept = default;

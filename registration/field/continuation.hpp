@@ -1,8 +1,8 @@
 #pragma once
 /// A nodal field of a mesh, continued to all of space.
 
-#include "imaging/volume.hpp"
 #include "meshing/tet_mesh.hpp"
+#include "registration/field/held_bodies.hpp"
 
 #include <memory>
 
@@ -30,13 +30,12 @@ struct ContinuationOptions {
 /// millimetres of the surface, so that the field is continuous there. In that layer and on the grid the continuation
 /// also approximates the field inside the mesh, which the inversion of a continued field needs close to the surface.
 ///
-/// Rigid surroundings are at rest: nodes of the grid in them hold zero.
+/// Nodes of the grid in rigid bodies move with them.
 class Continuation {
 public:
-    /// `nodes` 3 × N mm, positions of the mesh whose elements and outer boundary are given; `values` 3 × N, mm; `rigid`
-    /// uint8, != 0 in surroundings at rest, or empty.
+    /// `nodes` 3 × N mm, positions of the mesh whose elements and outer boundary are given; `values` 3 × N, mm.
     Continuation(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tets, const meshing::BoundarySurface& boundary,
-                 const Eigen::Matrix3Xd& values, double fade_mm, const imaging::Volume& rigid = {},
+                 const Eigen::Matrix3Xd& values, double fade_mm, const HeldBodies& bodies = {},
                  double finest_spacing_mm = ContinuationOptions().finest_spacing_mm);
     ~Continuation();
     Continuation(Continuation&&) noexcept;

@@ -2,7 +2,7 @@
 
 #include "core/errors.hpp"
 #include "imaging/filters.hpp"
-#include "imaging/mask_lookup.hpp"
+#include "registration/field/held_bodies.hpp"
 #include "registration/field/mesh_labels.hpp"
 #include "registration/field/voxel_jacobian.hpp"
 
@@ -19,7 +19,7 @@ Volume parted_after(const Deformation& deformation, const Volume& fixed_to_movin
     Volume organ = mask_of_mesh(deformation.deformed_mesh(), grid);
     if (deformation.surroundings && deformation.surroundings->slide)  // differences across the jump say nothing
         organ = imaging::dilate(organ, grid.spacing.maxCoeff());
-    const imaging::MaskLookup rigid(deformation.surroundings ? deformation.surroundings->rigid : Volume());
+    const detail::HeldBodies rigid = detail::held_after(deformation);
     const Eigen::Isometry3d to_rigid = deformation.far_motion().inverse();
     const detail::VoxelJacobian jacobian(fixed_to_moving);
     Volume parted(grid, CV_8UC1);
@@ -29,7 +29,7 @@ Volume parted_after(const Deformation& deformation, const Volume& fixed_to_movin
                 const std::int64_t voxel = parted.offset(i, j, k);
                 if (organ.data<std::uint8_t>()[voxel] || jacobian.determinant({i, j, k}) * most_stretch_of_volume >= 1)
                     continue;
-                parted.data<std::uint8_t>()[voxel] = rigid(to_rigid * grid.point(Eigen::Vector3d(i, j, k))) ? 0 : 1;
+                parted.data<std::uint8_t>()[voxel] = rigid.at(to_rigid * grid.point(Eigen::Vector3d(i, j, k))) == 0;
             }
     });
     return parted;

@@ -1,6 +1,6 @@
 #include "core/errors.hpp"
-#include "imaging/mask_lookup.hpp"
 #include "registration/field.hpp"
+#include "registration/field/held_bodies.hpp"
 #include "registration/field/mesh_labels.hpp"
 #include "registration/field/voxel_jacobian.hpp"
 
@@ -84,8 +84,8 @@ std::int64_t count_turned(const detail::VoxelJacobian& jacobian, const Voxels& v
 /// The organ and what is rigid about it, in the frame of a field.
 struct Bodies {
     meshing::TetMesh mesh;
-    imaging::MaskLookup rigid;
-    Eigen::Isometry3d to_rigid;  // into the frame of that mask
+    detail::HeldBodies rigid;
+    Eigen::Isometry3d to_rigid;  // into the frame of these
 };
 
 class Unfolder {
@@ -127,7 +127,7 @@ private:
     [[nodiscard]] bool is_free(std::int64_t voxel, const Pass& pass) const {
         if (inside_[voxel]) return pass.free == Free::All || (pass.free == Free::Rim && on_rim(voxel));
         const auto index = index_of(voxel, grid_);
-        return !bodies_.rigid(bodies_.to_rigid * grid_.point(Eigen::Vector3d(index[0], index[1], index[2])));
+        return bodies_.rigid.at(bodies_.to_rigid * grid_.point(Eigen::Vector3d(index[0], index[1], index[2]))) == 0;
     }
     [[nodiscard]] Voxels free_about_folds(const Pass& pass) const {
         Voxels near = folded_;
@@ -188,21 +188,17 @@ Unfolding unfold(Volume& field, const MakeBodies& bodies_of_frame) {
     return unfolder.changes();
 }
 
-imaging::MaskLookup rigid_about(const Deformation& deformation) {
-    return imaging::MaskLookup(deformation.surroundings ? deformation.surroundings->rigid : Volume());
-}
-
 }  // namespace
 
 Unfolding unfold_moving_to_fixed(Volume& field, const Deformation& deformation) {
     return unfold(field, [&] {
-        return Bodies{deformation.mesh, rigid_about(deformation), Eigen::Isometry3d::Identity()};
+        return Bodies{deformation.mesh, detail::held_before(deformation), Eigen::Isometry3d::Identity()};
     });
 }
 
 Unfolding unfold_fixed_to_moving(Volume& field, const Deformation& deformation) {
     return unfold(field, [&] {
-        return Bodies{deformation.deformed_mesh(), rigid_about(deformation), deformation.far_motion().inverse()};
+        return Bodies{deformation.deformed_mesh(), detail::held_after(deformation), deformation.far_motion().inverse()};
     });
 }
 

@@ -119,6 +119,7 @@ void return_to_fixed_frame(UpdateResult& result, const Eigen::Isometry3d& start)
     for (Eigen::Isometry3d* placement :
          {&result.deformation.placement, &result.alignment.placement, &result.pulls.placement})
         *placement = start * *placement;
+    for (BodyMotion& body : result.bodies) body.motion = start * body.motion;
 }
 
 }  // namespace detail

@@ -1,15 +1,18 @@
 #include "registration/surroundings/rigid_surroundings.hpp"
 
 #include "imaging/filters.hpp"
+#include "imaging/labels.hpp"
 #include "imaging/mask_lookup.hpp"
 #include "imaging/places.hpp"
 #include "imaging/sampling.hpp"
+#include "registration/field/held_bodies.hpp"
 #include "registration/field/mesh_labels.hpp"
 #include "registration/surroundings/organ_slid.hpp"
 #include "registration/surroundings/surroundings_motion.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace tissuewarp::registration {
 
@@ -35,14 +38,26 @@ struct SurroundingsOptions {
 };
 constexpr SurroundingsOptions choice;
 
-/// A mask without what the organ covers, before or after it deformed, and a layer around it that may open or close.
-Volume beside_organ(const Volume& mask, const Deformation& deformation) {
+/// Of bodies on a grid (as Surroundings::rigid), without what the organ covers, before or after it deformed, and a
+/// layer around it that may open or close.
+Surroundings beside_organ(Surroundings surroundings, const Deformation& given) {
+    const Deformation deformation = given.with_placement(surroundings.motion);
     const auto& mesh = deformation.mesh;
-    Volume result = mask.clone();
     const meshing::TetMesh deformed{mesh.nodes + deformation.displacement, mesh.tets, mesh.labels};
-    for (const meshing::TetMesh* organ : {&mesh, &deformed})
-        result.voxels.setTo(0, imaging::dilate(mask_of_mesh(*organ, mask.geometry), choice.layer_mm).voxels);
-    return result;
+    const std::vector<Eigen::Isometry3d> motions = detail::against_surroundings(surroundings);
+    Volume& rigid = surroundings.rigid;
+    const auto near = [](const meshing::TetMesh& organ, const Geometry& grid) {
+        return imaging::MaskLookup(imaging::dilate(mask_of_mesh(organ, grid), choice.layer_mm));
+    };
+    const imaging::MaskLookup before = near(mesh, rigid.geometry),
+                              after = near(deformed, detail::grown_by(rigid, motions));
+    for_each_place(rigid.geometry, [&](const Eigen::Vector3d& X, std::int64_t n) {
+        std::uint8_t& body = rigid.data<std::uint8_t>()[n];
+        if (body == 0) return;
+        const Eigen::Vector3d moved = body < 2 ? X : motions[std::size_t{body} - 2] * X;
+        if (before(X) || after(moved)) body = 0;
+    });
+    return surroundings;
 }
 
 /// A grid along the axes of `image` over the mesh and `reach` mm around it, as far as the image goes.
@@ -183,8 +198,15 @@ bool is_usable(const Volume& image) {
 
 }  // namespace
 
-Surroundings rigid_bodies(const Volume& mask, const Deformation& deformation) {
-    return {deformation.placement, beside_organ(mask, deformation)};
+Surroundings rigid_bodies(const Volume& labels, const std::vector<BodyMotion>& moved, const Deformation& deformation) {
+    Surroundings surroundings{deformation.placement, imaging::mask_of_all(labels).clone()};
+    imaging::Volume& rigid = surroundings.rigid;
+    rigid.voxels = cv::min(rigid.voxels, 1);
+    for (const BodyMotion& body : moved) {
+        surroundings.bodies.push_back(body.motion);
+        rigid.voxels.setTo(1 + double(surroundings.bodies.size()), imaging::mask_of(labels, body.label).voxels);
+    }
+    return beside_organ(std::move(surroundings), deformation);
 }
 
 std::optional<Surroundings> rigid_surroundings(const Deformation& given, const Volume& moving, const Volume& fixed,
@@ -206,11 +228,15 @@ std::optional<Surroundings> rigid_surroundings(const Deformation& given, const V
     const imaging::LinearSampler score(
         rigid_score(views_of(deformation, slides ? beside.across : beside.with, outside), outside.moving));
     const imaging::MaskLookup known(given.surroundings ? given.surroundings->rigid : Volume());
-    Volume mask(voxels_around(moving.geometry, outside.grid), CV_8UC1);
+    const bool with_bodies = given.surroundings && !given.surroundings->bodies.empty();  // whole, wherever they are
+    Volume mask(with_bodies ? moving.geometry : voxels_around(moving.geometry, outside.grid), CV_8UC1);
     for_each_place(mask.geometry, [&](const Eigen::Vector3d& X, std::int64_t n) {
-        mask.data<std::uint8_t>()[n] = known(X) || score.value(X) >= 1.0 ? 1 : 0;
+        const std::uint8_t body = known.value(X);
+        mask.data<std::uint8_t>()[n] = body == 0 && score.value(X) >= 1.0 ? 1 : body;
     });
-    return Surroundings{*motion, beside_organ(mask, deformation), slides};
+    Surroundings found{*motion, mask, slides};
+    if (with_bodies) found.bodies = given.surroundings->bodies;
+    return beside_organ(std::move(found), deformation);
 }
 
 }  // namespace tissuewarp::registration

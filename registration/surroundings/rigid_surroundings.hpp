@@ -11,6 +11,7 @@
 /// along its surroundings the images tell likewise (organ_slid.hpp).
 
 #include "registration/field.hpp"
+#include "registration/result.hpp"
 
 namespace tissuewarp::registration {
 
@@ -26,8 +27,9 @@ std::optional<Surroundings> rigid_surroundings(const Deformation& deformation, c
                                                const imaging::Volume& fixed, const FieldOptions& options = {},
                                                Observer& observer = silent_observer());
 
-/// Bodies that are known to be rigid and to move with the placement, without what the organ covers, before or after it
-/// deformed. `mask` uint8, moving frame.
-Surroundings rigid_bodies(const imaging::Volume& mask, const Deformation& deformation);
+/// Bodies that are known to be rigid, of a label map in the moving frame: those that moved on their own, at most 253,
+/// and the others, with the placement. Without what the organ covers, before or after it deformed.
+Surroundings rigid_bodies(const imaging::Volume& labels, const std::vector<BodyMotion>& moved,
+                          const Deformation& deformation);
 
 }  // namespace tissuewarp::registration

@@ -5,7 +5,9 @@
 
 #include "imaging/sampling.hpp"
 #include "registration/prepare.hpp"
+#include "registration/surroundings/seen_bodies.hpp"
 
+#include <optional>
 #include <vector>
 
 namespace tissuewarp::registration::detail {
@@ -21,14 +23,15 @@ inline constexpr ContactOptions contact_options{};
 
 /// Unilateral contact of surface nodes without friction, by the augmented Lagrangian with an active set [Simo and
 /// Laursen 1992]. The gap g of a node is its distance to the neighbours, plus how deep it lay in them at rest, so that
-/// nothing moves an organ that did not move. Where a node touches, a spring of stiffness k along the normal alone draws
+/// nothing moves an organ that did not move. Neighbours move with the placement, or as fixed labels show them to have
+/// moved, which the first round decides. Where a node touches, a spring of stiffness k along the normal alone draws
 /// g to the push s, and s becomes max(0, s − g) after every equilibrium: k s is the pressure that then holds with g =
 /// 0, whatever k is. A node comes off where its spring would have to hold it back.
 class ContactTerm : public Term {
 public:
-    /// `energy` is the strain energy (mN mm) that weighs as much as one standard deviation. Precondition: the model has
-    /// neighbours.
-    ContactTerm(const PreparedModel& prepared, double energy);
+    /// `energy` is the strain energy (mN mm) that weighs as much as one standard deviation; `seen` are neighbours that
+    /// may have moved on their own. Precondition: the model has neighbours.
+    ContactTerm(const PreparedModel& prepared, double energy, std::vector<SeenBody> seen = {});
 
     [[nodiscard]] Shows shows() const override { return Shows::Place; }
     /// Springs on the nodes that touch, from where they are.
@@ -46,8 +49,7 @@ public:
 private:
     struct SurfaceNode {
         int node = -1;
-        double area = 0;        // mm²
-        double rest_depth = 0;  // mm
+        double area = 0;  // mm²
         bool touches = false;
         double push = 0;  // mm
     };
@@ -56,13 +58,27 @@ private:
         Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // unit, away from it
     };
 
+    /// A body, or all that move with the placement.
+    struct Obstacle {
+        imaging::LinearSampler distance;          // where it lay at rest
+        std::vector<double> rest_depth;           // of each surface node, mm
+        std::optional<Eigen::Isometry3d> motion;  // moving → fixed; none: the placement
+    };
+
     const PreparedModel& prepared_;
-    imaging::LinearSampler distance_;
+    std::vector<SeenBody> seen_;
+    std::vector<BodyMotion> moved_;
     double stiffness_;  // kPa/mm
     std::vector<SurfaceNode> nodes_;
+    std::vector<Obstacle> obstacles_;  // from the first round on
+
+    void find_obstacles(const Eigen::Isometry3d& placement);
+    [[nodiscard]] Obstacle obstacle(const imaging::Volume& distance,
+                                    const std::optional<Eigen::Isometry3d>& motion) const;
 
     [[nodiscard]] ContactFit fit(const State& state) const;
-    [[nodiscard]] Gap gap(const SurfaceNode& node, const State& state) const;
+    /// To the nearest obstacle.
+    [[nodiscard]] Gap gap(std::size_t n, const State& state) const;
 };
 
 }  // namespace tissuewarp::registration::detail

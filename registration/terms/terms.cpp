@@ -152,7 +152,7 @@ void Terms::judge(const State& state, UpdateResult& result) {
 }
 
 Terms terms_of(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options,
-               SharedTools& tools) {
+               SharedTools& tools, std::vector<SeenBody> bodies) {
     require_usable(prepared, seen, tools.images.size());
     const double energy = strain_energy_unit(prepared, options.tissue);
     std::vector<std::unique_ptr<Term>> terms;
@@ -169,7 +169,7 @@ Terms terms_of(const PreparedModel& prepared, const Intraoperative& seen, const 
     if (seen.points) terms.push_back(std::make_unique<PointTerm>(prepared, *seen.points, options.points, energy));
     if (seen.curves) terms.push_back(std::make_unique<CurveTerm>(prepared, *seen.curves, options.curves, energy));
     if (!prepared.options.anchors.empty()) terms.push_back(std::make_unique<AnchorTerm>(prepared, energy));
-    if (prepared.neighbours) terms.push_back(std::make_unique<ContactTerm>(prepared, energy));
+    if (prepared.neighbours) terms.push_back(std::make_unique<ContactTerm>(prepared, energy, std::move(bodies)));
     if (!seen.labels && !seen.image)
         terms.push_back(std::make_unique<GroundTerm>(
             prepared, energy, options.align ? options.tissue.free_motion_mm : options.tissue.held_motion_mm));

@@ -5,6 +5,7 @@
 #include "registration/loads/load_finder.hpp"
 #include "registration/matching/dense/image_engine.hpp"
 #include "registration/prepare.hpp"
+#include "registration/surroundings/seen_bodies.hpp"
 #include "registration/terms/labels.hpp"
 #include "registration/terms/organ_surface.hpp"
 #include "registration/terms/term.hpp"
@@ -70,9 +71,10 @@ struct SharedTools {
 };
 
 /// Terms of what was seen, of what the model has about it and of the loads stated, with what is expected of tissue that
-/// no datum shows. Model, data, options and tools outlive them. Throws InvalidInput when there is nothing to register
-/// to, an image but no model of one, no label in common, or data that cannot be used.
+/// no datum shows; `bodies` are rigid neighbours that were seen too. Model, data, options and tools outlive them.
+/// Throws InvalidInput when there is nothing to register to, an image but no model of one, no label in common, or data
+/// that cannot be used.
 Terms terms_of(const PreparedModel& prepared, const Intraoperative& seen, const UpdateOptions& options,
-               SharedTools& tools);
+               SharedTools& tools, std::vector<SeenBody> bodies = {});
 
 }  // namespace tissuewarp::registration::detail

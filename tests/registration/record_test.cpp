@@ -191,6 +191,30 @@ TEST_F(Records, HoldHowTheSurroundingsMoved) {
     EXPECT_FALSE(read_record(path).deformation.surroundings);
 }
 
+TEST_F(Records, HoldBodiesThatMovedOnTheirOwn) {
+    UpdateResult result = some_result();
+    imaging::Volume mask(test::plain_grid({11, 9, 7}), CV_8UC1);
+    cv::RNG random(5);
+    for (std::int64_t n = 0; n < mask.geometry.voxel_count(); ++n)
+        mask.data<std::uint8_t>()[n] = static_cast<std::uint8_t>(random.uniform(0, 4));
+    result.deformation.surroundings = {test::motion(11, {1, 2, 3}, {4.5, -5.5, 0.1}), mask};
+    result.deformation.surroundings->bodies = {test::motion(3, {0, 1, 0}, {1, 2, 3}),
+                                               test::motion(-7, {1, 1, 0}, {0, 0, 1.0 / 3})};
+    write_record(prepared(), result, some_info(), path);
+    const Record record = read_record(path);
+    EXPECT_EQ(record.format_version, 5);  // older programs must not leave bones where the organ goes
+    const Surroundings& back = *record.deformation.surroundings;
+    ASSERT_EQ(back.bodies.size(), 2u);
+    for (std::size_t n = 0; n < 2; ++n)
+        EXPECT_EQ(back.bodies[n].matrix(), result.deformation.surroundings->bodies[n].matrix());
+    EXPECT_EQ(cv::norm(back.rigid.voxels, mask.voxels, cv::NORM_INF), 0);
+    poke<int>("surroundings/values", 0, 4);
+    EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr("do not fill its grid")));
+    write_record(prepared(), result, some_info(), path);
+    poke<double>("surroundings/body 1", 0, 2.0);
+    EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr("of a rigid neighbour")));
+}
+
 TEST_F(Records, OfTheFirstVersionAreRead) {
     write();
     make_materials_old("materials");

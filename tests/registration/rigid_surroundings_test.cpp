@@ -168,7 +168,7 @@ TEST(RigidSurroundings, ImagesOfSeveralComponentsLeaveWhatIsKnown) {
     Deformation deformation = sagged();
     const Volume vectors(grid, CV_32FC3);
     EXPECT_FALSE(rigid_surroundings(deformation, vectors, vectors));
-    deformation.surroundings = rigid_bodies(Volume(grid, CV_8UC1), deformation);
+    deformation.surroundings = rigid_bodies(Volume(grid, CV_32SC1), {}, deformation);
     const auto same = rigid_surroundings(deformation, vectors, vectors);
     ASSERT_TRUE(same);
     EXPECT_EQ(same->rigid.voxels.data, deformation.surroundings->rigid.voxels.data);
