@@ -177,7 +177,8 @@ TEST(MovedBodies, TheOrganDoesNotEnterThemWhereTheyWent) {
     EXPECT_LT(result.contact->deepest_mm, 0.1);
     Bone inner = bones()[0];
     inner.half.array() -= 0.8;  // boundaries of voxels
-    for (const auto& y : result.deformation.deformed_nodes().colwise())
+    const Eigen::Matrix3Xd nodes = result.deformation.deformed_nodes();
+    for (const auto& y : nodes.colwise())
         EXPECT_FALSE(inner.holds(result.bodies[0].motion.inverse() * y)) << y.transpose();
 }
 

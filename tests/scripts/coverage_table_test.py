@@ -68,6 +68,17 @@ class CoverageTable(unittest.TestCase):
             text = self.printed("--drawn", folder)
         self.assertIn("| labels | 1 | 1.", text)  # √(8/π) of a deviation of 1 mm
 
+    def test_two_families_of_the_same_patients(self):
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            for seed, error, other in ((1, 2, 1), (2, 3, 3), (3, 9, None)):
+                written(folder / "resected", seed, [("image", "", error, 1, 5)] * 10)
+                if other:
+                    written(folder / "unresected", seed, [("image", "", other, 1, 5)] * 10)
+            text = self.printed(folder / "resected", "--against", folder / "unresected")
+        self.assertIn("image: 2 patients of both, 2.500 mm over 2.000 mm is 1.25; of single patients 1.50 in the median, 1 above 1.3",
+                      text)
+
 
 if __name__ == "__main__":
     unittest.main()
