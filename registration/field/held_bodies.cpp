@@ -35,7 +35,8 @@ Eigen::Matrix3Xd HeldBodies::corners_of_moved() const {
     std::vector<Eigen::Vector3d> places;
     for (const auto& [body, box] : imaging::label_extents(mask_)) {
         if (body < 2) continue;
-        for (const auto& index : corners_of(box).colwise()) places.push_back(mask_.geometry.point(index));
+        const Eigen::Matrix<double, 3, 8> corners = corners_of(box);
+        for (const auto& index : corners.colwise()) places.push_back(mask_.geometry.point(index));
     }
     Eigen::Matrix3Xd result(3, static_cast<Eigen::Index>(places.size()));
     for (std::size_t n = 0; n < places.size(); ++n) result.col(static_cast<Eigen::Index>(n)) = places[n];
@@ -48,7 +49,8 @@ Geometry grown_by(const Volume& bodies, const std::vector<Eigen::Isometry3d>& mo
     for (const auto& [body, box] : imaging::label_extents(bodies)) {
         if (body < 2) continue;
         const Eigen::Isometry3d& motion = motions[static_cast<std::size_t>(body) - 2];
-        for (const auto& index : corners_of(box).colwise()) {
+        const Eigen::Matrix<double, 3, 8> corners = corners_of(box);
+        for (const auto& index : corners.colwise()) {
             const Eigen::Array3d moved = grid.index(motion * grid.point(index)).array();
             lower = lower.min(moved);
             upper = upper.max(moved);

@@ -1,9 +1,11 @@
 #include "registration/surroundings/seen_bodies.hpp"
 
 #include "imaging/label_extents.hpp"
+#include "registration/boundary/surroundings.hpp"
 #include "registration/doubts.hpp"
 #include "registration/options.hpp"
 #include "registration/pose/pose_search.hpp"
+#include "registration/surroundings/finer_motion.hpp"
 
 #include <string>
 #include <utility>
@@ -40,7 +42,10 @@ SeenBody::SeenBody(int label, std::unique_ptr<LabelBoundaries> moving, std::uniq
     };
     const Alignment pose = search_pose(cost, distance_->forward.points(), distance_->backward.points().rowwise().mean(),
                                        PoseFreedom::Rigid, AlignmentOptions(), observer);
-    found_ = {label, pose.placement, pose.mean_distance_mm};
+    const imaging::Volume from = smooth_distance(moving_->labels()), to = smooth_distance(fixed_->labels());
+    const Eigen::Isometry3d motion = finer_motion({moving_->of(LabelBoundaries::of_all).faces, from},
+                                                  {fixed_->of(LabelBoundaries::of_all).faces, to}, pose.placement);
+    found_ = {label, motion, apart_mm(motion)};
 }
 
 double SeenBody::apart_mm(const Eigen::Isometry3d& motion) const {

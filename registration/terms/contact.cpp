@@ -47,11 +47,12 @@ ContactTerm::Obstacle ContactTerm::obstacle(const imaging::Volume& distance,
     return result;
 }
 
-void ContactTerm::find_obstacles(const Eigen::Isometry3d& placement) {
+void ContactTerm::know_obstacles(const State& state) {
+    if (!obstacles_.empty()) return;
     const RigidNeighbours& neighbours = *prepared_.neighbours;
     std::vector<int> moved;
     for (const SeenBody& body : seen_) {
-        if (!body.moved_beside(placement)) continue;
+        if (!body.moved_beside(state.placement)) continue;
         moved_.push_back(body.found());
         moved.push_back(body.found().label);
         obstacles_.push_back(obstacle(distance_about(neighbours.labels, moved.back()), moved_.back().motion));
@@ -79,7 +80,7 @@ ContactTerm::Gap ContactTerm::gap(std::size_t n, const State& state) const {
 }
 
 Contribution ContactTerm::linearise(const RoundPlan& plan, const State& state, Observer& /*observer*/) {
-    if (obstacles_.empty()) find_obstacles(state.placement);
+    know_obstacles(state);
     Contribution result;
     for (std::size_t n = 0; n < nodes_.size(); ++n) {
         const SurfaceNode& node = nodes_[n];
@@ -94,7 +95,7 @@ Contribution ContactTerm::linearise(const RoundPlan& plan, const State& state, O
 }
 
 bool ContactTerm::follow(const State& solved) {
-    if (obstacles_.empty()) find_obstacles(solved.placement);
+    know_obstacles(solved);
     bool entered = false;
     for (std::size_t n = 0; n < nodes_.size(); ++n) {
         SurfaceNode& node = nodes_[n];
@@ -128,6 +129,7 @@ ContactFit ContactTerm::fit(const State& state) const {
 
 void ContactTerm::judge(const State& state, UpdateResult& result) {
     constexpr double most_mm = contact_options.most_depth_mm;
+    know_obstacles(state);
     result.contact = fit(state);
     result.bodies = moved_;
     if (result.contact->deepest_mm > most_mm)

@@ -70,9 +70,10 @@ private:
     std::vector<BodyMotion> moved_;
     double stiffness_;  // kPa/mm
     std::vector<SurfaceNode> nodes_;
-    std::vector<Obstacle> obstacles_;  // from the first round on
+    std::vector<Obstacle> obstacles_;  // none before the first round
 
-    void find_obstacles(const Eigen::Isometry3d& placement);
+    /// In the first round, by the placement that it has.
+    void know_obstacles(const State& state);
     [[nodiscard]] Obstacle obstacle(const imaging::Volume& distance,
                                     const std::optional<Eigen::Isometry3d>& motion) const;
 

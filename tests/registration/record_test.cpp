@@ -350,8 +350,8 @@ TEST_F(Records, OfForeignFormatsAreRefused) {
 
 TEST_F(Records, OfANewerVersionAreRefused) {
     write();
-    set_version(5);
-    EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr("format version 5")));
+    set_version(6);
+    EXPECT_THAT([&] { read_record(path); }, ThrowsMessage<InvalidInput>(HasSubstr("format version 6")));
 }
 
 TEST_F(Records, WithNodeIndicesOutOfRangeAreRefused) {

@@ -1,0 +1,103 @@
+"""Bones about an organ that each moved on its own: random spines by the command line.
+
+TISSUEWARP_BONES_SEEDS=FIRST-LAST draws others than the two of every test."""
+
+import json
+import os
+import pathlib
+import tempfile
+import unittest
+
+import nibabel
+import numpy
+
+from phantom import lps_of_voxels, run, save
+
+FIRST, LAST = map(int, os.environ.get("TISSUEWARP_BONES_SEEDS", "1-2").split("-"))
+AFFINE = numpy.diag([-1.5, -1.5, 1.5, 1.0])
+AFFINE[:3, 3] = [60, 36, -60]
+SHAPE = (80, 48, 64)
+ORGAN, BONES = 1, (3, 4, 5)
+
+
+def rotation(degrees, axis):
+    x, y, z = axis / numpy.linalg.norm(axis)
+    cross = numpy.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    angle = numpy.radians(degrees)
+    return numpy.eye(3) + numpy.sin(angle) * cross + (1 - numpy.cos(angle)) * cross @ cross
+
+
+class Spine:
+    """Three bones in a row below an organ that moves up or down as a whole."""
+
+    def __init__(self, seed):
+        draw = numpy.random.default_rng(seed)
+        self.organ_axes = draw.uniform([34, 20, 15], [44, 26, 19])
+        self.organ_shift = numpy.array([0, 0, draw.uniform(0, 3)])
+        self.bones = []
+        for n, label in enumerate(BONES):
+            centre = numpy.array([32.0 * (n - 1), 0, -38]) + draw.uniform(-1.5, 1.5, 3)
+            motion = numpy.eye(4)
+            motion[:3, :3] = rotation(draw.uniform(-7, 7), draw.normal(size=3))
+            shift = draw.uniform([-2, -4, -4], [2, 4, 2]) * (0 if draw.random() < 0.25 else 1)
+            motion[:3, 3] = centre - motion[:3, :3] @ centre + shift
+            if not shift.any():
+                motion = numpy.eye(4)
+            self.bones.append((label, centre, draw.uniform([10, 13, 11], [12, 17, 13]), motion))
+
+    def is_bone(self, points, centre, half):
+        at = (points - centre) / half
+        body = (at ** 2).sum(axis=-1) < 1
+        keel = (abs(at[..., 0]) < 0.3) & (abs(at[..., 1]) < 1.3) & (abs(at[..., 2]) < 0.5)
+        return body | keel
+
+    def labels(self, moved):
+        places = lps_of_voxels(AFFINE, SHAPE)
+        shift = self.organ_shift if moved else 0
+        labels = (numpy.linalg.norm((places - shift) / self.organ_axes, axis=-1) < 1).astype(numpy.uint8) * ORGAN
+        for label, centre, half, motion in self.bones:
+            back = numpy.linalg.inv(motion if moved else numpy.eye(4))
+            labels[self.is_bone(places @ back[:3, :3].T + back[:3, 3], centre, half)] = label
+        return labels
+
+
+def dice(a, b):
+    return 2 * (a & b).sum() / (a.sum() + b.sum())
+
+
+class Bones(unittest.TestCase):
+    def registered(self, seed):
+        spine = Spine(seed)
+        temporary = tempfile.TemporaryDirectory(prefix="tissuewarp-test-")
+        self.addCleanup(temporary.cleanup)
+        folder = pathlib.Path(temporary.name)
+        moving, fixed = spine.labels(False), spine.labels(True)
+        result = run("register", "--no-align", "--rigid-neighbour", ",".join(map(str, BONES)), "--edge-length", 7,
+                     "--moving-labels", save(moving, AFFINE, folder / "moving.nii.gz"),
+                     "--fixed-labels", save(fixed, AFFINE, folder / "fixed.nii.gz"), "--output", folder / "out")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        warped = numpy.asarray(nibabel.load(str(folder / "out" / "warped_labels.nii.gz")).dataobj)
+        return spine, moving, fixed, warped, json.loads((folder / "out" / "report.json").read_text())
+
+    def test_each_goes_where_the_labels_show_it(self):
+        for seed in range(FIRST, LAST + 1):
+            with self.subTest(seed=seed):
+                spine, moving, fixed, warped, report = self.registered(seed)
+                self.assertLess(report["contact"]["deepest_mm"], 0.3)
+                self.assertEqual(report["jacobian"]["field"]["folded"], 0)
+                found = {body["label"]: numpy.array(body["matrix"]) for body in report.get("rigid_neighbours", [])}
+                for label, centre, half, motion in spine.bones:
+                    ends = centre + half * numpy.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
+                    went = ends @ motion[:3, :3].T + motion[:3, 3]
+                    moved = numpy.linalg.norm(went - ends, axis=1).mean()
+                    placed = found.get(label, numpy.eye(4))
+                    off = numpy.linalg.norm(ends @ placed[:3, :3].T + placed[:3, 3] - went, axis=1).mean()
+                    print(f"seed {seed} bone {label}: moved {moved:.2f} mm, {'followed' if label in found else 'left'}, "
+                          f"{off:.2f} mm off; Dice {dice(moving == label, fixed == label):.3f} -> "
+                          f"{dice(warped == label, fixed == label):.3f}")
+                    self.assertLess(off, 1.0 if label in found else 1.5)
+                    self.assertGreater(dice(warped == label, fixed == label), 0.88)
+
+
+if __name__ == "__main__":
+    unittest.main()
