@@ -66,22 +66,23 @@ Isometry3d finer_motion(const BodyBoundary& moving, const BodyBoundary& fixed, c
     const Vector3d centre = to.rowwise().mean();
     const Step space{centre, std::max(1.0, std::sqrt((to.colwise() - centre).colwise().squaredNorm().mean()))};
     Isometry3d motion = start;
+    double scale_mm = options.first_scale_mm;
     for (int step = 0; step < options.most_steps; ++step) {
         NormalEquations equations;
         for (const auto& x : from.colwise()) {
             const Vector3d y = motion * x;
             const auto [distance, gradient] = in_fixed.value_and_gradient(y);
-            equations.add(space.derivative(y, gradient), distance - in_moving.value(x), options.scale_mm);
+            equations.add(space.derivative(y, gradient), distance - in_moving.value(x), scale_mm);
         }
         const Isometry3d back = motion.inverse();
         for (const auto& y : to.colwise()) {
             const auto [distance, gradient] = in_moving.value_and_gradient(back * y);
-            equations.add(-space.derivative(y, motion.linear() * gradient), distance - in_fixed.value(y),
-                          options.scale_mm);
+            equations.add(-space.derivative(y, motion.linear() * gradient), distance - in_fixed.value(y), scale_mm);
         }
         const Vector6d change = equations.step(options.stiffness);
         motion = space.motion(change) * motion;
-        if (change.norm() < options.tolerance_mm) break;
+        if (scale_mm <= options.last_scale_mm && change.norm() < options.tolerance_mm) break;
+        scale_mm = std::max(options.last_scale_mm, options.falling * scale_mm);
     }
     return motion;
 }

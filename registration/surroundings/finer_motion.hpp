@@ -9,9 +9,11 @@ namespace tissuewarp::registration::detail {
 
 /// Chosen by hand.
 struct FinerMotionOptions {
-    double scale_mm = 1;         ///< distances that differ by more weigh little: another shape, a wrong label
+    double first_scale_mm = 6;   ///< distances that differ by more weigh little: another shape, a wrong label …
+    double falling = 0.6;        ///< … less from step to step …
+    double last_scale_mm = 1;    ///< … down to this
     int samples = 3000;          ///< boundary points of each map
-    int most_steps = 12;         ///< of Gauss and Newton
+    int most_steps = 20;         ///< of Gauss and Newton
     double tolerance_mm = 1e-3;  ///< of a step, over the body
     double stiffness = 1e-3;     ///< that holds what the boundaries do not tell, over what they tell best
 };

@@ -16,10 +16,10 @@ namespace tissuewarp::registration::detail {
 
 /// When a body is taken to have moved on its own. Chosen by hand.
 struct SeenBodyOptions {
-    double least_gain_mm = 0.3;  ///< by which its boundaries come nearer, in the mean, than with the placement …
-    double least_gain = 0.3;     ///< … and as a share of that
-    double most_apart_mm = 2;    ///< of its boundaries afterwards: beyond, they are not of one rigid body
-    int samples = 4000;          ///< boundary points, half from each map
+    double least_gain_mm = 0.15;  ///< by which its boundaries come nearer, in the mean, than with the placement …
+    double least_gain = 0.2;      ///< … and as a share of that
+    double most_apart_mm = 2;     ///< of its boundaries afterwards: beyond, they are not of one rigid body
+    int samples = 4000;           ///< boundary points, half from each map
 };
 inline constexpr SeenBodyOptions seen_body_options{};
 

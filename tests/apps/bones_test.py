@@ -14,9 +14,9 @@ import numpy
 from phantom import lps_of_voxels, run, save
 
 FIRST, LAST = map(int, os.environ.get("TISSUEWARP_BONES_SEEDS", "1-2").split("-"))
-AFFINE = numpy.diag([-1.5, -1.5, 1.5, 1.0])
-AFFINE[:3, 3] = [60, 36, -60]
-SHAPE = (80, 48, 64)
+AFFINE = numpy.diag([-1.0, -1.0, 1.0, 1.0])
+AFFINE[:3, 3] = [60, 36, -64]
+SHAPE = (120, 72, 96)
 ORGAN, BONES = 1, (3, 4, 5)
 
 
@@ -36,29 +36,39 @@ class Spine:
         self.organ_shift = numpy.array([0, 0, draw.uniform(0, 3)])
         self.bones = []
         for n, label in enumerate(BONES):
-            centre = numpy.array([32.0 * (n - 1), 0, -38]) + draw.uniform(-1.5, 1.5, 3)
+            centre = numpy.array([34.0 * (n - 1), 0, -40]) + draw.uniform(-1.5, 1.5, 3)
             motion = numpy.eye(4)
             motion[:3, :3] = rotation(draw.uniform(-7, 7), draw.normal(size=3))
             shift = draw.uniform([-2, -4, -4], [2, 4, 2]) * (0 if draw.random() < 0.25 else 1)
             motion[:3, 3] = centre - motion[:3, :3] @ centre + shift
             if not shift.any():
                 motion = numpy.eye(4)
-            self.bones.append((label, centre, draw.uniform([10, 13, 11], [12, 17, 13]), motion))
+            self.bones.append((label, centre, draw.uniform([10, 13, 10], [13, 17, 14]), motion))
+        while self.overlap():
+            self.bones = [(label, centre, 0.95 * half, motion) for label, centre, half, motion in self.bones]
 
     def is_bone(self, points, centre, half):
+        """A body and processes behind it, which tell how it is turned."""
         at = (points - centre) / half
         body = (at ** 2).sum(axis=-1) < 1
-        keel = (abs(at[..., 0]) < 0.3) & (abs(at[..., 1]) < 1.3) & (abs(at[..., 2]) < 0.5)
-        return body | keel
+        processes = (abs(at[..., 0]) < 0.9) & (at[..., 1] > 0.4) & (at[..., 1] < 1.3) & (abs(at[..., 2]) < 0.3)
+        return body | processes
 
-    def labels(self, moved):
+    def parts(self, moved):
+        """Masks of the organ and of each bone."""
         places = lps_of_voxels(AFFINE, SHAPE)
         shift = self.organ_shift if moved else 0
-        labels = (numpy.linalg.norm((places - shift) / self.organ_axes, axis=-1) < 1).astype(numpy.uint8) * ORGAN
+        masks = {ORGAN: numpy.linalg.norm((places - shift) / self.organ_axes, axis=-1) < 1}
         for label, centre, half, motion in self.bones:
             back = numpy.linalg.inv(motion if moved else numpy.eye(4))
-            labels[self.is_bone(places @ back[:3, :3].T + back[:3, 3], centre, half)] = label
-        return labels
+            masks[label] = self.is_bone(places @ back[:3, :3].T + back[:3, 3], centre, half)
+        return masks
+
+    def overlap(self):
+        return any((sum(mask.astype(int) for mask in self.parts(moved).values()) > 1).any() for moved in (False, True))
+
+    def labels(self, moved):
+        return sum(mask.astype(numpy.uint8) * numpy.uint8(label) for label, mask in self.parts(moved).items())
 
 
 def dice(a, b):
