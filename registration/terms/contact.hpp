@@ -4,8 +4,8 @@
 #include "registration/terms/term.hpp"
 
 #include "imaging/sampling.hpp"
+#include "registration/pose/seen_bodies.hpp"
 #include "registration/prepare.hpp"
-#include "registration/surroundings/seen_bodies.hpp"
 
 #include <optional>
 #include <vector>

@@ -60,7 +60,7 @@ const std::map<std::string, std::set<std::string>> rooms_of_registration{
     {"resection", {"boundary", "field", "matching"}},
     {"surroundings", {"field"}},
     {"matching", {"field", "springs"}},
-    {"pose", {"io"}},
+    {"pose", {"boundary", "io"}},
     {"loads", {"pose", "springs"}},
     {"course", {"loads", "pose"}},
     {"terms", {"boundary", "evaluation", "io", "loads", "matching", "pose", "resection", "springs"}},

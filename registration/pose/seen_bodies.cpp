@@ -1,11 +1,11 @@
-#include "registration/surroundings/seen_bodies.hpp"
+#include "registration/pose/seen_bodies.hpp"
 
 #include "imaging/label_extents.hpp"
 #include "registration/boundary/surroundings.hpp"
 #include "registration/doubts.hpp"
 #include "registration/options.hpp"
+#include "registration/pose/finer_motion.hpp"
 #include "registration/pose/pose_search.hpp"
-#include "registration/surroundings/finer_motion.hpp"
 
 #include <string>
 #include <utility>

@@ -1,4 +1,4 @@
-#include "registration/surroundings/finer_motion.hpp"
+#include "registration/pose/finer_motion.hpp"
 
 #include "imaging/sampling.hpp"
 #include "registration/pose/robust_weight.hpp"
