@@ -86,7 +86,7 @@ std::string fits_text(const RegistrationRun& run) {
         text += fmt::format("rigid neighbours: {} surface nodes touch, at most {:.2f} mm deep\n", fit->touching,
                             fit->deepest_mm);
     for (const registration::BodyMotion& body : run.result.bodies)
-        text += body_text(body, run.result.deformation.placement, run.inputs.label_names);
+        if (body.own) text += body_text(body, run.result.deformation.placement, run.inputs.label_names);
     if (const auto& fit = run.result.anchors)
         text += fmt::format("anchors: {} nodes, moved by at most {:.2f} mm\n", fit->nodes, fit->largest_mm);
     return text;

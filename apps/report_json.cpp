@@ -204,8 +204,9 @@ void add_fits(json& report, const registration::UpdateResult& result) {
     if (const auto& fit = result.contact)
         report["contact"] = {{"touching", fit->touching}, {"deepest_mm", number(fit->deepest_mm)}};
     for (const registration::BodyMotion& body : result.bodies)
-        report["rigid_neighbours"].push_back(
-            {{"label", body.label}, {"matrix", rows_of(body.motion)}, {"apart_mm", number(body.apart_mm)}});
+        if (body.own)
+            report["rigid_neighbours"].push_back(
+                {{"label", body.label}, {"matrix", rows_of(body.motion)}, {"apart_mm", number(body.apart_mm)}});
     if (const auto& fit = result.anchors)
         report["anchors"] = {{"nodes", fit->nodes}, {"largest_mm", number(fit->largest_mm)}};
 }

@@ -75,9 +75,10 @@ struct ContactFit {
     double deepest_mm = 0;  ///< that a surface node lies in a neighbour, beyond where it lay at rest
 };
 
-/// A rigid neighbour that the fixed labels show, and that did not move with the placement.
+/// A rigid neighbour that the fixed labels show.
 struct BodyMotion {
     int label = 0;
+    bool own = false;                                          ///< it did not move with the placement
     Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();  ///< moving → fixed
     double apart_mm = 0;                                       ///< of its boundaries after it, in the mean
 };
@@ -184,7 +185,7 @@ struct UpdateResult {
     std::optional<CurveFit> curves;     ///< where points along vessels were given
     std::optional<ContactFit> contact;  ///< where the model has rigid neighbours
     std::optional<AnchorFit> anchors;   ///< and anchors
-    std::vector<BodyMotion> bodies;     ///< rigid neighbours that moved on their own
+    std::vector<BodyMotion> bodies;     ///< rigid neighbours that fixed labels show
     std::vector<StageTime> times;
     bool cut_short = false;     ///< by the time budget: the last round was not reached
     std::vector<Doubt> doubts;  ///< empty when there are none

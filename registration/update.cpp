@@ -1,6 +1,7 @@
 #include "registration/update.hpp"
 
 #include "core/stopwatch.hpp"
+#include "imaging/labels.hpp"
 #include "registration/boundary/surroundings.hpp"
 #include "registration/course/go_on.hpp"
 #include "registration/engine_choice.hpp"
@@ -117,12 +118,16 @@ private:
         if (prepared->neighbours && seen.data.labels)
             seen.bodies = detail::seen_bodies(*prepared->neighbours, *seen.data.labels, observer);
         seen.data = detail::without_neighbours(seen.data, prepared->options.rigid_neighbours);
+        const bool bones_alone = !seen.bodies.empty() && imaging::labels_in(*seen.data.labels).empty();
+        if (bones_alone) seen.data.labels.reset();
         return seen;
     }
 
     [[nodiscard]] UpdateResult in_fixed_frame(UpdateResult result, const Intraoperative& given,
                                               double boundary_maps_s) const {
         if (given.start) detail::return_to_fixed_frame(result, *given.start);
+        for (BodyMotion& body : result.bodies)
+            if (!body.own) body.motion = result.deformation.placement;
         if (prepared->neighbours)
             result.deformation.surroundings =
                 rigid_bodies(prepared->neighbours->labels, result.bodies, result.deformation);

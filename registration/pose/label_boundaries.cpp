@@ -91,12 +91,12 @@ double labelled_volume(const imaging::LabelExtents& extents, const Geometry& gri
     return double(extent_of_all(extents).voxels) * grid.voxel_volume();
 }
 
-LabelBoundaries::LabelBoundaries(const Volume& labels) : labels_(labels), extents_(imaging::label_extents(labels)) {}
+LabelBoundaries::LabelBoundaries(const Volume& labels, double spacing_mm)
+    : labels_(labels), spacing_mm_(spacing_mm), extents_(imaging::label_extents(labels)) {}
 
 Volume LabelBoundaries::coarse_about_all() const {
     const Geometry& grid = labels_.geometry;
-    return coarsened(labels_, grown(extent_of_all(extents_), voxels_of(beyond_mm, grid), grid),
-                     LabelPoseOptions().map_spacing_mm);
+    return coarsened(labels_, grown(extent_of_all(extents_), voxels_of(beyond_mm, grid), grid), spacing_mm_);
 }
 
 LabelBoundaries::Boundary LabelBoundaries::boundary(const Volume& coarse, int label) const {

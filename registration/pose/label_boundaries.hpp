@@ -3,6 +3,7 @@
 
 #include "imaging/label_extents.hpp"
 #include "imaging/volume.hpp"
+#include "registration/pose/alignment.hpp"
 
 #include <Eigen/Core>
 
@@ -28,14 +29,14 @@ public:
     /// Stands for the boundary of all labels together.
     static constexpr int of_all = 0;
 
-    /// Throws InvalidInput for other voxels than integers.
-    explicit LabelBoundaries(const imaging::Volume& labels);
+    /// Distances lie on a grid of about `spacing_mm`. Throws InvalidInput for other voxels than integers.
+    explicit LabelBoundaries(const imaging::Volume& labels, double spacing_mm = LabelPoseOptions().map_spacing_mm);
 
     [[nodiscard]] const imaging::Volume& labels() const { return labels_; }
     [[nodiscard]] const imaging::LabelExtents& extents() const { return extents_; }
 
     struct Boundary {
-        imaging::Volume distance;  ///< signed, mm, on a grid of about 2 mm, as far as labels reach and 60 mm beyond
+        imaging::Volume distance;  ///< signed, mm, as far as labels reach and 60 mm beyond
         Eigen::Matrix3Xd faces;    ///< centres of those between voxels, 3 × F, LPS mm
     };
     /// Makes those that are not there yet, of labels that the map holds. One thread at a time.
@@ -45,6 +46,7 @@ public:
 
 private:
     imaging::Volume labels_;
+    double spacing_mm_;
     imaging::LabelExtents extents_;
     std::map<int, Boundary> made_;
 

@@ -7,6 +7,7 @@
 #include "registration/pose/finer_motion.hpp"
 #include "registration/pose/pose_search.hpp"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
@@ -14,8 +15,12 @@ namespace tissuewarp::registration::detail {
 
 namespace {
 
+using Eigen::Isometry3d;
 using imaging::LabelExtent;
 using imaging::Volume;
+
+constexpr SeenBodyOptions options;
+constexpr int all = LabelBoundaries::of_all;
 
 bool meets_border(const LabelExtent& box, const imaging::Geometry& grid) {
     for (std::size_t axis = 0; axis < 3; ++axis)
@@ -23,59 +28,109 @@ bool meets_border(const LabelExtent& box, const imaging::Geometry& grid) {
     return false;
 }
 
-/// The map as what alignments ask for, a label alone.
+/// The label alone, as alignments ask for it, with distances on its own voxels: coarser ones miss thin parts.
 std::unique_ptr<LabelBoundaries> alone(const Volume& labels, const LabelExtent& box, int label) {
-    constexpr double about_mm = 20;  // farther off distances grow by those to the grid
-    return std::make_unique<LabelBoundaries>(
-        imaging::mask_in(labels, imaging::grown(box, voxels_of(about_mm, labels.geometry), labels.geometry), label));
+    constexpr double about_mm = 20, as_it_is = 0;  // farther off distances grow by those to the grid
+    auto boundaries = std::make_unique<LabelBoundaries>(
+        imaging::mask_in(labels, imaging::grown(box, voxels_of(about_mm, labels.geometry), labels.geometry), label),
+        as_it_is);
+    boundaries->make({all});
+    return boundaries;
+}
+
+std::string name_of_body(int label) {
+    return "rigid neighbour " + std::to_string(label);
+}
+
+/// Why a label is not followed by itself; empty where it is.
+std::string why_left(const Volume& moving, const LabelExtent& box, const Volume& fixed, const LabelExtent& there) {
+    if (there.voxels == 0) return " is not in the fixed labels";
+    if (meets_border(box, moving.geometry) || meets_border(there, fixed.geometry))
+        return " meets the border of a label map";
+    return "";
+}
+
+double turn_deg(const Isometry3d& motion) {
+    return Eigen::AngleAxisd(motion.linear()).angle() * 180 / EIGEN_PI;
 }
 
 }  // namespace
 
-SeenBody::SeenBody(int label, std::unique_ptr<LabelBoundaries> moving, std::unique_ptr<LabelBoundaries> fixed,
-                   Observer& observer)
-    : moving_(std::move(moving)),
+SeenBody::SeenBody(int label, std::unique_ptr<LabelBoundaries> moving, std::unique_ptr<LabelBoundaries> fixed)
+    : label_(label),
+      moving_(std::move(moving)),
       fixed_(std::move(fixed)),
-      distance_(std::make_unique<LabelDistance>(*moving_, *fixed_, seen_body_options.samples)) {
-    const auto cost = [&](const Eigen::Affine3d& map, double trim, int stride) {
-        return (*distance_)(map, trim, stride);
-    };
-    const Alignment pose = search_pose(cost, distance_->forward.points(), distance_->backward.points().rowwise().mean(),
-                                       PoseFreedom::Rigid, AlignmentOptions(), observer);
-    const imaging::Volume from = smooth_distance(moving_->labels()), to = smooth_distance(fixed_->labels());
-    const Eigen::Isometry3d motion = finer_motion({moving_->of(LabelBoundaries::of_all).faces, from},
-                                                  {fixed_->of(LabelBoundaries::of_all).faces, to}, pose.placement);
-    found_ = {label, motion, apart_mm(motion)};
-}
+      distance_(std::make_unique<LabelDistance>(*moving_, *fixed_, options.samples)) {}
 
-double SeenBody::apart_mm(const Eigen::Isometry3d& motion) const {
+double SeenBody::apart_mm(const Isometry3d& motion) const {
     return (*distance_)(Eigen::Affine3d(motion.matrix()), AlignmentOptions().trim_mm, 1);
 }
 
-bool SeenBody::moved_beside(const Eigen::Isometry3d& placement) const {
-    const double apart = apart_mm(placement), gain = apart - found_.apart_mm;
-    return gain > seen_body_options.least_gain_mm && gain > seen_body_options.least_gain * apart;
+Isometry3d SeenBody::best_from(const Isometry3d& placement, Observer& observer) const {
+    const auto cost = [&](const Eigen::Affine3d& map, double trim, int stride) {
+        return (*distance_)(map * Eigen::Affine3d(placement.matrix()), trim, stride);
+    };
+    const Alignment pose =
+        search_pose(cost, placement * distance_->forward.points(), distance_->backward.points().rowwise().mean(),
+                    PoseFreedom::Rigid, AlignmentOptions(), observer);
+    const Volume from = smooth_distance(moving_->labels()), to = smooth_distance(fixed_->labels());
+    return finer_motion({moving_->of(all).faces, from}, {fixed_->of(all).faces, to}, pose.placement * placement);
+}
+
+BodyMotion SeenBody::motion(const Isometry3d& placement, Observer& observer) const {
+    const std::string name = name_of_body(label_);
+    const BodyMotion left{label_, false, placement, apart_mm(placement)};
+    const BodyMotion found{label_, true, best_from(placement, observer), 0};
+    const double apart = apart_mm(found.motion), gain = left.apart_mm - apart;
+    const Eigen::Matrix3Xd& points = distance_->forward.points();
+    const double moved = (found.motion * points - placement * points).colwise().norm().mean();
+    if (apart > options.most_apart_mm) {
+        observer.note(name + " has another shape in the fixed labels (" + to_text(apart) +
+                      " mm apart at best): it is not followed by itself");
+        return left;
+    }
+    if (moved < options.least_moved_mm || gain < options.least_gain_mm || gain < options.least_gain * left.apart_mm)
+        return left;
+    if (const double turn = turn_deg(placement.inverse() * found.motion); turn > options.most_turn_deg) {
+        observer.note(name + " fits best turned by " + to_text(turn) +
+                      "°, as a symmetric one may: it is not followed by itself");
+        return left;
+    }
+    const double voxel =
+        std::max(moving_->labels().geometry.spacing.maxCoeff(), fixed_->labels().geometry.spacing.maxCoeff());
+    if (apart > options.exact_apart_mm + 0.5 * voxel)
+        observer.note(name + " moved on its own, but its boundaries stay " + to_text(apart) +
+                      " mm apart: another shape, or pieces that moved each by itself");
+    if (double least = 0;
+        cv::minMaxLoc(moving_->of(all).distance.voxels.reshape(1, 1), &least, nullptr), -least < options.least_depth_mm)
+        observer.note(name + " is thin: fields carry it less exactly than points are apart that tell how it moved");
+    return {label_, true, found.motion, apart};
 }
 
 std::vector<SeenBody> seen_bodies(const RigidNeighbours& neighbours, const Volume& fixed_labels, Observer& observer) {
     const imaging::LabelExtents moving = imaging::label_extents(neighbours.labels),
                                 fixed = imaging::label_extents(fixed_labels);
+    const auto in_fixed = [&](int label) {
+        const auto there = fixed.find(label);
+        return there == fixed.end() ? LabelExtent{} : there->second;
+    };
+    if (std::none_of(moving.begin(), moving.end(), [&](const auto& body) { return in_fixed(body.first).voxels > 0; }))
+        return {};
     std::vector<SeenBody> bodies;
     for (const auto& [label, box] : moving) {
-        const auto there = fixed.find(label);
-        if (there == fixed.end()) continue;
-        const std::string name = "rigid neighbour " + std::to_string(label);
-        if (meets_border(box, neighbours.labels.geometry) || meets_border(there->second, fixed_labels.geometry)) {
-            observer.note(name + " meets the border of a label map: it moves with the placement");
-            continue;
+        const LabelExtent there = in_fixed(label);
+        std::string why = why_left(neighbours.labels, box, fixed_labels, there);
+        if (why.empty()) {
+            auto before = alone(neighbours.labels, box, label), after = alone(fixed_labels, there, label);
+            const auto faces = std::min(before->of(all).faces.cols(), after->of(all).faces.cols());
+            if (static_cast<std::size_t>(faces) < options.fewest_faces)
+                why = " is too small";
+            else if (bodies.size() == options.most_bodies)
+                why = " is one of too many";
+            else
+                bodies.emplace_back(label, std::move(before), std::move(after));
         }
-        SeenBody body(label, alone(neighbours.labels, box, label), alone(fixed_labels, there->second, label), observer);
-        if (body.found().apart_mm > seen_body_options.most_apart_mm) {
-            observer.note(name + " has another shape in the fixed labels (" + to_text(body.found().apart_mm) +
-                          " mm apart at best): it moves with the placement");
-            continue;
-        }
-        bodies.push_back(std::move(body));
+        if (!why.empty()) observer.note(name_of_body(label) + why + ": it is not followed by itself");
     }
     return bodies;
 }

@@ -16,34 +16,42 @@ namespace tissuewarp::registration::detail {
 
 /// When a body is taken to have moved on its own. Chosen by hand.
 struct SeenBodyOptions {
-    double least_gain_mm = 0.15;  ///< by which its boundaries come nearer, in the mean, than with the placement …
-    double least_gain = 0.2;      ///< … and as a share of that
-    double most_apart_mm = 2;     ///< of its boundaries afterwards: beyond, they are not of one rigid body
-    int samples = 4000;           ///< boundary points, half from each map
+    double least_moved_mm = 0.5;    ///< against the placement, in the mean over its boundary …
+    double least_gain_mm = 0.05;    ///< … and by which its boundaries come nearer, in the mean …
+    double least_gain = 0.1;        ///< … and as a share of how far apart they were
+    double most_turn_deg = 60;      ///< against the placement: beyond, a body is taken to be symmetric
+    double most_apart_mm = 2;       ///< of its boundaries afterwards: beyond, they are not of one rigid body
+    double exact_apart_mm = 0.5;    ///< likewise, and half a voxel: beyond, a note says so
+    double least_depth_mm = 3;      ///< of a body: fields carry a thinner one less exactly, which a note says
+    std::size_t fewest_faces = 60;  ///< between voxels, of its boundary: smaller ones are left
+    std::size_t most_bodies = 253;  ///< that the mask of Surroundings can tell apart
+    int samples = 4000;             ///< boundary points, half from each map
 };
 inline constexpr SeenBodyOptions seen_body_options{};
 
-/// One label in both maps, and the rigid motion that brings its boundaries together.
+/// One label in both maps.
 class SeenBody {
 public:
-    /// Its boundaries in the moving and the fixed frame. Throws Cancelled.
-    SeenBody(int label, std::unique_ptr<LabelBoundaries> moving, std::unique_ptr<LabelBoundaries> fixed,
-             Observer& observer);
+    /// Its boundaries in the moving and the fixed frame, made, and neither without faces.
+    SeenBody(int label, std::unique_ptr<LabelBoundaries> moving, std::unique_ptr<LabelBoundaries> fixed);
 
-    [[nodiscard]] const BodyMotion& found() const { return found_; }
-    /// Mean distance of the boundaries after another motion, mm.
-    [[nodiscard]] double apart_mm(const Eigen::Isometry3d& motion) const;
-    /// By SeenBodyOptions.
-    [[nodiscard]] bool moved_beside(const Eigen::Isometry3d& placement) const;
+    [[nodiscard]] int label() const { return label_; }
+    /// How it moved: by the rigid motion that brings its boundaries together, sought from the placement; or with the
+    /// placement, by SeenBodyOptions. Notes what speaks against the former. Throws Cancelled.
+    [[nodiscard]] BodyMotion motion(const Eigen::Isometry3d& placement, Observer& observer) const;
 
 private:
+    int label_;
     std::unique_ptr<LabelBoundaries> moving_, fixed_;
     std::unique_ptr<LabelDistance> distance_;
-    BodyMotion found_;
+
+    /// Mean distance of the boundaries after a motion, mm.
+    [[nodiscard]] double apart_mm(const Eigen::Isometry3d& motion) const;
+    [[nodiscard]] Eigen::Isometry3d best_from(const Eigen::Isometry3d& placement, Observer& observer) const;
 };
 
-/// Of the neighbours that both maps show whole; those that the border of an image cuts are left to the placement, and
-/// those whose boundaries stay apart, each with a note. Throws Cancelled.
+/// The neighbours that both maps show whole. Where the fixed map shows any, a note says which of the others it does not
+/// show, or not whole, or that are too small to be followed.
 std::vector<SeenBody> seen_bodies(const RigidNeighbours& neighbours, const imaging::Volume& fixed_labels,
                                   Observer& observer);
 

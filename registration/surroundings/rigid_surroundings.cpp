@@ -198,11 +198,11 @@ bool is_usable(const Volume& image) {
 
 }  // namespace
 
-Surroundings rigid_bodies(const Volume& labels, const std::vector<BodyMotion>& moved, const Deformation& deformation) {
+Surroundings rigid_bodies(const Volume& labels, const std::vector<BodyMotion>& seen, const Deformation& deformation) {
     Surroundings surroundings{deformation.placement, imaging::mask_of_all(labels).clone()};
     imaging::Volume& rigid = surroundings.rigid;
     rigid.voxels = cv::min(rigid.voxels, 1);
-    for (const BodyMotion& body : moved) {
+    for (const BodyMotion& body : seen) {
         surroundings.bodies.push_back(body.motion);
         rigid.voxels.setTo(1 + double(surroundings.bodies.size()), imaging::mask_of(labels, body.label).voxels);
     }

@@ -27,9 +27,9 @@ std::optional<Surroundings> rigid_surroundings(const Deformation& deformation, c
                                                const imaging::Volume& fixed, const FieldOptions& options = {},
                                                Observer& observer = silent_observer());
 
-/// Bodies that are known to be rigid, of a label map in the moving frame: those that moved on their own, at most 253,
+/// Bodies that are known to be rigid, of a label map in the moving frame: those whose motion labels show, at most 253,
 /// and the others, with the placement. Without what the organ covers, before or after it deformed.
-Surroundings rigid_bodies(const imaging::Volume& labels, const std::vector<BodyMotion>& moved,
+Surroundings rigid_bodies(const imaging::Volume& labels, const std::vector<BodyMotion>& seen,
                           const Deformation& deformation);
 
 }  // namespace tissuewarp::registration

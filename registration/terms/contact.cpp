@@ -47,15 +47,15 @@ ContactTerm::Obstacle ContactTerm::obstacle(const imaging::Volume& distance,
     return result;
 }
 
-void ContactTerm::know_obstacles(const State& state) {
+void ContactTerm::know_obstacles(const State& state, Observer& observer) {
     if (!obstacles_.empty()) return;
     const RigidNeighbours& neighbours = *prepared_.neighbours;
     std::vector<int> moved;
     for (const SeenBody& body : seen_) {
-        if (!body.moved_beside(state.placement)) continue;
-        moved_.push_back(body.found());
-        moved.push_back(body.found().label);
-        obstacles_.push_back(obstacle(distance_about(neighbours.labels, moved.back()), moved_.back().motion));
+        bodies_.push_back(body.motion(state.placement, observer));
+        if (!bodies_.back().own) continue;
+        moved.push_back(body.label());
+        obstacles_.push_back(obstacle(distance_about(neighbours.labels, body.label()), bodies_.back().motion));
     }
     if (moved.empty()) {
         obstacles_.push_back(obstacle(neighbours.distance, std::nullopt));
@@ -79,8 +79,8 @@ ContactTerm::Gap ContactTerm::gap(std::size_t n, const State& state) const {
     return nearest;
 }
 
-Contribution ContactTerm::linearise(const RoundPlan& plan, const State& state, Observer& /*observer*/) {
-    know_obstacles(state);
+Contribution ContactTerm::linearise(const RoundPlan& plan, const State& state, Observer& observer) {
+    know_obstacles(state, observer);
     Contribution result;
     for (std::size_t n = 0; n < nodes_.size(); ++n) {
         const SurfaceNode& node = nodes_[n];
@@ -95,7 +95,7 @@ Contribution ContactTerm::linearise(const RoundPlan& plan, const State& state, O
 }
 
 bool ContactTerm::follow(const State& solved) {
-    know_obstacles(solved);
+    know_obstacles(solved, silent_observer());
     bool entered = false;
     for (std::size_t n = 0; n < nodes_.size(); ++n) {
         SurfaceNode& node = nodes_[n];
@@ -129,9 +129,9 @@ ContactFit ContactTerm::fit(const State& state) const {
 
 void ContactTerm::judge(const State& state, UpdateResult& result) {
     constexpr double most_mm = contact_options.most_depth_mm;
-    know_obstacles(state);
+    know_obstacles(state, silent_observer());
     result.contact = fit(state);
-    result.bodies = moved_;
+    result.bodies = bodies_;
     if (result.contact->deepest_mm > most_mm)
         result.doubts.push_back(
             {"contact.entered", result.contact->deepest_mm, most_mm,

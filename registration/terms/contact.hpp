@@ -67,13 +67,13 @@ private:
 
     const PreparedModel& prepared_;
     std::vector<SeenBody> seen_;
-    std::vector<BodyMotion> moved_;
+    std::vector<BodyMotion> bodies_;
     double stiffness_;  // kPa/mm
     std::vector<SurfaceNode> nodes_;
     std::vector<Obstacle> obstacles_;  // none before the first round
 
     /// In the first round, by the placement that it has.
-    void know_obstacles(const State& state);
+    void know_obstacles(const State& state, Observer& observer);
     [[nodiscard]] Obstacle obstacle(const imaging::Volume& distance,
                                     const std::optional<Eigen::Isometry3d>& motion) const;
 

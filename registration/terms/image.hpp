@@ -29,7 +29,7 @@ inline constexpr ImagePoseOptions image_pose_options{};
 struct EchoDoubtLimits {
     double least_agreement = 0.05;  ///< UltrasoundSearch: of the variance that chance leaves
     double most_rival = 0.8;        ///< support of the second-best pose over that of the best
-    double least_support = 6;       ///< of the pose: logarithm of the odds against chance
+    double least_support = 45;      ///< EchoPose::support; chosen on `faint-ultrasound:1-24`
     double most_residual_mm = 2;    ///< as ImageDoubtLimits'; single places of ultrasound err more than blocks do
 };
 inline constexpr EchoDoubtLimits echo_doubt_limits{};

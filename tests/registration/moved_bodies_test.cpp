@@ -94,33 +94,45 @@ double apart(const Isometry3d& a, const Isometry3d& b, const Bone& bone) {
     return most;
 }
 
+struct Notes : Observer {
+    std::vector<std::string>& kept;
+    explicit Notes(std::vector<std::string>& notes) : kept(notes) {}
+    void note(std::string_view text) override { kept.emplace_back(text); }
+};
+
 std::vector<detail::SeenBody> seen(const std::vector<Bone>& fixed, std::vector<std::string>& notes,
                                    const imaging::Geometry& grid = room()) {
-    struct Notes : Observer {
-        std::vector<std::string>* kept;
-        void note(std::string_view text) override { kept->emplace_back(text); }
-    } observer;
-    observer.kept = &notes;
+    Notes observer(notes);
     return detail::seen_bodies(*ball_and_bones().neighbours, map_of(fixed, true, grid), observer);
+}
+
+/// What a body's motion is, and the notes that it gives.
+BodyMotion motion_of(const detail::SeenBody& body, const Isometry3d& placement, std::vector<std::string>& notes) {
+    Notes observer(notes);
+    return body.motion(placement, observer);
 }
 
 TEST(MovedBodies, EachIsFoundWhereItWent) {
     std::vector<std::string> notes;
     const auto bodies = seen(bones(), notes);
     ASSERT_EQ(bodies.size(), 2u);
-    EXPECT_THAT(notes, IsEmpty());
     for (std::size_t n = 0; n < 2; ++n) {
-        EXPECT_LT(apart(bodies[n].found().motion, bones()[n].motion, bones()[n]), 0.6);
-        EXPECT_TRUE(bodies[n].moved_beside(Isometry3d::Identity()));
-        EXPECT_FALSE(bodies[n].moved_beside(bones()[n].motion));
+        const BodyMotion found = motion_of(bodies[n], Isometry3d::Identity(), notes);
+        EXPECT_TRUE(found.own);
+        EXPECT_LT(apart(found.motion, bones()[n].motion, bones()[n]), 0.6);
+        const BodyMotion placed = motion_of(bodies[n], bones()[n].motion, notes);
+        EXPECT_FALSE(placed.own);
+        EXPECT_EQ(placed.motion.matrix(), bones()[n].motion.matrix());
     }
+    EXPECT_THAT(notes, IsEmpty());
 }
 
 TEST(MovedBodies, WhatStayedOrIsNotSeenWholeMovesWithThePlacement) {
     std::vector<std::string> notes;
     std::vector<Bone> still = bones();
     for (Bone& bone : still) bone.motion.setIdentity();
-    for (const detail::SeenBody& body : seen(still, notes)) EXPECT_FALSE(body.moved_beside(Isometry3d::Identity()));
+    for (const detail::SeenBody& body : seen(still, notes))
+        EXPECT_FALSE(motion_of(body, Isometry3d::Identity(), notes).own);
     EXPECT_THAT(notes, IsEmpty());
 
     imaging::Geometry narrow = room();
@@ -129,10 +141,58 @@ TEST(MovedBodies, WhatStayedOrIsNotSeenWholeMovesWithThePlacement) {
     EXPECT_THAT(notes, ElementsAre(HasSubstr("rigid neighbour 3 meets the border")));
 
     notes.clear();
+    EXPECT_EQ(seen({bones()[0]}, notes).size(), 1u);
+    EXPECT_THAT(notes, ElementsAre(HasSubstr("rigid neighbour 3 is not in the fixed labels")));
+
+    notes.clear();
     std::vector<Bone> other = bones();
     other[0].half = {5, 22, 5};
-    EXPECT_EQ(seen(other, notes).size(), 1u);
+    EXPECT_FALSE(motion_of(seen(other, notes)[0], Isometry3d::Identity(), notes).own);
     EXPECT_THAT(notes, ElementsAre(HasSubstr("rigid neighbour 2 has another shape")));
+}
+
+/// A plate of one voxel has places between coarser samples, a speck next to no boundary.
+TEST(MovedBodies, MayBeThinOrTiny) {
+    for (int k = 20; k < 24; ++k) {
+        imaging::Volume labels(room(), CV_32SC1), fixed(room(), CV_32SC1);
+        for (int j = 10; j < 40; ++j)
+            for (int i = 10; i < 40; ++i) {
+                labels.data<int>()[labels.offset(i, j, k)] = left;
+                fixed.data<int>()[fixed.offset(i, j, k + 2)] = left;
+            }
+        labels.data<int>()[labels.offset(50, 50, k)] = right;
+        fixed.data<int>()[fixed.offset(50, 50, k + 1)] = right;
+        std::vector<std::string> notes;
+        Notes observer(notes);
+        const auto bodies = detail::seen_bodies({labels, {}}, fixed, observer);
+        ASSERT_EQ(bodies.size(), 1u);
+        EXPECT_THAT(notes, ElementsAre(HasSubstr("rigid neighbour 3 is too small")));
+        notes.clear();
+        const BodyMotion found = motion_of(bodies[0], Isometry3d::Identity(), notes);
+        EXPECT_TRUE(found.own);
+        EXPECT_LT((found.motion.translation() - Vector3d(0, 0, 3)).norm(), 0.3) << k;
+        EXPECT_THAT(notes, ElementsAre(HasSubstr("is thin")));
+    }
+}
+
+/// A cube is as well turned by 90°: it is taken to have turned by the least from the placement.
+TEST(MovedBodies, AreNotTurnedAboutTheirSymmetries) {
+    const auto cube = [](const Isometry3d& motion) {
+        imaging::Volume labels(room(), CV_32SC1);
+        test::for_each_voxel(labels, [&](const Vector3d& index, std::int64_t n) {
+            const Vector3d x = motion.inverse() * room().point(index);
+            if ((x - Vector3d(0, 0, -20)).cwiseAbs().maxCoeff() < 14) labels.data<int>()[n] = left;
+        });
+        return labels;
+    };
+    const Isometry3d placement = about({0, 0, -20}, 85, {0, 0, 1}, {2, 1, 0}),
+                     truth = about({0, 0, -20}, 8, {1, 0, 0}, {0, 2, 1}) * placement;
+    const RigidNeighbours neighbours{cube(Isometry3d::Identity()), {}};
+    const auto bodies = detail::seen_bodies(neighbours, cube(truth), silent_observer());
+    ASSERT_EQ(bodies.size(), 1u);
+    const BodyMotion found = bodies[0].motion(placement, silent_observer());
+    EXPECT_TRUE(found.own);
+    EXPECT_LT(apart(found.motion, truth, {left, {0, 0, -20}, {14, 14, 14}}), 1.0);
 }
 
 /// Far from its surface, and from the organ: what is nearer may give way.

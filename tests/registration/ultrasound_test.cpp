@@ -2,6 +2,7 @@
 #include "registration/matching/ultrasound/echo_costs.hpp"
 #include "registration/matching/ultrasound/echo_pose.hpp"
 #include "registration/matching/ultrasound/speckle.hpp"
+#include "registration/matching/ultrasound/structure_costs.hpp"
 #include "registration/matching/ultrasound/ultrasound_search.hpp"
 #include "registration/terms/datum_kind.hpp"
 #include "registration/terms/image.hpp"
@@ -108,26 +109,45 @@ TEST(Speckle, ThatTheMovingImageHasTooIsNoSignOfUltrasound) {
 }
 
 /// Of an organ that was shifted by (1, −2, 1) places along the axes of its grid.
-detail::EchoCosts costs_of_a_shift() {
+template <class Costs>
+detail::EchoCosts of_a_shift(const Costs& costs) {
     const Organ one = organ();
     Eigen::Isometry3d shift = Eigen::Isometry3d::Identity();
     shift.translation() = one.labels.geometry.direction * Eigen::Vector3d(3, -6, 3);
     const detail::SeenImage seen(echoes(one.labels.geometry, shift));
     detail::EchoSource source(one.model.model.mesh, one.image, seen);
     const detail::State rest{Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, one.model.rest.node_count)};
-    return detail::echo_costs(source.on_grid(rest, 3, 12), {8, 3, 3});
+    return costs(source, rest);
+}
+detail::EchoCosts costs_of_a_shift() {
+    return of_a_shift([](detail::EchoSource& source, const detail::State& rest) {
+        return detail::echo_costs(source.on_grid(rest, 3, 12), {8, 3, 3});
+    });
 }
 
-TEST(EchoCosts, AreLeastAtTheShiftThatWasMade) {
-    const detail::EchoCosts costs = costs_of_a_shift();
-    ASSERT_GT(costs.at.size(), 20U);
+Eigen::Vector3i least_shift(const detail::EchoCosts& costs) {
     Eigen::VectorXd total = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(costs.lattice()));
     for (std::size_t n = 0; n < costs.at.size(); ++n)
         for (std::size_t entry = 0; entry < costs.lattice(); ++entry)
             total[static_cast<Eigen::Index>(entry)] += std::min(costs.of(n)[entry], 1.F);
     Eigen::Index least = 0;
     total.minCoeff(&least);
-    EXPECT_EQ(costs.shift(static_cast<std::size_t>(least)), Eigen::Vector3i(1, -2, 1));
+    return costs.shift(static_cast<std::size_t>(least));
+}
+
+TEST(EchoCosts, AreLeastAtTheShiftThatWasMade) {
+    const detail::EchoCosts costs = costs_of_a_shift();
+    ASSERT_GT(costs.at.size(), 20U);
+    EXPECT_EQ(least_shift(costs), Eigen::Vector3i(1, -2, 1));
+}
+
+TEST(StructureCosts, AreLeastAtTheShiftThatWasMade) {
+    const detail::EchoCosts costs = of_a_shift([](detail::EchoSource& source, const detail::State& rest) {
+        return detail::structure_costs(source.on_grid(rest, 1.5, 12), {8, 2, 3, 6});
+    });
+    EXPECT_DOUBLE_EQ(costs.step_mm, 3);
+    ASSERT_GT(costs.at.size(), 20U);
+    EXPECT_EQ(least_shift(costs), Eigen::Vector3i(1, -2, 1));
 }
 
 // How the organ is turned, they can hardly say.
@@ -138,7 +158,7 @@ TEST(EchoPose, IsSoughtFromAFewPlacesCloseTogether) {
         few.at.resize(count);
         few.cost.resize(count * few.lattice());
         few.window_share.resize(count);
-        const detail::EchoPose found = detail::echo_pose(few, {}, silent_observer());
+        const detail::EchoPose found = detail::echo_pose({{few}}, {}, silent_observer());
         EXPECT_TRUE(found.motion.matrix().allFinite());
         EXPECT_LT(found.motion.translation().norm(), 30) << count;
     }
@@ -167,11 +187,11 @@ TEST(UltrasoundUpdate, FindsTheOrganAndSaysHowItCompared) {
 
 TEST(UltrasoundDoubts, AreOfEchoesThatNothingExplainsAndOfPosesThatFitAsWell) {
     detail::EchoPose pose;
-    pose.support = 50;
+    pose.support = 60;
     pose.rival_mm = 11;
     pose.rival_support = 20;
     EXPECT_TRUE(detail::doubts_of_echoes(0.2, pose, "image").empty());
-    pose.rival_support = 45;
+    pose.rival_support = 55;
     EXPECT_EQ(codes(detail::doubts_of_echoes(0.01, pose, "image")),
               (std::vector<std::string>{"image.echoes_unexplained", "image.two_poses"}));
 }

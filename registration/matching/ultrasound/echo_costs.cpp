@@ -1,5 +1,7 @@
 #include "registration/matching/ultrasound/echo_costs.hpp"
 
+#include "registration/matching/ultrasound/window_sums.hpp"
+
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
@@ -16,50 +18,7 @@ namespace {
 using Sums = Eigen::Array<float, 12, 1>;
 enum Sum { W, U, UU, M, G, MM, GG, MG, UM, UG };
 
-struct Grid {
-    std::array<int, 3> size;
-    std::vector<Sums> sums;
-
-    Sums& at(int i, int j, int k) {
-        return sums[static_cast<std::size_t>(i + size[0] * (j + std::ptrdiff_t{size[1]} * k))];
-    }
-};
-
-std::vector<float> gaussian(double deviation_voxels) {
-    constexpr double cut = 2;  // deviations
-    const int radius = std::max(1, static_cast<int>(std::lround(cut * deviation_voxels)));
-    std::vector<float> weights;
-    float total = 0;
-    for (int n = -radius; n <= radius; ++n) {
-        weights.push_back(static_cast<float>(std::exp(-0.5 * std::pow(n / deviation_voxels, 2))));
-        total += weights.back();
-    }
-    for (float& weight : weights) weight /= total;
-    return weights;
-}
-
-/// Smooths along an axis and keeps every `stride`-th.
-void smooth_along(std::size_t axis, const std::vector<float>& weights, int stride, Grid& from, Grid& to) {
-    const int radius = static_cast<int>(weights.size()) / 2, length = from.size[axis];
-    to.size = from.size;
-    to.size[axis] = (length + stride - 1) / stride;
-    to.sums.resize(static_cast<std::size_t>(to.size[0]) * static_cast<std::size_t>(to.size[1]) *
-                   static_cast<std::size_t>(to.size[2]));
-    const std::ptrdiff_t step = axis == 0 ? 1 : axis == 1 ? from.size[0] : std::ptrdiff_t{from.size[0]} * from.size[1];
-    for (int k = 0; k < to.size[2]; ++k)
-        for (int j = 0; j < to.size[1]; ++j)
-            for (int i = 0; i < to.size[0]; ++i) {
-                std::array<int, 3> voxel{i, j, k};
-                voxel[axis] *= stride;
-                const int middle = voxel[axis], low = std::max(-radius, -middle),
-                          high = std::min(radius, length - 1 - middle);
-                const Sums* source = &from.at(voxel[0], voxel[1], voxel[2]);
-                Sums sum = Sums::Zero();
-                for (int n = low; n <= high; ++n)
-                    sum += weights[static_cast<std::size_t>(n + radius)] * source[n * step];
-                to.at(i, j, k) = sum;
-            }
-}
+using Grid = SumGrid<Sums>;
 
 /// Memory of a thread.
 struct Work {
@@ -80,15 +39,12 @@ float unexplained(const Sums& s, double ridge) {
 class Shifted {
 public:
     Shifted(const EchoImages& images, const EchoCostOptions& options)
-        : images_(images), options_(options), weights_(gaussian(options.window_mm / images.grid.spacing[0])) {}
+        : images_(images), options_(options), weights_(gaussian_window(options.window_mm / images.grid.spacing[0])) {}
 
     /// Sums of the windows about all places, of the moving image shifted by steps.
     Grid& sums(const Eigen::Vector3i& shift, Work& work) const {
         fill(shift, work.one);
-        smooth_along(2, weights_, options_.stride, work.one, work.other);
-        smooth_along(1, weights_, options_.stride, work.other, work.one);
-        smooth_along(0, weights_, options_.stride, work.one, work.other);
-        return work.other;
+        return window_sums(weights_, options_.stride, work.one, work.other);
     }
 
 private:

@@ -15,79 +15,37 @@ namespace {
 
 using Pose = std::array<double, 6>;  // shift of the middle and rotation vector times the radius, mm
 
-class PoseEvidence {
+/// Of one kind of costs.
+class KindEvidence {
 public:
-    PoseEvidence(const EchoCosts& costs, const EchoPoseOptions& options) : costs_(costs), options_(options) {
-        const std::size_t lattice = costs.lattice();
-        const double independent = costs.places.voxel_volume() / options.independent_mm3;
-        evidence_.resize(costs.cost.size());
-        places_.resize(3, static_cast<Eigen::Index>(costs.at.size()));
-        for (std::size_t n = 0; n < costs.at.size(); ++n) {
-            places_.col(static_cast<Eigen::Index>(n)) = costs.place(n);
-            add_evidence(costs.of(n), lattice, independent * costs.window_share[n], evidence_.data() + n * lattice);
+    KindEvidence(const EchoCosts& costs, double weight, double independent_mm3)
+        : costs_(costs), along_(costs_.places.direction.transpose() / costs_.step_mm) {
+        const std::size_t lattice = costs_.lattice();
+        const double independent = weight * costs_.places.voxel_volume() / independent_mm3;
+        evidence_.resize(costs_.cost.size());
+        places_.resize(3, static_cast<Eigen::Index>(costs_.at.size()));
+        for (std::size_t n = 0; n < costs_.at.size(); ++n) {
+            places_.col(static_cast<Eigen::Index>(n)) = costs_.place(n);
+            add_evidence(costs_.of(n), lattice, independent * costs_.window_share[n], evidence_.data() + n * lattice);
         }
-        centre_ = places_.rowwise().mean();
-        radius_ = std::max(1.0, std::sqrt((places_.colwise() - centre_).colwise().squaredNorm().mean()));
     }
 
-    [[nodiscard]] double radius() const { return radius_; }
+    [[nodiscard]] const Eigen::Matrix3Xd& places() const { return places_; }
 
-    /// −log posterior of a pose, 0 by chance where the headers put the organ.
-    [[nodiscard]] double operator()(const Pose& pose) const {
-        const Eigen::Isometry3d back = motion(pose).inverse();
-        const Eigen::Matrix3d along = costs_.places.direction.transpose() / costs_.step_mm;
+    /// −log odds of a motion against chance.
+    [[nodiscard]] double of(const Eigen::Isometry3d& motion) const {
+        const Eigen::Isometry3d back = motion.inverse();
         double sum = 0;
         for (Eigen::Index n = 0; n < places_.cols(); ++n)
-            sum += at(static_cast<std::size_t>(n), along * (places_.col(n) - back * places_.col(n)));
-        return sum + expectation(pose);
-    }
-
-    [[nodiscard]] Eigen::Isometry3d motion(const Pose& pose) const {
-        const Eigen::Vector3d rotation = Eigen::Vector3d(pose[3], pose[4], pose[5]) / radius_;
-        const double angle = rotation.norm();
-        Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
-        if (angle > 0) result.linear() = Eigen::AngleAxisd(angle, rotation / angle).toRotationMatrix();
-        result.translation() = centre_ + Eigen::Vector3d(pose[0], pose[1], pose[2]) - result.linear() * centre_;
-        return result;
-    }
-
-    /// Mean over the places.
-    [[nodiscard]] double distance(const Pose& a, const Pose& b) const {
-        return (motion(a) * places_ - motion(b) * places_).colwise().norm().mean();
-    }
-
-    /// The shifts that are lower than their neighbours, the lowest first.
-    [[nodiscard]] std::vector<Pose> lowest_shifts() const {
-        const std::size_t lattice = costs_.lattice();
-        std::vector<Pose> shifts(lattice);
-        std::vector<double> costs(lattice);
-        tbb::parallel_for(std::size_t{0}, lattice, [&](std::size_t entry) {
-            const Eigen::Vector3d shift =
-                costs_.places.direction * (costs_.step_mm * costs_.shift(entry).cast<double>());
-            shifts[entry] = {shift[0], shift[1], shift[2], 0, 0, 0};
-            costs[entry] = (*this)(shifts[entry]);
-        });
-        std::vector<std::size_t> order(lattice);
-        std::iota(order.begin(), order.end(), std::size_t{0});
-        std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return costs[a] < costs[b]; });
-        std::vector<Pose> result;
-        for (const std::size_t entry : order) {
-            const bool alone = std::none_of(result.begin(), result.end(), [&](const Pose& other) {
-                return distance(other, shifts[entry]) < 1.5 * costs_.step_mm;
-            });
-            if (alone) result.push_back(shifts[entry]);
-            if (static_cast<int>(result.size()) == options_.starts) break;
-        }
-        return result;
+            sum += at(static_cast<std::size_t>(n), along_ * (places_.col(n) - back * places_.col(n)));
+        return sum;
     }
 
 private:
     const EchoCosts& costs_;
-    const EchoPoseOptions& options_;
-    std::vector<float> evidence_;  // −log odds of each shift of each place against chance
+    Eigen::Matrix3d along_;        // axes of the lattice, in steps
+    std::vector<float> evidence_;  // of each shift of each place
     Eigen::Matrix3Xd places_;
-    Eigen::Vector3d centre_;
-    double radius_ = 1;  // of the places, mm
 
     static void add_evidence(const float* cost, std::size_t lattice, double independent, float* evidence) {
         constexpr double least_cost = 1e-3;
@@ -127,6 +85,74 @@ private:
             }
         return sum;
     }
+};
+
+class PoseEvidence {
+public:
+    PoseEvidence(const std::vector<PoseCosts>& kinds, double PoseCosts::*weight, const EchoPoseOptions& options)
+        : first_(kinds.front().costs), options_(options) {
+        for (const PoseCosts& kind : kinds) kinds_.emplace_back(kind.costs, kind.*weight, options.independent_mm3);
+        centre_ = places().rowwise().mean();
+        radius_ = std::max(1.0, std::sqrt((places().colwise() - centre_).colwise().squaredNorm().mean()));
+    }
+
+    [[nodiscard]] double radius() const { return radius_; }
+
+    /// −log posterior of a pose, 0 by chance where the headers put the organ.
+    [[nodiscard]] double operator()(const Pose& pose) const {
+        const Eigen::Isometry3d moved = motion(pose);
+        double sum = expectation(pose);
+        for (const KindEvidence& kind : kinds_) sum += kind.of(moved);
+        return sum;
+    }
+
+    [[nodiscard]] Eigen::Isometry3d motion(const Pose& pose) const {
+        const Eigen::Vector3d rotation = Eigen::Vector3d(pose[3], pose[4], pose[5]) / radius_;
+        const double angle = rotation.norm();
+        Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
+        if (angle > 0) result.linear() = Eigen::AngleAxisd(angle, rotation / angle).toRotationMatrix();
+        result.translation() = centre_ + Eigen::Vector3d(pose[0], pose[1], pose[2]) - result.linear() * centre_;
+        return result;
+    }
+
+    /// Mean over the places.
+    [[nodiscard]] double distance(const Pose& a, const Pose& b) const {
+        return (motion(a) * places() - motion(b) * places()).colwise().norm().mean();
+    }
+
+    /// The shifts that are lower than their neighbours, the lowest first.
+    [[nodiscard]] std::vector<Pose> lowest_shifts() const {
+        const std::size_t lattice = first_.lattice();
+        std::vector<Pose> shifts(lattice);
+        std::vector<double> costs(lattice);
+        tbb::parallel_for(std::size_t{0}, lattice, [&](std::size_t entry) {
+            const Eigen::Vector3d shift =
+                first_.places.direction * (first_.step_mm * first_.shift(entry).cast<double>());
+            shifts[entry] = {shift[0], shift[1], shift[2], 0, 0, 0};
+            costs[entry] = (*this)(shifts[entry]);
+        });
+        std::vector<std::size_t> order(lattice);
+        std::iota(order.begin(), order.end(), std::size_t{0});
+        std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return costs[a] < costs[b]; });
+        std::vector<Pose> result;
+        for (const std::size_t entry : order) {
+            const bool alone = std::none_of(result.begin(), result.end(), [&](const Pose& other) {
+                return distance(other, shifts[entry]) < 1.5 * first_.step_mm;
+            });
+            if (alone) result.push_back(shifts[entry]);
+            if (static_cast<int>(result.size()) == options_.starts) break;
+        }
+        return result;
+    }
+
+private:
+    const EchoCosts& first_;
+    const EchoPoseOptions& options_;
+    std::vector<KindEvidence> kinds_;
+    Eigen::Vector3d centre_;
+    double radius_ = 1;  // of the places, mm
+
+    [[nodiscard]] const Eigen::Matrix3Xd& places() const { return kinds_.front().places(); }
 
     [[nodiscard]] double expectation(const Pose& pose) const {
         const double shift = std::hypot(pose[0], pose[1], pose[2]) / options_.shift_mm,
@@ -174,10 +200,10 @@ Found descended(const PoseEvidence& evidence, const Pose& start, const EchoPoseO
 
 }  // namespace
 
-EchoPose echo_pose(const EchoCosts& costs, const EchoPoseOptions& options, Observer& observer) {
+EchoPose echo_pose(const std::vector<PoseCosts>& kinds, const EchoPoseOptions& options, Observer& observer) {
     EchoPose result;
-    if (costs.at.empty()) return result;
-    const PoseEvidence evidence(costs, options);
+    if (kinds.front().costs.at.empty()) return result;
+    const PoseEvidence evidence(kinds, &PoseCosts::weight, options), finer(kinds, &PoseCosts::finer_weight, options);
     std::vector<Pose> starts = evidence.lowest_shifts();
     const std::size_t turned = std::min(starts.size(), static_cast<std::size_t>(options.turned_starts));
     for (std::size_t n = 0; n < turned; ++n)
@@ -193,7 +219,7 @@ EchoPose echo_pose(const EchoCosts& costs, const EchoPoseOptions& options, Obser
                       [&](std::size_t n) { found[n] = descended(evidence, starts[n], options); });
     observer.checkpoint("rigid alignment", 1.0);
     std::stable_sort(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.cost < b.cost; });
-    result.motion = evidence.motion(found.front().pose);
+    result.motion = finer.motion(descended(finer, found.front().pose, options).pose);
     result.support = -found.front().cost;
     for (const Found& other : found) {
         const double away = evidence.distance(other.pose, found.front().pose);

@@ -6,6 +6,8 @@
 
 #include <Eigen/Geometry>
 
+#include <vector>
+
 namespace tissuewarp::registration::detail {
 
 /// What is expected of tracking, and how poses are searched. Chosen on `study coverage --problems ultrasound:1-12`.
@@ -21,11 +23,19 @@ struct EchoPoseOptions {
 
 struct EchoPose {
     Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();  ///< of the tissue, in the frame of the places
-    double support = 0;                                        ///< logarithm of the odds against chance
+    double support = 0;        ///< what speaks for it against chance, by the weights that tell poses apart
     double rival_mm = 0;       ///< how far the best other pose lies from it; 0: there is none
     double rival_support = 0;  ///< of that one
 };
 
-EchoPose echo_pose(const EchoCosts& costs, const EchoPoseOptions& options, Observer& observer);
+/// Costs of one kind, and how much they count against those of another: when poses are told apart, and when the best of
+/// them is made finer.
+struct PoseCosts {
+    EchoCosts costs;
+    double weight = 1, finer_weight = 1;
+};
+
+/// All have the same lattice of shifts.
+EchoPose echo_pose(const std::vector<PoseCosts>& kinds, const EchoPoseOptions& options, Observer& observer);
 
 }  // namespace tissuewarp::registration::detail

@@ -18,7 +18,14 @@ EchoCosts UltrasoundSearch::costs(const State& state, const EchoLevel& level) {
 }
 
 EchoPose UltrasoundSearch::pose(const State& by_headers, Observer& observer) {
-    return echo_pose(costs(by_headers, options_.pose), {}, observer);
+    const StructureCostOptions& structure = options_.structure;
+    const double spacing_mm = options_.pose.spacing_mm / structure.step,
+                 reach_mm = (structure.reach + 1) * options_.pose.spacing_mm;
+    std::vector<PoseCosts> kinds;
+    kinds.push_back({costs(by_headers, options_.pose)});
+    kinds.push_back(
+        {structure_costs(source_.on_grid(by_headers, spacing_mm, reach_mm), structure), options_.structure_weight});
+    return echo_pose(kinds, {}, observer);
 }
 
 DenseMatches UltrasoundSearch::matches(const State& state, int number, const meshing::PointLocator& locator) {

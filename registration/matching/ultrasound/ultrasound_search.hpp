@@ -4,6 +4,7 @@
 #include "registration/matching/dense/dense_search.hpp"
 #include "registration/matching/ultrasound/echo_matches.hpp"
 #include "registration/matching/ultrasound/echo_pose.hpp"
+#include "registration/matching/ultrasound/structure_costs.hpp"
 
 namespace tissuewarp::registration::detail {
 
@@ -16,6 +17,9 @@ struct EchoLevel {
 /// Chosen on `study coverage --problems ultrasound:1-12` (docs/decisions/ultrasound.md).
 struct UltrasoundSearchOptions {
     EchoLevel pose{3, {9, 6, 2}};
+    StructureCostOptions structure;  ///< of the pose too, on a grid finer by its step
+    double structure_weight = 10;    ///< against the echoes' costs, where poses are told apart; chosen on
+                                     ///< `faint-ultrasound:1-24`
     std::vector<EchoLevel> levels{{3, {9, 3, 2}}, {2.5, {8, 2, 2}}, {2, {6, 2, 2}},
                                   {2, {5, 2, 2}}, {2, {5, 2, 2}},   {2, {5, 2, 2}}};
 };
