@@ -143,7 +143,7 @@ TEST(EchoCosts, AreLeastAtTheShiftThatWasMade) {
 
 TEST(StructureCosts, AreLeastAtTheShiftThatWasMade) {
     const detail::EchoCosts costs = of_a_shift([](detail::EchoSource& source, const detail::State& rest) {
-        return detail::structure_costs(source.on_grid(rest, 1.5, 12), {8, 2, 3, 6});
+        return detail::structure_costs(source.on_grid(rest, 1.5, 12), {8, 2, 3, 3});
     });
     EXPECT_DOUBLE_EQ(costs.step_mm, 3);
     ASSERT_GT(costs.at.size(), 20U);

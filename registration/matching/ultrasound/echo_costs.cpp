@@ -44,7 +44,7 @@ EchoCosts echo_costs(const EchoImages& images, const EchoCostOptions& options) {
         return sums;
     };
     const auto cost = [&](const Sums& sums) { return unexplained(sums, options.ridge); };
-    const ShiftedWindows windows{options.window_mm, 1, options.reach, options.stride, options.least_share,
+    const ShiftedWindows windows{options.window_mm, options.reach, options.stride, options.least_share,
                                  options.most_lost};
     return costs_of_shifts<Sums>(images, windows, pixel, cost);
 }

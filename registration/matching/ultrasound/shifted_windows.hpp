@@ -77,7 +77,7 @@ SumGrid<Sums>& window_sums(const std::vector<float>& weights, int stride, SumGri
 /// How windows are shifted and which count; see EchoCostOptions.
 struct ShiftedWindows {
     double window_mm;
-    int step, reach, stride;  ///< voxels from shift to shift; steps; voxels between places
+    int reach, stride;  ///< voxels: shifts of up to the one, places apart by the other
     double least_share, most_lost;
 };
 
@@ -105,7 +105,7 @@ EchoCosts costs_of_shifts(const EchoImages& images, const ShiftedWindows& window
         return window_sums(weights, windows.stride, work.one, work.other);
     };
     EchoCosts result;
-    result.step_mm = windows.step * images.grid.spacing[0];
+    result.step_mm = images.grid.spacing[0];
     result.reach = windows.reach;
     result.places = images.grid;
     result.places.spacing *= windows.stride;
@@ -125,7 +125,7 @@ EchoCosts costs_of_shifts(const EchoImages& images, const ShiftedWindows& window
         const auto both = [&](std::size_t n, std::size_t from, Sums& sums) {
             if (images.shown[from] != 0) sums = pixel(n, from);
         };
-        const SumGrid<Sums>& sums = sums_of(windows.step * result.shift(entry), works.local(), both);
+        const SumGrid<Sums>& sums = sums_of(result.shift(entry), works.local(), both);
         for (std::size_t n = 0; n < result.at.size(); ++n) {
             const Sums& here = sums.sums[result.at[n]];
             const bool lost = here[0] < (1 - windows.most_lost) * result.window_share[n];

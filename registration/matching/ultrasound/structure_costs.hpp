@@ -10,9 +10,9 @@ namespace tissuewarp::registration::detail {
 /// Chosen on `study coverage --problems faint-ultrasound:1-24` (docs/decisions/ultrasound.md).
 struct StructureCostOptions {
     double window_mm = 9;      ///< deviation of the Gaussian window about a place
-    int step = 2;              ///< voxels from one shift to the next
+    int step = 2;              ///< voxels from one that is compared to the next, and from shift to shift
     int reach = 6;             ///< steps: shifts of up to this along each axis
-    int stride = 4;            ///< voxels between places
+    int stride = 2;            ///< steps between places
     double least_share = 0.3;  ///< as EchoCostOptions
     double most_lost = 0.4;    ///< likewise
 };
