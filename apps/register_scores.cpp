@@ -28,6 +28,21 @@ CurveDistances curve_distances(const RegistrationRun& run) {
             curve_residual(carried, curves.fixed, {}).to_lines};
 }
 
+/// Of the organ; fixed labels of bones alone say nothing of it.
+void score_overlap(RegistrationRun& run) {
+    if (run.inputs.fixed_labels.empty()) return;
+    const auto organ = [&](const imaging::Volume& labels) { return organ_of(labels, run.options); };
+    const imaging::Volume fixed = organ(run.inputs.fixed_labels);
+    if (imaging::labels_in(fixed).empty()) return;
+    Scores& scores = run.scores;
+    tbb::parallel_invoke(
+        [&] {
+            const imaging::Volume moving = organ(run.inputs.moving_labels);
+            scores.before = overlap(imaging::resample(moving, fixed.geometry, imaging::Interpolation::Nearest), fixed);
+        },
+        [&] { scores.after = overlap(organ(run.products.warped_labels), fixed); });
+}
+
 }  // namespace
 
 void estimate_errors(RegistrationRun& run, ProgressLine& progress) {
@@ -42,17 +57,7 @@ void estimate_errors(RegistrationRun& run, ProgressLine& progress) {
 
 void score_warped(RegistrationRun& run) {
     Scores& scores = run.scores;
-    const auto organ = [&](const imaging::Volume& labels) { return organ_of(labels, run.options); };
-    if (!run.inputs.fixed_labels.empty()) {
-        const imaging::Volume fixed = organ(run.inputs.fixed_labels);
-        tbb::parallel_invoke(
-            [&] {
-                const imaging::Volume moving = organ(run.inputs.moving_labels);
-                scores.before =
-                    overlap(imaging::resample(moving, fixed.geometry, imaging::Interpolation::Nearest), fixed);
-            },
-            [&] { scores.after = overlap(organ(run.products.warped_labels), fixed); });
-    }
+    score_overlap(run);
     scores.mesh = mesh_jacobians(run.result.deformation);
     if (run.inputs.landmarks) scores.target_error = target_error(*run.inputs.landmarks, run.products.landmarks);
     if (run.inputs.curves) scores.curves = curve_distances(run);

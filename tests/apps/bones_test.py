@@ -76,11 +76,13 @@ def dice(a, b):
 
 
 class Bones(unittest.TestCase):
-    def registered(self, seed):
-        spine = Spine(seed)
+    def folder(self):
         temporary = tempfile.TemporaryDirectory(prefix="tissuewarp-test-")
         self.addCleanup(temporary.cleanup)
-        folder = pathlib.Path(temporary.name)
+        return pathlib.Path(temporary.name)
+
+    def registered(self, seed):
+        spine, folder = Spine(seed), self.folder()
         moving, fixed = spine.labels(False), spine.labels(True)
         result = run("register", "--no-align", "--rigid-neighbour", ",".join(map(str, BONES)), "--edge-length", 7,
                      "--moving-labels", save(moving, AFFINE, folder / "moving.nii.gz"),
@@ -107,6 +109,24 @@ class Bones(unittest.TestCase):
                           f"{dice(warped == label, fixed == label):.3f}")
                     self.assertLess(off, 1.0 if label in found else 1.5)
                     self.assertGreater(dice(warped == label, fixed == label), 0.88)
+
+    def test_labels_may_show_bones_alone(self):
+        spine, folder = Spine(7), self.folder()
+        bones = spine.labels(True)
+        bones[bones == ORGAN] = 0
+        places = numpy.random.default_rng(1).normal(size=(40, 3))
+        places *= 0.7 * spine.organ_axes / numpy.linalg.norm(places, axis=1)[:, None]
+        numpy.savetxt(folder / "pairs.csv", numpy.hstack([places, places + spine.organ_shift]), delimiter=",", comments="",
+                      header="pre_x,pre_y,pre_z,intra_x,intra_y,intra_z")
+        result = run("register", "--no-align", "--rigid-neighbour", ",".join(map(str, BONES)), "--edge-length", 8,
+                     "--moving-labels", save(spine.labels(False), AFFINE, folder / "moving.nii.gz"),
+                     "--fixed-labels", save(bones, AFFINE, folder / "fixed.nii.gz"),
+                     "--fixed-points", folder / "pairs.csv", "--output", folder / "out")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        report = json.loads((folder / "out" / "report.json").read_text())
+        self.assertEqual([body["label"] for body in report["rigid_neighbours"]], list(BONES))
+        self.assertEqual(report["points"]["outliers"], 0)
+        self.assertNotIn("after", report.get("overlap", {}))
 
 
 if __name__ == "__main__":
