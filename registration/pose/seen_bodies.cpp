@@ -77,6 +77,18 @@ Isometry3d SeenBody::best_from(const Isometry3d& placement, Observer& observer) 
     return finer_motion({moving_->of(all).faces, from}, {fixed_->of(all).faces, to}, pose.placement * placement);
 }
 
+void SeenBody::note_what_is_inexact(double apart, Observer& observer) const {
+    const double voxel =
+        std::max(moving_->labels().geometry.spacing.maxCoeff(), fixed_->labels().geometry.spacing.maxCoeff());
+    if (apart > options.exact_apart_mm + 0.5 * voxel)
+        observer.note(name_of_body(label_) + " moved on its own, but its boundaries stay " + to_text(apart) +
+                      " mm apart: another shape, or pieces that moved each by itself");
+    double deepest = 0;
+    cv::minMaxLoc(moving_->of(all).distance.voxels.reshape(1, 1), &deepest, nullptr);
+    if (-deepest < options.least_depth_mm)
+        observer.note(name_of_body(label_) + " is thin: the fields carry it to a millimetre or two only");
+}
+
 BodyMotion SeenBody::motion(const Isometry3d& placement, Observer& observer) const {
     const std::string name = name_of_body(label_);
     const BodyMotion left{label_, false, placement, apart_mm(placement)};
@@ -96,14 +108,7 @@ BodyMotion SeenBody::motion(const Isometry3d& placement, Observer& observer) con
                       "°, as a symmetric one may: it is not followed by itself");
         return left;
     }
-    const double voxel =
-        std::max(moving_->labels().geometry.spacing.maxCoeff(), fixed_->labels().geometry.spacing.maxCoeff());
-    if (apart > options.exact_apart_mm + 0.5 * voxel)
-        observer.note(name + " moved on its own, but its boundaries stay " + to_text(apart) +
-                      " mm apart: another shape, or pieces that moved each by itself");
-    if (double least = 0;
-        cv::minMaxLoc(moving_->of(all).distance.voxels.reshape(1, 1), &least, nullptr), -least < options.least_depth_mm)
-        observer.note(name + " is thin: fields carry it less exactly than points are apart that tell how it moved");
+    note_what_is_inexact(apart, observer);
     return {label_, true, found.motion, apart};
 }
 

@@ -48,6 +48,8 @@ private:
     /// Mean distance of the boundaries after a motion, mm.
     [[nodiscard]] double apart_mm(const Eigen::Isometry3d& motion) const;
     [[nodiscard]] Eigen::Isometry3d best_from(const Eigen::Isometry3d& placement, Observer& observer) const;
+    /// Of a body that moved on its own.
+    void note_what_is_inexact(double apart, Observer& observer) const;
 };
 
 /// The neighbours that both maps show whole. Where the fixed map shows any, a note says which of the others it does not
