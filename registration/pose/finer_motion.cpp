@@ -1,6 +1,8 @@
 #include "registration/pose/finer_motion.hpp"
 
 #include "imaging/sampling.hpp"
+#include "registration/pose/label_boundaries.hpp"
+#include "registration/pose/pose_space.hpp"
 #include "registration/pose/robust_weight.hpp"
 
 #include <Eigen/Dense>
@@ -15,26 +17,12 @@ using Eigen::Isometry3d;
 using Eigen::Vector3d;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-/// Of six numbers, all in mm: a shift, and a turn about `centre` times `radius`.
-struct Step {
-    Vector3d centre;
-    double radius;
-
-    [[nodiscard]] Isometry3d motion(const Vector6d& x) const {
-        const Vector3d turn = x.tail<3>() / radius;
-        Isometry3d result = Isometry3d::Identity();
-        if (const double angle = turn.norm(); angle > 0)
-            result.linear() = Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix();
-        result.translation() = centre + x.head<3>() - result.linear() * centre;
-        return result;
-    }
-    /// How a distance with this gradient changes at a place (fixed frame).
-    [[nodiscard]] Vector6d derivative(const Vector3d& place, const Vector3d& gradient) const {
-        Vector6d result;
-        result << gradient, (place - centre).cross(gradient) / radius;
-        return result;
-    }
-};
+/// How a distance with this gradient changes at a place (fixed frame) with the first six numbers of the space.
+Vector6d derivative(const PoseSpace& space, const Vector3d& place, const Vector3d& gradient) {
+    Vector6d result;
+    result << gradient, (place - space.centre).cross(gradient) / space.radius;
+    return result;
+}
 
 struct NormalEquations {
     Eigen::Matrix<double, 6, 6> matrix = Eigen::Matrix<double, 6, 6>::Zero();
@@ -52,11 +40,6 @@ struct NormalEquations {
     }
 };
 
-Eigen::Matrix3Xd thinned(const Eigen::Matrix3Xd& points, Eigen::Index most) {
-    const Eigen::Index stride = std::max<Eigen::Index>(1, (points.cols() + most - 1) / most);
-    return points(Eigen::all, Eigen::seq(0, points.cols() - 1, stride));
-}
-
 }  // namespace
 
 Isometry3d finer_motion(const BodyBoundary& moving, const BodyBoundary& fixed, const Isometry3d& start,
@@ -64,7 +47,7 @@ Isometry3d finer_motion(const BodyBoundary& moving, const BodyBoundary& fixed, c
     const imaging::LinearSampler in_moving(moving.distance), in_fixed(fixed.distance);
     const Eigen::Matrix3Xd from = thinned(moving.points, options.samples), to = thinned(fixed.points, options.samples);
     const Vector3d centre = to.rowwise().mean();
-    const Step space{centre, std::max(1.0, std::sqrt((to.colwise() - centre).colwise().squaredNorm().mean()))};
+    const PoseSpace space{centre, std::max(1.0, std::sqrt((to.colwise() - centre).colwise().squaredNorm().mean()))};
     Isometry3d motion = start;
     double scale_mm = options.first_scale_mm;
     for (int step = 0; step < options.most_steps; ++step) {
@@ -72,15 +55,15 @@ Isometry3d finer_motion(const BodyBoundary& moving, const BodyBoundary& fixed, c
         for (const auto& x : from.colwise()) {
             const Vector3d y = motion * x;
             const auto [distance, gradient] = in_fixed.value_and_gradient(y);
-            equations.add(space.derivative(y, gradient), distance - in_moving.value(x), scale_mm);
+            equations.add(derivative(space, y, gradient), distance - in_moving.value(x), scale_mm);
         }
         const Isometry3d back = motion.inverse();
         for (const auto& y : to.colwise()) {
             const auto [distance, gradient] = in_moving.value_and_gradient(back * y);
-            equations.add(-space.derivative(y, motion.linear() * gradient), distance - in_fixed.value(y), scale_mm);
+            equations.add(-derivative(space, y, motion.linear() * gradient), distance - in_fixed.value(y), scale_mm);
         }
         const Vector6d change = equations.step(options.stiffness);
-        motion = space.motion(change) * motion;
+        motion = space.rigid(change.data()) * motion;
         if (scale_mm <= options.last_scale_mm && change.norm() < options.tolerance_mm) break;
         scale_mm = std::max(options.last_scale_mm, options.falling * scale_mm);
     }

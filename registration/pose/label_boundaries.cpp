@@ -87,6 +87,11 @@ std::array<int, 3> voxels_of(double length_mm, const Geometry& grid) {
     return count;
 }
 
+Eigen::Matrix3Xd thinned(const Eigen::Matrix3Xd& points, Eigen::Index most) {
+    const Eigen::Index stride = std::max<Eigen::Index>(1, (points.cols() + most - 1) / most);
+    return points(Eigen::all, Eigen::seq(0, points.cols() - 1, stride));
+}
+
 double labelled_volume(const imaging::LabelExtents& extents, const Geometry& grid) {
     return double(extent_of_all(extents).voxels) * grid.voxel_volume();
 }

@@ -21,6 +21,9 @@ imaging::Volume coarsened(const imaging::Volume& labels, imaging::LabelExtent bo
 /// At least so many voxels along each axis as a length is.
 std::array<int, 3> voxels_of(double length_mm, const imaging::Geometry& grid);
 
+/// Every n-th of the columns, so that at most `most` remain.
+Eigen::Matrix3Xd thinned(const Eigen::Matrix3Xd& points, Eigen::Index most);
+
 /// mm³ of all labels.
 double labelled_volume(const imaging::LabelExtents& extents, const imaging::Geometry& grid);
 

@@ -29,12 +29,6 @@ std::vector<int> labels_to_align(LabelBoundaries& moving, LabelBoundaries& fixed
     return labels;
 }
 
-/// Every n-th of the columns, so that at most `most` remain.
-Eigen::Matrix3Xd thinned(const Eigen::Matrix3Xd& points, Eigen::Index most) {
-    const Eigen::Index stride = std::max<Eigen::Index>(1, (points.cols() + most - 1) / most);
-    return points(Eigen::all, Eigen::seq(0, points.cols() - 1, stride));
-}
-
 }  // namespace
 
 BoundaryDistances::BoundaryDistances(const LabelBoundaries& points_from, const LabelBoundaries& distances_from,

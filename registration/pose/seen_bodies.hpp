@@ -27,7 +27,6 @@ struct SeenBodyOptions {
     std::size_t most_bodies = 253;  ///< that the mask of Surroundings can tell apart
     int samples = 4000;             ///< boundary points, half from each map
 };
-inline constexpr SeenBodyOptions seen_body_options{};
 
 /// One label in both maps.
 class SeenBody {

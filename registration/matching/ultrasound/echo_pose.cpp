@@ -32,7 +32,7 @@ public:
 
     [[nodiscard]] const Eigen::Matrix3Xd& places() const { return places_; }
 
-    /// −log odds of a motion against chance.
+    /// −log odds of a motion against chance, times the weight.
     [[nodiscard]] double of(const Eigen::Isometry3d& motion) const {
         const Eigen::Isometry3d back = motion.inverse();
         double sum = 0;
