@@ -239,11 +239,12 @@ report::Pictures draw_pictures(const RegistrationRun& run) {
     const Products& products = run.products;
     const registration::Deformation& deformation = run.result.deformation;
     const Eigen::Matrix3Xd nodes = deformation.deformed_nodes();
+    const imaging::Volume organ = organ_of(run.inputs.moving_labels, run.options);
     return report::draw_pictures({given(run.inputs.moving), given(run.inputs.fixed), given(products.warped),
                                   &run.inputs.moving_labels, given(run.inputs.fixed_labels), &products.warped_labels,
                                   &products.moving_to_fixed, given(products.uncertainty_volumes.deviation),
                                   given(products.uncertainty_volumes.trust), &products.fixed_to_moving,
-                                  &deformation.mesh, &nodes, alignment_json(run)});
+                                  &deformation.mesh, &nodes, alignment_json(run), &organ});
 }
 
 void write_reports(const nlohmann::json& report, const report::Pictures& pictures, const OutputFolder& output) {

@@ -28,6 +28,7 @@ struct ReportInput {
     const meshing::TetMesh* mesh = nullptr;            ///< of the organ, moving frame
     const Eigen::Matrix3Xd* fixed_nodes = nullptr;     ///< where its nodes are now, 3 × N, LPS mm, fixed frame
     nlohmann::json report;  ///< report.json, docs/manual/register-outputs.md; missing keys leave sections out
+    const imaging::Volume* organ = nullptr;  ///< the moving labels without bones about it, where these have some
 };
 
 /// What of a report takes time to draw, and none of its figures but "alignment".

@@ -264,7 +264,8 @@ Scene scene_of(const ReportInput& input) {
     Scene scene{input};
     if (input.moving_to_fixed != nullptr) {
         scene.magnitude = elastic_magnitude(*input.moving_to_fixed, alignment_of(input.report));
-        const Focus focus = largest_displacement(*input.moving_to_fixed, *scene.magnitude, *input.moving_labels);
+        const Focus focus = largest_displacement(*input.moving_to_fixed, *scene.magnitude,
+                                                 input.organ ? *input.organ : *input.moving_labels);
         if (focus.displacement >= 0)
             scene.focus = focus;
         else

@@ -5,6 +5,7 @@ TISSUEWARP_BONES_SEEDS=FIRST-LAST draws others than the two of every test."""
 import json
 import os
 import pathlib
+import re
 import tempfile
 import unittest
 
@@ -89,6 +90,9 @@ class Bones(unittest.TestCase):
                      "--fixed-labels", save(fixed, AFFINE, folder / "fixed.nii.gz"), "--output", folder / "out")
         self.assertEqual(result.returncode, 0, result.stderr)
         warped = numpy.asarray(nibabel.load(str(folder / "out" / "warped_labels.nii.gz")).dataobj)
+        page = (folder / "out" / "report.html").read_text(encoding="utf-8")
+        largest = float(re.search(r"Largest displacement in the organ</div>\s*<div class=\"value\">([\d.]+)", page)[1])
+        self.assertLess(largest, numpy.linalg.norm(spine.organ_shift) + 1)  # not of a bone
         return spine, moving, fixed, warped, json.loads((folder / "out" / "report.json").read_text())
 
     def test_each_goes_where_the_labels_show_it(self):
