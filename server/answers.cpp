@@ -87,7 +87,7 @@ Status status_of_failure(const Job& job, const std::string& why) {
 
 Parcel parcel(const std::string& key, std::string_view type, std::string_view device, const Bytes& body,
               double time_s) {
-    return {key, std::make_shared<const Bytes>(framed(type, device, body, timestamp_of(time_s)))};
+    return {key, {std::make_shared<const Bytes>(framed(type, device, body, timestamp_of(time_s)))}};
 }
 
 Parcel shown(const Status& status, double time_s) {

@@ -1,18 +1,21 @@
 #pragma once
 /// What waits to be sent to one client. Of what shows a state the newest takes the place of what was not begun, so that
-/// a client that reads slowly gets less, not later.
+/// a client that reads slowly gets less, not later, and what is said after a state arrives after it or a newer one.
 
 #include "server/wire.hpp"
 
 #include <deque>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace tissuewarp::server {
 
+/// Messages that are sent one after the other.
 struct Parcel {
     std::string key;  ///< of a state: the next of the same key replaces it; empty: an answer, which is kept
-    std::shared_ptr<const Bytes> bytes;
+    std::vector<std::shared_ptr<const Bytes>> messages;
+    bool answers = false;  ///< its first message is kept when the others are replaced
 };
 
 class Outgoing {
@@ -22,11 +25,12 @@ public:
     [[nodiscard]] ByteView next() const;
     /// So many bytes of it were sent.
     void sent(std::size_t count);
+    /// Parcels.
     [[nodiscard]] std::size_t waiting() const { return parcels_.size(); }
 
 private:
     std::deque<Parcel> parcels_;
-    std::size_t offset_ = 0;  // of the first
+    std::size_t message_ = 0, offset_ = 0;  // of the first
 };
 
 }  // namespace tissuewarp::server

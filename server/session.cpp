@@ -288,12 +288,20 @@ void Session::tell(const Job& job, const Products& products, const std::vector<s
     const long long newest = newest_state_;
     const double time = products.time_s;
     outbox_.show(shown(status_of(job, products, newest), time));
-    if (job.client > 0)
-        outbox_.send(job.client, said(answer(job, products, job.request.sequence, newest, notes), time));
-    outbox_.show({"answer", said(answer(job, products, 0, newest, notes), time).bytes}, job.client);
-    outbox_.show(parcel("organ", "POLYDATA", "organ", encode(products.organ), time));
-    if (!products.targets.empty())
-        outbox_.show(parcel("targets", "POINT", "targets_now", encode(products.targets), time));
+    const Parcel organ = parcel("update", "POLYDATA", "organ", encode(products.organ), time);
+    const Parcel targets = parcel("update", "POINT", "targets_now", encode(products.targets), time);
+    const auto update = [&](long long sequence) {
+        Parcel all{"update", said(answer(job, products, sequence, newest, notes), time).messages};
+        all.messages.push_back(organ.messages.front());
+        if (!products.targets.empty()) all.messages.push_back(targets.messages.front());
+        return all;
+    };
+    if (job.client > 0) {
+        Parcel asked_for = update(job.request.sequence);
+        asked_for.answers = true;
+        outbox_.send(job.client, asked_for);
+    }
+    outbox_.show(update(0), job.client);
     const auto send_image = [&](const char* name, const imaging::Volume& image) {
         if (!image.empty()) outbox_.send(job.client, parcel(name, "IMAGE", name, encode(image), time));
     };

@@ -152,7 +152,7 @@ TEST(Hub, WhoNeverReadsIsLetGoAndDelaysNobody) {
     other.send(info());
     EXPECT_EQ(other.texts(1).size(), 1u);
     const auto large = std::make_shared<const Bytes>(framed("XYZ", "", Bytes(8 << 20)));
-    for (int n = 0; n < 8; ++n) serving.hub.send(1, {"", large});
+    for (int n = 0; n < 8; ++n) serving.hub.send(1, {"", {large}});
     other.send(info());
     EXPECT_EQ(other.texts(1).size(), 1u);
     EXPECT_THAT(serving.told("did not read"), HasSubstr("client 1"));

@@ -92,8 +92,11 @@ public:
 
 private:
     void keep(const Parcel& parcel) {
-        const Header header = parse_header(ByteView(*parcel.bytes).first(header_bytes), {.text_bytes = 1 << 17});
-        Frame frame{header, {parcel.bytes->begin() + header_bytes, parcel.bytes->end()}};
+        for (const std::shared_ptr<const Bytes>& bytes : parcel.messages) keep(*bytes);
+    }
+    void keep(const Bytes& bytes) {
+        const Header header = parse_header(ByteView(bytes).first(header_bytes), {.text_bytes = 1 << 17});
+        Frame frame{header, {bytes.begin() + header_bytes, bytes.end()}};
         const std::scoped_lock lock(mutex_);
         got_.push_back({header.type, header.device, decode(frame), frame.body, seconds_of(header)});
         changed_.notify_all();

@@ -142,7 +142,14 @@ TEST(Wire, ContentOfVersionTwoLiesBetweenHeaderAndMetadata) {
 }
 
 Parcel parcel(const std::string& key, unsigned char byte) {
-    return {key, std::make_shared<const Bytes>(Bytes(4, byte))};
+    return {key, {std::make_shared<const Bytes>(Bytes(4, byte))}};
+}
+
+/// The first bytes of all messages, as they would go out.
+std::vector<int> order(Outgoing outgoing) {
+    std::vector<int> bytes;
+    for (; outgoing.waiting() > 0; outgoing.sent(outgoing.next().size())) bytes.push_back(outgoing.next()[0]);
+    return bytes;
 }
 
 TEST(Outgoing, TheNewestStateTakesThePlaceOfWhatWasNotBegun) {
@@ -150,15 +157,29 @@ TEST(Outgoing, TheNewestStateTakesThePlaceOfWhatWasNotBegun) {
     outgoing.add(parcel("organ", 1));
     outgoing.add(parcel("", 2));
     outgoing.add(parcel("organ", 3));
-    ASSERT_EQ(outgoing.waiting(), 2u);
-    EXPECT_EQ(outgoing.next()[0], 2);  // the answer stays
-    outgoing.sent(4);
-    EXPECT_EQ(outgoing.next()[0], 3);
+    EXPECT_EQ(order(outgoing), (std::vector{3, 2}));  // what is said after a state arrives after it or a newer one
     outgoing.sent(1);
-    outgoing.add(parcel("organ", 4));  // a message that has begun goes to its end
-    EXPECT_EQ(outgoing.next()[0], 3);
-    outgoing.sent(3);
-    EXPECT_EQ(outgoing.next()[0], 4);
+    outgoing.add(parcel("organ", 4));  // what has begun goes to its end
+    outgoing.add(parcel("organ", 5));
+    EXPECT_EQ(order(outgoing), (std::vector{3, 2, 5}));
+}
+
+TEST(Outgoing, AStateIsSentWholeAndItsAnswerIsNotLost) {
+    Outgoing outgoing;
+    const auto state = [](unsigned char answer, bool answers) {
+        Parcel both = parcel("update", answer);
+        both.messages.push_back(parcel("", static_cast<unsigned char>(answer + 1)).messages.front());
+        both.answers = answers;
+        return both;
+    };
+    outgoing.add(state(10, true));
+    outgoing.add(parcel("", 2));
+    outgoing.add(state(20, false));
+    EXPECT_EQ(order(outgoing), (std::vector{10, 20, 21, 2}));
+    outgoing.sent(4);
+    outgoing.sent(4);
+    outgoing.add(state(30, false));  // between the answer and what it answers nothing gets
+    EXPECT_EQ(order(outgoing), (std::vector{21, 2, 30, 31}));
 }
 
 }  // namespace
