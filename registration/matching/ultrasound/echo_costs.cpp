@@ -8,9 +8,21 @@ namespace tissuewarp::registration::detail {
 
 namespace {
 
-/// Σ w over a window of 1, u, u², m, g, m², g², m g, u m, u g: w what both show, u echoes, m and g what explains them.
+/// Σ w over a window of 1, m, g, m², g², m g, u, u m, u g, u²: w what both show, u echoes, m and g what explains them.
 using Sums = Eigen::Array<float, 12, 1>;
-enum Sum { W, U, UU, M, G, MM, GG, MG, UM, UG };
+enum Sum { W, M, G, MM = 4, GG, MG, U = 8, UM, UG, UU };
+
+/// What a voxel of the moving image adds to the first eight.
+using Explaining = Eigen::Array<float, 8, 1>;
+
+std::vector<Explaining> explaining(const EchoImages& images) {
+    std::vector<Explaining> result(images.grey.size(), Explaining::Zero());
+    for (std::size_t n = 0; n < result.size(); ++n) {
+        const float m = images.grey[n], g = images.gradient[n];
+        if (images.shown[n] != 0) result[n] << 1, m, g, 0, m * m, g * g, m * g, 0;
+    }
+    return result;
+}
 
 /// The share of the echoes' variance that is not explained.
 float unexplained(const Sums& s, double ridge) {
@@ -37,16 +49,18 @@ Eigen::Vector3i EchoCosts::shift(std::size_t entry) const {
 }
 
 EchoCosts echo_costs(const EchoImages& images, const EchoCostOptions& options) {
-    const auto pixel = [&](std::size_t n, std::size_t from) {
-        const float u = images.echo[n], m = images.grey[from], g = images.gradient[from];
-        Sums sums;
-        sums << 1, u, u * u, m, g, m * m, g * g, m * g, u * m, u * g, 0, 0;
-        return sums;
+    const std::vector<Explaining> moving = explaining(images);
+    const auto add = [&](std::size_t n, std::size_t from, Sums& sums) {
+        const float u = images.echo[n];
+        Eigen::Array4f products = u * moving[from].head<4>();  // of 1, m, g
+        products[3] = u * products[0];
+        sums.head<8>() += moving[from];
+        sums.tail<4>() += products;
     };
     const auto cost = [&](const Sums& sums) { return unexplained(sums, options.ridge); };
     const ShiftedWindows windows{options.window_mm, options.reach, options.stride, options.least_share,
                                  options.most_lost};
-    return costs_of_shifts<Sums>(images, windows, pixel, cost);
+    return costs_of_shifts<Sums>(images, windows, add, cost);
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -7,6 +7,8 @@
 #include "registration/matching/descriptors/grid_samples.hpp"
 #include "registration/matching/descriptors/matching_grid.hpp"
 
+#include <tbb/parallel_invoke.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -160,6 +162,7 @@ EchoImages EchoSource::on_grid(const State& state, double spacing_mm, double mar
         displacement_near_mesh({mesh_, state.displacement, state.placement}, GridSamples::with_rim(grid),
                                static_cast<int>(std::ceil(margin_mm / spacing_mm)));
     const GridSamples samples(level.echo, fixed_.seen, grid, SearchRegion(grid), field);
+    EchoImages result{grid, {}, {}, {}, {}, {}};
     const Volume counts = near_mesh(mesh_, grid, options_.outside_mm);
     Volume echo(grid, CV_32FC1), weight(grid, CV_32FC1), shown(grey_.geometry, CV_32FC1);
     std::size_t n = 0;
@@ -176,13 +179,15 @@ EchoImages EchoSource::on_grid(const State& state, double spacing_mm, double mar
             without_trend(imaging::resample(image, grid, imaging::Interpolation::Linear), shown, options_.trend_mm),
             shown);
     };
-    const Volume flat = without_trend(echo, weight, options_.trend_mm);
-    return {grid,
-            values_of(of_even_amplitude(flat, weight, options_)),
-            values_of(weight),
-            prepared(level.grey),
-            prepared(level.gradient),
-            values_of(shown)};
+    result.seen = values_of(weight);
+    result.shown = values_of(shown);
+    tbb::parallel_invoke(
+        [&] {
+            const Volume flat = without_trend(echo, weight, options_.trend_mm);
+            result.echo = values_of(of_even_amplitude(flat, weight, options_));
+        },
+        [&] { result.grey = prepared(level.grey); }, [&] { result.gradient = prepared(level.gradient); });
+    return result;
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -31,7 +31,15 @@ struct Choice {
 class Choosing {
 public:
     Choosing(const EchoCosts& costs, double window_mm, const EchoInformation& rules)
-        : costs_(costs), rules_(rules), independent_(window_volume(window_mm) / rules.independent_mm3) {}
+        : costs_(costs),
+          rules_(rules),
+          independent_(window_volume(window_mm) / rules.independent_mm3),
+          surprise_(costs.cost.size()) {
+        tbb::parallel_for(std::size_t{0}, costs_.at.size(), [&](std::size_t n) {
+            for (std::size_t entry = 0; entry < costs_.lattice(); ++entry)
+                surprise_[n * costs_.lattice() + entry] = surprise(n, costs_.of(n)[entry]);
+        });
+    }
 
     std::vector<Choice> choices() const {
         std::vector<Choice> chosen(costs_.at.size());
@@ -68,11 +76,12 @@ public:
 private:
     const EchoCosts& costs_;
     const EchoInformation& rules_;
-    double independent_;  // samples in a window
+    double independent_;            // samples in a window
+    std::vector<double> surprise_;  // of each place, of each shift
 
-    /// −log likelihood of a shift, but for a constant: the residuals' variance is what the best fit leaves.
-    [[nodiscard]] double surprise(std::size_t n, std::size_t entry) const {
-        const float cost = costs_.of(n)[entry];
+    /// −log likelihood of a shift of this cost, but for a constant: the residuals' variance is what the best fit
+    /// leaves.
+    [[nodiscard]] double surprise(std::size_t n, float cost) const {
         if (!std::isfinite(cost)) return std::numeric_limits<double>::infinity();
         return 0.5 * independent_ * costs_.window_share[n] * std::log(std::max<double>(cost, least_cost));
     }
@@ -82,7 +91,7 @@ private:
         double least = std::numeric_limits<double>::infinity();
         std::vector<double> surprises(costs_.lattice());
         for (std::size_t entry = 0; entry < surprises.size(); ++entry) {
-            double value = surprise(n, entry);
+            double value = surprise_[n * surprises.size() + entry];
             if (story) value += 0.5 * per_step2 * (costs_.shift(entry).cast<double>() - *story).squaredNorm();
             surprises[entry] = value;
             least = std::min(least, value);
@@ -119,6 +128,8 @@ private:
 
     void smooth(std::vector<Eigen::Vector4d>& grid, double deviation) const {
         const int radius = std::max(1, static_cast<int>(std::lround(2 * deviation)));
+        std::vector<double> weights;
+        for (int d = -radius; d <= radius; ++d) weights.push_back(std::exp(-0.5 * d * d / (deviation * deviation)));
         const auto& size = costs_.places.size;
         const std::array<std::ptrdiff_t, 3> stride{1, size[0], std::ptrdiff_t{size[0]} * size[1]};
         for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -127,7 +138,7 @@ private:
                 const int at = static_cast<int>(static_cast<std::ptrdiff_t>(n) / stride[axis] % size[axis]);
                 Eigen::Vector4d sum = Eigen::Vector4d::Zero();
                 for (int d = std::max(-radius, -at); d <= std::min(radius, size[axis] - 1 - at); ++d)
-                    sum += std::exp(-0.5 * d * d / (deviation * deviation)) *
+                    sum += weights[static_cast<std::size_t>(d + radius)] *
                            from[static_cast<std::size_t>(static_cast<std::ptrdiff_t>(n) + d * stride[axis])];
                 grid[n] = sum;
             });

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 namespace tissuewarp::registration::detail {
@@ -18,26 +19,40 @@ using Pose = std::array<double, 6>;  // shift of the middle and rotation vector 
 /// Of one kind of costs.
 class KindEvidence {
 public:
-    KindEvidence(const EchoCosts& costs, double weight, double independent_mm3)
+    KindEvidence(const EchoCosts& costs, double independent_mm3)
         : costs_(costs), along_(costs_.places.direction.transpose() / costs_.step_mm) {
         const std::size_t lattice = costs_.lattice();
-        const double independent = weight * costs_.places.voxel_volume() / independent_mm3;
+        const double independent = costs_.places.voxel_volume() / independent_mm3;
         evidence_.resize(costs_.cost.size());
         places_.resize(3, static_cast<Eigen::Index>(costs_.at.size()));
-        for (std::size_t n = 0; n < costs_.at.size(); ++n) {
+        tbb::parallel_for(std::size_t{0}, costs_.at.size(), [&](std::size_t n) {
             places_.col(static_cast<Eigen::Index>(n)) = costs_.place(n);
             add_evidence(costs_.of(n), lattice, independent * costs_.window_share[n], evidence_.data() + n * lattice);
-        }
+        });
     }
 
+    [[nodiscard]] const EchoCosts& costs() const { return costs_; }
     [[nodiscard]] const Eigen::Matrix3Xd& places() const { return places_; }
 
-    /// −log odds of a motion against chance, times the weight.
+    /// −log odds of each shift of the lattice against chance.
+    [[nodiscard]] Eigen::VectorXd of_shifts() const {
+        const auto lattice = static_cast<Eigen::Index>(costs_.lattice());
+        Eigen::VectorXf total = Eigen::VectorXf::Zero(lattice);
+        for (std::size_t n = 0; n < costs_.at.size(); ++n)
+            total += Eigen::Map<const Eigen::VectorXf>(evidence_.data() + n * costs_.lattice(), lattice);
+        Eigen::VectorXd result(lattice);
+        for (Eigen::Index entry = 0; entry < lattice; ++entry)
+            result[entry] = interpolated(total.data(), costs_.shift(static_cast<std::size_t>(entry)).cast<double>());
+        return result;
+    }
+
+    /// −log odds of a motion against chance.
     [[nodiscard]] double of(const Eigen::Isometry3d& motion) const {
         const Eigen::Isometry3d back = motion.inverse();
         double sum = 0;
         for (Eigen::Index n = 0; n < places_.cols(); ++n)
-            sum += at(static_cast<std::size_t>(n), along_ * (places_.col(n) - back * places_.col(n)));
+            sum += interpolated(evidence_.data() + static_cast<std::size_t>(n) * costs_.lattice(),
+                                along_ * (places_.col(n) - back * places_.col(n)));
         return sum;
     }
 
@@ -66,7 +81,7 @@ private:
 
     /// By quadratic B-splines: between the steps of a linear interpolation there are no minima. Beyond the lattice
     /// nothing is known.
-    [[nodiscard]] double at(std::size_t n, const Eigen::Vector3d& shift) const {
+    [[nodiscard]] double interpolated(const float* evidence, const Eigen::Vector3d& shift) const {
         const int side = costs_.side();
         std::array<int, 3> low{};
         std::array<std::array<double, 3>, 3> weight{};
@@ -76,7 +91,7 @@ private:
             low[a] = static_cast<int>(middle) - 1;
             weight[a] = {0.5 * (0.5 - t) * (0.5 - t), 0.75 - t * t, 0.5 * (0.5 + t) * (0.5 + t)};
         }
-        const float* e = evidence_.data() + n * costs_.lattice() + low[0] + side * (low[1] + side * low[2]);
+        const float* e = evidence + low[0] + side * (low[1] + side * low[2]);
         double sum = 0;
         for (std::size_t k = 0; k < 3; ++k)
             for (std::size_t j = 0; j < 3; ++j, e += side) {
@@ -89,9 +104,9 @@ private:
 
 class PoseEvidence {
 public:
-    PoseEvidence(const std::vector<PoseCosts>& kinds, double PoseCosts::*weight, const EchoPoseOptions& options)
-        : first_(kinds.front().costs), options_(options) {
-        for (const PoseCosts& kind : kinds) kinds_.emplace_back(kind.costs, kind.*weight, options.independent_mm3);
+    /// The kinds outlive this.
+    PoseEvidence(const std::vector<KindEvidence>& kinds, std::vector<double> weights, const EchoPoseOptions& options)
+        : kinds_(kinds), weights_(std::move(weights)), options_(options) {
         centre_ = places().rowwise().mean();
         radius_ = std::max(1.0, std::sqrt((places().colwise() - centre_).colwise().squaredNorm().mean()));
     }
@@ -102,7 +117,7 @@ public:
     [[nodiscard]] double operator()(const Pose& pose) const {
         const Eigen::Isometry3d moved = motion(pose);
         double sum = expectation(pose);
-        for (const KindEvidence& kind : kinds_) sum += kind.of(moved);
+        for (std::size_t n = 0; n < kinds_.size(); ++n) sum += weights_[n] * kinds_[n].of(moved);
         return sum;
     }
 
@@ -122,33 +137,35 @@ public:
 
     /// The shifts that are lower than their neighbours, the lowest first.
     [[nodiscard]] std::vector<Pose> lowest_shifts() const {
-        const std::size_t lattice = first_.lattice();
+        const EchoCosts& first = kinds_.front().costs();
+        const std::size_t lattice = first.lattice();
         std::vector<Pose> shifts(lattice);
-        std::vector<double> costs(lattice);
-        tbb::parallel_for(std::size_t{0}, lattice, [&](std::size_t entry) {
-            const Eigen::Vector3d shift =
-                first_.places.direction * (first_.step_mm * first_.shift(entry).cast<double>());
+        Eigen::VectorXd costs(static_cast<Eigen::Index>(lattice));
+        for (std::size_t entry = 0; entry < lattice; ++entry) {
+            const Eigen::Vector3d shift = first.places.direction * (first.step_mm * first.shift(entry).cast<double>());
             shifts[entry] = {shift[0], shift[1], shift[2], 0, 0, 0};
-            costs[entry] = (*this)(shifts[entry]);
-        });
-        std::vector<std::size_t> order(lattice);
-        std::iota(order.begin(), order.end(), std::size_t{0});
-        std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return costs[a] < costs[b]; });
+            costs[static_cast<Eigen::Index>(entry)] = expectation(shifts[entry]);
+        }
+        for (std::size_t n = 0; n < kinds_.size(); ++n) costs += weights_[n] * kinds_[n].of_shifts();
+        std::vector<Eigen::Index> order(lattice);
+        std::iota(order.begin(), order.end(), Eigen::Index{0});
+        std::sort(order.begin(), order.end(), [&](auto a, auto b) { return costs[a] < costs[b]; });
         std::vector<Pose> result;
-        for (const std::size_t entry : order) {
+        for (const Eigen::Index entry : order) {
+            const Pose& shift = shifts[static_cast<std::size_t>(entry)];
             const bool alone = std::none_of(result.begin(), result.end(), [&](const Pose& other) {
-                return distance(other, shifts[entry]) < 1.5 * first_.step_mm;
+                return distance(other, shift) < 1.5 * first.step_mm;
             });
-            if (alone) result.push_back(shifts[entry]);
+            if (alone) result.push_back(shift);
             if (static_cast<int>(result.size()) == options_.starts) break;
         }
         return result;
     }
 
 private:
-    const EchoCosts& first_;
+    const std::vector<KindEvidence>& kinds_;
+    const std::vector<double> weights_;
     const EchoPoseOptions& options_;
-    std::vector<KindEvidence> kinds_;
     Eigen::Vector3d centre_;
     double radius_ = 1;  // of the places, mm
 
@@ -203,7 +220,14 @@ Found descended(const PoseEvidence& evidence, const Pose& start, const EchoPoseO
 EchoPose echo_pose(const std::vector<PoseCosts>& kinds, const EchoPoseOptions& options, Observer& observer) {
     EchoPose result;
     if (kinds.front().costs.at.empty()) return result;
-    const PoseEvidence evidence(kinds, &PoseCosts::weight, options), finer(kinds, &PoseCosts::finer_weight, options);
+    std::vector<KindEvidence> of_kinds;
+    std::vector<double> weights, finer_weights;
+    for (const PoseCosts& kind : kinds) {
+        of_kinds.emplace_back(kind.costs, options.independent_mm3);
+        weights.push_back(kind.weight);
+        finer_weights.push_back(kind.finer_weight);
+    }
+    const PoseEvidence evidence(of_kinds, weights, options), finer(of_kinds, finer_weights, options);
     std::vector<Pose> starts = evidence.lowest_shifts();
     const std::size_t turned = std::min(starts.size(), static_cast<std::size_t>(options.turned_starts));
     for (std::size_t n = 0; n < turned; ++n)

@@ -26,14 +26,23 @@ MatchingImage described(const imaging::Geometry& grid, const std::vector<float>&
     return matching_image(image, all, grid, SearchRegion(grid));
 }
 
-/// Mean over the channels of two voxels, 0..1.
-float difference(const MatchingImage& one, std::size_t n, const MatchingImage& other, std::size_t m) {
+/// As wide as what one instruction compares; beyond the channels 0.
+using Descriptor = std::array<std::uint8_t, 16>;
+static_assert(descriptor_channels <= 16);
+
+/// Mean over the channels, 0..1.
+float difference(const Descriptor& one, const Descriptor& other) {
     constexpr float most = 255.F * descriptor_channels;
-    const std::uint8_t *a = one.descriptors.get() + n * descriptor_channels,
-                       *b = other.descriptors.get() + m * descriptor_channels;
     int sum = 0;
-    for (int c = 0; c < descriptor_channels; ++c) sum += std::abs(int(a[c]) - int(b[c]));
+    for (std::size_t c = 0; c < one.size(); ++c) sum += std::abs(int(one[c]) - int(other[c]));
     return static_cast<float>(sum) / most;
+}
+
+std::vector<Descriptor> descriptors_at(const std::vector<std::size_t>& voxels, const MatchingImage& image) {
+    std::vector<Descriptor> result(voxels.size(), Descriptor{});
+    for (std::size_t n = 0; n < voxels.size(); ++n)
+        std::copy_n(image.descriptors.get() + voxels[n] * descriptor_channels, descriptor_channels, result[n].begin());
+    return result;
 }
 
 /// Every `step`-th voxel of a grid along each axis, as offsets; the coarser grid.
@@ -60,13 +69,14 @@ EchoCosts structure_costs(const EchoImages& images, const StructureCostOptions& 
         compared.seen.push_back(images.seen[n]);
         compared.shown.push_back(images.shown[n]);
     }
-    const auto pixel = [&](std::size_t n, std::size_t from) {
-        return Sums(1, difference(echoes, fine[n], moving, fine[from]));
+    const std::vector<Descriptor> seen = descriptors_at(fine, echoes), like = descriptors_at(fine, moving);
+    const auto add = [&](std::size_t n, std::size_t from, Sums& sums) {
+        if (compared.shown[from] != 0) sums += Sums(1, difference(seen[n], like[from]));
     };
     const auto cost = [](const Sums& sums) { return sums[D] / sums[W]; };
     const ShiftedWindows windows{options.window_mm, options.reach, options.stride, options.least_share,
                                  options.most_lost};
-    return costs_of_shifts<Sums>(compared, windows, pixel, cost);
+    return costs_of_shifts<Sums>(compared, windows, add, cost);
 }
 
 }  // namespace tissuewarp::registration::detail
