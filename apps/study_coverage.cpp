@@ -27,7 +27,8 @@ std::pair<study::Family, std::vector<std::string>> family_of(std::vector<std::st
     using study::Family;
     for (const auto& [name, family] :
          {std::pair{"bent:", Family::Bent}, std::pair{"organ:", Family::Labelled}, std::pair{"found:", Family::Found},
-          std::pair{"resected:", Family::Resected}, std::pair{"unresected:", Family::Unresected}})
+          std::pair{"resected:", Family::Resected}, std::pair{"unresected:", Family::Unresected},
+          std::pair{"bulged:", Family::Bulged}})
         if (problems.size() == 1 && problems.front().starts_with(name)) {
             problems.front().replace(0, std::string(name).size(), "phantom:");
             return {family, std::move(problems)};

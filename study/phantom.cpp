@@ -20,6 +20,7 @@
 #include <cstdio>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -189,6 +190,8 @@ Phantom solved_phantom(std::uint64_t seed, const PhantomOptions& options, Observ
     detail::Random random(seed);
     detail::RandomOrgan organ = detail::random_organ(random);
     const detail::OrganShape& shape = organ.shape;
+    const bool bulges = options.family == Family::Bulged;
+    if (bulges) organ.loads = detail::bulging_loads(shape, organ.tissue.youngs_modulus_kpa, random);
     const double motion_mm = random.uniform(3, std::min(15.0, strain * shape.length()));
     const int elements = least_elements + random.index(most_elements - least_elements);
     const Eigen::Isometry3d placement =
@@ -207,7 +210,9 @@ Phantom solved_phantom(std::uint64_t seed, const PhantomOptions& options, Observ
     Phantom phantom;
     phantom.moving_labels = detail::draw(shape, options.voxel_mm);
     phantom.fixed_labels = detail::drawn_labels(deformed, options.voxel_mm, options.boundary_deviation_mm, random);
-    phantom.surface = detail::seen_surface(deformed, seen_share, options.point_deviation_mm, random);
+    std::optional<Vector3d> opening;
+    if (bulges) opening = placement.linear() * shape.normal(organ.loads.pressures.front().cap.middle);
+    phantom.surface = detail::seen_surface(deformed, seen_share, options.point_deviation_mm, random, opening);
     phantom.points =
         detail::found_again(detail::places(tissue, pairs, pair_depth_mm, random), options.point_deviation_mm, random);
     phantom.targets = detail::places(tissue, options.targets, target_depth_mm, random);
@@ -266,7 +271,8 @@ Phantom bent_phantom(detail::TrueTissue tissue, imaging::Volume moving_labels, c
 }
 
 Phantom drawn_phantom(std::uint64_t seed, const PhantomOptions& options, Observer& observer) {
-    if (options.family == Family::Solved) return solved_phantom(seed, options, observer);
+    if (options.family == Family::Solved || options.family == Family::Bulged)
+        return solved_phantom(seed, options, observer);
     if (options.family == Family::Resected || options.family == Family::Unresected)
         return resection_phantom(seed, options, observer);
     detail::Random random(seed);

@@ -104,9 +104,10 @@ imaging::Volume drawn_labels(const DeformedOrgan& organ, double voxel_mm, double
 namespace {
 
 /// The share of points that faces one way, with noise and outliers.
-registration::SurfacePoints seen_of(const Matrix3Xd& samples, double share, double deviation_mm, Random& random) {
+registration::SurfacePoints seen_of(const Matrix3Xd& samples, double share, double deviation_mm, Random& random,
+                                    const std::optional<Vector3d>& facing = {}) {
     constexpr double outliers = 0.03, outlier_mm = 15;
-    const Eigen::VectorXd height = samples.transpose() * random.direction();
+    const Eigen::VectorXd height = samples.transpose() * (facing ? *facing : random.direction());
     std::vector<Eigen::Index> order(std::size_t(samples.cols()));
     std::iota(order.begin(), order.end(), Eigen::Index{0});
     std::sort(order.begin(), order.end(), [&](Eigen::Index a, Eigen::Index b) { return height[a] > height[b]; });
@@ -126,9 +127,9 @@ constexpr double mm2_per_point = 6;
 
 }  // namespace
 
-registration::SurfacePoints seen_surface(const DeformedOrgan& organ, double share, double deviation_mm,
-                                         Random& random) {
-    return seen_of(surface_samples(organ, mm2_per_point, random), share, deviation_mm, random);
+registration::SurfacePoints seen_surface(const DeformedOrgan& organ, double share, double deviation_mm, Random& random,
+                                         const std::optional<Vector3d>& facing) {
+    return seen_of(surface_samples(organ, mm2_per_point, random), share, deviation_mm, random, facing);
 }
 
 registration::SurfacePoints seen_surface(const TrueTissue& tissue, double share, double deviation_mm, Random& random) {

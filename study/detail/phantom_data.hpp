@@ -12,6 +12,8 @@
 
 #include <Eigen/Geometry>
 
+#include <optional>
+
 namespace tissuewarp::study::detail {
 
 /// The deformed organ in the fixed frame.
@@ -24,9 +26,10 @@ struct DeformedOrgan {
 /// length of 10 mm whose deviation along every direction is `boundary_deviation_mm`.
 imaging::Volume drawn_labels(const DeformedOrgan& organ, double voxel_mm, double boundary_deviation_mm, Random& random);
 
-/// Points of the part of the surface that faces one way, a share of `share` of its area, with noise along each axis; 3
-/// % are anywhere within 15 mm of where they belong.
-registration::SurfacePoints seen_surface(const DeformedOrgan& organ, double share, double deviation_mm, Random& random);
+/// Points of the part of the surface that faces one way (none: any), a share of `share` of its area, with noise along
+/// each axis; 3 % are anywhere within 15 mm of where they belong.
+registration::SurfacePoints seen_surface(const DeformedOrgan& organ, double share, double deviation_mm, Random& random,
+                                         const std::optional<Eigen::Vector3d>& facing = {});
 
 /// Of tissue that is known by its maps alone.
 imaging::Volume drawn_labels(const TrueTissue& tissue, double voxel_mm, double boundary_deviation_mm, Random& random);

@@ -79,6 +79,18 @@ RandomLoads random_loads(const OrganShape& shape, double youngs_modulus_kpa, Ran
     return loads;
 }
 
+RandomLoads bulging_loads(const OrganShape& shape, double youngs_modulus_kpa, Random& random) {
+    const double modulus = youngs_modulus_kpa, length = shape.length();
+    const Vector3d towards = random.direction();
+    const Cap opening{shape.surface_point(towards), length * random.uniform(0.2, 0.35)};
+    const Vector3d opposite = shape.surface_point(-towards);
+    RandomLoads loads;
+    loads.held.push_back({{opposite, (opposite - opening.middle).norm()}, modulus * random.log_uniform(0.2, 2)});
+    loads.pressures.push_back({opening, -modulus});
+    loads.words = " what bulges through an opening";
+    return loads;
+}
+
 RandomLoads scaled(RandomLoads loads, double factor) {
     loads.body_force *= factor;
     for (Pressure& pressure : loads.pressures) pressure.kpa *= factor;

@@ -44,6 +44,10 @@ struct RandomLoads {
 /// A mixture that moves tissue of a Young's modulus by some millimetres; `scaled` brings it to a size.
 RandomLoads random_loads(const OrganShape& shape, double youngs_modulus_kpa, Random& random);
 
+/// Of an organ whose hull is open over a cap, the only pressure, through which it bulges. A bed holds it elsewhere, the
+/// less the nearer to the opening.
+RandomLoads bulging_loads(const OrganShape& shape, double youngs_modulus_kpa, Random& random);
+
 /// The loads times a factor; what is held stays held.
 RandomLoads scaled(RandomLoads loads, double factor);
 

@@ -1,4 +1,4 @@
-/// Phantoms whose tumour is resected.
+/// Phantoms whose tumour is resected, and those that bulge through an opening.
 #include "study/phantom.hpp"
 
 #include "imaging/labels.hpp"
@@ -47,6 +47,24 @@ TEST(ResectionPhantom, HasATwinThatIsWhole) {
     EXPECT_EQ(gone.targets.moving, whole.targets.moving);
     EXPECT_NE(gone.targets.fixed, whole.targets.fixed);
     EXPECT_EQ(cv::norm(gone.moving_labels.voxels, whole.moving_labels.voxels, cv::NORM_INF), 0.0);
+}
+
+// What moves most moves out, towards where the surface is seen.
+TEST(BulgedPhantom, IsSeenWhereItBulges) {
+    PhantomOptions options;
+    options.family = Family::Bulged;
+    options.misplacement = Misplacement{};
+    for (const std::uint64_t seed : {2, 3}) {
+        const Phantom phantom = random_phantom(seed, options);
+        const Eigen::Matrix3Xd &from = phantom.targets.moving, moved = phantom.targets.fixed - from;
+        Eigen::Index most = 0;
+        const double most_mm = moved.colwise().norm().maxCoeff(&most);
+        const Eigen::Vector3d out = (phantom.surface.points.rowwise().mean() - from.rowwise().mean()).normalized();
+        EXPECT_GT(most_mm, 2) << phantom.story;
+        EXPECT_GT(moved.col(most).dot(out), 0.7 * most_mm) << phantom.story;
+        EXPECT_GT((from.col(most) - from.rowwise().mean()).dot(out), 0) << phantom.story;
+        EXPECT_NE(phantom.story.find("bulges"), std::string::npos) << phantom.story;
+    }
 }
 
 }  // namespace
