@@ -86,11 +86,13 @@ std::optional<Doubt> doubt_of_folds(const JacobianReport& everywhere, const Jaco
 
 /// From where on a field that was unfolded is doubted.
 struct UnfoldingDoubtLimits {
-    double most_mm = 1;  ///< of a voxel of the organ
+    double most_mm = 1;          ///< of a voxel of the organ
+    double least_share = 0.001;  ///< of its voxels: fewer are worth a notice
 };
 inline constexpr UnfoldingDoubtLimits unfolding_doubt_limits{};
 
-/// `field.unfolded` where one of the fields, so that it does not fold, is not that of the simulation.
+/// `field.unfolded` where one of the fields, so that it does not fold, is not that of the simulation; a notice where that
+/// is so in a few voxels.
 std::optional<Doubt> doubt_of_unfolding(const Unfolding& forth, const Unfolding& back);
 
 }  // namespace tissuewarp::registration

@@ -54,11 +54,14 @@ void require_usable(const Deformation& deformation, const FieldOptions& options)
                            ", of no body that is there; give rigid_surroundings()");
 }
 
-/// Displacements of the mesh's surface as what lies beside it has them, and within it of any value.
-Eigen::Matrix3Xd beside_surface(const Deformation& deformation, const Eigen::Matrix3Xd& nodes,
-                                const meshing::BoundarySurface& boundary, const Eigen::Matrix3Xd& values) {
+/// Displacements of the mesh as what lies beside its surface has them, and what the surface itself has beyond that.
+detail::NodalField beside_surface(const Deformation& deformation, const Eigen::Matrix3Xd& nodes,
+                                  const meshing::BoundarySurface& boundary, const Eigen::Matrix3Xd& values) {
     const bool slides = deformation.surroundings && deformation.surroundings->slide;
-    return slides ? detail::motion_across_surface(nodes, boundary, values) : values;
+    if (!slides) return {values};
+    detail::NodalField field{detail::motion_across_surface(nodes, boundary, values)};
+    field.slip = values - field.beside;
+    return field;
 }
 
 /// Of a deformation whose placement is the motion far away.
@@ -221,7 +224,9 @@ Volume displacement_fixed_to_moving(const Deformation& given, const Geometry& fi
         complete(raster, fixed_grid, identity, linear, to_moving.translation(),
                  [&] { return [&](int, const Eigen::Vector3d& z) { return backward(z); }; });
     } else {
-        if (!raster.full()) forward.emplace(mesh.nodes, mesh.tets, boundary, deformation.displacement, options.fade_mm);
+        if (!raster.full())
+            forward.emplace(mesh.nodes, mesh.tets, boundary, detail::NodalField{deformation.displacement},
+                            options.fade_mm);
         observer.checkpoint(stage, 0.6);
         complete(raster, fixed_grid, identity, linear, to_moving.translation(),
                  [&] { return detail::RowInverse(*forward, backward); });

@@ -61,13 +61,14 @@ struct Unfolding {
     std::int64_t left = 0;        ///< that are folded nevertheless: det ≤ 0
     std::int64_t in_organ = 0;    ///< of these in the mesh
     double most_in_organ_mm = 0;  ///< largest of their changes
+    std::int64_t organ = 0;       ///< voxels in the mesh
 };
 
 /// Take the folds out of a field, in place: voxels about those with det(∂y/∂X) ≤ 0.05 take the mean of their six
-/// neighbours again and again (Laplacian smoothing), beside the mesh first. Where that does not do, since parts of the
-/// mesh pass into each other, its outermost voxels do too, and at last all near a fold. Rigid surroundings stay. A
-/// field without folds is not touched, nor one that folds in a twentieth of its voxels. PointTransform, which has no
-/// voxels, does not follow.
+/// neighbours again and again (Laplacian smoothing), beside the mesh and rigid surroundings first. Where that does not
+/// do, since parts of the mesh pass into each other, these and the mesh's outermost voxels do too, and at last all near
+/// a fold. A field without folds is not touched, nor one that folds in a twentieth of its voxels. PointTransform, which
+/// has no voxels, does not follow.
 Unfolding unfold_moving_to_fixed(imaging::Volume& field, const Deformation& deformation);
 Unfolding unfold_fixed_to_moving(imaging::Volume& field, const Deformation& deformation);
 

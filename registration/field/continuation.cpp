@@ -1,7 +1,9 @@
 #include "registration/field/continuation.hpp"
 
 #include "imaging/filters.hpp"
+#include "imaging/sampling.hpp"
 #include "meshing/search/surface_proximity.hpp"
+#include "registration/field/continuation_grid.hpp"
 #include "registration/field/rasterisation.hpp"
 
 #include <tbb/parallel_for.h>
@@ -13,176 +15,28 @@ namespace tissuewarp::registration::detail {
 
 namespace {
 
-using Vec4 = Eigen::Array4f;  // x, y, z and an unused fourth lane, so that one node is one SIMD register
-
 constexpr ContinuationOptions options;
-
-/// Why a node is fixed; 0 is free.
-enum : std::uint8_t { in_mesh = 1, on_sheet, in_body, at_rest };
-
-/// How the six neighbours of a free node beside the mesh are seen: a neighbour inside is replaced by the surface,
-/// `fraction` of the spacing away (Shortley and Weller 1938).
-struct SurfaceLinks {
-    std::array<float, 6> fraction{1, 1, 1, 1, 1, 1};
-    std::array<Vec4, 6> value{};  // where fraction < 1
-};
-
-/// Node values on a regular grid; fixed nodes are Dirichlet data.
-struct Level {
-    std::array<int, 3> size{};
-    double spacing;
-    std::vector<Vec4> value;
-    std::vector<std::uint8_t> fixed;
-    std::vector<float> stiffness;  // of free nodes; 0 where fixed
-    std::vector<int> links_of;     // index into `links` or −1; empty when no node has links
-    std::vector<SurfaceLinks> links;
-
-    Level(const std::array<int, 3>& nodes, double spacing_mm) : size(nodes), spacing(spacing_mm) {
-        const std::size_t count =
-            static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(size[2]);
-        value.assign(count, Vec4::Zero());
-        fixed.assign(count, 0);
-    }
-    [[nodiscard]] std::size_t at(int i, int j, int k) const {
-        return static_cast<std::size_t>(i) +
-               static_cast<std::size_t>(size[0]) *
-                   (static_cast<std::size_t>(j) + static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(k));
-    }
-    /// Offsets to the neighbours −i, +i, −j, +j, −k, +k.
-    [[nodiscard]] std::array<std::ptrdiff_t, 6> neighbours() const {
-        const std::ptrdiff_t row = size[0], slice = row * size[1];
-        return {-1, 1, -row, row, -slice, slice};
-    }
-    [[nodiscard]] const SurfaceLinks* links_at(std::size_t n) const {
-        return links.empty() || links_of[n] < 0 ? nullptr : &links[static_cast<std::size_t>(links_of[n])];
-    }
-};
-
-/// Calls visit(n) for the inner free nodes of one colour (0, 1) or of both (−1), in parallel.
-template <class Visit>
-void for_each_free(const Level& level, int colour, const Visit& visit) {
-    tbb::parallel_for(1, level.size[2] - 1, [&](int k) {
-        for (int j = 1; j < level.size[1] - 1; ++j) {
-            const int first = colour < 0 ? 1 : 1 + (j + k + colour) % 2;
-            for (int i = first; i < level.size[0] - 1; i += colour < 0 ? 1 : 2)
-                if (const std::size_t n = level.at(i, j, k); !level.fixed[n]) visit(n);
-        }
-    });
-}
-
-/// 1 + (|∇u| / s)² at the free nodes, |∇u|² from the mean of the one-sided differences; averaged with the value before,
-/// without which the alternation of weights and values oscillates.
-void update_stiffness(Level& level) {
-    const auto neighbours = level.neighbours();
-    const float scale =
-        static_cast<float>(0.5 / (level.spacing * level.spacing * options.stiffening * options.stiffening));
-    level.stiffness.resize(level.value.size(), 0.0F);
-    for_each_free(level, -1, [&](std::size_t n) {
-        const Vec4* v = level.value.data() + n;
-        const SurfaceLinks* links = level.links_at(n);
-        Vec4 sum = Vec4::Zero();
-        for (std::size_t e = 0; e < 6; ++e) {
-            const bool cut = links && links->fraction[e] < 1.0F;
-            const Vec4 difference =
-                cut ? Vec4((links->value[e] - *v) / links->fraction[e]) : Vec4(v[neighbours[e]] - *v);
-            sum += difference.square();
-        }
-        const float relative = scale * (sum[0] + sum[1] + sum[2]);
-        const float wanted = 1.0F + relative;
-        level.stiffness[n] = level.stiffness[n] > 0.0F ? 0.5F * (level.stiffness[n] + wanted) : wanted;
-    });
-}
-
-/// One red-black sweep of successive over-relaxation; the border of the grid stays. An edge has the mean stiffness of
-/// its ends, or of its free end.
-void relax(Level& level, float omega) {
-    const auto neighbours = level.neighbours();
-    for (int colour = 0; colour < 2; ++colour) {
-        for_each_free(level, colour, [&](std::size_t n) {
-            const Vec4* v = level.value.data() + n;
-            const float* stiffness = level.stiffness.data() + n;
-            const SurfaceLinks* links = level.links_at(n);
-            Vec4 sum = Vec4::Zero();
-            float weights = 0.0F;
-            for (std::size_t e = 0; e < 6; ++e) {
-                const float other = stiffness[neighbours[e]];
-                float weight = *stiffness + (other > 0.0F ? other : *stiffness);
-                if (links && links->fraction[e] < 1.0F) {
-                    weight /= links->fraction[e];
-                    sum += weight * links->value[e];
-                } else {
-                    sum += weight * v[neighbours[e]];
-                }
-                weights += weight;
-            }
-            level.value[n] += omega * (sum / weights - *v);
-        });
-    }
-}
-
-Level coarsened(const Level& fine) {
-    Level coarse({(fine.size[0] + 1) / 2, (fine.size[1] + 1) / 2, (fine.size[2] + 1) / 2}, 2.0 * fine.spacing);
-    for (int k = 0; k < coarse.size[2]; ++k)
-        for (int j = 0; j < coarse.size[1]; ++j)
-            for (int i = 0; i < coarse.size[0]; ++i) {
-                const std::size_t from = fine.at(2 * i, 2 * j, 2 * k), to = coarse.at(i, j, k);
-                coarse.fixed[to] = fine.fixed[from];
-                coarse.value[to] = fine.value[from];
-            }
-    return coarse;
-}
-
-/// Free nodes of the fine grid from the coarse one, trilinear.
-void prolong(const Level& coarse, Level& fine) {
-    tbb::parallel_for(0, fine.size[2], [&](int k) {
-        for (int j = 0; j < fine.size[1]; ++j) {
-            for (int i = 0; i < fine.size[0]; ++i) {
-                const std::size_t n = fine.at(i, j, k);
-                if (fine.fixed[n]) continue;
-                Vec4 sum = Vec4::Zero();
-                for (int corner = 0; corner < 8; ++corner) {
-                    const auto half = [&](int index, int bit, int axis) {
-                        return std::min((index + (corner >> bit & 1)) / 2, coarse.size[axis] - 1);
-                    };
-                    sum += coarse.value[coarse.at(half(i, 0, 0), half(j, 1, 1), half(k, 2, 2))];
-                }
-                fine.value[n] = 0.125F * sum;
-            }
-        }
-    });
-}
-
-/// Minimises ∫ ½ |∇u|² + |∇u|⁴ / (4 s²): harmonic where gradients are small, and where harmonic functions would be
-/// steep enough to fold (beside edges and narrow bumps) closer to the extension of least slope. Cascadic multigrid
-/// (Bornemann and Deuflhard 1996): solved coarse to fine, each level starting from the one below. A few sweeps a level
-/// suffice, because what is left is small and smooth.
-void solve(Level& level) {
-    const bool coarsest = *std::min_element(level.size.begin(), level.size.end()) < options.coarsest_nodes;
-    if (!coarsest) {
-        Level coarse = coarsened(level);
-        solve(coarse);
-        prolong(coarse, level);
-    }
-    const int rounds = coarsest ? options.coarsest_rounds : options.rounds;
-    for (int round = 0; round < rounds; ++round) {
-        update_stiffness(level);
-        for (int sweep = 0; sweep < options.sweeps; ++sweep) relax(level, options.relaxation);
-    }
-}
 
 }  // namespace
 
 struct Continuation::Impl {
     Eigen::Vector3d lower;
     double spacing;
-    Level grid;
+    ContinuationGrid grid;
     meshing::SurfaceProximity surface;
+    std::optional<meshing::SurfaceProximity> sliding;  // the slip at it
+    imaging::Volume body_distance;
+    std::optional<imaging::LinearSampler> to_bodies;  // mm, where the surface slides
     HeldBodies bodies;
 
     Impl(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tets, const meshing::BoundarySurface& boundary,
-         const Eigen::Matrix3Xd& values, double fade_mm, const HeldBodies& held, double finest_spacing_mm)
-        : Impl(box_about(nodes, held.corners_of_moved()), nodes, tets, boundary, values, fade_mm, held,
-               finest_spacing_mm) {}
+         const NodalField& field, double fade_mm, const HeldBodies& held, double finest_spacing_mm)
+        : Impl(box_about(nodes, held.corners_of_moved()), nodes, tets, boundary, field.beside, fade_mm, held,
+               finest_spacing_mm) {
+        if (field.slip.cols() == 0) return;
+        sliding.emplace(nodes, boundary, field.slip, options.slip_mm);
+        measure_to_bodies();
+    }
 
     /// `box`: lower and upper corner of the organ and of bodies that moved.
     Impl(const Eigen::Matrix<double, 3, 2>& box, const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tets,
@@ -274,6 +128,22 @@ struct Continuation::Impl {
         });
     }
 
+    void measure_to_bodies() {
+        imaging::Geometry geometry;
+        geometry.size = grid.size;
+        geometry.spacing.setConstant(spacing);
+        geometry.origin = lower;
+        imaging::Volume held(geometry, CV_8UC1);
+        bool any = false;
+        for (std::size_t n = 0; n < grid.fixed.size(); ++n) {
+            held.data<std::uint8_t>()[n] = grid.fixed[n] == in_body;
+            any = any || grid.fixed[n] == in_body;
+        }
+        if (!any) return;
+        body_distance = imaging::signed_distance(held);
+        to_bodies.emplace(body_distance);
+    }
+
     /// Cuts the edges from free nodes into the mesh at the surface.
     void link_surface() {
         const auto neighbours = grid.neighbours();
@@ -360,31 +230,50 @@ struct Continuation::Impl {
         return hit.value - interpolated(hit.point);
     }
 
-    /// What is missing at the closest point of the surface, fading over the layer; in a narrow gap with that of the
-    /// other side, each by the inverse of its distance, so that nothing jumps halfway.
+    /// What is added near the surface.
     [[nodiscard]] Eigen::Vector3d correction(const Eigen::Vector3d& point) const {
-        const auto near = surface.closest(point);
+        const Eigen::Vector3d missed =
+            fading(point, surface, [&](const meshing::SurfaceProximity::Hit& hit) { return missing(hit); });
+        if (!sliding) return missed;
+        const auto slip = sliding->closest(point);
+        return slip ? Eigen::Vector3d(missed + share(slip->distance, room(point, *slip)) * slip->value) : missed;
+    }
+
+    /// Of the layer that slides, as far as a body that is held.
+    [[nodiscard]] double room(const Eigen::Vector3d& point, const meshing::SurfaceProximity::Hit& hit) const {
+        if (!to_bodies) return sliding->reach();
+        return std::min(sliding->reach(), hit.distance + std::max(0.0, to_bodies->value(point)));
+    }
+
+    /// 1 at a surface, 0 at the end of a layer, slope 0 at both.
+    static double share(double distance, double thickness) {
+        const double t = thickness > 0 ? std::min(distance / thickness, 1.0) : 1.0;
+        return (1.0 - t) * (1.0 - t) * (1.0 + 2.0 * t);
+    }
+
+    /// What `value` is at the closest point of a surface, fading over its reach; in a narrow gap with that of the other
+    /// side, each by the inverse of its distance, so that nothing jumps halfway.
+    template <class Value>
+    static Eigen::Vector3d fading(const Eigen::Vector3d& point, const meshing::SurfaceProximity& from,
+                                  const Value& value) {
+        const auto near = from.closest(point);
         if (!near) return Eigen::Vector3d::Zero();
-        const auto fading = [&](const meshing::SurfaceProximity::Hit& hit) {
-            const double t = hit.distance / surface.reach();
-            return (1.0 - t) * (1.0 - t) * (1.0 + 2.0 * t);  // 1 at the surface, slope 0 at both ends
-        };
-        const double near_fading = fading(*near);
-        const Eigen::Vector3d of_near = near_fading * missing(*near);
-        const auto opposite = surface.closest_opposite(point, *near);
+        const double near_fading = share(near->distance, from.reach());
+        const Eigen::Vector3d of_near = near_fading * value(*near);
+        const auto opposite = from.closest_opposite(point, *near);
         if (!opposite) return of_near;
-        const double opposite_fading = fading(*opposite);
+        const double opposite_fading = share(opposite->distance, from.reach());
         const double near_share = near_fading * opposite->distance, opposite_share = opposite_fading * near->distance;
         const double sum = near_share + opposite_share;
         if (!(sum > 0.0)) return of_near;
-        return (near_share * of_near + opposite_share * opposite_fading * missing(*opposite)) / sum;
+        return (near_share * of_near + opposite_share * opposite_fading * value(*opposite)) / sum;
     }
 };
 
 Continuation::Continuation(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tets,
-                           const meshing::BoundarySurface& boundary, const Eigen::Matrix3Xd& values, double fade_mm,
+                           const meshing::BoundarySurface& boundary, const NodalField& field, double fade_mm,
                            const HeldBodies& bodies, double finest_spacing_mm)
-    : impl_(std::make_unique<Impl>(nodes, tets, boundary, values, fade_mm, bodies, finest_spacing_mm)) {}
+    : impl_(std::make_unique<Impl>(nodes, tets, boundary, field, fade_mm, bodies, finest_spacing_mm)) {}
 Continuation::~Continuation() = default;
 Continuation::Continuation(Continuation&&) noexcept = default;
 Continuation& Continuation::operator=(Continuation&&) noexcept = default;

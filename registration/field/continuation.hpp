@@ -16,9 +16,16 @@ struct ContinuationOptions {
     double stiffening = 0.2;         ///< |∇u| from which the continuation resists steeper gradients
     double least_share = 0.01;       ///< of a value that would lead into rigid surroundings, that it is shortened by
     double blend_spacings = 1.25;    ///< thickness of the correcting layer at the surface, in grid spacings
+    double slip_mm = 4;              ///< thickness of the layer that shears where the surface slides
     int coarsest_nodes = 16;         ///< along the shortest side of a grid that is not coarsened any more
     int coarsest_rounds = 20, rounds = 4, sweeps = 3;  ///< of weights, there and elsewhere; sweeps under each
     float relaxation = 1.4F;                           ///< factor of over-relaxation
+};
+
+/// Vectors at the nodes of a mesh (3 × N, mm): what is continued, and what its surface has beyond that where it slides
+/// along what lies beside it (empty: nothing).
+struct NodalField {
+    Eigen::Matrix3Xd beside, slip = {};
 };
 
 /// Continues nodal vectors (mm) outward from the surface of a mesh, down to zero `fade_mm` away.
@@ -31,11 +38,13 @@ struct ContinuationOptions {
 /// also approximates the field inside the mesh, which the inversion of a continued field needs close to the surface.
 ///
 /// Nodes of the grid in rigid bodies move with them.
+///
+/// Where the surface slides a layer shears: a jump would fold on any grid of voxels, whose steps are not along it.
 class Continuation {
 public:
-    /// `nodes` 3 × N mm, positions of the mesh whose elements and outer boundary are given; `values` 3 × N, mm.
+    /// `nodes` 3 × N mm, positions of the mesh whose elements and outer boundary are given.
     Continuation(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix4Xi& tets, const meshing::BoundarySurface& boundary,
-                 const Eigen::Matrix3Xd& values, double fade_mm, const HeldBodies& bodies = {},
+                 const NodalField& field, double fade_mm, const HeldBodies& bodies = {},
                  double finest_spacing_mm = ContinuationOptions().finest_spacing_mm);
     ~Continuation();
     Continuation(Continuation&&) noexcept;

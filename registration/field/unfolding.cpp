@@ -22,7 +22,7 @@ using Voxels = std::vector<std::int64_t>;  // in ascending order
 constexpr float least_determinant = 0.05F;
 constexpr double most_folded_share = 0.05;  // of all voxels: more is no map to mend
 
-/// Voxels that may be smoothed: beside the mesh, the outermost of it too, all.
+/// Voxels that may be smoothed: beside the mesh and what is rigid; all beside it and its outermost; all.
 enum class Free { Beside, Rim, All };
 
 /// Who is smoothed, and how much.
@@ -32,7 +32,8 @@ struct Pass {
     int sweeps, rounds;
 };
 // What is beside the mesh is free to give way, and most folds go. Those left lie where parts of the mesh pass into each
-// other, a gap of a voxel closes, or the organ slid far along bone: there the mesh gives way, as little as it can.
+// other, a gap of a voxel closes, or the organ slid far along bone: there mesh and bone give way, as little as they
+// can.
 constexpr Pass passes[] = {
     {Free::Beside, 2, 5, 10}, {Free::Rim, 1, 1, 20}, {Free::All, 1, 1, 20}, {Free::All, 3, 1, 20}};
 
@@ -108,7 +109,8 @@ public:
     }
 
     [[nodiscard]] Unfolding changes() const {
-        Unfolding result{.left = count_turned(jacobian_, folded_, grid_)};
+        Unfolding result{.left = count_turned(jacobian_, folded_, grid_),
+                         .organ = cv::countNonZero(organ_.voxels.reshape(1, 1))};
         for (const auto& [voxel, before] : before_) {
             ++result.voxels;
             if (!inside_[voxel]) continue;
@@ -126,6 +128,7 @@ private:
     }
     [[nodiscard]] bool is_free(std::int64_t voxel, const Pass& pass) const {
         if (inside_[voxel]) return pass.free == Free::All || (pass.free == Free::Rim && on_rim(voxel));
+        if (pass.free != Free::Beside) return true;
         const auto index = index_of(voxel, grid_);
         return bodies_.rigid.at(bodies_.to_rigid * grid_.point(Eigen::Vector3d(index[0], index[1], index[2]))) == 0;
     }

@@ -13,7 +13,7 @@ MotionsBeside motions_beside(const Deformation& deformation, double fade_mm) {
     const auto& mesh = deformation.mesh;
     const meshing::BoundarySurface boundary = meshing::boundary_surface(mesh);
     const auto continued = [&](const Eigen::Matrix3Xd& values) {
-        return Continuation(mesh.nodes, mesh.tets, boundary, values, fade_mm, {}, sliding_options.continuation_mm);
+        return Continuation(mesh.nodes, mesh.tets, boundary, {values}, fade_mm, {}, sliding_options.continuation_mm);
     };
     return {continued(deformation.displacement),
             continued(motion_across_surface(mesh.nodes, boundary, deformation.displacement))};

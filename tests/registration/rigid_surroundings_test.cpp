@@ -207,8 +207,11 @@ TEST(RigidSurroundings, AnOrganThatSlidAlongThemDragsNothing) {
     const Eigen::Isometry3d& motion = deformation.surroundings->motion;
     Volume forward = displacement_moving_to_fixed(deformation, grid);
     Volume backward = displacement_fixed_to_moving(deformation, fixed.geometry);
-    EXPECT_EQ(unfold_moving_to_fixed(forward, deformation).left, 0);
-    EXPECT_EQ(unfold_fixed_to_moving(backward, deformation).left, 0);
+    const Unfolding forth = unfold_moving_to_fixed(forward, deformation),
+                    back = unfold_fixed_to_moving(backward, deformation);
+    EXPECT_EQ(forth.left + back.left, 0);
+    // A layer shears beside the organ: with a jump 101 of its voxels gave way.
+    EXPECT_LT(std::max(forth.in_organ, back.in_organ), 0.002 * double(forth.organ));
     std::vector<double> bone_off, organ_off;
     for_each_voxel(forward, [&](const Eigen::Vector3d& index, std::int64_t n) {
         const Eigen::Vector3d X = grid.point(index);
