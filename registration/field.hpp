@@ -9,7 +9,8 @@
 /// does not fold. Where the surroundings' motion is known (Deformation::surroundings) that motion takes the place of
 /// the placement, rigid ones move by it but for 2.5 mm at their edges, and the backward field is continued on its own:
 /// tissue that parts from bone leaves places to which no preoperative point comes. Where the organ slid along them
-/// (Surroundings::slide) both continue the motion of its surface across itself instead, and jump there.
+/// (Surroundings::slide) both continue the motion of its surface across itself instead, beyond a layer of 4 mm that
+/// shears.
 
 #include "core/observer.hpp"
 #include "imaging/volume.hpp"

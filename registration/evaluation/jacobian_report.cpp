@@ -128,11 +128,15 @@ std::optional<Doubt> doubt_of_folds(const JacobianReport& everywhere, const Jaco
     if (everywhere.folded == 0 && back.left == 0) return std::nullopt;
     char least[32];
     std::snprintf(least, sizeof least, "%.3g", everywhere.minimum);
+    const std::string forth = "the displacement field folds in " + std::to_string(everywhere.folded) + " voxels, " +
+                              std::to_string(in_organ.folded) + " of them in the organ, and its det J falls to " +
+                              least;
+    const std::string backward = "the backward field folds in " + std::to_string(back.left) + " voxels";
     return Doubt{
         "field.folds", double(everywhere.folded + back.left), 0,
-        "the displacement field folds in " + std::to_string(everywhere.folded) + " voxels, " +
-            std::to_string(in_organ.folded) + " of them in the organ, and its det J falls to " + least +
-            "; the backward field folds in " + std::to_string(back.left),
+        everywhere.folded == 0 ? backward
+        : back.left == 0       ? forth
+                               : forth + "; " + backward,
         "do not trust it there (report.json lists places); a finer mesh, or labels and points that do not pull "
         "against each other there"};
 }

@@ -16,7 +16,7 @@
 namespace tissuewarp::registration {
 
 inline constexpr const char* sliding_note =
-    "the images show that the organ slid along what lies around it, which is not dragged along: the fields jump there";
+    "the images show that the organ slid along what lies around it, which is not dragged along but for 4 mm beside it";
 
 /// How the surroundings moved, with the voxels of the moving image's grid that are rigid; those of
 /// `deformation.surroundings` among them. None of them lies in the organ, before or after it deformed. Only what

@@ -112,6 +112,7 @@ TEST(Doubts, OfFoldsSolverAndAccuracy) {
     JacobianReport report;
     EXPECT_EQ(code(doubt_of_folds(report, report, {})), "");
     EXPECT_EQ(code(doubt_of_folds(report, report, {.left = 1})), "field.folds");
+    EXPECT_EQ(doubt_of_folds(report, report, {.left = 1})->text, "the backward field folds in 1 voxels");
     report.folded = 1;
     EXPECT_EQ(code(doubt_of_folds(report, {}, {})), "field.folds");
     EXPECT_EQ(code(doubt_of_unfolding({20, 0, 3, 0.9}, {10, 0, 2, 0.8})), "");

@@ -125,6 +125,72 @@ detail::EchoCosts costs_of_a_shift() {
     });
 }
 
+/// Of anything, a part of which each image shows.
+detail::EchoImages random_images() {
+    detail::EchoImages images;
+    images.grid = plain_grid({13, 12, 11}, 3, {5, -7, 9});
+    cv::RNG random(3);
+    for_each_voxel(Volume(images.grid, CV_8UC1), [&](const Eigen::Vector3d& index, std::int64_t) {
+        const bool seen = (index - Eigen::Vector3d(6, 5, 5)).norm() < 4.2;
+        images.seen.push_back(seen);
+        images.shown.push_back(index[0] > 1);
+        images.echo.push_back(seen ? static_cast<float>(random.gaussian(1)) : 0.F);
+        images.grey.push_back(static_cast<float>(random.gaussian(1)));
+        images.gradient.push_back(static_cast<float>(random.gaussian(1)));
+    });
+    return images;
+}
+
+/// 1 − LC2 voxel by voxel, each weighed as its brick of 2³ is by the window about another; negative where too much is
+/// lost.
+double unexplained(const detail::EchoImages& images, const Eigen::Vector3i& brick, const Eigen::Vector3i& shift,
+                   double window_mm) {
+    const double deviation = window_mm / 6;
+    const int radius = static_cast<int>(std::lround(2 * deviation));
+    double total = 0, shown = 0;
+    Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d sums = Eigen::Vector3d::Zero();
+    for_each_voxel(Volume(images.grid, CV_8UC1), [&](const Eigen::Vector3d& index, std::int64_t n) {
+        const Eigen::Vector3i at = index.cast<int>(), from = at - shift, away = at / 2 - brick;
+        if (images.seen[std::size_t(n)] == 0 || away.cwiseAbs().maxCoeff() > radius) return;
+        const double weight = std::exp(-0.5 * away.cast<double>().squaredNorm() / (deviation * deviation));
+        total += weight;
+        const auto& size = images.grid.size;
+        if ((from.array() < 0).any() || from[0] >= size[0] || from[1] >= size[1] || from[2] >= size[2]) return;
+        const auto m = std::size_t(from[0] + size[0] * (from[1] + size[1] * from[2]));
+        if (images.shown[m] == 0) return;
+        const Eigen::Vector3d values(images.echo[std::size_t(n)], images.grey[m], images.gradient[m]);
+        shown += weight;
+        sums += weight * values;
+        products += weight * values * values.transpose();
+    });
+    if (shown < (1 - detail::EchoCostOptions().most_lost) * total) return -1;
+    Eigen::Matrix3d covariance = products / shown - (sums / shown) * (sums / shown).transpose();
+    covariance.bottomRightCorner<2, 2>() += detail::EchoCostOptions().ridge * Eigen::Matrix2d::Identity();
+    const Eigen::Vector2d with = covariance.bottomLeftCorner<2, 1>();
+    return 1 - with.dot(covariance.bottomRightCorner<2, 2>().inverse() * with) / covariance(0, 0);
+}
+
+TEST(EchoCosts, AreThoseOfVoxelsOneByOne) {
+    const detail::EchoImages images = random_images();
+    constexpr double window_mm = 8;
+    const detail::EchoCosts costs = detail::echo_costs(images, {window_mm, 3, 2});
+    ASSERT_GT(costs.at.size(), 30U);
+    int lost = 0;
+    for (std::size_t n = 0; n < costs.at.size(); n += 3)
+        for (std::size_t entry = 0; entry < costs.lattice(); entry += 5) {
+            const Eigen::Vector3d place = (costs.place(n) - costs.places.origin) / 6;
+            const Eigen::Vector3i brick = place.array().round().cast<int>();
+            const double direct = unexplained(images, brick, costs.shift(entry), window_mm);
+            if (direct < 0) {
+                ++lost;
+                EXPECT_TRUE(std::isinf(costs.of(n)[entry]));
+            } else
+                EXPECT_NEAR(costs.of(n)[entry], direct, 1e-4);
+        }
+    EXPECT_GT(lost, 0);
+}
+
 Eigen::Vector3i least_shift(const detail::EchoCosts& costs) {
     Eigen::VectorXd total = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(costs.lattice()));
     for (std::size_t n = 0; n < costs.at.size(); ++n)
