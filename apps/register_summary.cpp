@@ -19,6 +19,7 @@ std::string summary_row(const std::string& name, const registration::Summary& s)
 }
 
 std::string estimate_text(const registration::UncertaintySummary& s) {
+    if (!std::isfinite(s.deviation_mm)) return "estimated error: none could be made of these data\n";
     const std::string of_mesh =
         std::isfinite(s.discretisation_mm) ? fmt::format("{:.2f}", s.discretisation_mm) : "not estimated";
     std::string text = fmt::format(
@@ -69,9 +70,12 @@ std::string fits_text(const RegistrationRun& run) {
     std::string text;
     for (std::size_t n = 0; n < run.result.images.size(); ++n) {
         const registration::ImageFit& fit = run.result.images[n];
-        text += fmt::format("{}: {} of {} blocks found, {:.2f} mm from the tissue; near {:.0f} % of the organ\n",
-                            n == 0 ? "image" : fmt::format("contrast {}", n + 1), fit.matched, fit.blocks,
-                            fit.residual_mm, 100 * fit.shown_share);
+        const std::string name = n == 0 ? "image" : fmt::format("contrast {}", n + 1);
+        if (fit.matched == 0)
+            text += fmt::format("{}: none of {} blocks found\n", name, fit.blocks);
+        else
+            text += fmt::format("{}: {} of {} blocks found, {:.2f} mm from the tissue; near {:.0f} % of the organ\n",
+                                name, fit.matched, fit.blocks, fit.residual_mm, 100 * fit.shown_share);
     }
     if (const auto& fit = run.result.surface)
         text += fmt::format("surface points: {:.0f} % on the model, {:.2f} mm from it (root mean square)\n",

@@ -68,7 +68,8 @@ struct Unfolding {
 /// Take the folds out of a field, in place: voxels about those with det(∂y/∂X) ≤ 0.05 take the mean of their six
 /// neighbours again and again (Laplacian smoothing), beside the mesh and rigid surroundings first. Where that does not
 /// do, since parts of the mesh pass into each other, these and the mesh's outermost voxels do too, and at last all near
-/// a fold. A field without folds is not touched, nor one that folds in a twentieth of its voxels. PointTransform, which
+/// a fold. Differences are central ones, over two voxels: beside what slid far, interpolation within a voxel may fold.
+/// A field without folds is not touched, nor one that folds in a twentieth of its voxels. PointTransform, which
 /// has no voxels, does not follow.
 Unfolding unfold_moving_to_fixed(imaging::Volume& field, const Deformation& deformation);
 Unfolding unfold_fixed_to_moving(imaging::Volume& field, const Deformation& deformation);

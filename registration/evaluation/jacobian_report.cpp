@@ -146,15 +146,15 @@ std::optional<Doubt> doubt_of_unfolding(const Unfolding& forth, const Unfolding&
     if (unfolding.most_in_organ_mm <= unfolding_doubt_limits.most_mm) return std::nullopt;
     char text[240];
     std::snprintf(text, sizeof text,
-                  "the displacement field folded where parts of the organ pass into each other or slid far along bone: "
-                  "%lld of its voxels were moved by up to %.2g mm, so that it does not",
+                  "the displacement field folded where parts of the organ pass into each other or slid far along what "
+                  "lies beside them; so that it does not, %lld voxels of the organ gave way, by up to %.2g mm",
                   static_cast<long long>(unfolding.in_organ), unfolding.most_in_organ_mm);
     const bool few = double(unfolding.in_organ) < unfolding_doubt_limits.least_share * double(unfolding.organ);
     return Doubt{"field.unfolded",
                  unfolding.most_in_organ_mm,
                  unfolding_doubt_limits.most_mm,
                  text,
-                 "look where labels lie close together; give parts that slide on each other as one label",
+                 "look where it slid or labels lie close together; give parts that slide on each other as one label",
                  few ? Severity::Notice : Severity::Doubt};
 }
 

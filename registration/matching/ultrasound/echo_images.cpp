@@ -106,9 +106,8 @@ Volume near_mesh(const meshing::TetMesh& mesh, const imaging::Geometry& grid, do
     return imaging::dilate(mask_of_mesh(mesh, grid), outside_mm);
 }
 
-/// Voxel centres of what is seen, thinned.
-Eigen::Matrix3Xd places_seen(const Volume& seen) {
-    constexpr int step = 4;
+/// Voxel centres of what is seen, every `step`-th along each axis.
+Eigen::Matrix3Xd places_seen(const Volume& seen, int step) {
     const auto& size = seen.geometry.size;
     std::vector<Eigen::Vector3d> places;
     for (int k = 0; k < size[2]; k += step)
@@ -119,6 +118,16 @@ Eigen::Matrix3Xd places_seen(const Volume& seen) {
     Eigen::Matrix3Xd result(3, static_cast<Eigen::Index>(places.size()));
     for (std::size_t n = 0; n < places.size(); ++n) result.col(static_cast<Eigen::Index>(n)) = places[n];
     return result;
+}
+
+/// Voxel centres of what is seen, thinned where that leaves enough: a slab of a voxel or two lies between them.
+/// Throws InvalidInput where there are none.
+Eigen::Matrix3Xd places_seen(const Volume& seen) {
+    constexpr int thinned = 4, enough = 1000;
+    Eigen::Matrix3Xd places = places_seen(seen, thinned);
+    if (places.cols() < enough) places = places_seen(seen, 1);
+    if (places.cols() == 0) throw InvalidInput("the ultrasound shows nothing: all of it has one value");
+    return places;
 }
 
 /// A grid about what is seen, and no wider than the model needs.
