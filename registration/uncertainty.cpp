@@ -205,12 +205,13 @@ ErrorEstimate Uncertainty::at(int tet, const Eigen::Vector4d& barycentric) const
     result.covariance = tled::symmetric_matrix(covariance);
     result.deviation_mm = std::sqrt(result.covariance.trace());
     static const double z_95 = normal_quantile(0.95);
-    result.interval_mm = radius_mm(result.covariance, z_95);
+    const bool told = result.covariance.allFinite();  // not by data that no motion of the tissue would change
+    result.interval_mm = told ? radius_mm(result.covariance, z_95) : std::numeric_limits<double>::quiet_NaN();
     const bool shown = std::all_of(corners.begin(), corners.end(),
                                    [&](int node) { return nodal_.shown[static_cast<std::size_t>(node)] != 0; });
-    result.trust = !nodal_.placed || result.interval_mm > detail::error_model.failed_mm ? Trust::Unknown
-                   : shown                                                              ? Trust::Shown
-                                                                                        : Trust::Carried;
+    result.trust = !nodal_.placed || !(result.interval_mm <= detail::error_model.failed_mm) ? Trust::Unknown
+                   : shown                                                                  ? Trust::Shown
+                                                                                            : Trust::Carried;
     return result;
 }
 
@@ -253,8 +254,8 @@ UncertaintySummary summarise(const Uncertainty& uncertainty) {
         sum.interval_mm += share[n] * here.interval_mm;
         if (here.trust == Trust::Shown) sum.shown_share += share[n];
         if (here.trust == Trust::Unknown) sum.unknown_share += share[n];
-        if (here.interval_mm > data_doubt_limits.failed_mm) sum.failed_share += share[n];
-        if (here.interval_mm > data_doubt_limits.poor_mm) sum.poor_share += share[n];
+        if (!(here.interval_mm <= data_doubt_limits.failed_mm)) sum.failed_share += share[n];
+        if (!(here.interval_mm <= data_doubt_limits.poor_mm)) sum.poor_share += share[n];
         if (here.interval_mm <= sum.worst_interval_mm) continue;
         sum.worst_interval_mm = here.interval_mm;
         sum.worst_place = mesh.nodes.col(n);

@@ -39,7 +39,7 @@ struct ErrorEstimate {
     double deviation_mm = 0;       ///< all together, 1 σ
     /// All together, mm², moving frame before the placement turns it.
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-    double interval_mm = 0;  ///< with a probability of 95 % the true place lies within
+    double interval_mm = 0;  ///< with a probability of 95 % the true place lies within; NaN where the data tell nothing
     Trust trust = Trust::Unknown;
 };
 

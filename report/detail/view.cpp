@@ -250,17 +250,21 @@ json materials_view(const json& materials) {
     return rows;
 }
 
+std::string image_line(const json& image) {
+    const std::string blocks = number(at(image, "blocks"), 0) + " blocks of the preoperative image were found in it.";
+    if (at(image, "matched") == 0) return "Intraoperative image: none of " + blocks;
+    return "Intraoperative image: " + number(at(image, "matched"), 0) + " of " + blocks +
+           " What was matched last lies " + number(at(image, "residual_mm"), 2) +
+           " mm from where the tissue went, in the mean; " + percent(at(image, "shown_share")) +
+           " of the organ lies near some of it.";
+}
+
 /// A sentence on each kind of data that pulled at the model.
 json data_view(const json& report) {
     json lines = json::array();
     if (at(report, "inputs").contains("fixed-labels"))
         lines.push_back("Intraoperative labels: boundaries of the tissue were brought to theirs.");
-    if (const json& image = at(report, "image"); image.is_object())
-        lines.push_back("Intraoperative image: " + number(at(image, "matched"), 0) + " of " +
-                        number(at(image, "blocks"), 0) +
-                        " blocks of the preoperative image were found in it. What was matched last lies " +
-                        number(at(image, "residual_mm"), 2) + " mm from where the tissue went, in the mean; " +
-                        percent(at(image, "shown_share")) + " of the organ lies near some of it.");
+    if (const json& image = at(report, "image"); image.is_object()) lines.push_back(image_line(image));
     if (const json& surface = at(report, "surface"); surface.is_object())
         lines.push_back("Points of the intraoperative surface: " + percent(at(surface, "inlier_share")) +
                         " of them lie on the model, " + number(at(surface, "residual_mm"), 2) +

@@ -6,6 +6,7 @@
 #include "registration/matching/ultrasound/ultrasound_search.hpp"
 #include "registration/terms/datum_kind.hpp"
 #include "registration/terms/image.hpp"
+#include "registration/uncertainty.hpp"
 #include "registration/update.hpp"
 #include "tests/registration/doubt_codes.hpp"
 #include "tests/registration/textured_phantom.hpp"
@@ -280,9 +281,14 @@ TEST(UltrasoundUpdate, OfASlabIsDoubtedAndOfNothingRefused) {
     seen.image->voxels = 0;
     EXPECT_THROW(update(one.model, seen, options), InvalidInput);
     for_each_voxel(whole, [&](const Eigen::Vector3d& index, std::int64_t n) {
-        if (std::abs(index[0] - whole.geometry.size[0] / 2 - 1.5) < 1) seen.image->data<float>()[n] = whole.data<float>()[n];
+        if (std::abs(index[0] - whole.geometry.size[0] / 2 - 1.5) < 1)
+            seen.image->data<float>()[n] = whole.data<float>()[n];
     });
-    EXPECT_FALSE(update(one.model, seen, options).doubts.empty());
+    const UpdateResult result = update(one.model, seen, options);
+    EXPECT_FALSE(result.doubts.empty());
+    const UncertaintySummary known = summarise(uncertainty(one.model, result));
+    EXPECT_FALSE(std::isfinite(known.interval_mm)) << "nothing was found: that is not within 0.00 mm";
+    EXPECT_NEAR(known.unknown_share, 1, 1e-9);
 }
 
 TEST(UltrasoundUpdate, DoubtsEchoesOfSomethingElse) {
