@@ -2,6 +2,7 @@
 #include "registration/doubts.hpp"
 #include "registration/uncertainty.hpp"
 
+#include <cmath>
 #include <cstdio>
 #include <string>
 #include <utility>
@@ -24,10 +25,12 @@ std::optional<Doubt> doubt_of_data(const UncertaintySummary& summary) {
     const double share = failed ? summary.failed_share : summary.poor_share,
                  limit = failed ? limits.failed_share : limits.poor_share,
                  apart_mm = failed ? limits.failed_mm : limits.poor_mm;
+    const std::string worst = std::isfinite(summary.worst_interval_mm)
+                                  ? ", and the place known least " + detail::to_text(summary.worst_interval_mm) + " mm"
+                                  : "";
     return Doubt{"data.show_too_little", share, limit,
                  "the data show too little of the organ: " + detail::percent(share) +
-                     " of its tissue may lie more than " + std::to_string(int(apart_mm)) +
-                     " mm off, and the place known least " + detail::to_text(summary.worst_interval_mm) + " mm",
+                     " of its tissue may lie more than " + std::to_string(int(apart_mm)) + " mm off" + worst,
                  "show more of it, or give landmarks"};
 }
 
