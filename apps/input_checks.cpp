@@ -79,10 +79,11 @@ void require_known_surroundings(const Volume& moving_labels, const PreoperativeO
     named.anchors = options.anchors;
     named.rigid_neighbours = options.rigid_neighbours;
     named.resected = options.resected;
+    named.sliding = options.sliding;
     try {
         registration::require_surroundings(moving_labels, named);
     } catch (const InvalidInput& problem) {
-        throw InvalidInput(fmt::format("'{}', --anchor, --rigid-neighbour and --resected: {}",
+        throw InvalidInput(fmt::format("'{}', --anchor, --rigid-neighbour, --resected and --sliding: {}",
                                        organ_file(options).string(), problem.what()));
     }
 }

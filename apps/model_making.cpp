@@ -33,6 +33,7 @@ PrepareOptions prepare_options(const PreoperativeOptions& options, const Registr
     made.anchors = options.anchors;
     made.rigid_neighbours = options.rigid_neighbours;
     made.resected = options.resected;
+    made.sliding = options.sliding;
     return made;
 }
 

@@ -13,7 +13,7 @@ HelpLayout layout_of_register() {
           {"--fixed", "--fixed-labels", "--fixed-surface", "--fixed-points", "--moving-points", "--moving-curves",
            "--fixed-curves", "--match-image", "--similarity", "--moving-mask", "--fixed-mask", "--resample-labels"}},
          {"How well it was seen", {"--surface-sd", "--points-sd", "--curves-sd", "--data-stiffness"}},
-         {"Where the organ lies", {"--no-align", "--initial-transform", "--anchor", "--rigid-neighbour"}},
+         {"Where the organ lies", {"--no-align", "--initial-transform", "--anchor", "--rigid-neighbour", "--sliding"}},
          {"Tissue",
           {"--materials", "--tissue", "--label-tissue", "--default-youngs-modulus", "--default-poissons-ratio",
            "--element", "--resected"}},

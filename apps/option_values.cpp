@@ -78,4 +78,14 @@ std::vector<int> label_list(const std::string& option, const std::vector<std::st
     return labels;
 }
 
+std::vector<std::array<int, 2>> label_pairs(const std::string& option, const std::vector<std::string>& entries) {
+    const std::vector<int> labels = label_list(option, entries);
+    if (labels.size() % 2 != 0)
+        throw InvalidInput(option + " is given " + std::to_string(labels.size()) +
+                           " labels; give pairs, for instance 1,2");
+    std::vector<std::array<int, 2>> pairs;
+    for (std::size_t n = 0; n < labels.size(); n += 2) pairs.push_back({labels[n], labels[n + 1]});
+    return pairs;
+}
+
 }  // namespace tissuewarp::apps

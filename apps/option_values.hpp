@@ -2,6 +2,7 @@
 /// What options of the command line say beyond numbers and text. Each throws InvalidInput with the option, its value
 /// and an example where that is no such thing.
 
+#include <array>
 #include <map>
 #include <optional>
 #include <string>
@@ -21,5 +22,7 @@ std::optional<double> quantity(const std::string& option, const std::string& tex
                                const std::vector<std::pair<std::string, double>>& units);
 /// Whole numbers above 0.
 std::vector<int> label_list(const std::string& option, const std::vector<std::string>& entries);
+/// The same, two and two.
+std::vector<std::array<int, 2>> label_pairs(const std::string& option, const std::vector<std::string>& entries);
 
 }  // namespace tissuewarp::apps

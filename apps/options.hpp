@@ -4,6 +4,7 @@
 
 #include "apps/parameters.hpp"
 
+#include <array>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -63,6 +64,7 @@ struct PreoperativeOptions {
     double default_poissons_ratio = 0.45;
     std::string element = "auto";                          ///< "auto", "t4" or "averaged-pressure"
     std::vector<int> anchors, rigid_neighbours, resected;  ///< labels of the preoperative map
+    std::vector<std::array<int, 2>> sliding;               ///< pairs of them
     double data_stiffness = 3.0;                           ///< kPa/mm
 };
 

@@ -40,6 +40,7 @@ void require_organ(const PreoperativeOptions& o) {
     if (!o.anchors.empty()) refuse_without_labels(o, "--anchor");
     if (!o.rigid_neighbours.empty()) refuse_without_labels(o, "--rigid-neighbour");
     if (!o.resected.empty()) refuse_without_labels(o, "--resected");
+    if (!o.sliding.empty()) refuse_without_labels(o, "--sliding");
 }
 
 void require_where_to_find_resection(const RegisterOptions& o) {

@@ -2,6 +2,7 @@
 
 #include "apps/output_names.hpp"
 #include "apps/register_outputs.hpp"
+#include "apps/report_tissue.hpp"
 #include "apps/versions.hpp"
 #include "core/atomic_file.hpp"
 #include "imaging/labels.hpp"
@@ -10,13 +11,13 @@
 
 namespace tissuewarp::apps {
 
-namespace {
-
 using nlohmann::json;
 
-json number(double value) {
+json number_json(double value) {
     return std::isfinite(value) ? json(value) : json(nullptr);
 }
+
+namespace {
 
 json vector(const Eigen::Vector3d& v) {
     return {v.x(), v.y(), v.z()};
@@ -48,9 +49,9 @@ json inputs(const RegistrationInputs& inputs) {
 }
 
 json foreground(const imaging::Foreground& found) {
-    return {{"threshold", number(found.threshold)},
-            {"volume_ml", number(found.volume_mm3 / 1000)},
-            {"image_share", number(found.image_share)}};
+    return {{"threshold", number_json(found.threshold)},
+            {"volume_ml", number_json(found.volume_mm3 / 1000)},
+            {"image_share", number_json(found.image_share)}};
 }
 
 json start(const registration::StartPose& pose) {
@@ -59,8 +60,9 @@ json start(const registration::StartPose& pose) {
         const Eigen::RowVector4d values = pose.placement.matrix().row(row);
         matrix.push_back({values[0], values[1], values[2], values[3]});
     }
-    return {
-        {"matrix", matrix}, {"deformation_mm", number(pose.deformation_mm)}, {"furthest_mm", number(pose.furthest_mm)}};
+    return {{"matrix", matrix},
+            {"deformation_mm", number_json(pose.deformation_mm)},
+            {"furthest_mm", number_json(pose.furthest_mm)}};
 }
 
 json parameters(const RegisterOptions& options) {
@@ -126,20 +128,20 @@ json alignment(const RegistrationRun& run) {
             {"rotation_deg", angle},
             {"translation_mm", vector(placement.translation())},
             {"free_stretch", stretch},
-            {"mean_distance_mm", number(run.result.alignment.mean_distance_mm)}};
+            {"mean_distance_mm", number_json(run.result.alignment.mean_distance_mm)}};
 }
 
 json rounds(const RegistrationRun& run) {
     json list = json::array();
     for (const registration::Round& round : run.result.rounds)
-        list.push_back({{"range_mm", number(round.range_mm)},
+        list.push_back({{"range_mm", number_json(round.range_mm)},
                         {"matched", round.matched},
                         {"interface_nodes", round.interface_nodes},
                         {"held_back", round.held_back},
-                        {"mean_residual_mm", number(round.mean_residual_mm)},
-                        {"largest_change_mm", number(round.largest_change_mm)},
+                        {"mean_residual_mm", number_json(round.mean_residual_mm)},
+                        {"largest_change_mm", number_json(round.largest_change_mm)},
                         {"force_evaluations", round.force_evaluations},
-                        {"estimated_error_mm", number(round.estimated_error_mm)}});
+                        {"estimated_error_mm", number_json(round.estimated_error_mm)}});
     return list;
 }
 
@@ -160,8 +162,8 @@ json doubts(const std::vector<registration::Doubt>& doubts) {
     for (const registration::Doubt& doubt : doubts)
         list.push_back({{"code", doubt.code},
                         {"severity", name_of(doubt.severity)},
-                        {"value", number(doubt.value)},
-                        {"limit", number(doubt.limit)},
+                        {"value", number_json(doubt.value)},
+                        {"limit", number_json(doubt.limit)},
                         {"text", doubt.text},
                         {"remedy", doubt.remedy}});
     return list;
@@ -180,9 +182,9 @@ json mesh(const RegistrationRun& run) {
 json to_json(const registration::ImageFit& fit) {
     return {{"blocks", fit.blocks},
             {"matched", fit.matched},
-            {"residual_mm", number(fit.residual_mm)},
-            {"agreement", fit.agreement ? number(*fit.agreement) : json()},
-            {"shown_share", number(fit.shown_share)}};
+            {"residual_mm", number_json(fit.residual_mm)},
+            {"agreement", fit.agreement ? number_json(*fit.agreement) : json()},
+            {"shown_share", number_json(fit.shown_share)}};
 }
 
 /// How points agree with the model, and what is expected where they are all there is.
@@ -190,54 +192,42 @@ void add_fits(json& report, const registration::UpdateResult& result) {
     if (!result.images.empty()) report["image"] = to_json(result.images.front());
     for (std::size_t n = 1; n < result.images.size(); ++n) report["contrasts"].push_back(to_json(result.images[n]));
     if (const auto& fit = result.surface)
-        report["surface"] = {{"inlier_share", number(fit->inlier_share)},
-                             {"residual_mm", number(fit->residual_mm)},
-                             {"coverage", number(fit->coverage)}};
+        report["surface"] = {{"inlier_share", number_json(fit->inlier_share)},
+                             {"residual_mm", number_json(fit->residual_mm)},
+                             {"coverage", number_json(fit->coverage)}};
     if (const auto& fit = result.points)
         report["points"] = {
-            {"used", fit->used}, {"outliers", fit->outliers}, {"residual_mm", number(fit->residual_mm)}};
+            {"used", fit->used}, {"outliers", fit->outliers}, {"residual_mm", number_json(fit->residual_mm)}};
     if (const auto& fit = result.curves)
         report["curves"] = {{"points", fit->points},
-                            {"inlier_share", number(fit->inlier_share)},
-                            {"residual_mm", number(fit->residual_mm)},
-                            {"length_mm", number(fit->length_mm)}};
+                            {"inlier_share", number_json(fit->inlier_share)},
+                            {"residual_mm", number_json(fit->residual_mm)},
+                            {"length_mm", number_json(fit->length_mm)}};
     if (const auto& fit = result.contact)
-        report["contact"] = {{"touching", fit->touching}, {"deepest_mm", number(fit->deepest_mm)}};
+        report["contact"] = {{"touching", fit->touching}, {"deepest_mm", number_json(fit->deepest_mm)}};
     for (const registration::BodyMotion& body : result.bodies)
         if (body.own)
             report["rigid_neighbours"].push_back(
-                {{"label", body.label}, {"matrix", rows_of(body.motion)}, {"apart_mm", number(body.apart_mm)}});
+                {{"label", body.label}, {"matrix", rows_of(body.motion)}, {"apart_mm", number_json(body.apart_mm)}});
     if (const auto& fit = result.anchors)
-        report["anchors"] = {{"nodes", fit->nodes}, {"largest_mm", number(fit->largest_mm)}};
+        report["anchors"] = {{"nodes", fit->nodes}, {"largest_mm", number_json(fit->largest_mm)}};
 }
 
 json to_json(const registration::HeldOut& held_out) {
-    return {{"z", number(held_out.z)}, {"regions", held_out.regions}, {"seconds", held_out.seconds}};
+    return {{"z", number_json(held_out.z)}, {"regions", held_out.regions}, {"seconds", held_out.seconds}};
 }
 
 json to_json(const registration::UncertaintySummary& s) {
-    return {{"algebraic_mm", number(s.algebraic_mm)},
-            {"discretisation_mm", number(s.discretisation_mm)},
-            {"data_mm", number(s.data_mm)},
-            {"deviation_mm", number(s.deviation_mm)},
-            {"interval_95_mm", number(s.interval_mm)},
-            {"worst_interval_95_mm", number(s.worst_interval_mm)},
+    return {{"algebraic_mm", number_json(s.algebraic_mm)},
+            {"discretisation_mm", number_json(s.discretisation_mm)},
+            {"data_mm", number_json(s.data_mm)},
+            {"deviation_mm", number_json(s.deviation_mm)},
+            {"interval_95_mm", number_json(s.interval_mm)},
+            {"worst_interval_95_mm", number_json(s.worst_interval_mm)},
             {"worst_place_mm", vector(s.worst_place)},
-            {"shown_share", number(s.shown_share)},
-            {"unknown_share", number(s.unknown_share)},
-            {"beyond_10_mm_share", number(s.failed_share)}};
-}
-
-/// What is gone, before and after.
-json resected(const RegistrationRun& run) {
-    json object{{"labels", run.prepared->options.resected},
-                {"volume_ml", number(imaging::millilitres(run.prepared->resected))},
-                {"gap_ml", number(imaging::millilitres(run.products.gap))},
-                {"value", gap_value}};
-    if (run.resection)
-        object["found"] = {{"cavity_ml", number(run.resection->cavity_ml)},
-                           {"deviation", number(run.resection->deviation)}};
-    return object;
+            {"shown_share", number_json(s.shown_share)},
+            {"unknown_share", number_json(s.unknown_share)},
+            {"beyond_10_mm_share", number_json(s.failed_share)}};
 }
 
 /// What was asked for, chosen and expected.
@@ -263,10 +253,10 @@ json to_json(const registration::Summary& s) {
     if (s.count == 0)
         return {{"count", 0}, {"mean", nullptr}, {"median", nullptr}, {"percentile_95", nullptr}, {"maximum", nullptr}};
     return {{"count", s.count},
-            {"mean", number(s.mean)},
-            {"median", number(s.median)},
-            {"percentile_95", number(s.percentile_95)},
-            {"maximum", number(s.maximum)}};
+            {"mean", number_json(s.mean)},
+            {"median", number_json(s.median)},
+            {"percentile_95", number_json(s.percentile_95)},
+            {"maximum", number_json(s.maximum)}};
 }
 
 json to_json(const registration::TargetError& error) {
@@ -280,16 +270,16 @@ json to_json(const registration::TargetError& error) {
 json to_json(const registration::JacobianReport& report) {
     json places = json::array();
     for (const Eigen::Vector3d& place : report.folded_places) places.push_back(vector(place));
-    return {{"minimum", number(report.minimum)},
-            {"percentile_1", number(report.percentile_1)},
-            {"percentile_5", number(report.percentile_5)},
-            {"median", number(report.median)},
-            {"percentile_95", number(report.percentile_95)},
-            {"percentile_99", number(report.percentile_99)},
-            {"maximum", number(report.maximum)},
+    return {{"minimum", number_json(report.minimum)},
+            {"percentile_1", number_json(report.percentile_1)},
+            {"percentile_5", number_json(report.percentile_5)},
+            {"median", number_json(report.median)},
+            {"percentile_95", number_json(report.percentile_95)},
+            {"percentile_99", number_json(report.percentile_99)},
+            {"maximum", number_json(report.maximum)},
             {"folded", report.folded},
-            {"folded_share", number(report.folded_share)},
-            {"folded_mm3", number(report.folded_mm3)},
+            {"folded_share", number_json(report.folded_share)},
+            {"folded_mm3", number_json(report.folded_mm3)},
             {"folded_places_mm", places}};
 }
 
@@ -297,25 +287,26 @@ json to_json(const registration::Unfolding& unfolding) {
     return {{"voxels", unfolding.voxels},
             {"left", unfolding.left},
             {"in_organ", unfolding.in_organ},
-            {"most_in_organ_mm", number(unfolding.most_in_organ_mm)}};
+            {"sliding", unfolding.sliding},
+            {"most_in_organ_mm", number_json(unfolding.most_in_organ_mm)}};
 }
 
 json to_json(const std::map<int, registration::Overlap>& overlaps, const imaging::LabelNames& names) {
     json object = json::object();
     for (const auto& [label, overlap] : overlaps) {
         json& entry = object[label == 0 ? "all" : std::to_string(label)];
-        entry = {{"dice", number(overlap.dice)},
-                 {"hausdorff_95_mm", number(overlap.hausdorff_95_mm)},
-                 {"mean_surface_distance_mm", number(overlap.mean_surface_distance_mm)}};
+        entry = {{"dice", number_json(overlap.dice)},
+                 {"hausdorff_95_mm", number_json(overlap.hausdorff_95_mm)},
+                 {"mean_surface_distance_mm", number_json(overlap.mean_surface_distance_mm)}};
         if (const auto named = names.find(label); named != names.end()) entry["name"] = named->second;
     }
     return object;
 }
 
 json to_json(const meshing::Distribution& d) {
-    return {{"minimum", number(d.minimum)}, {"percentile_1", number(d.percentile_1)},
-            {"median", number(d.median)},   {"percentile_99", number(d.percentile_99)},
-            {"maximum", number(d.maximum)}, {"mean", number(d.mean)}};
+    return {{"minimum", number_json(d.minimum)}, {"percentile_1", number_json(d.percentile_1)},
+            {"median", number_json(d.median)},   {"percentile_99", number_json(d.percentile_99)},
+            {"maximum", number_json(d.maximum)}, {"mean", number_json(d.mean)}};
 }
 
 json to_json(const meshing::QualityReport& quality) {
@@ -328,7 +319,7 @@ json to_json(const meshing::QualityReport& quality) {
             {"edge_mm", to_json(quality.edge_mm)},
             {"label_volume_mm3", volumes},
             {"step_limiting_tetrahedron", quality.step_limiting_tet},
-            {"step_limit_mm", number(quality.step_limit_mm)},
+            {"step_limit_mm", number_json(quality.step_limit_mm)},
             {"components", quality.components}};
 }
 
@@ -336,9 +327,9 @@ json to_json(const meshing::Fidelity& fidelity) {
     json ratios = json::object();
     for (const auto& [label, ratio] : fidelity.volume_ratio) ratios[std::to_string(label)] = ratio;
     return {{"volume_ratio", ratios},
-            {"mean_surface_distance_mm", number(fidelity.mean_surface_distance_mm)},
-            {"hausdorff_95_mm", number(fidelity.hausdorff_95_mm)},
-            {"hausdorff_mm", number(fidelity.hausdorff_mm)}};
+            {"mean_surface_distance_mm", number_json(fidelity.mean_surface_distance_mm)},
+            {"hausdorff_95_mm", number_json(fidelity.hausdorff_95_mm)},
+            {"hausdorff_mm", number_json(fidelity.hausdorff_mm)}};
 }
 
 json alignment_json(const RegistrationRun& run) {
@@ -374,14 +365,15 @@ json report_json(const RegistrationRun& run, double total_seconds) {
                 {"total_seconds", total_seconds},
                 {"peak_memory_mb", static_cast<double>(peak_memory_bytes()) / 1e6}};
     report["estimated_error_mm"] =
-        run.result.rounds.empty() ? json(nullptr) : number(run.result.rounds.back().estimated_error_mm);
+        run.result.rounds.empty() ? json(nullptr) : number_json(run.result.rounds.back().estimated_error_mm);
     if (!scores.after.empty())
         report["overlap"] = {{"before", to_json(scores.before, run.inputs.label_names)},
                              {"after", to_json(scores.after, run.inputs.label_names)}};
     if (run.inputs.foreground) report["foreground"] = foreground(*run.inputs.foreground);
     if (run.inputs.start) report["initial_transform"] = start(*run.inputs.start);
-    if (!run.products.gap.empty()) report["resected"] = resected(run);
-    if (!run.products.parted.empty()) report["parted_ml"] = number(imaging::millilitres(run.products.parted));
+    if (!run.products.gap.empty()) report["resected"] = resected_json(run);
+    if (!run.prepared->sliding.empty()) report["sliding"] = sliding_json(run);
+    if (!run.products.parted.empty()) report["parted_ml"] = number_json(imaging::millilitres(run.products.parted));
     add_fits(report, run.result);
     if (run.products.uncertainty) {
         report["error_estimate"] = to_json(registration::summarise(*run.products.uncertainty));

@@ -17,6 +17,8 @@ nlohmann::json alignment_json(const RegistrationRun& run);
 /// Complete or absent. Bytes that are not UTF-8, as file names may hold, are replaced. Throws IoError.
 void write_json(const nlohmann::json& document, const std::filesystem::path& path);
 
+/// null in place of what is not finite.
+nlohmann::json number_json(double value);
 /// null in place of what a summary of nothing would say.
 nlohmann::json to_json(const registration::Summary& summary);
 nlohmann::json to_json(const registration::TargetError& error);

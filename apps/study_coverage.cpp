@@ -28,7 +28,7 @@ std::pair<study::Family, std::vector<std::string>> family_of(std::vector<std::st
     for (const auto& [name, family] :
          {std::pair{"bent:", Family::Bent}, std::pair{"organ:", Family::Labelled}, std::pair{"found:", Family::Found},
           std::pair{"resected:", Family::Resected}, std::pair{"unresected:", Family::Unresected},
-          std::pair{"bulged:", Family::Bulged}})
+          std::pair{"opened:", Family::Opened}, std::pair{"bulged:", Family::Bulged}})
         if (problems.size() == 1 && problems.front().starts_with(name)) {
             problems.front().replace(0, std::string(name).size(), "phantom:");
             return {family, std::move(problems)};
@@ -59,13 +59,20 @@ void take_ultrasound(std::vector<std::string>& problems, study::CoverageOptions&
     plan.evidence = {study::Evidence::Ultrasound};
 }
 
-/// "sought:7-9": patients as "resected:7-9", of whom nobody tells what is gone.
-void take_sought(std::vector<std::string>& problems, study::CoverageOptions& plan) {
-    constexpr std::string_view name = "sought:";
-    if (problems.size() != 1 || !problems.front().starts_with(name)) return;
-    problems.front().replace(0, name.size(), "resected:");
-    plan.seek_resected = true;
-    plan.evidence = {study::Evidence::Image};
+/// "sought:7-9": patients as "resected:7-9", of whom nobody tells what is gone, to be found in an image.
+/// "untold:7-9": the same whom the program takes to be whole.
+void take_untold(std::vector<std::string>& problems, study::CoverageOptions& plan) {
+    constexpr std::string_view sought = "sought:", untold = "untold:";
+    if (problems.size() != 1) return;
+    std::string& problem = problems.front();
+    if (problem.starts_with(sought)) {
+        problem.replace(0, sought.size(), "resected:");
+        plan.resection = study::KnownOfResection::Sought;
+        plan.evidence = {study::Evidence::Image};
+    } else if (problem.starts_with(untold)) {
+        problem.replace(0, untold.size(), "resected:");
+        plan.resection = study::KnownOfResection::Untold;
+    }
 }
 
 /// "turned:7-9": patients as "bent:7-9" that headers place anyhow, as labels show them.
@@ -93,7 +100,7 @@ study::CoverageOptions coverage_plan(const StudyOptions& options, Observer& obse
     plan.update = on_device(options.device);
     std::vector<std::string> wanted = options.problems;
     take_ultrasound(wanted, plan);
-    take_sought(wanted, plan);
+    take_untold(wanted, plan);
     take_turned(wanted, plan);
     const auto [family, problems] = family_of(std::move(wanted));
     plan.phantom.family = family;

@@ -10,7 +10,7 @@ inline constexpr const char* label_names_text =
 
 /// Values of options that are more than text, as the command line gives them.
 struct RegistrationTexts {
-    std::vector<std::string> label_lengths, anchors, rigid_neighbours, resected, tissues;
+    std::vector<std::string> label_lengths, anchors, rigid_neighbours, resected, sliding, tissues;
     std::string accuracy, time_budget;
 };
 

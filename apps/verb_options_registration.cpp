@@ -76,6 +76,9 @@ void declare_model(Verb& verb, PreoperativeOptions& o, RegistrationTexts& texts)
     verb.list("--rigid-neighbour", texts.rigid_neighbours, "LABEL",
               "Labels of bone and the like: not meshed, and the organ slides along them without entering")
         ->delimiter(',');
+    verb.list("--sliding", texts.sliding, "LABEL,LABEL",
+              "Two labels whose tissue slides on one another where they touch; repeatable")
+        ->delimiter(',');
     verb.list(
             "--resected", texts.resected, "LABEL",
             "Labels of tissue that is gone by the time of the operation: a hole is left there; auto (register): sought "
@@ -180,6 +183,7 @@ void take_texts(PreoperativeOptions& o, const RegistrationTexts& texts) {
     require_one_tissue(o);
     o.anchors = label_list("--anchor", texts.anchors);
     o.rigid_neighbours = label_list("--rigid-neighbour", texts.rigid_neighbours);
+    o.sliding = label_pairs("--sliding", texts.sliding);
     if (!is_auto(texts.resected)) o.resected = label_list("--resected", texts.resected);
 }
 

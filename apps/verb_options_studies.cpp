@@ -88,9 +88,9 @@ void declare_study(Verb& verb, StudyOptions& o) {
     verb.list("--problems", o.problems, "NAME",
               "Of cube, brain, brainshift, liver, phantom:SEED; dial: phantom:FIRST-LAST; coverage: that, "
               "bent:FIRST-LAST, ultrasound:FIRST-LAST, tracked-ultrasound:FIRST-LAST, faint-ultrasound:FIRST-LAST, "
-              "resected:FIRST-LAST, "
-              "unresected:FIRST-LAST, bulged:FIRST-LAST, sought:FIRST-LAST, turned:FIRST-LAST, organ:FIRST-LAST or "
-              "found:FIRST-LAST")
+              "resected:FIRST-LAST, opened:FIRST-LAST, "
+              "unresected:FIRST-LAST, bulged:FIRST-LAST, sought:FIRST-LAST, untold:FIRST-LAST, turned:FIRST-LAST, "
+              "organ:FIRST-LAST or found:FIRST-LAST")
         ->delimiter(',');
     verb.list("--evidence", o.evidence, "KIND",
               "What coverage registers to, of labels, surface, surface-and-points, points, curves, image, "

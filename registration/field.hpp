@@ -60,8 +60,9 @@ private:
 struct Unfolding {
     std::int64_t voxels = 0;      ///< whose displacement is another
     std::int64_t left = 0;        ///< that are folded nevertheless: det ≤ 0
-    std::int64_t in_organ = 0;    ///< of these in the mesh
+    std::int64_t in_organ = 0;    ///< of these in the mesh, but not beside a surface along which it slides on itself
     double most_in_organ_mm = 0;  ///< largest of their changes
+    std::int64_t sliding = 0;     ///< of these in tetrahedra at such a surface
     std::int64_t organ = 0;       ///< voxels in the mesh
 };
 

@@ -5,6 +5,7 @@
 #include "core/stopwatch.hpp"
 #include "registration/boundary/label_boundary_field.hpp"
 #include "registration/loads/coarse_twin.hpp"
+#include "registration/springs/conditions.hpp"
 #include "registration/springs/label_springs.hpp"
 #include "registration/terms/anchors.hpp"
 
@@ -13,6 +14,7 @@
 #include "registration/matching/image_mask.hpp"
 #include "registration/matching/image_matching.hpp"
 #include "registration/resection/cavity_wall.hpp"
+#include "tled/tissue_mesh.hpp"
 
 #include <tbb/task_arena.h>
 #include <tbb/task_group.h>
@@ -45,10 +47,24 @@ void measure_offsets(Interfaces& interfaces, const meshing::TetMesh& mesh, const
                                       options.max_angle_deg);
 }
 
-tled::NodalConditions label_conditions(const Interfaces& interfaces, const PrepareOptions& options, int nodes) {
+tled::Conditions label_conditions(const Interfaces& interfaces, const PrepareOptions& options) {
     tled::Conditions conditions;
     conditions.springs = detail::full_weight_springs(interfaces, options);
-    return tled::nodal_conditions(conditions, nodes);
+    return conditions;
+}
+
+/// Opens a mesh where tissue is to slide; one that was opened so before is left as it is.
+std::vector<tled::SlidingPair> open_where_tissue_slides(meshing::TetMesh& mesh, const PrepareOptions& options) {
+    if (options.sliding.empty()) return {};
+    tled::TissueMesh tissue = tled::closed(tled::rejoined(mesh));
+    std::vector<tled::SlidingPair> pairs;
+    for (const std::array<int, 2>& labels : options.sliding) {
+        const auto more =
+            tled::open_interface(tissue, tled::sides_of_labels(tissue, labels), {}, SlidingOptions().kpa_per_mm);
+        pairs.insert(pairs.end(), more.begin(), more.end());
+    }
+    mesh = std::move(tissue.mesh);
+    return pairs;
 }
 
 /// Numbers of a factor depend on what pulls at the tissue, and relaxation needs none.
@@ -65,15 +81,17 @@ PreparedModel of_mesh(meshing::TetMesh mesh, const imaging::Volume& moving_label
     imaging::Volume organ = imaging::without_labels(moving_labels, detail::not_meshed(options));
     imaging::Volume resected = detail::labels_alone(moving_labels, options.resected);
     std::optional<RigidNeighbours> neighbours = detail::rigid_neighbours(moving_labels, options.rigid_neighbours);
+    std::vector<tled::SlidingPair> sliding = open_where_tissue_slides(mesh, options);
     tled::Model model = model_of(std::move(mesh), options);
     tled::RestState rest = tled::rest_state(model);
-    Interfaces interfaces(model.mesh);
+    Interfaces interfaces(model.mesh, sliding);
     measure_offsets(interfaces, model.mesh, LabelBoundaryField(organ, interfaces.thickness(model.mesh)));
     if (!resected.empty()) detail::mark_cavity_wall(interfaces, model.mesh, resected);
     times.push_back({"rest state", stopwatch.lap()});
     observer.checkpoint("rest stiffness", 0.0);
-    const auto springs = label_conditions(interfaces, options, rest.node_count);
-    tled::RestStiffness stiffness(rest, springs);
+    tled::Conditions conditions = label_conditions(interfaces, options);
+    conditions.effects.sliding = sliding;
+    tled::RestStiffness stiffness(rest, tled::nodal_conditions(conditions, rest));
     make_ready(stiffness);
     times.push_back({"rest stiffness", stopwatch.lap()});
     return {std::move(model),
@@ -87,7 +105,8 @@ PreparedModel of_mesh(meshing::TetMesh mesh, const imaging::Volume& moving_label
             std::move(neighbours),
             nullptr,
             {},
-            std::move(resected)};
+            std::move(resected),
+            std::move(sliding)};
 }
 
 PrepareOptions with_edge_length(PrepareOptions options, const imaging::Volume& organ) {
@@ -172,7 +191,7 @@ PreparedModel with_materials(PreparedModel prepared, const tled::MaterialTable& 
     prepared.model.materials = prepared.options.materials = materials;
     prepared.rest = tled::rest_state(prepared.model);
     prepared.stiffness = tled::RestStiffness(
-        prepared.rest, label_conditions(prepared.interfaces, prepared.options, prepared.rest.node_count));
+        prepared.rest, detail::conditions_on(prepared, label_conditions(prepared.interfaces, prepared.options)));
     make_ready(prepared.stiffness);
     if (prepared.coarse) *prepared.coarse = with_materials(std::move(*prepared.coarse), materials);
     return prepared;

@@ -10,6 +10,7 @@
 #include "tled/model.hpp"
 #include "tled/stiffness/rest_stiffness.hpp"
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -52,6 +53,12 @@ inline meshing::MeshingOptions automatic_edge_length() {
     return options;
 }
 
+/// How stiff surfaces that slide on one another are against overlapping and opening. Chosen by hand: pressures within
+/// soft tissue, some 0.1 kPa, open them by a hundredth of a millimetre.
+struct SlidingOptions {
+    double kpa_per_mm = 10;
+};
+
 struct PrepareOptions {
     meshing::MeshingOptions meshing = automatic_edge_length();
     tled::MaterialTable materials;  ///< labels without an entry take `default_material`
@@ -68,11 +75,14 @@ struct PrepareOptions {
     std::vector<int> anchors;           ///< labels of tissue that stays where the rigid placement has it
     std::vector<int> rigid_neighbours;  ///< labels of bodies that move with the placement and are not meshed; the
                                         ///< organ slides along them and comes off, but does not enter them
+    std::vector<std::array<int, 2>> sliding;  ///< pairs of labels whose tissue slides on one another along the surface
+                                              ///< that they share
     std::vector<int> resected;  ///< labels of tissue that is gone by the time of the operation: not meshed, not matched
 };
 
-/// Throws InvalidInput, naming the label and those present, unless the map holds every anchor, rigid neighbour and
-/// resected label, none is two of these or 0, and something else is left to register.
+/// Throws InvalidInput, naming the label and those present, unless the map holds every anchor, rigid neighbour,
+/// resected and sliding label, none of the first three is two of these or 0, something else is left to register, and
+/// what slides are two labels of that.
 void require_surroundings(const imaging::Volume& moving_labels, const PrepareOptions& options);
 
 /// What the preoperative image shows of the tissue, to be found again in a bare intraoperative volume.
@@ -97,7 +107,8 @@ struct PreparedModel {
     std::optional<RigidNeighbours> neighbours;
     std::unique_ptr<PreparedModel> coarse;                     ///< of the same organ, see prepare_loads
     std::vector<std::shared_ptr<const ImageModel>> contrasts;  ///< see prepare_contrast
-    imaging::Volume resected = {};                             ///< labels of what is gone alone; empty where nothing is
+    imaging::Volume resected = {};                ///< labels of what is gone alone; empty where nothing is
+    std::vector<tled::SlidingPair> sliding = {};  ///< of the mesh, which is open where tissue slides
 };
 
 /// Label map → mesh → rest state → rest stiffness, its pattern analysed. Throws InvalidInput, Cancelled.

@@ -1,6 +1,7 @@
 #include "registration/round.hpp"
 
 #include "core/stopwatch.hpp"
+#include "registration/springs/conditions.hpp"
 
 #include <cmath>
 #include <utility>
@@ -71,7 +72,7 @@ tled::NodalConditions RoundSolver::linearised(const RoundPlan& plan, Standing& s
                              terms_.placement_sought(),
                              terms_.hardly_shown(state.placement, prepared_.model.mesh.nodes),
                              state.load_size};
-    return tled::nodal_conditions(all, prepared_.rest.node_count);
+    return conditions_on(prepared_, std::move(all));
 }
 
 }  // namespace tissuewarp::registration::detail

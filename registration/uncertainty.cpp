@@ -4,6 +4,7 @@
 #include "meshing/search/point_tree.hpp"
 #include "registration/doubts.hpp"
 #include "registration/loads/coarse_twin.hpp"
+#include "registration/springs/conditions.hpp"
 #include "registration/springs/pull.hpp"
 #include "registration/uncertainty/data_uncertainty.hpp"
 #include "registration/uncertainty/error_model.hpp"
@@ -46,7 +47,7 @@ tled::NodalConditions conditions_of(const PreparedModel& prepared, const LastPul
     tled::Conditions conditions;
     for (const PulledNode& pulled : pulls.springs) conditions.springs.push_back(pulled.spring);
     conditions.external_force = pulls.loads;
-    return tled::nodal_conditions(conditions, prepared.rest.node_count);
+    return detail::conditions_on(prepared, std::move(conditions));
 }
 
 /// Points of a part of the surface alone: where an organ of smooth shape lies may be told wrong, by more than any

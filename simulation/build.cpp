@@ -54,19 +54,19 @@ struct Interfaces {
     std::vector<tled::SlidingPair> held, free;
 };
 
-InterfaceSides sides_of(const Sliding& sliding, const Scene& scene, const TissueMesh& tissue) {
-    if (!sliding.sets) return sides_of_labels(tissue, sliding.labels);
+tled::InterfaceSides sides_of(const Sliding& sliding, const Scene& scene, const tled::TissueMesh& tissue) {
+    if (!sliding.sets) return tled::sides_of_labels(tissue, sliding.labels);
     const RegionFinder finder(tissue, scene.sets);
     return {finder.tets((*sliding.sets)[0]), finder.tets((*sliding.sets)[1]), simulation::sides_of(sliding)};
 }
 
-Interfaces open_interfaces(const Scene& scene, TissueMesh& tissue) {
+Interfaces open_interfaces(const Scene& scene, tled::TissueMesh& tissue) {
     Interfaces interfaces;
     for (const Sliding& sliding : scene.sliding) {
         std::vector<int> joined;
         if (!sliding.except.empty()) joined = RegionFinder(tissue, scene.sets).nodes(sliding.except);
         auto& pairs = sliding.opening == Sliding::Opening::Held ? interfaces.held : interfaces.free;
-        const auto more = open_interface(tissue, sides_of(sliding, scene, tissue), joined, sliding.per_area);
+        const auto more = tled::open_interface(tissue, sides_of(sliding, scene, tissue), joined, sliding.per_area);
         pairs.insert(pairs.end(), more.begin(), more.end());
     }
     return interfaces;
@@ -240,7 +240,7 @@ BuiltScene build(const Scene& scene, const meshing::TetMesh& mesh, Observer& obs
     require_valid(scene);
     BuiltScene built;
     built.scene = scene;
-    TissueMesh tissue = closed(mesh);
+    tled::TissueMesh tissue = tled::closed(mesh);
     Interfaces interfaces = open_interfaces(scene, tissue);
     const RegionFinder finder(tissue, scene.sets);
     built.held = held_nodes(scene, finder);

@@ -4,10 +4,10 @@
 #include "core/observer.hpp"
 #include "meshing/point_location.hpp"
 #include "simulation/scene.hpp"
-#include "simulation/tissue_mesh.hpp"
 #include "tled/conditions.hpp"
 #include "tled/model.hpp"
 #include "tled/rest_state.hpp"
+#include "tled/tissue_mesh.hpp"
 
 #include <vector>
 

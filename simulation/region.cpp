@@ -39,7 +39,7 @@ Matrix3Xi matrix_of(const std::vector<std::array<int, 3>>& faces) {
 }
 
 /// The face seen by the tissue of a label: its nodes there, normal outward.
-std::array<int, 3> seen_from(const TissueMesh& tissue, const TissueFace& each, int label) {
+std::array<int, 3> seen_from(const tled::TissueMesh& tissue, const tled::TissueFace& each, int label) {
     const InterfaceFace& face = each.face;
     const int tet = face.inner == label ? each.inner_tet : each.outer_tet;
     const auto node = [&](std::size_t corner) { return tissue.node_of(face.nodes[corner], tet); };
@@ -49,7 +49,7 @@ std::array<int, 3> seen_from(const TissueMesh& tissue, const TissueFace& each, i
 
 }  // namespace
 
-RegionFinder::RegionFinder(const TissueMesh& tissue, const Regions& regions)
+RegionFinder::RegionFinder(const tled::TissueMesh& tissue, const Regions& regions)
     : tissue_(tissue),
       regions_(regions),
       lower_(tissue.mesh.nodes.rowwise().minCoeff()),
@@ -88,10 +88,10 @@ std::vector<bool> RegionFinder::holds_node(const std::string& name, int depth) c
     }
     if (region.interface || region.surface_of) {
         std::vector<bool> of_surface(held.size(), false);
-        const auto mark = [&](const TissueFace& face, int label) {
+        const auto mark = [&](const tled::TissueFace& face, int label) {
             for (const int node : seen_from(tissue_, face, label)) of_surface[static_cast<std::size_t>(node)] = true;
         };
-        for (const TissueFace& each : tissue_.faces) {
+        for (const tled::TissueFace& each : tissue_.faces) {
             if (!belongs(region, each.face)) continue;
             mark(each, side_of(region, each.face));
             if (region.interface) mark(each, (*region.interface)[1]);
@@ -121,7 +121,7 @@ Matrix3Xi RegionFinder::faces(const std::string& name) const {
     const Region& region = this->region(name);
     const std::vector<bool> held = holds_node(name, 0);
     std::vector<std::array<int, 3>> found;
-    for (const TissueFace& each : tissue_.faces) {
+    for (const tled::TissueFace& each : tissue_.faces) {
         if (!belongs(region, each.face)) continue;
         const std::array<int, 3> nodes = seen_from(tissue_, each, side_of(region, each.face));
         if (std::all_of(nodes.begin(), nodes.end(), [&](int node) { return held[static_cast<std::size_t>(node)]; }))
@@ -133,7 +133,7 @@ Matrix3Xi RegionFinder::faces(const std::string& name) const {
 
 Matrix3Xi RegionFinder::outer_faces() const {
     std::vector<std::array<int, 3>> found;
-    for (const TissueFace& each : tissue_.faces)
+    for (const tled::TissueFace& each : tissue_.faces)
         if (each.face.outer == 0) found.push_back(seen_from(tissue_, each, each.face.inner));
     return matrix_of(found);
 }

@@ -1,7 +1,7 @@
 #pragma once
 /// Parts of the tissue by where they are at rest and what they are made of.
 
-#include "simulation/tissue_mesh.hpp"
+#include "tled/tissue_mesh.hpp"
 
 #include <array>
 #include <map>
@@ -50,7 +50,7 @@ using Regions = std::map<std::string, Region>;
 class RegionFinder {
 public:
     /// Holds references.
-    RegionFinder(const TissueMesh& tissue, const Regions& regions);
+    RegionFinder(const tled::TissueMesh& tissue, const Regions& regions);
 
     /// Nodes, ascending; at a sliding interface those of both sides, unless the region names one label.
     [[nodiscard]] std::vector<int> nodes(const std::string& name) const;
@@ -68,7 +68,7 @@ private:
     [[nodiscard]] std::vector<bool> holds_node(const std::string& name, int depth) const;
     [[nodiscard]] bool contains(const Region& region, const Eigen::Vector3d& point) const;
 
-    const TissueMesh& tissue_;
+    const tled::TissueMesh& tissue_;
     const Regions& regions_;
     Eigen::Vector3d lower_, upper_;
 };

@@ -28,17 +28,21 @@ bool is_image(Evidence evidence) {
 
 /// What a registration without resected tissue leaves open.
 struct Hole {
-    double dice = 0;  ///< of the hole or the found cavity with the true cavity
+    double dice = 0;                          ///< of the hole or the found cavity with the true cavity
     std::vector<registration::Doubt> doubts;  ///< of what was found to be gone
 };
 
 /// A phantom, its images once they are needed, and models made of it.
 class Patient {
 public:
-    Patient(const Phantom& phantom, bool seeks_resected)
-        : phantom_(phantom), labels_(phantom.moving_labels), resected_(phantom.resected) {
-        if (!seeks_resected) return;
-        labels_ = imaging::mask_of_all(labels_).as(CV_32S);  // tumour and organ alike
+    Patient(const Phantom& phantom, KnownOfResection known)
+        : phantom_(phantom),
+          labels_(phantom.moving_labels),
+          fixed_labels_(phantom.fixed_labels),
+          resected_(phantom.resected) {
+        if (known == KnownOfResection::Told) return;
+        for (imaging::Volume* map : {&labels_, &fixed_labels_})
+            *map = imaging::mask_of_all(*map).as(CV_32S);  // tumour and organ alike
         resected_.clear();
     }
 
@@ -46,7 +50,7 @@ public:
         registration::Intraoperative seen;
         switch (evidence) {
             case Evidence::Labels:
-                seen.labels = phantom_.fixed_labels;
+                seen.labels = fixed_labels_;
                 break;
             case Evidence::Surface:
                 seen.surface = phantom_.surface;
@@ -156,7 +160,7 @@ private:
     }
 
     const Phantom& phantom_;
-    imaging::Volume labels_;  // what is known of the organ before
+    imaging::Volume labels_, fixed_labels_;  // what is known of the organ
     std::vector<int> resected_;
     std::optional<PhantomImages> images_;
     std::optional<PhantomUltrasound> ultrasound_;
@@ -172,7 +176,7 @@ void add_codes(std::string& codes, const std::vector<registration::Doubt>& doubt
 std::vector<CoverageRow> rows_of(const Phantom& phantom, Patient& patient, Evidence evidence,
                                  const CoverageOptions& options, Observer& observer) {
     const registration::Intraoperative seen = patient.seen(evidence);
-    const bool seeks = options.seek_resected && seen.image;
+    const bool seeks = options.resection == KnownOfResection::Sought && seen.image;
     const PreparedModel& prepared = seeks ? patient.without_what_is_gone(evidence, seen, options.update, observer)
                                           : patient.prepared(evidence, observer);
     const auto result = registration::update(prepared, seen, options.update, observer);
@@ -245,7 +249,7 @@ const char* name_of(Evidence evidence) {
 
 std::vector<CoverageRow> measured_coverage(const Phantom& phantom, const CoverageOptions& options, Observer& observer) {
     std::vector<CoverageRow> rows;
-    Patient patient(phantom, options.seek_resected);
+    Patient patient(phantom, options.resection);
     for (const Evidence evidence : options.evidence) {
         try {
             const auto here = rows_of(phantom, patient, evidence, options, observer);

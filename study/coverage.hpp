@@ -37,11 +37,18 @@ constexpr std::array all_evidence{Evidence::Labels,        Evidence::Surface,   
 /// "other-contrast", "ultrasound".
 const char* name_of(Evidence evidence);
 
+/// What a registration knows of tissue that is gone.
+enum class KnownOfResection {
+    Told,    ///< which labels are
+    Sought,  ///< it is to be found in images (registration/resection)
+    Untold   ///< nothing: organ and tumour are one label, which is taken to be whole
+};
+
 struct CoverageOptions {
     std::uint64_t first_seed = 1001, last_seed = 1120;
     std::vector<Evidence> evidence{all_evidence.begin(), all_evidence.end() - 1};  ///< without ultrasound
     PhantomOptions phantom;
-    bool seek_resected = false;  ///< what is gone is not told but found in images (registration/resection)
+    KnownOfResection resection = KnownOfResection::Told;
     registration::UpdateOptions update;
     registration::UncertaintyOptions uncertainty;
 };
@@ -57,7 +64,8 @@ struct CoverageRow {
     double moved_mm = 0;    ///< elastic displacement that the registration gave it
     bool in_view = true;    ///< where it truly is lies in what was seen
     registration::ErrorEstimate estimate;
-    double cavity_dice = -1;  ///< of the registration, by images: of its hole, or the cavity found, with the true one; -1: none
+    double cavity_dice =
+        -1;  ///< of the registration, by images: of its hole, or the cavity found, with the true one; -1: none
 };
 
 /// Registers the phantoms of the seeds to each kind of evidence. Each seed's rows are kept in

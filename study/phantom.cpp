@@ -1,6 +1,7 @@
 #include "study/phantom.hpp"
 
 #include "core/errors.hpp"
+#include "meshing/search/point_tree.hpp"
 #include "study/detail/bent_map.hpp"
 #include "study/detail/field_map.hpp"
 #include "study/detail/label_organ.hpp"
@@ -134,14 +135,26 @@ detail::TrueTissue tissue_of(const std::shared_ptr<const detail::Truth>& truth, 
     return tissue;
 }
 
+/// Whether a place without tissue (fixed frame) came from what is gone if it moved as the tissue next to it did.
+std::function<bool(const Vector3d&)> hollow_of(const std::shared_ptr<const detail::Truth>& truth,
+                                               const detail::ResectedShape& shape, const Eigen::Isometry3d& placement) {
+    const Eigen::Matrix3Xd places = truth->mesh.quadratic.nodes + truth->displacement;
+    const auto nearest = std::make_shared<const meshing::PointTree>(places);
+    return [truth, shape, nearest, back = placement.inverse()](const Vector3d& x) {
+        const Vector3d y = back * x;
+        return shape.label(y - truth->displacement.col(nearest->nearest(y).index)) == 2;
+    };
+}
+
 /// A patient with a tumour, of whom all or what a resection leaves is deformed.
 Phantom resection_phantom(std::uint64_t seed, const PhantomOptions& options, Observer& observer) {
     constexpr int elements = 3500;
     constexpr double strain = 0.12, most_grey = 180, least_grey = 20;
     constexpr std::uint64_t of_places = 111;
-    const bool gone = options.family == Family::Resected;
+    const bool open = options.family == Family::Opened, gone = open || options.family == Family::Resected;
     detail::Random random(seed);
-    const detail::ResectedOrgan organ = detail::random_resection(random);
+    const detail::ResectedOrgan organ =
+        detail::random_resection(random, open ? detail::Access::Corridor : detail::Access::None);
     const detail::OrganShape& shape = organ.shape.organ();
     const double motion_mm = random.uniform(3, std::min(15.0, strain * shape.length()));
     const Eigen::Isometry3d placement =
@@ -155,6 +168,7 @@ Phantom resection_phantom(std::uint64_t seed, const PhantomOptions& options, Obs
              : detail::unresected_truth(organ, std::move(meshes.whole), motion_mm, observer));
     detail::TrueTissue tissue = tissue_of(truth, shape, placement);
     if (gone) tissue.cavity_grey = organ.air ? 0 : grey;
+    if (open) tissue.hollow = hollow_of(truth, organ.shape, placement);
 
     observer.checkpoint("Drawing", 0.8);
     Phantom phantom;
@@ -273,7 +287,7 @@ Phantom bent_phantom(detail::TrueTissue tissue, imaging::Volume moving_labels, c
 Phantom drawn_phantom(std::uint64_t seed, const PhantomOptions& options, Observer& observer) {
     if (options.family == Family::Solved || options.family == Family::Bulged)
         return solved_phantom(seed, options, observer);
-    if (options.family == Family::Resected || options.family == Family::Unresected)
+    if (options.family == Family::Resected || options.family == Family::Opened || options.family == Family::Unresected)
         return resection_phantom(seed, options, observer);
     detail::Random random(seed);
     detail::TrueTissue tissue;

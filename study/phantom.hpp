@@ -24,6 +24,7 @@ enum class Family {
     Labelled,  ///< organs of a real label map; such a map
     Found,     ///< organs of a real label map; a motion that another program found between images
     Resected,  ///< drawn organs without a tumour of 10 to 60 ml, whose cavity collapses; as Solved
+    Opened,    ///< likewise, and a corridor leads to the cavity from outside
     Unresected,  ///< the same organs and places, the tumour in them, under the same loads from outside
     Bulged  ///< drawn organs that bulge through an opening of what holds them, where their surface is seen; as Solved
 };

@@ -24,7 +24,8 @@ using Moduli = std::array<double, 2>;
 
 PrepareOptions options_of(double edge_length, const std::map<int, double>& label_edge_length,
                           const std::map<int, Moduli>& materials, const Moduli& default_material,
-                          std::vector<int> anchors, std::vector<int> rigid_neighbours, std::vector<int> resected) {
+                          std::vector<int> anchors, std::vector<int> rigid_neighbours, std::vector<int> resected,
+                          std::vector<std::array<int, 2>> sliding) {
     PrepareOptions options;
     options.meshing.edge_length = edge_length;
     options.meshing.label_edge_length = label_edge_length;
@@ -34,6 +35,7 @@ PrepareOptions options_of(double edge_length, const std::map<int, double>& label
     options.anchors = std::move(anchors);
     options.rigid_neighbours = std::move(rigid_neighbours);
     options.resected = std::move(resected);
+    options.sliding = std::move(sliding);
     return options;
 }
 
@@ -68,7 +70,8 @@ Model read(const std::filesystem::path& path, py::object progress) {
 void bind_models(py::module_& module) {
     py::class_<PrepareOptions>(module, "PrepareOptions")
         .def(py::init(&options_of), py::arg("edge_length"), py::arg("label_edge_length"), py::arg("materials"),
-             py::arg("default_material"), py::arg("anchors"), py::arg("rigid_neighbours"), py::arg("resected"));
+             py::arg("default_material"), py::arg("anchors"), py::arg("rigid_neighbours"), py::arg("resected"),
+             py::arg("sliding"));
     py::class_<PreparedModel, Model>(module, "PreparedModel")
         .def_property_readonly(
             "mesh", [](const PreparedModel& model) -> const TetMesh& { return model.model.mesh; },

@@ -45,7 +45,7 @@ def prepare(labels, *, image=None, contrasts: Sequence = (), mesh: Optional[_cor
             edge_length: Optional[float] = None, label_edge_length: Optional[Mapping[int, float]] = None,
             materials: Optional[Mapping[int, Moduli]] = None, default_material: Moduli = (3.0, 0.45),
             anchors: Sequence[int] = (), rigid_neighbours: Sequence[int] = (), resected: Sequence[int] = (),
-            progress: Progress = None) -> Model:
+            sliding: Sequence[Tuple[int, int]] = (), progress: Progress = None) -> Model:
     """Makes the model of a patient from a label map. Takes seconds to minutes.
 
     labels            label map (image of whole numbers, 0 is background)
@@ -61,6 +61,7 @@ def prepare(labels, *, image=None, contrasts: Sequence = (), mesh: Optional[_cor
     anchors           labels of tissue that stays where the rigid placement has it
     rigid_neighbours  labels of bone and the like, along which the organ slides
     resected          labels of tissue that is gone by the time of the operation: neither meshed nor matched
+    sliding           pairs of labels whose tissue slides on one another where they touch
     progress          called as progress(stage, fraction in [0, 1]); returning False ends with Cancelled
 
     Raises InvalidInput, Cancelled.
@@ -69,7 +70,7 @@ def prepare(labels, *, image=None, contrasts: Sequence = (), mesh: Optional[_cor
         raise InvalidInput("contrasts go beside an image; give image=")
     options = _core.PrepareOptions(0.0 if edge_length is None else edge_length, dict(label_edge_length or {}),
                                    dict(materials or {}), default_material, list(anchors), list(rigid_neighbours),
-                                   list(resected))
+                                   list(resected), [tuple(pair) for pair in sliding])
     core = _core.prepare(labels_volume(labels, "labels"), mesh, options, progress)
     if image is None:
         _core.prepare_loads(core, progress)

@@ -9,9 +9,43 @@
 
 namespace tissuewarp::registration {
 
-Interfaces::Interfaces(const meshing::TetMesh& mesh) {
+namespace {
+
+using Corners = std::array<int, 3>;
+
+/// Gives faces of an open mesh that lie on one another each the other's label as the outer one; returns which do.
+std::vector<bool> join_sides(std::vector<meshing::InterfaceFace>& faces,
+                             const std::vector<tled::SlidingPair>& sliding) {
+    std::vector<bool> slides(faces.size(), false);
+    if (sliding.empty()) return slides;
+    std::map<int, int> place;
+    for (const tled::SlidingPair& pair : sliding) place[pair.second] = pair.first;
+    std::map<Corners, std::size_t> one_side;
+    for (std::size_t f = 0; f < faces.size(); ++f) {
+        if (faces[f].outer != 0) continue;
+        Corners corners = faces[f].nodes;
+        for (int& node : corners)
+            for (auto at = place.find(node); at != place.end(); at = place.find(node)) node = at->second;
+        std::sort(corners.begin(), corners.end());
+        const auto [at, fresh] = one_side.try_emplace(corners, f);
+        if (fresh) continue;
+        faces[f].outer = faces[at->second].inner;
+        faces[at->second].outer = faces[f].inner;
+        slides[f] = slides[at->second] = true;
+    }
+    return slides;
+}
+
+}  // namespace
+
+Interfaces::Interfaces(const meshing::TetMesh& mesh) : Interfaces(mesh, {}) {}
+
+Interfaces::Interfaces(const meshing::TetMesh& mesh, const std::vector<tled::SlidingPair>& sliding) {
+    std::vector<meshing::InterfaceFace> faces = meshing::interface_faces(mesh);
+    const std::vector<bool> slides = join_sides(faces, sliding);
     std::map<std::tuple<int, int, int>, int> index;  // (inner, outer, node) → entry
-    for (const meshing::InterfaceFace& face : meshing::interface_faces(mesh)) {
+    for (std::size_t f = 0; f < faces.size(); ++f) {
+        const meshing::InterfaceFace& face = faces[f];
         std::array<int, 3> entries{};
         const Eigen::Vector3d a = mesh.nodes.col(face.nodes[0]), b = mesh.nodes.col(face.nodes[1]),
                               c = mesh.nodes.col(face.nodes[2]);
@@ -23,6 +57,7 @@ Interfaces::Interfaces(const meshing::TetMesh& mesh) {
                 nodes_.push_back({face.nodes[corner], face.inner, face.outer, 0.0, Eigen::Vector3d::Zero(), 0.0});
             entries[corner] = entry->second;
             InterfaceNode& node = nodes_[static_cast<std::size_t>(entry->second)];
+            node.slides = slides[f];
             node.area += twice_area.norm() / 6;
             node.normal += twice_area;
         }
@@ -30,6 +65,13 @@ Interfaces::Interfaces(const meshing::TetMesh& mesh) {
         face_entries_.push_back(entries);
     }
     for (InterfaceNode& node : nodes_) node.normal.normalize();
+}
+
+std::vector<std::array<int, 3>> Interfaces::outer_faces() const {
+    std::vector<std::array<int, 3>> faces;
+    for (std::size_t f = 0; f < faces_.size(); ++f)
+        if (nodes_[static_cast<std::size_t>(face_entries_[f][0])].outer == 0) faces.push_back(faces_[f]);
+    return faces;
 }
 
 Eigen::Matrix3Xd Interfaces::normals(const Eigen::Matrix3Xd& positions) const {
@@ -68,7 +110,7 @@ std::map<int, double> Interfaces::thickness(const meshing::TetMesh& mesh) const 
     for (int t = 0; t < mesh.tet_count(); ++t) volume[mesh.labels[t]] += volumes[t];
     for (const InterfaceNode& node : nodes_) {
         area[node.inner] += node.area;
-        area[node.outer] += node.area;
+        if (!node.slides) area[node.outer] += node.area;
     }
     std::map<int, double> result;
     for (const auto& [label, of_label] : volume) result[label] = 2 * of_label / area.at(label);

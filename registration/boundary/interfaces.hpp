@@ -2,6 +2,7 @@
 /// Where labels of a mesh meet: the nodes that a label map says something of.
 
 #include "meshing/tet_mesh.hpp"
+#include "tled/effects.hpp"
 
 #include <Eigen/Core>
 
@@ -19,14 +20,20 @@ struct InterfaceNode {
     Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< unit, rest configuration, from inner to outer
     double offset = 0;       ///< mm along the normal from the node to the moving label boundary
     bool at_cavity = false;  ///< what was beyond it is gone: nothing around the organ holds it
+    bool slides = false;     ///< along the outer label's tissue, whose interface has nodes of its own
 };
 
 /// Interface triangles of a mesh gathered at nodes, and recomputed normals for a deformed state.
 class Interfaces {
 public:
     explicit Interfaces(const meshing::TetMesh& mesh);
+    /// Of a mesh that is open where tissue slides: faces between such pairs of nodes are interfaces of both sides, whose
+    /// outer label is the other side's.
+    Interfaces(const meshing::TetMesh& mesh, const std::vector<tled::SlidingPair>& sliding);
     [[nodiscard]] const std::vector<InterfaceNode>& nodes() const { return nodes_; }
     [[nodiscard]] std::vector<InterfaceNode>& nodes() { return nodes_; }
+    /// Triangles of mesh nodes between tissue and the outside.
+    [[nodiscard]] std::vector<std::array<int, 3>> outer_faces() const;
     /// Unit normals at other node positions (3 × mesh nodes), one column per interface node.
     [[nodiscard]] Eigen::Matrix3Xd normals(const Eigen::Matrix3Xd& positions) const;
     /// Positions in nodes() of those that two edges or fewer along the same interface lead to, without the node itself.

@@ -19,7 +19,7 @@ bool is_one_of(int label, const std::vector<int>& labels) {
 void require_surroundings(const imaging::Volume& moving_labels, const PrepareOptions& options) {
     const std::vector<int>&anchors = options.anchors, &neighbours = options.rigid_neighbours,
           &resected = options.resected;
-    if (anchors.empty() && neighbours.empty() && resected.empty()) return;
+    if (anchors.empty() && neighbours.empty() && resected.empty() && options.sliding.empty()) return;
     imaging::require_labels(moving_labels, anchors, "anchors");
     imaging::require_labels(moving_labels, neighbours, "rigid neighbours");
     imaging::require_labels(moving_labels, resected, "resected tissue");
@@ -43,6 +43,14 @@ void require_surroundings(const imaging::Volume& moving_labels, const PrepareOpt
                 ? "every label is an anchor or a rigid neighbour: nothing is left to register; name fewer of them"
                 : "every label is an anchor, a rigid neighbour or resected: nothing is left to register; name fewer of "
                   "them");
+    for (const std::array<int, 2>& labels : options.sliding) {
+        imaging::require_labels(moving_labels, {labels.begin(), labels.end()}, "tissue that slides");
+        const auto is_meshed = [&](int label) { return !is_one_of(label, neighbours) && !is_one_of(label, resected); };
+        if (labels[0] == labels[1] || !is_meshed(labels[0]) || !is_meshed(labels[1]))
+            throw InvalidInput("labels " + std::to_string(labels[0]) + " and " + std::to_string(labels[1]) +
+                               " cannot slide on one another: give two labels of the tissue that is meshed; along "
+                               "rigid neighbours it slides anyway");
+    }
 }
 
 namespace detail {

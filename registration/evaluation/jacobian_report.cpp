@@ -154,7 +154,7 @@ std::optional<Doubt> doubt_of_unfolding(const Unfolding& forth, const Unfolding&
                  unfolding.most_in_organ_mm,
                  unfolding_doubt_limits.most_mm,
                  text,
-                 "look where it slid or labels lie close together; give parts that slide on each other as one label",
+                 "look where it slid or labels lie close together; name labels that slide on each other by --sliding",
                  few ? Severity::Notice : Severity::Doubt};
 }
 

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
 #include <unordered_map>
 #include <vector>
 
@@ -84,10 +85,38 @@ std::int64_t count_turned(const detail::VoxelJacobian& jacobian, const Voxels& v
 
 /// The organ and what is rigid about it, in the frame of a field.
 struct Bodies {
-    meshing::TetMesh mesh;
+    meshing::TetMesh mesh;  // labelled by whether a tetrahedron lies at a surface that slides
     detail::HeldBodies rigid;
     Eigen::Isometry3d to_rigid;  // into the frame of these
 };
+
+constexpr int holds_together = 1, slides = 2;  // labels of tetrahedra
+
+/// Which nodes lie at rest where another one does: the mesh is open there.
+std::vector<bool> doubled(const Eigen::Matrix3Xd& rest) {
+    std::vector<int> order(static_cast<std::size_t>(rest.cols()));
+    std::iota(order.begin(), order.end(), 0);
+    const auto place = [&](int node) { return std::array{rest(0, node), rest(1, node), rest(2, node)}; };
+    std::sort(order.begin(), order.end(), [&](int a, int b) { return place(a) < place(b); });
+    std::vector<bool> result(order.size(), false);
+    for (std::size_t n = 1; n < order.size(); ++n)
+        if (place(order[n - 1]) == place(order[n]))
+            result[std::size_t(order[n - 1])] = result[std::size_t(order[n])] = true;
+    return result;
+}
+
+/// A mesh of these nodes whose labels say which tetrahedra lie at a surface that slides.
+meshing::TetMesh labelled_by_sliding(const Deformation& deformation, Eigen::Matrix3Xd nodes) {
+    const std::vector<bool> open = doubled(deformation.mesh.nodes);
+    meshing::TetMesh mesh{std::move(nodes), deformation.mesh.tets, deformation.mesh.labels};
+    for (int t = 0; t < mesh.tet_count(); ++t) {
+        const auto corners = mesh.tets.col(t);
+        mesh.labels[t] = std::any_of(corners.begin(), corners.end(), [&](int node) { return open[std::size_t(node)]; })
+                             ? slides
+                             : holds_together;
+    }
+    return mesh;
+}
 
 class Unfolder {
 public:
@@ -95,8 +124,8 @@ public:
         : grid_(displacement.geometry),
           field_(displacement.data<cv::Vec3f>()),
           jacobian_(displacement),
-          organ_(mask_of_mesh(bodies.mesh, grid_)),
-          inside_(organ_.data<std::uint8_t>()),
+          organ_(labels_of_mesh(bodies.mesh, grid_)),
+          inside_(organ_.data<std::int32_t>()),
           bodies_(bodies),
           folded_(std::move(folded)) {}
 
@@ -113,7 +142,8 @@ public:
                          .organ = cv::countNonZero(organ_.voxels.reshape(1, 1))};
         for (const auto& [voxel, before] : before_) {
             ++result.voxels;
-            if (!inside_[voxel]) continue;
+            if (inside_[voxel] == slides) ++result.sliding;
+            if (inside_[voxel] != holds_together) continue;
             ++result.in_organ;
             result.most_in_organ_mm = std::max(result.most_in_organ_mm, cv::norm(field_[voxel] - before));
         }
@@ -170,7 +200,7 @@ private:
     cv::Vec3f* field_;
     detail::VoxelJacobian jacobian_;
     Volume organ_;
-    const std::uint8_t* inside_;
+    const std::int32_t* inside_;
     const Bodies& bodies_;
     Voxels folded_;
     std::unordered_map<std::int64_t, cv::Vec3f> before_;
@@ -195,13 +225,15 @@ Unfolding unfold(Volume& field, const MakeBodies& bodies_of_frame) {
 
 Unfolding unfold_moving_to_fixed(Volume& field, const Deformation& deformation) {
     return unfold(field, [&] {
-        return Bodies{deformation.mesh, detail::held_before(deformation), Eigen::Isometry3d::Identity()};
+        return Bodies{labelled_by_sliding(deformation, deformation.mesh.nodes), detail::held_before(deformation),
+                      Eigen::Isometry3d::Identity()};
     });
 }
 
 Unfolding unfold_fixed_to_moving(Volume& field, const Deformation& deformation) {
     return unfold(field, [&] {
-        return Bodies{deformation.deformed_mesh(), detail::held_after(deformation), deformation.far_motion().inverse()};
+        return Bodies{labelled_by_sliding(deformation, deformation.deformed_nodes()), detail::held_after(deformation),
+                      deformation.far_motion().inverse()};
     });
 }
 

@@ -1,6 +1,7 @@
 #include "registration/loads/posterior.hpp"
 
 #include "registration/pose/rigid_part.hpp"
+#include "registration/springs/conditions.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
@@ -18,7 +19,7 @@ tled::RestStiffness stiffness_with(const PreparedModel& prepared, const WeighedS
     tled::Conditions all;
     all.springs = springs.data;
     all.springs.insert(all.springs.end(), springs.ground.begin(), springs.ground.end());
-    return {prepared.rest, tled::nodal_conditions(all, prepared.rest.node_count), prepared.stiffness};
+    return {prepared.rest, conditions_on(prepared, std::move(all)), prepared.stiffness};
 }
 
 double least_eigenvalue(const Columns& symmetric) {

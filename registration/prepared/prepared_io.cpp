@@ -126,6 +126,10 @@ void detail::write_prepared_parts(Hdf5Output& file, const PreparedModel& prepare
     write_list(file, "options/anchors", prepared.options.anchors);
     write_list(file, "options/rigid_neighbours", prepared.options.rigid_neighbours);
     if (!prepared.resected.empty()) write_list(file, "options/resected", prepared.options.resected);
+    std::vector<int> sliding;
+    for (const std::array<int, 2>& pair : prepared.options.sliding)
+        sliding.insert(sliding.end(), pair.begin(), pair.end());
+    if (!sliding.empty()) write_list(file, "options/sliding", sliding);
     if (prepared.coarse) detail::write_mesh(file, coarse_mesh, prepared.coarse->model.mesh);
     if (prepared.image) write_image(file, image, *prepared.image);
     for (std::size_t n = 0; n < prepared.contrasts.size(); ++n)
@@ -146,6 +150,9 @@ PreparedModel detail::read_prepared_parts(const Hdf5Input& file, const std::file
     options.anchors = read_list(file, "options/anchors");
     options.rigid_neighbours = read_list(file, "options/rigid_neighbours");
     options.resected = read_list(file, "options/resected");
+    const std::vector<int> sliding = read_list(file, "options/sliding");
+    if (sliding.size() % 2 != 0) throw InvalidInput("'options/sliding' holds no pairs of labels");
+    for (std::size_t n = 0; n < sliding.size(); n += 2) options.sliding.push_back({sliding[n], sliding[n + 1]});
     if (!(options.data_stiffness > 0) || !(options.tangential_ratio > 0))
         throw InvalidInput("'" + path.string() + "': the stiffness of the data must be positive");
     PreparedModel prepared =

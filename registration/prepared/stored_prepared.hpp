@@ -10,11 +10,13 @@ namespace tissuewarp::registration::detail {
 
 /// Of files that hold a prepared model.
 inline constexpr const char* prepared_format = "tissuewarp prepared model";
-inline constexpr int prepared_version = 7, oldest_prepared_version = 1;
-/// The version to write: older programs would take what is gone for tissue, and read everything else.
+inline constexpr int prepared_version = 8, oldest_prepared_version = 1;
+/// The version to write: older programs would take what is gone for tissue, or join what slides, and read everything
+/// else.
 inline int version_of(const PreparedModel& prepared) {
-    constexpr int before_resection = 6;
-    return prepared.resected.empty() ? before_resection : prepared_version;
+    constexpr int of_whole_tissue = 6, of_resections = 7;
+    if (!prepared.sliding.empty()) return prepared_version;
+    return prepared.resected.empty() ? of_whole_tissue : of_resections;
 }
 
 void write_prepared_parts(Hdf5Output& file, const PreparedModel& prepared);

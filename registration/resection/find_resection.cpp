@@ -5,12 +5,10 @@
 #include "registration/doubts.hpp"
 #include "registration/field.hpp"
 #include "registration/resection/cavity_wall.hpp"
+#include "registration/resection/without_counterpart.hpp"
 #include "registration/resection/without_structure.hpp"
 #include "registration/warp.hpp"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -19,74 +17,21 @@ namespace tissuewarp::registration {
 namespace {
 
 using detail::CavityView;
-using imaging::millilitres;
 using Eigen::Vector3d;
+using imaging::millilitres;
 using imaging::Volume;
-
-/// What grey the fixed image mostly has where the moving one has a grey: median and deviation, by bins.
-class ExpectedGrey {
-public:
-    ExpectedGrey(const Volume& moving, const Volume& fixed, const Volume& organ) {
-        std::vector<float> sorted = detail::values_in(moving, organ);
-        std::sort(sorted.begin(), sorted.end());
-        for (std::size_t b = 1; b < bins && !sorted.empty(); ++b) limits_.push_back(sorted[b * sorted.size() / bins]);
-        std::array<std::vector<float>, bins> of_bin;
-        for (std::int64_t n = 0; n < fixed.geometry.voxel_count(); ++n)
-            if (organ.data<std::uint8_t>()[n])
-                of_bin[bin_of(moving.data<float>()[n])].push_back(fixed.data<float>()[n]);
-        for (std::size_t b = 0; b < bins; ++b) {
-            middle_[b] = detail::median(of_bin[b]);
-            for (float& value : of_bin[b]) value = std::abs(value - float(middle_[b]));
-            constexpr double of_normal = 1.4826;  // deviation over the median of distances from the middle
-            deviation_[b] = of_normal * detail::median(of_bin[b]);
-        }
-    }
-    /// In deviations.
-    [[nodiscard]] double distance(float moving, float fixed) const {
-        const std::size_t b = bin_of(moving);
-        return deviation_[b] > 0 ? std::abs(fixed - middle_[b]) / deviation_[b] : 0;
-    }
-
-private:
-    static constexpr std::size_t bins = 16;
-    std::vector<float> limits_;
-    std::array<double, bins> middle_{}, deviation_{};
-    [[nodiscard]] std::size_t bin_of(float value) const {
-        return static_cast<std::size_t>(std::upper_bound(limits_.begin(), limits_.end(), value) - limits_.begin());
-    }
-};
 
 /// What of the images a cavity is told by, on one grid.
 struct Look {
     CavityView fixed;
-    Volume moving, moving_deviation;
+    Volume moving;
 
     Look(const PreparedModel& whole, const Volume& moving_image, const Volume& fixed_image, const Volume& field)
         : Look(imaging::mask_of_all(warp_labels(whole.labels, field)), moving_image, fixed_image, field) {}
 
-    /// Voxels without structure where the tissue that lies there shows some, or is of another grey.
-    [[nodiscard]] Volume core() const {
-        constexpr CavityOptions options = cavity_options;
-        const Volume& organ = fixed.organ;
-        const double most = options.most_deviation * fixed.tissue_deviation,
-                     least = options.least_counterpart * detail::median(detail::values_in(moving_deviation, organ));
-        const ExpectedGrey expected(moving, fixed.grey, organ);
-        Volume core(organ.geometry, CV_8UC1);
-        for (std::int64_t n = 0; n < organ.geometry.voxel_count(); ++n) {
-            const bool flat = organ.data<std::uint8_t>()[n] && fixed.deviation.data<float>()[n] < most;
-            core.data<std::uint8_t>()[n] =
-                flat &&
-                (moving_deviation.data<float>()[n] > least ||
-                 expected.distance(moving.data<float>()[n], fixed.grey.data<float>()[n]) > options.least_difference);
-        }
-        return core;
-    }
-
 private:
     Look(const Volume& organ, const Volume& moving_image, const Volume& fixed_image, const Volume& field)
-        : fixed(fixed_image, organ, organ),
-          moving(detail::against_noise(warp_image(moving_image.as(CV_32F), field))),
-          moving_deviation(detail::local_deviation(moving)) {}
+        : fixed(fixed_image, organ, organ), moving(detail::against_noise(warp_image(moving_image.as(CV_32F), field))) {}
 };
 
 /// Labelled voxels that a forward field leads into the cavity.
@@ -131,7 +76,8 @@ FoundResection find_resection(const PreparedModel& whole, const Deformation& def
     observer.checkpoint("resection", 0.5);
     FoundResection found;
     Volume cavity(look.fixed.organ.geometry, CV_8UC1);
-    const std::vector<Volume> cores = detail::pieces_of(look.core(), cavity_options.least_core_ml);
+    const std::vector<Volume> cores =
+        detail::pieces_of(detail::without_counterpart(look.fixed, look.moving), cavity_options.least_core_ml);
     for (const Volume& core : cores) cavity.voxels |= detail::up_to_wall(look.fixed, core).voxels;
     if (!cores.empty() && look.fixed.tissue_deviation > 0)
         found.deviation =

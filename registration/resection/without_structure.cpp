@@ -17,17 +17,14 @@ namespace tissuewarp::registration::detail {
 using Eigen::Vector3d;
 using imaging::Volume;
 
-namespace {
-
-/// Means over boxes about each voxel; borders replicate.
-Volume box_mean(const Volume& image, const Vector3d& half_mm) {
+Volume box_mean(const Volume& image, double half_mm) {
     Volume result = image.clone();
     const auto& size = image.geometry.size;
     const std::array<std::int64_t, 3> stride{1, size[0], std::int64_t{size[0]} * size[1]};
     for (std::size_t axis = 0; axis < 3; ++axis) {
         const std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
         const double spacing = image.geometry.spacing[static_cast<Eigen::Index>(axis)];
-        const int half = std::max(1, static_cast<int>(std::lround(half_mm[static_cast<Eigen::Index>(axis)] / spacing)));
+        const int half = std::max(1, static_cast<int>(std::lround(half_mm / spacing)));
         const int last = size[axis] - 1;
         tbb::parallel_for(0, size[v], [&](int b) {
             std::vector<double> line(static_cast<std::size_t>(size[axis]));
@@ -46,8 +43,6 @@ Volume box_mean(const Volume& image, const Vector3d& half_mm) {
     }
     return result;
 }
-
-}  // namespace
 
 CavityView::CavityView(const Volume& image, Volume whole, const Volume& tissue)
     : organ(std::move(whole)),
@@ -74,7 +69,7 @@ Volume against_noise(const Volume& image) {
 }
 
 Volume local_deviation(const Volume& image) {
-    const Vector3d half = Vector3d::Constant(cavity_options.window_mm);
+    constexpr double half = cavity_options.window_mm;
     Volume centred = image.clone();  // of large means little would be left of squares in float32
     centred.voxels -= cv::mean(image.voxels.reshape(1, 1));
     Volume squares = centred.clone();
@@ -101,6 +96,14 @@ double median(std::vector<float> values) {
     return *middle;
 }
 
+Spread spread_of(const std::vector<float>& values) {
+    constexpr double of_normal = 1.4826;
+    const double middle = median(values);
+    std::vector<float> off = values;
+    for (float& value : off) value = std::abs(value - float(middle));
+    return {middle, of_normal * median(std::move(off))};
+}
+
 std::vector<Volume> pieces_of(const Volume& mask, double least_ml) {
     const Volume numbered = imaging::connected_components(mask);
     std::vector<Volume> pieces;
@@ -114,21 +117,18 @@ std::vector<Volume> pieces_of(const Volume& mask, double least_ml) {
 
 Volume up_to_wall(const CavityView& view, const Volume& piece) {
     constexpr CavityOptions options = cavity_options;
-    constexpr double within_deviations = 4, of_normal = 1.4826;
-    const std::vector<float> inside = values_in(view.grey, piece);
-    const double grey = median(inside);
-    std::vector<float> off = inside;
-    for (float& value : off) value = std::abs(value - float(grey));
+    constexpr double within_deviations = 4;
+    const auto [grey, deviation] = spread_of(values_in(view.grey, piece));
     const Volume near = imaging::dilate(piece, options.reach_mm);
     Volume around = imaging::dilate(near, options.reach_mm);
     around.voxels &= ~near.voxels & view.organ.voxels;
     const double halfway = 0.5 * std::abs(median(values_in(view.grey, around)) - grey),
-                 most = std::max({within_deviations * of_normal * median(off), view.tissue_deviation, halfway});
+                 most = std::max({within_deviations * deviation, view.tissue_deviation, halfway});
     Volume like(piece.geometry, CV_8UC1);
     for (std::int64_t n = 0; n < piece.geometry.voxel_count(); ++n)
         like.data<std::uint8_t>()[n] =
-            piece.data<std::uint8_t>()[n] ||
-            (near.data<std::uint8_t>()[n] && std::abs(view.grey.data<float>()[n] - grey) < most);
+            piece.data<std::uint8_t>()[n] || (near.data<std::uint8_t>()[n] && view.organ.data<std::uint8_t>()[n] &&
+                                              std::abs(view.grey.data<float>()[n] - grey) < most);
     return imaging::without_holes(imaging::largest_component(imaging::open(like, options.opening_mm)));
 }
 

@@ -25,17 +25,26 @@ imaging::Geometry grid_about(const imaging::Geometry& image, const Eigen::Matrix
 /// Smoothed so that noise does not look like structure, float32.
 imaging::Volume against_noise(const imaging::Volume& image);
 
+/// Means of an image (float32) over boxes of twice `half_mm`, and a voxel at least either way, about each voxel;
+/// borders replicate.
+imaging::Volume box_mean(const imaging::Volume& image, double half_mm);
+
 /// Standard deviation of an image (float32) in a box about each voxel. Boxes, unlike Gaussians, see nothing of a wall
 /// beyond them, however bright.
 imaging::Volume local_deviation(const imaging::Volume& image);
 
 std::vector<float> values_in(const imaging::Volume& image, const imaging::Volume& mask);
 double median(std::vector<float> values);
+/// Median, and the deviation that a normal distribution with the same median distance from it has.
+struct Spread {
+    double middle = 0, deviation = 0;
+};
+Spread spread_of(const std::vector<float>& values);
 
 /// Pieces of a mask, largest first, of more than a volume.
 std::vector<imaging::Volume> pieces_of(const imaging::Volume& mask, double least_ml);
 
-/// A piece without structure up to its wall: halfway between its grey and that of the organ about it.
+/// A piece without structure up to its wall, within the organ: halfway between its grey and that of the organ about it.
 imaging::Volume up_to_wall(const CavityView& view, const imaging::Volume& piece);
 
 }  // namespace tissuewarp::registration::detail

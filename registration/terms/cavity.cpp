@@ -2,10 +2,8 @@
 
 #include "registration/resection/find_resection.hpp"
 #include "registration/resection/seen_cavity.hpp"
-#include "registration/springs/label_springs.hpp"
-#include "registration/terms/label_matches.hpp"
 
-#include <cmath>
+#include <limits>
 
 namespace tissuewarp::registration::detail {
 
@@ -21,11 +19,7 @@ imaging::Volume all_beside(const imaging::Volume& cavity) {
 
 CavityTerm::CavityTerm(const PreparedModel& prepared, const imaging::Volume& fixed, const FieldOfView& view,
                        const UpdateOptions& options)
-    : prepared_(prepared),
-      fixed_(fixed),
-      view_(view),
-      options_(options),
-      neighbours_(prepared.interfaces.neighbours()) {}
+    : prepared_(prepared), fixed_(fixed), view_(view), options_(options), pull_(prepared, options) {}
 
 void CavityTerm::search(const State& state) {
     const std::optional<imaging::Volume> cavity =
@@ -42,34 +36,15 @@ Contribution CavityTerm::linearise(const RoundPlan& plan, const State& state, Ob
         result.pulls_anew = true;
     }
     if (!wall_) return result;
-    const Interfaces& interfaces = prepared_.interfaces;
-    const Eigen::Matrix3Xd& rest = prepared_.model.mesh.nodes;
-    const Eigen::Matrix3Xd normals = interfaces.normals(rest + state.displacement);
-    std::vector<Match> matches(interfaces.nodes().size());
-    for (std::size_t i = 0; i < matches.size(); ++i) {
-        const InterfaceNode& node = interfaces.nodes()[i];
-        if (!node.at_cavity || std::isnan(node.offset)) continue;
-        const Eigen::Vector3d place = rest.col(node.node) + state.displacement.col(node.node),
-                              normal = state.placement.linear() * normals.col(static_cast<Eigen::Index>(i));
-        const double crossing = wall_->crossing(state.placement * place, normal, beside, 0,
-                                                cavity_term_options.range_mm, options_.max_angle_deg);
-        if (std::isnan(crossing)) continue;
-        matches[i].found = true;
-        matches[i].distance_mm = crossing - node.offset;
-        matches[i].held_back = std::abs(matches[i].distance_mm) > plan.most_step_mm;
-    }
-    leave_out_strays(matches, interfaces, neighbours_, rest, state.displacement, normals);
-    weigh(matches, neighbours_, plan.scale_mm);
-    bound(matches, plan.most_step_mm);
-    result.mean_residual_mm = mean_residual(matches);
-    for (std::size_t i = 0; i < matches.size(); ++i) {
-        result.candidates += interfaces.nodes()[i].at_cavity;
-        result.matched += matches[i].found;
-        result.held_back += matches[i].held_back;
-    }
+    const std::vector<InterfaceNode>& nodes = prepared_.interfaces.nodes();
+    const auto ahead = [&](std::size_t i, const Eigen::Vector3d& place, const Eigen::Vector3d& normal) {
+        if (!nodes[i].at_cavity) return std::numeric_limits<double>::quiet_NaN();
+        return wall_->crossing(place, normal, beside, 0, cavity_term_options.range_mm, options_.max_angle_deg) -
+               nodes[i].offset;
+    };
     const imaging::Geometry& grid = fixed_.geometry;
-    result.springs = pulled_by(label_kind(grid, grid),
-                               matched_springs(interfaces, matches, normals, state.displacement, prepared_.options));
+    add(result, pull_.towards(ahead, label_kind(grid, grid), plan, state));
+    for (const InterfaceNode& node : nodes) result.candidates += node.at_cavity;
     return result;
 }
 

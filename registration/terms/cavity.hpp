@@ -5,10 +5,10 @@
 #include "registration/matching/points/field_of_view.hpp"
 #include "registration/options.hpp"
 #include "registration/prepare.hpp"
+#include "registration/terms/boundary_pull.hpp"
 #include "registration/terms/term.hpp"
 
 #include <optional>
-#include <vector>
 
 namespace tissuewarp::registration::detail {
 
@@ -35,9 +35,9 @@ private:
     const imaging::Volume& fixed_;
     const FieldOfView& view_;
     const UpdateOptions& options_;
-    std::vector<std::vector<int>> neighbours_;  // of interface nodes
-    int searches_ = 0;                          // of the image, that the cavity was looked for after
-    std::optional<LabelBoundaryField> wall_;    // of all that is not the cavity, label 1
+    BoundaryPull pull_;
+    int searches_ = 0;                        // of the image, that the cavity was looked for after
+    std::optional<LabelBoundaryField> wall_;  // of all that is not the cavity, label 1
 
     void search(const State& state);
 };

@@ -4,6 +4,7 @@
 #include "registration/doubts.hpp"
 #include "registration/matching/image_matching.hpp"
 #include "registration/pose/least_trimmed_motion.hpp"
+#include "registration/resection/tissue_gone.hpp"
 #include "registration/terms/view_prior.hpp"
 
 #include <Eigen/Eigenvalues>
@@ -103,9 +104,9 @@ ImageTerm::ImageTerm(const PreparedModel& prepared, const ImageModel& moving, co
       name_(std::move(name)),
       options_(options),
       energy_(energy),
+      fixed_(fixed),
       search_(prepared.model.mesh, moving, fixed, options, tools),
-      view_(search_.seen()),
-      fixed_grid_(fixed.geometry) {}
+      view_(search_.seen()) {}
 
 void ImageTerm::tell_similarity(Observer& observer) const {
     if (search_.similarity() != Similarity::LinearCombination) return;
@@ -211,7 +212,7 @@ Contribution ImageTerm::linearise(const RoundPlan& plan, const State& state, Obs
     const bool echoes = search_.similarity() == Similarity::LinearCombination;
     const double agreement = search_.agreement().value_or(shared_errors.full_agreement);
     const DatumKind kind =
-        echoes ? ultrasound_kind(agreement) : image_kind(moving_.image.geometry, fixed_grid_, agreement);
+        echoes ? ultrasound_kind(agreement) : image_kind(moving_.image.geometry, fixed_.geometry, agreement);
     result.springs = pulled_by(kind, lumped_springs(found_.shares, memory_.forces, state.displacement));
     for (PulledNode& pulled : result.springs)
         if (view_.distance(state.placement * (prepared_.model.mesh.nodes.col(pulled.spring.node) +
@@ -271,7 +272,7 @@ LeftBehind ImageTerm::left_behind_of(const LocatedMatches& blocks, const State& 
 std::vector<Doubt> ImageTerm::doubts_of_blocks(const State& state) const {
     if (shows_echoes()) return {};
     const auto doubts = [&](const LocatedMatches& blocks) {
-        return doubts_of(left_behind_of(blocks, state), larger_voxel(moving_.image.geometry, fixed_grid_), name_);
+        return doubts_of(left_behind_of(blocks, state), larger_voxel(moving_.image.geometry, fixed_.geometry), name_);
     };
     if (doubts(search_.blocks()).empty()) return {};
     return doubts(search_.block_search(state, silent_observer()));  // the first may have erred, far from where they are
@@ -284,7 +285,12 @@ void ImageTerm::judge(const State& state, UpdateResult& result) {
         limits.most_residual_mm = echo_doubt_limits.most_residual_mm;
     for (Doubt& doubt : doubts_of(result.images.back(), name_, limits)) result.doubts.push_back(std::move(doubt));
     for (Doubt& doubt : doubts_of_blocks(state)) result.doubts.push_back(std::move(doubt));
-    if (search_.similarity() != Similarity::LinearCombination) return;
+    if (!shows_echoes()) {
+        const Deformation here{prepared_.model.mesh, state.displacement, state.placement};
+        if (auto doubt = doubt_of_image(tissue_gone(here, moving_.image, fixed_, view_), name_))
+            result.doubts.push_back(std::move(*doubt));
+        return;
+    }
     for (Doubt& doubt : doubts_of_echoes(search_.agreement().value_or(0), echo_pose_, name_))
         result.doubts.push_back(std::move(doubt));
 }

@@ -79,6 +79,8 @@ public:
 
     /// What the fixed image shows.
     [[nodiscard]] const FieldOfView& view() const { return view_; }
+    /// Mask (uint8) of what it shows: not padding, nor what was stripped off around the organ.
+    [[nodiscard]] const imaging::Volume& shown() const { return search_.seen(); }
     /// It is taken for ultrasound.
     [[nodiscard]] bool shows_echoes() const { return search_.similarity() == Similarity::LinearCombination; }
 
@@ -124,9 +126,9 @@ private:
     std::string name_;
     const ImageOptions& options_;
     double energy_;
+    const imaging::Volume& fixed_;
     ImageSearch search_;
     FieldOfView view_;
-    imaging::Geometry fixed_grid_;
     bool has_placed_ = false;
     std::optional<EchoPose> echo_pose_;
     Found found_;

@@ -7,6 +7,7 @@
 #include "registration/evaluation/model_labels.hpp"
 #include "registration/pose/alignment.hpp"
 #include "registration/pose/label_rivals.hpp"
+#include "registration/resection/tissue_gone.hpp"
 
 #include <algorithm>
 #include <array>
@@ -154,6 +155,7 @@ public:
             if (label != 0 && is_in_both(label)) doubt_fit(label, fit, doubts);
         doubt_worse(doubts);
         doubt_cut(doubts);
+        if (auto doubt = doubt_of_labels(tissue_unlabelled(shown_, coarse_))) doubts.push_back(std::move(*doubt));
         return doubts;
     }
 
@@ -283,7 +285,8 @@ std::optional<Doubt> doubt_of_pose(const LabelFits& fits, const UpdateOptions& o
 /// Labels that lie elsewhere, as opposed to those that a map lacks or that its image cuts off.
 bool is_misplaced(const std::vector<Doubt>& doubts) {
     return std::any_of(doubts.begin(), doubts.end(), [](const Doubt& doubt) {
-        return doubt.severity == Severity::Doubt && doubt.code != "labels.cut_off" && doubt.code != "label.vanished";
+        return doubt.severity == Severity::Doubt && doubt.code != "labels.cut_off" && doubt.code != "label.vanished" &&
+               doubt.code != "resected.untold";
     });
 }
 

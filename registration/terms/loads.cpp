@@ -8,12 +8,10 @@ Eigen::Matrix3Xd nodal_forces(const PreparedModel& prepared, const TissueLoads& 
     const meshing::TetMesh& mesh = prepared.model.mesh;
     Eigen::Matrix3Xd forces = loads.body_force * (prepared.rest.lumped_mass / prepared.model.density).transpose();
     if (loads.pressure_kpa == 0) return forces;
-    for (const meshing::InterfaceFace& face : meshing::interface_faces(mesh)) {
-        if (face.outer != 0) continue;
-        const Eigen::Vector3d a = mesh.nodes.col(face.nodes[0]), b = mesh.nodes.col(face.nodes[1]),
-                              c = mesh.nodes.col(face.nodes[2]);
+    for (const std::array<int, 3>& face : prepared.interfaces.outer_faces()) {
+        const Eigen::Vector3d a = mesh.nodes.col(face[0]), b = mesh.nodes.col(face[1]), c = mesh.nodes.col(face[2]);
         const Eigen::Vector3d outward = 0.5 * (b - a).cross(c - a);  // mm²
-        for (const int node : face.nodes) forces.col(node) -= loads.pressure_kpa / 3 * outward;
+        for (const int node : face) forces.col(node) -= loads.pressure_kpa / 3 * outward;
     }
     return forces;
 }

@@ -41,12 +41,11 @@ OrganSurface::OrganSurface(const PreparedModel& prepared) {
                 tet_of_face[sorted(face)] = tet;
         }
     std::vector<Eigen::Vector3i> triangles;
-    for (const meshing::InterfaceFace& face : meshing::interface_faces(mesh)) {
-        if (face.outer != 0) continue;
-        const auto [a, b, c] = face.nodes;
+    for (const std::array<int, 3>& face : prepared.interfaces.outer_faces()) {
+        const auto [a, b, c] = face;
         if (!places.contains(a) || !places.contains(b) || !places.contains(c)) continue;
         triangles.emplace_back(index[a], index[b], index[c]);
-        tet_of.push_back(tet_of_face.at(sorted(face.nodes)));
+        tet_of.push_back(tet_of_face.at(sorted(face)));
     }
     if (triangles.empty()) throw InvalidInput("the model has no outer surface that the image shows");
     at_rest.nodes.resize(3, static_cast<Eigen::Index>(node_of.size()));

@@ -10,6 +10,7 @@
 #include "registration/terms/image.hpp"
 #include "registration/terms/labels.hpp"
 #include "registration/terms/loads.hpp"
+#include "registration/terms/outline.hpp"
 #include "registration/terms/points.hpp"
 #include "registration/terms/surface.hpp"
 #include "registration/terms/view_prior.hpp"
@@ -39,16 +40,18 @@ void require_usable(const PreparedModel& prepared, const Intraoperative& seen, s
         throw InvalidInput("the model got its image after its updater was made; make the updater after prepare_image");
 }
 
-/// One for the image and each of its contrasts, one for the wall of a cavity that no labels show, and what is expected
-/// of tissue by what the image has in view.
+/// One for the image and each of its contrasts, one for the wall of a cavity that no labels show and one for the outer
+/// surface beside it where images show the organ alone, and what is expected of tissue by what the image has in view.
 void add_images(std::vector<std::unique_ptr<Term>>& terms, const PreparedModel& prepared, const Intraoperative& seen,
                 const UpdateOptions& all, std::vector<ImageTools>& tools, double energy) {
     const ImageOptions& options = all.image;
     auto image =
         std::make_unique<ImageTerm>(prepared, *prepared.image, *seen.image, "image", options, tools[0], energy);
     auto prior = std::make_unique<ViewPrior>(prepared, image->view(), options, energy);
-    if (!prepared.resected.empty() && !seen.labels && !image->shows_echoes())
+    if (!prepared.resected.empty() && !seen.labels && !image->shows_echoes()) {
         terms.push_back(std::make_unique<CavityTerm>(prepared, *seen.image, image->view(), all));
+        if (auto outline = outline_term(prepared, image->shown(), all)) terms.push_back(std::move(outline));
+    }
     terms.push_back(std::move(image));
     for (std::size_t n = 0; n < seen.contrasts.size(); ++n)
         terms.push_back(std::make_unique<ImageTerm>(prepared, *prepared.contrasts[n], seen.contrasts[n],

@@ -66,8 +66,11 @@ Ball view_of(const Eigen::Matrix3Xd& tissue, const Vector3d& middle, double shar
     return {middle, distances[std::size_t(rank)]};
 }
 
-/// uint8: voxels that hold no tissue and are not connected to what is around it.
-imaging::Volume enclosed_by(const TrueTissue& tissue, const imaging::Geometry& grid) {
+/// uint8: voxels that hold no tissue and are the hole of what was resected, or not connected to what is around it.
+imaging::Volume hole_in(const TrueTissue& tissue, const imaging::Geometry& grid) {
+    if (tissue.hollow)
+        return filled(grid, [&](const Vector3d& x) { return !tissue.backward(x) && tissue.hollow(x) ? 1.0 : 0.0; })
+            .as(CV_8U);
     const imaging::Volume without =
         filled(grid, [&](const Vector3d& x) { return tissue.backward(x) ? 0.0 : 1.0; }).as(CV_8U);
     const imaging::Volume pieces = imaging::connected_components(without);
@@ -101,7 +104,7 @@ PhantomImages drawn_images(const TrueTissue& tissue, Random& random) {
     });
     PhantomImages images;
     if (tissue.cavity_grey) {
-        images.cavity = enclosed_by(tissue, fixed.geometry);
+        images.cavity = hole_in(tissue, fixed.geometry);
         fixed.voxels.setTo(*tissue.cavity_grey, images.cavity.voxels);
     }
     const Eigen::Matrix3Xd inside = places(tissue, 2000, 0, random).fixed;

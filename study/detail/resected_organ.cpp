@@ -18,6 +18,14 @@ namespace {
 
 constexpr double least_ml = 10, most_ml = 60, mm3_per_ml = 1000;
 
+constexpr double rim_mm = 5;  // over which the rim of an opening, and where a corridor meets the cavity, are rounded
+
+/// The larger one of two distances, rounded where they are alike (Quilez's polynomial).
+double rounded_max(double a, double b) {
+    const double h = std::max(rim_mm - std::abs(a - b), 0.0) / rim_mm;
+    return std::max(a, b) + 0.25 * h * h * rim_mm;
+}
+
 OrganShape organ_with_tumour(Random& random) {
     const double volume = mm3_per_ml * random.log_uniform(least_ml, most_ml);
     return OrganShape(random, {110, 160, std::cbrt(3 * volume / (4 * EIGEN_PI))});
@@ -25,7 +33,7 @@ OrganShape organ_with_tumour(Random& random) {
 
 }  // namespace
 
-ResectedShape::ResectedShape(Random& random) : organ_(organ_with_tumour(random)) {
+ResectedShape::ResectedShape(Random& random, Access access) : organ_(organ_with_tumour(random)) {
     const double part = random.uniform(0.8, 0.95);
     const Vector3d off = random.uniform(0.15, 0.3) * organ_.inclusion_radius() * random.direction();
     if (random.uniform() < 0.5) {
@@ -34,6 +42,19 @@ ResectedShape::ResectedShape(Random& random) : organ_(organ_with_tumour(random))
     }
     if (cavity_ml() < least_ml || cavity_ml() > most_ml)
         throw InvalidInput("phantom: the cavity that fits holds " + std::to_string(cavity_ml()) + " ml, not 10 to 60");
+    if (access == Access::Corridor) corridor_ = shortest_way_out(random.uniform(0.5, 0.8) * cavity_radius());
+}
+
+ResectedShape::Corridor ResectedShape::shortest_way_out(double radius_mm) const {
+    constexpr int steps = 20;
+    constexpr double deepest_radii = 4;
+    const Vector3d from = organ_.inclusion_centre() + shift_;
+    Vector3d out = from;
+    for (int step = 0; step < steps; ++step)  // downhill on the distance, as that is a rough one deep in the organ
+        out -= 0.5 * organ_.outer_distance(out) * organ_.normal(out);
+    if ((out - from).norm() > deepest_radii * cavity_radius())
+        throw InvalidInput("phantom: the tumour lies too deep for a corridor");
+    return {from, (out - from).normalized(), radius_mm};
 }
 
 double ResectedShape::cavity_ml() const {
@@ -45,14 +66,34 @@ Vector3d ResectedShape::in_tumour(const Vector3d& point) const {
     return middle + (point - middle - shift_) / scale_;
 }
 
+double ResectedShape::corridor_distance(const Vector3d& point) const {
+    const auto& [from, along, radius_mm] = *corridor_;
+    const Vector3d beyond = point - from;
+    return (beyond - std::max(beyond.dot(along), 0.0) * along).norm() - radius_mm;
+}
+
 double ResectedShape::cavity_distance(const Vector3d& point) const {
-    return scale_ * organ_.inclusion_distance(in_tumour(point));
+    const double closed = scale_ * organ_.inclusion_distance(in_tumour(point));
+    return corridor_ ? -rounded_max(-closed, -corridor_distance(point)) : closed;
+}
+
+double ResectedShape::surface_distance(const Vector3d& point) const {
+    const double outer = organ_.outer_distance(point), wall = -cavity_distance(point);
+    return is_open() ? rounded_max(outer, wall) : std::max(outer, wall);
+}
+
+bool ResectedShape::at_rim(const Vector3d& point) const {
+    constexpr double wide_mm = 1.6 * rim_mm;  // an element beside it too
+    if (!corridor_) return false;
+    const double of_corridor = corridor_distance(point), closed = scale_ * organ_.inclusion_distance(in_tumour(point));
+    return std::abs(organ_.outer_distance(point) + cavity_distance(point)) < wide_mm ||
+           std::abs(closed - of_corridor) < wide_mm;
 }
 
 int ResectedShape::label(const Vector3d& point) const {
     const int of_organ = organ_.label(point);
     if (of_organ == 0) return 0;
-    if (cavity_distance(point) <= 0) return 2;
+    if (surface_distance(point) >= 0) return 2;
     return of_organ == 2 ? 3 : 1;
 }
 
@@ -68,6 +109,7 @@ Vector3d ResectedShape::wall_normal(const Vector3d& point) const {
 
 Vector3d ResectedShape::on_surface(const Vector3d& point) const {
     constexpr double near_mm = 4;
+    if (at_rim(point)) return point;  // too round for the elements there to follow
     const double outer = organ_.outer_distance(point), wall = cavity_distance(point);
     if (std::min(std::abs(outer), std::abs(wall)) > near_mm) return point;
     Vector3d x = point;
@@ -80,8 +122,8 @@ Vector3d ResectedShape::on_surface(const Vector3d& point) const {
     return x;
 }
 
-ResectedOrgan random_resection(Random& random) {
-    ResectedShape shape(random);
+ResectedOrgan random_resection(Random& random, Access access) {
+    ResectedShape shape(random, access);
     RandomTissue tissue = random_tissue(random);
     RandomLoads loads = random_loads(shape.organ(), tissue.youngs_modulus_kpa, random);
     const bool air = random.uniform() < 0.5;
@@ -92,8 +134,9 @@ ResectedOrgan random_resection(Random& random) {
     loads.body_force += sag * random.direction();
     const double relief = random.uniform(0.05, 0.25) * tissue.youngs_modulus_kpa;
     char words[160];
-    std::snprintf(words, sizeof words, "; %.0f ml resected%s, %s in the cavity", shape.cavity_ml(),
-                  shape.leaves_tumour() ? " and tumour left" : "", air ? "air" : "fluid");
+    std::snprintf(words, sizeof words, "; %.0f ml resected%s%s, %s in the cavity", shape.cavity_ml(),
+                  shape.leaves_tumour() ? " and tumour left" : "", shape.is_open() ? " through a corridor" : "",
+                  air ? "air" : "fluid");
     return {std::move(shape), std::move(tissue), std::move(loads), relief, air, words};
 }
 
@@ -108,8 +151,8 @@ imaging::Volume meshed_labels(const ResectedShape& shape, double layer_mm) {
         for (int j = 0; j < size[1]; ++j)
             for (int i = 0; i < size[0]; ++i, ++voxel) {
                 if (*voxel == 0) continue;
-                const double d = shape.cavity_distance(labels.geometry.point({double(i), double(j), double(k)}));
-                *voxel = d <= 0 ? 0 : d < layer_mm ? 2 : 1;
+                const Vector3d x = labels.geometry.point({double(i), double(j), double(k)});
+                *voxel = shape.label(x) == 2 ? 0 : shape.cavity_distance(x) < layer_mm ? 2 : 1;
             }
     return labels;
 }

@@ -271,6 +271,35 @@ TEST(Resection, IsNotFoundWhereNothingIsGone) {
     EXPECT_THAT(codes(doubts_of(found, {})), ::testing::ElementsAre("resected.not_found"));
 }
 
+/// Whoever takes all of it for present hears what is not.
+TEST(Resection, OfWhichNobodySaysAnythingIsDoubted) {
+    const PreparedModel whole = with_image(prepare(labelled_ball(), without({})));
+    const auto doubts = [&](const Volume& seen) { return codes(update(whole, {.image = seen}, quick()).doubts); };
+    for (const double grey : {-4.0, 0.2})
+        EXPECT_THAT(doubts(seen_with([grey](const Vector3d&) { return grey; })), ::testing::Contains("resected.untold"))
+            << grey;
+    const Volume present =
+        sampled(whole.labels.geometry, [](const Vector3d& y) { return Texture()(before_displacement(y)); });
+    EXPECT_THAT(doubts(present), ::testing::Not(::testing::Contains("resected.untold")));
+}
+
+TEST(Resection, OfWhichLabelsSayNothingIsDoubted) {
+    Volume one = labelled_ball();
+    one.voxels.setTo(organ, one.voxels == tumour);
+    PrepareOptions options = without({});
+    const PreparedModel whole = prepare(one, options);
+    const auto doubts = [&](bool gone) {
+        Volume seen(one.geometry, CV_32SC1);
+        for_each_voxel(seen, [&](const Vector3d& index, std::int64_t n) {
+            const Vector3d X = before_displacement(seen.geometry.point(index));
+            seen.data<std::int32_t>()[n] = X.norm() < radius && !(gone && in_tumour(X)) ? organ : 0;
+        });
+        return codes(update(whole, {.labels = seen}, quick()).doubts);
+    };
+    EXPECT_THAT(doubts(true), ::testing::Contains("resected.untold"));
+    EXPECT_THAT(doubts(false), ::testing::Not(::testing::Contains("resected.untold")));
+}
+
 /// Label maps: the cavity is background in what was seen; what is left of the tumour is told of.
 TEST(Resection, IsFollowedInLabels) {
     const PreparedModel& model = resected_ball();

@@ -24,7 +24,7 @@ meshing::TetMesh two_layers() {
 }
 
 TEST(Regions, HoldTheNodesThatFulfilEveryCondition) {
-    const TissueMesh tissue = closed(two_layers());
+    const tled::TissueMesh tissue = tled::closed(two_layers());
     Regions regions;
     regions["below"].side = Side{2, false, 0.0};
     regions["deep below"].side = Side{2, false, 10.5};
@@ -61,7 +61,7 @@ Vector3d area_normal(const meshing::TetMesh& mesh, const Eigen::Matrix3Xi& faces
 }
 
 TEST(Regions, FacesLookOutward) {
-    const TissueMesh tissue = closed(two_layers());
+    const tled::TissueMesh tissue = tled::closed(two_layers());
     Regions regions;
     regions["below"].side = Side{2, false, 0.0};
     regions["up"].interface = {1, 2};
@@ -78,7 +78,7 @@ TEST(Regions, FacesLookOutward) {
 }
 
 TEST(Regions, TetrahedraGoByTheirCentroids) {
-    const TissueMesh tissue = closed(two_layers());
+    const tled::TissueMesh tissue = tled::closed(two_layers());
     Regions regions;
     regions["upper"].label = 2;
     regions["cell"].box = Box{{0, 0, 0}, {10, 10, 10}};
@@ -90,7 +90,7 @@ TEST(Regions, TetrahedraGoByTheirCentroids) {
 }
 
 TEST(Regions, RefuseWhatHoldsNothing) {
-    const TissueMesh tissue = closed(two_layers());
+    const tled::TissueMesh tissue = tled::closed(two_layers());
     Regions regions;
     regions["far"].ball = Ball{{500, 0, 0}, 1};
     regions["self"].without = {"other"};
@@ -109,9 +109,9 @@ TEST(Regions, RefuseWhatHoldsNothing) {
 }
 
 TEST(SlidingInterface, SplitsItsNodesAndNothingElse) {
-    TissueMesh tissue = closed(two_layers());
+    tled::TissueMesh tissue = tled::closed(two_layers());
     const meshing::TetMesh before = tissue.mesh;
-    const auto pairs = open_interface(tissue, sides_of_labels(tissue, {1, 2}), {}, 3.0);
+    const auto pairs = tled::open_interface(tissue, tled::sides_of_labels(tissue, {1, 2}), {}, 3.0);
     EXPECT_EQ(pairs.size(), 16u);
     EXPECT_EQ(tissue.mesh.node_count(), before.node_count() + 16);
     EXPECT_EQ(meshing::quality(before).components, 1);
@@ -136,35 +136,35 @@ TEST(SlidingInterface, StaysJoinedWhereAThirdLabelTouchesAndWhereToldSo) {
     meshing::TetMesh mesh = two_layers();
     for (int e = 0; e < mesh.tet_count(); ++e)
         if (mesh.nodes(0, mesh.tets.col(e)).mean() > 20) mesh.labels[e] = 3;  // a wall across both layers
-    TissueMesh tissue = closed(mesh);
-    TissueMesh told = tissue;
-    EXPECT_EQ(open_interface(tissue, sides_of_labels(tissue, {1, 2}), {}, 1.0).size(), 8u)
+    tled::TissueMesh tissue = tled::closed(mesh);
+    tled::TissueMesh told = tissue;
+    EXPECT_EQ(tled::open_interface(tissue, tled::sides_of_labels(tissue, {1, 2}), {}, 1.0).size(), 8u)
         << "4 of 12 nodes lie on the wall";
     EXPECT_EQ(meshing::quality(tissue.mesh).components, 1) << "the wall joins them";
     Regions regions;
     regions["front"].side = Side{1, false, 0.0};
     const std::vector<int> joined = RegionFinder(told, regions).nodes("front");
-    EXPECT_EQ(open_interface(told, sides_of_labels(told, {1, 2}), joined, 1.0).size(), 6u);
-    EXPECT_THROW(open_interface(told, sides_of_labels(told, {1, 7}), {}, 1.0), InvalidInput);
-    TissueMesh all = closed(two_layers());
+    EXPECT_EQ(tled::open_interface(told, tled::sides_of_labels(told, {1, 2}), joined, 1.0).size(), 6u);
+    EXPECT_THROW(tled::open_interface(told, tled::sides_of_labels(told, {1, 7}), {}, 1.0), InvalidInput);
+    tled::TissueMesh all = tled::closed(two_layers());
     const std::vector<int> everything = RegionFinder(all, {{"all", Region{}}}).nodes("all");
-    EXPECT_THROW(open_interface(all, sides_of_labels(all, {1, 2}), everything, 1.0), InvalidInput);
+    EXPECT_THROW(tled::open_interface(all, tled::sides_of_labels(all, {1, 2}), everything, 1.0), InvalidInput);
 }
 
 // A cut within one label: the sides are sets of its tissue.
 TEST(SlidingInterface, OpensWithinOneLabelBetweenSets) {
     meshing::TetMesh mesh = two_layers();
     mesh.labels.setOnes();
-    const auto sides = [&](const TissueMesh& tissue, double lower, double upper) {
+    const auto sides = [&](const tled::TissueMesh& tissue, double lower, double upper) {
         Regions halves;
         halves["first"].half_space = HalfSpace{{0, 0, lower}, {0, 0, 1}};
         halves["second"].half_space = HalfSpace{{0, 0, upper}, {0, 0, -1}};
         const RegionFinder finder(tissue, halves);
-        return InterfaceSides{finder.tets("first"), finder.tets("second"), "the sets 'first' and 'second'"};
+        return tled::InterfaceSides{finder.tets("first"), finder.tets("second"), "the sets 'first' and 'second'"};
     };
     const double middle = 0.5 * (mesh.nodes.row(2).minCoeff() + mesh.nodes.row(2).maxCoeff());
-    TissueMesh tissue = closed(mesh);
-    const auto pairs = open_interface(tissue, sides(tissue, middle, middle), {}, 3.0);
+    tled::TissueMesh tissue = tled::closed(mesh);
+    const auto pairs = tled::open_interface(tissue, sides(tissue, middle, middle), {}, 3.0);
     EXPECT_EQ(pairs.size(), 16u);
     EXPECT_EQ(meshing::quality(tissue.mesh).components, 2);
     for (const tled::SlidingPair& pair : pairs) EXPECT_TRUE(pair.normal.isApprox(Vector3d::UnitZ())) << "out of first";
@@ -174,21 +174,23 @@ TEST(SlidingInterface, OpensWithinOneLabelBetweenSets) {
         << "both sides are of the label";
     EXPECT_EQ(RegionFinder(tissue, {}).outer_faces().cols(), 2 * (2 * 9 + 4 * 12)) << "the cut is no outer surface";
     // Tissue on neither side holds the rim of a cut that ends within the tissue.
-    TissueMesh cut = closed(mesh);
-    InterfaceSides front = sides(cut, middle, middle);
+    tled::TissueMesh cut = tled::closed(mesh);
+    tled::InterfaceSides front = sides(cut, middle, middle);
     const auto behind = [&](int e) { return mesh.nodes(1, mesh.tets.col(e)).mean() > 10; };
     std::erase_if(front.first, behind);
     std::erase_if(front.second, behind);
-    EXPECT_EQ(open_interface(cut, front, {}, 3.0).size(), 4u) << "of a row of cells, whose inner row of nodes stays";
+    EXPECT_EQ(tled::open_interface(cut, front, {}, 3.0).size(), 4u)
+        << "of a row of cells, whose inner row of nodes stays";
     EXPECT_EQ(meshing::quality(cut.mesh).components, 1);
-    TissueMesh none = closed(mesh);
+    tled::TissueMesh none = tled::closed(mesh);
     const double high = mesh.nodes.row(2).maxCoeff();
-    EXPECT_THROW(open_interface(none, sides(none, high, middle), {}, 1.0), InvalidInput) << "they share tetrahedra";
+    EXPECT_THROW(tled::open_interface(none, sides(none, high, middle), {}, 1.0), InvalidInput)
+        << "they share tetrahedra";
 }
 
 TEST(SlidingInterface, RegionsFollowBothSides) {
-    TissueMesh tissue = closed(two_layers());
-    open_interface(tissue, sides_of_labels(tissue, {1, 2}), {}, 1.0);
+    tled::TissueMesh tissue = tled::closed(two_layers());
+    tled::open_interface(tissue, tled::sides_of_labels(tissue, {1, 2}), {}, 1.0);
     Regions regions;
     regions["between"].interface = {1, 2};
     regions["upper"].label = 2;

@@ -51,7 +51,7 @@ double sag_of_top(double gravity) {
 
 /// Mean z displacement of a set's faces: the cells' pattern favours some nodes, by tenths of a millimetre.
 double mean_on(const BuiltScene& built, const std::string& set, const Matrix3Xd& displacement) {
-    const TissueMesh tissue = closed(built.mesh);
+    const tled::TissueMesh tissue = tled::closed(built.mesh);
     const Eigen::VectorXd area = nodal_areas(built.mesh, RegionFinder(tissue, built.scene.sets).faces(set));
     return displacement.row(2).dot(area) / area.sum();
 }

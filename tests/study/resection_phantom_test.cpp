@@ -49,6 +49,30 @@ TEST(ResectionPhantom, HasATwinThatIsWhole) {
     EXPECT_EQ(cv::norm(gone.moving_labels.voxels, whole.moving_labels.voxels, cv::NORM_INF), 0.0);
 }
 
+/// The cavity meets the outside: what fills it is seen beside what is around the organ.
+TEST(ResectionPhantom, MayBeOpenToTheOutside) {
+    const Phantom gone = patient(Family::Opened, 2);
+    EXPECT_NE(gone.story.find("through a corridor"), std::string::npos) << gone.story;
+    const auto touches_outside = [](const imaging::Volume& hole, const auto& is_outside) {
+        int touching = 0;
+        const auto& size = hole.geometry.size;
+        for (int k = 1; k < size[2]; ++k)
+            for (int j = 0; j < size[1]; ++j)
+                for (int i = 0; i < size[0]; ++i) {
+                    const std::int64_t here = hole.offset(i, j, k), below = hole.offset(i, j, k - 1);
+                    const auto* in = hole.data<std::uint8_t>();
+                    touching += (in[here] && is_outside(below)) || (in[below] && is_outside(here));
+                }
+        return touching;
+    };
+    const imaging::Volume taken = imaging::mask_of(gone.moving_labels, 2);
+    EXPECT_GT(touches_outside(taken, [&](std::int64_t n) { return gone.moving_labels.data<std::int32_t>()[n] == 0; }),
+              10);
+    const PhantomImages images = gone.images();
+    EXPECT_GT(imaging::millilitres(images.cavity), 0.3 * imaging::millilitres(taken));
+    EXPECT_LT(imaging::millilitres(images.cavity), 1.3 * imaging::millilitres(taken));
+}
+
 // What moves most moves out, towards where the surface is seen.
 TEST(BulgedPhantom, IsSeenWhereItBulges) {
     PhantomOptions options;

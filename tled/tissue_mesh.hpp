@@ -1,5 +1,5 @@
 #pragma once
-/// The mesh of a scene, opened along interfaces that slide.
+/// A mesh, opened along interfaces that slide.
 
 #include "meshing/tet_mesh.hpp"
 #include "tled/effects.hpp"
@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace tissuewarp::simulation {
+namespace tissuewarp::tled {
 
 /// A face of the closed mesh, and the tetrahedra on its sides; no outer one outside.
 struct TissueFace {
@@ -30,6 +30,9 @@ struct TissueMesh {
 /// Throws InvalidInput for an invalid mesh.
 TissueMesh closed(meshing::TetMesh mesh);
 
+/// The same mesh without copies of nodes: those at one place become the first of them.
+meshing::TetMesh rejoined(const meshing::TetMesh& mesh);
+
 /// The tissue on both sides of an interface that is to open.
 struct InterfaceSides {
     std::vector<int> first, second;  ///< tetrahedra
@@ -41,7 +44,7 @@ InterfaceSides sides_of_labels(const TissueMesh& tissue, const std::array<int, 2
 /// and where other tissue touches it. One pair for each, normal out of the first side, of stiffness `per_area` (kPa/mm)
 /// times the node's share of the area. Throws InvalidInput where the sides share tetrahedra or do not touch, and where
 /// nothing can open.
-std::vector<tled::SlidingPair> open_interface(TissueMesh& tissue, const InterfaceSides& sides,
+std::vector<SlidingPair> open_interface(TissueMesh& tissue, const InterfaceSides& sides,
                                               const std::vector<int>& joined, double per_area);
 
-}  // namespace tissuewarp::simulation
+}  // namespace tissuewarp::tled

@@ -1,4 +1,4 @@
-#include "simulation/tissue_mesh.hpp"
+#include "tled/tissue_mesh.hpp"
 
 #include "core/errors.hpp"
 
@@ -8,7 +8,7 @@
 #include <map>
 #include <set>
 
-namespace tissuewarp::simulation {
+namespace tissuewarp::tled {
 
 using Eigen::Vector3d;
 using meshing::InterfaceFace;
@@ -95,10 +95,26 @@ std::set<int> staying(const TissueMesh& tissue, const meshing::TetMesh& by_side,
 }  // namespace
 
 TissueMesh closed(meshing::TetMesh mesh) {
-    meshing::require_valid(mesh, "the mesh of the scene");
+    meshing::require_valid(mesh, "the mesh");
     std::vector<TissueFace> faces = between_tets(mesh, meshing::interface_faces(mesh));
     Eigen::Matrix4Xi tets = mesh.tets;
     return {std::move(mesh), std::move(tets), std::move(faces)};
+}
+
+meshing::TetMesh rejoined(const meshing::TetMesh& mesh) {
+    std::map<std::array<double, 3>, int> first;
+    std::vector<int> kept;
+    Eigen::VectorXi node_of(mesh.node_count());
+    for (int node = 0; node < mesh.node_count(); ++node) {
+        const auto x = mesh.nodes.col(node);
+        const auto [at, fresh] = first.try_emplace({x[0], x[1], x[2]}, static_cast<int>(kept.size()));
+        node_of[node] = at->second;
+        if (fresh) kept.push_back(node);
+    }
+    meshing::TetMesh joined = mesh;
+    joined.nodes = mesh.nodes(Eigen::all, kept).eval();
+    joined.tets = mesh.tets.unaryExpr([&](int node) { return node_of[node]; });
+    return joined;
 }
 
 InterfaceSides sides_of_labels(const TissueMesh& tissue, const std::array<int, 2>& labels) {
@@ -111,14 +127,14 @@ InterfaceSides sides_of_labels(const TissueMesh& tissue, const std::array<int, 2
     return sides;
 }
 
-std::vector<tled::SlidingPair> open_interface(TissueMesh& tissue, const InterfaceSides& sides,
-                                              const std::vector<int>& joined, double per_area) {
+std::vector<SlidingPair> open_interface(TissueMesh& tissue, const InterfaceSides& sides, const std::vector<int>& joined,
+                                        double per_area) {
     const meshing::TetMesh by_side = labelled_by_side(tissue, sides);
     const std::map<int, Vector3d> normals = area_normals(by_side);
     if (normals.empty()) throw InvalidInput(sides.name + " share no face of the mesh and cannot slide");
     const std::set<int> stay = staying(tissue, by_side, joined);
     std::map<int, int> copies;
-    std::vector<tled::SlidingPair> pairs;
+    std::vector<SlidingPair> pairs;
     int next = tissue.mesh.node_count();
     for (const auto& [node, area] : normals) {
         if (stay.contains(node) || !(area.norm() > 0)) continue;
@@ -127,11 +143,11 @@ std::vector<tled::SlidingPair> open_interface(TissueMesh& tissue, const Interfac
     }
     if (pairs.empty()) throw InvalidInput("all nodes between " + sides.name + " stay joined: nothing can slide");
     tissue.mesh.nodes.conservativeResize(3, next);
-    for (const tled::SlidingPair& pair : pairs) tissue.mesh.nodes.col(pair.second) = tissue.mesh.nodes.col(pair.first);
+    for (const SlidingPair& pair : pairs) tissue.mesh.nodes.col(pair.second) = tissue.mesh.nodes.col(pair.first);
     for (const int e : sides.second)
         for (int& node : tissue.mesh.tets.col(e))
             if (const auto copy = copies.find(node); copy != copies.end()) node = copy->second;
     return pairs;
 }
 
-}  // namespace tissuewarp::simulation
+}  // namespace tissuewarp::tled

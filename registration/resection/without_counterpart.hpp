@@ -1,0 +1,14 @@
+#pragma once
+/// Where an image of the operation has no structure and the preoperative one, carried along, has some.
+
+#include "imaging/volume.hpp"
+#include "registration/resection/without_structure.hpp"
+
+namespace tissuewarp::registration::detail {
+
+/// uint8: voxels of the organ without structure where the tissue that lies there shows some, or is of a grey that goes
+/// with another one elsewhere (CavityOptions). `moving`: the preoperative image on the grid of the view, smoothed
+/// against noise, float32.
+imaging::Volume without_counterpart(const CavityView& fixed, const imaging::Volume& moving);
+
+}  // namespace tissuewarp::registration::detail

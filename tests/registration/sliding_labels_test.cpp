@@ -1,0 +1,162 @@
+/// Tissue whose parts slide on one another.
+#include "core/errors.hpp"
+#include "registration/field.hpp"
+#include "registration/prepared/prepared_io.hpp"
+#include "registration/uncertainty.hpp"
+#include "registration/update.hpp"
+#include "tests/registration/shapes.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace tissuewarp::registration {
+namespace {
+
+using namespace test;
+using Eigen::Matrix3Xd;
+using Eigen::Vector3d;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+using tissuewarp::test::TemporaryFolder;
+
+constexpr int lower = 1, upper = 2;
+constexpr double edge_mm = 40, slid_mm = 6;
+
+/// A cube whose upper half is a label of its own.
+meshing::TetMesh two_layers() {
+    meshing::TetMesh mesh = box_at({0, 0, 0}, {edge_mm, edge_mm, edge_mm}, {6, 6, 6});
+    for (int t = 0; t < mesh.tet_count(); ++t)
+        mesh.labels[t] = mesh.nodes(2, mesh.tets.col(t)).mean() < edge_mm / 2 ? lower : upper;
+    return mesh;
+}
+
+imaging::Volume layer_labels() {
+    imaging::Volume labels(plain_grid({30, 30, 30}, 2, {-9, -9, -9}), CV_32SC1);
+    for_each_voxel(labels, [&](const Vector3d& index, std::int64_t n) {
+        const Vector3d X = labels.geometry.point(index);
+        const bool in = (X.array() > 0).all() && (X.array() < edge_mm).all();
+        labels.data<std::int32_t>()[n] = !in ? 0 : X[2] < edge_mm / 2 ? lower : upper;
+    });
+    return labels;
+}
+
+PreparedModel prepared_with(std::vector<std::array<int, 2>> sliding) {
+    PrepareOptions options;
+    options.sliding = std::move(sliding);
+    return prepare(two_layers(), layer_labels(), options);
+}
+
+/// The upper half went along x, the lower one did not.
+Vector3d gone(const Vector3d& X) {
+    return X + (X[2] > edge_mm / 2 ? slid_mm : 0) * Vector3d::UnitX();
+}
+
+PointPairs pairs() {
+    Matrix3Xd moving(3, 128);
+    for (int n = 0; n < 128; ++n) moving.col(n) << 5 + 10 * (n % 4), 5 + 10 * (n / 4 % 4), 2.5 + 5 * (n / 16);
+    PointPairs pairs;
+    pairs.moving = pairs.fixed = moving;
+    for (auto place : pairs.fixed.colwise()) place = gone(place);
+    pairs.deviation_mm = 0.3;
+    return pairs;
+}
+
+UpdateOptions where_headers_have_it() {
+    UpdateOptions options;
+    options.align = false;
+    options.device = Device::Cpu;
+    return options;
+}
+
+UpdateResult registered(const PreparedModel& prepared) {
+    Intraoperative seen;
+    seen.points = pairs();
+    return update(prepared, seen, where_headers_have_it());
+}
+
+/// Largest error next to the surface along which the halves slid.
+double error_beside_it(const UpdateResult& result) {
+    Matrix3Xd places(3, 50);
+    for (int n = 0; n < 50; ++n) places.col(n) << 4 + 8 * (n % 5), 4 + 8 * (n / 5 % 5), edge_mm / 2 + (n < 25 ? -1 : 1);
+    Matrix3Xd truth = places;
+    for (auto place : truth.colwise()) place = gone(place);
+    return (PointTransform(result.deformation)(places) - truth).colwise().norm().maxCoeff();
+}
+
+TEST(SlidingLabels, HaveInterfacesOfTheirOwn) {
+    const PreparedModel glued = prepared_with({}), slides = prepared_with({{lower, upper}});
+    EXPECT_TRUE(glued.sliding.empty());
+    EXPECT_EQ(slides.sliding.size(), 49u) << "all nodes between the halves";
+    EXPECT_EQ(slides.rest.node_count, glued.rest.node_count + 49);
+    EXPECT_EQ(slides.interfaces.outer_faces().size(), glued.interfaces.outer_faces().size());
+    const auto thickness = slides.interfaces.thickness(slides.model.mesh);
+    for (const auto& [label, mm] : glued.interfaces.thickness(glued.model.mesh))
+        EXPECT_NEAR(thickness.at(label), mm, 1e-9) << label;
+    int sides = 0;
+    for (const InterfaceNode& node : slides.interfaces.nodes()) {
+        if (!node.slides) continue;
+        ++sides;
+        EXPECT_EQ(node.inner + node.outer, lower + upper);
+        EXPECT_NEAR(node.normal[2], node.inner == lower ? 1 : -1, 1e-9) << "from inner to outer";
+        EXPECT_NEAR(node.offset, 0, 0.1);
+    }
+    EXPECT_EQ(sides, 2 * 49);
+}
+
+TEST(SlidingLabels, SlideWherePairsSaySo) {
+    const UpdateResult glued = registered(prepared_with({})), slid = registered(prepared_with({{lower, upper}}));
+    EXPECT_LT(error_beside_it(slid), 0.3);
+    EXPECT_GT(error_beside_it(glued), 1.5) << "that tissue is torn or stays behind";
+}
+
+TEST(SlidingLabels, NeitherOpenNorEnterOneAnother) {
+    const PreparedModel prepared = prepared_with({{lower, upper}});
+    const UpdateResult result = registered(prepared);
+    for (const tled::SlidingPair& pair : prepared.sliding) {
+        const Vector3d apart =
+            result.deformation.displacement.col(pair.first) - result.deformation.displacement.col(pair.second);
+        EXPECT_NEAR(pair.normal.dot(apart), 0, 0.05);
+        EXPECT_NEAR(apart.norm(), slid_mm, 1);
+    }
+}
+
+TEST(SlidingLabels, ErrorsAreEstimatedOfEachSide) {
+    const PreparedModel prepared = prepared_with({{lower, upper}});
+    const UpdateResult result = registered(prepared);
+    const Uncertainty estimate = uncertainty(prepared, result);
+    const auto beside = estimate.at(Vector3d(20, 20, edge_mm / 2 + 1));
+    ASSERT_EQ(beside.size(), 1u);
+    ASSERT_TRUE(beside[0]);
+    EXPECT_LT(beside[0]->interval_mm, 2);
+}
+
+TEST(SlidingLabels, ComeBackFromAFile) {
+    const TemporaryFolder folder;
+    const PreparedModel prepared = prepared_with({{lower, upper}});
+    write_prepared(prepared, folder / "a.h5");
+    const PreparedModel back = read_prepared(folder / "a.h5");
+    EXPECT_EQ(back.options.sliding, prepared.options.sliding);
+    EXPECT_EQ(back.model.mesh.nodes, prepared.model.mesh.nodes);
+    EXPECT_EQ(back.model.mesh.tets, prepared.model.mesh.tets);
+    ASSERT_EQ(back.sliding.size(), prepared.sliding.size());
+    EXPECT_EQ(registered(back).deformation.displacement, registered(prepared).deformation.displacement);
+}
+
+TEST(SlidingLabels, ThatCannotSlideAreRefused) {
+    const auto refusal = [](std::array<int, 2> labels, const char* words) {
+        EXPECT_THAT([&] { prepared_with({labels}); }, ThrowsMessage<InvalidInput>(HasSubstr(words))) << words;
+    };
+    refusal({lower, lower}, "cannot slide on one another");
+    refusal({lower, 7}, "7");
+    PrepareOptions options;
+    options.sliding = {{lower, upper}};
+    options.rigid_neighbours = {upper};
+    EXPECT_THAT([&] { prepare(two_layers(), layer_labels(), options); },
+                ThrowsMessage<InvalidInput>(HasSubstr("along rigid neighbours it slides anyway")));
+}
+
+}  // namespace
+}  // namespace tissuewarp::registration
