@@ -57,7 +57,7 @@ Interfaces::Interfaces(const meshing::TetMesh& mesh, const std::vector<tled::Sli
                 nodes_.push_back({face.nodes[corner], face.inner, face.outer, 0.0, Eigen::Vector3d::Zero(), 0.0});
             entries[corner] = entry->second;
             InterfaceNode& node = nodes_[static_cast<std::size_t>(entry->second)];
-            node.slides = slides[f];
+            node.slides = node.slides || slides[f];
             node.area += twice_area.norm() / 6;
             node.normal += twice_area;
         }
@@ -72,6 +72,23 @@ std::vector<std::array<int, 3>> Interfaces::outer_faces() const {
     for (std::size_t f = 0; f < faces_.size(); ++f)
         if (nodes_[static_cast<std::size_t>(face_entries_[f][0])].outer == 0) faces.push_back(faces_[f]);
     return faces;
+}
+
+Eigen::Matrix3Xd Interfaces::on_sliding_faces(const Eigen::Matrix3Xd& positions) const {
+    constexpr double apart_mm = 1.5;
+    std::vector<Eigen::Vector3d> points;
+    for (std::size_t f = 0; f < faces_.size(); ++f) {
+        const InterfaceNode& node = nodes_[static_cast<std::size_t>(face_entries_[f][0])];
+        if (!node.slides || node.inner < node.outer) continue;  // the other side's faces lie in the same places
+        const Eigen::Vector3d a = positions.col(faces_[f][0]), ab = positions.col(faces_[f][1]) - a,
+                              ac = positions.col(faces_[f][2]) - a;
+        const int steps = 1 + static_cast<int>(std::max(ab.norm(), ac.norm()) / apart_mm);
+        for (int i = 0; i <= steps; ++i)
+            for (int j = 0; i + j <= steps; ++j) points.emplace_back(a + (i * ab + j * ac) / steps);
+    }
+    Eigen::Matrix3Xd result(3, static_cast<Eigen::Index>(points.size()));
+    for (std::size_t p = 0; p < points.size(); ++p) result.col(static_cast<Eigen::Index>(p)) = points[p];
+    return result;
 }
 
 Eigen::Matrix3Xd Interfaces::normals(const Eigen::Matrix3Xd& positions) const {

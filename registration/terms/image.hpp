@@ -1,6 +1,7 @@
 #pragma once
 /// A bare intraoperative volume: blocks of the preoperative image, then all of it, belong where they were found.
 
+#include "meshing/search/point_tree.hpp"
 #include "registration/matching/image_search.hpp"
 #include "registration/matching/points/field_of_view.hpp"
 #include "registration/springs/pull.hpp"
@@ -70,6 +71,14 @@ std::vector<Doubt> doubts_of(const LeftBehind& left, double spacing_mm, const st
 std::vector<Doubt> doubts_of(const ImageFit& fit, const std::string& name = "image",
                              const ImageDoubtLimits& limits = image_doubt_limits);
 
+/// Tissue that slides along other tissue.
+struct SlidingMatchOptions {
+    /// Matches so near to a surface that slides see both sides of it, and are left out. Chosen on the seeds 1 to 6 of
+    /// `scripts/sliding_pairs`.
+    double beside_mm = 4;
+};
+inline constexpr SlidingMatchOptions sliding_match_options{};
+
 class ImageTerm : public Term {
 public:
     /// Of an image of the model and an intraoperative one, called `name` in doubts. `energy` (mN mm) weighs as much as
@@ -129,12 +138,14 @@ private:
     const imaging::Volume& fixed_;
     ImageSearch search_;
     FieldOfView view_;
+    meshing::PointTree sliding_;  // spread over the surfaces that slide
     bool has_placed_ = false;
     std::optional<EchoPose> echo_pose_;
     Found found_;
     Memory memory_;
 
     void search(const State& state, Observer& observer);
+    void leave_out_beside_sliding(LocatedMatches& located) const;
     void tell_similarity(Observer& observer) const;
     [[nodiscard]] std::optional<Eigen::Isometry3d> rigid_motion() const;
     /// Of all matches, in `memory_`.

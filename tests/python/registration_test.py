@@ -152,6 +152,13 @@ class Registration(unittest.TestCase):
         with self.assertRaisesRegex(tissuewarp.InvalidInput, "0.5"):
             tissuewarp.prepare(MOVING_LABELS, default_material=(3.0, 0.5))
 
+    def test_labels_slide(self):
+        model = tissuewarp.prepare(MOVING_LABELS, edge_length=EDGE, sliding=[(1, 2)])
+        mesh = tissuewarp.Updater(model, device="cpu").update(labels=FIXED_LABELS).mesh
+        self.assertGreater(len(mesh.nodes), len(numpy.unique(mesh.nodes, axis=0)), "sides have nodes of their own")
+        with self.assertRaisesRegex(tissuewarp.InvalidInput, "cannot slide"):
+            tissuewarp.prepare(MOVING_LABELS, edge_length=EDGE, sliding=[(1, 1)])
+
     def test_models_on_disk_give_the_same(self):
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, "patient.tw")

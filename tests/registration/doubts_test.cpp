@@ -118,8 +118,8 @@ TEST(Doubts, OfFoldsSolverAndAccuracy) {
     EXPECT_EQ(code(doubt_of_unfolding({20, 0, 3, 0.9}, {10, 0, 2, 0.8})), "");
     EXPECT_EQ(code(doubt_of_unfolding({20, 0, 3, 1.1}, {})), "field.unfolded");
     EXPECT_EQ(code(doubt_of_unfolding({20, 0, 3, 0.1}, {20, 0, 3, 1.1})), "field.unfolded");
-    EXPECT_EQ(doubt_of_unfolding({20, 0, 3, 1.1, 2900}, {})->severity, Severity::Doubt);
-    EXPECT_EQ(doubt_of_unfolding({20, 0, 3, 1.1, 3100}, {})->severity, Severity::Notice);
+    EXPECT_EQ(doubt_of_unfolding({20, 0, 3, 1.1, 0, 2900}, {})->severity, Severity::Doubt);
+    EXPECT_EQ(doubt_of_unfolding({20, 0, 3, 1.1, 0, 3100}, {})->severity, Severity::Notice);
     UncertaintySummary summary;
     summary.algebraic_mm = 0.051;
     EXPECT_EQ(code(doubt_of_solver(summary, 0.06)), "");

@@ -101,7 +101,11 @@ TEST(SlidingLabels, HaveInterfacesOfTheirOwn) {
         ++sides;
         EXPECT_EQ(node.inner + node.outer, lower + upper);
         EXPECT_NEAR(node.normal[2], node.inner == lower ? 1 : -1, 1e-9) << "from inner to outer";
-        EXPECT_NEAR(node.offset, 0, 0.1);
+        const Vector3d X = slides.model.mesh.nodes.col(node.node);
+        const bool within = (X.head(2).array() > 1).all() && (X.head(2).array() < edge_mm - 1).all();
+        if (within) {
+            EXPECT_NEAR(node.offset, 0, 0.1);
+        }
     }
     EXPECT_EQ(sides, 2 * 49);
 }
