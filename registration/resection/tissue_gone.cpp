@@ -67,6 +67,7 @@ TissueGone tissue_gone(const Deformation& deformation, const Volume& moving, con
     const int reach = static_cast<int>(std::ceil(margin_mm / grid.spacing.minCoeff()));
     const Volume moved = displacement_near_mesh(deformation, grid, reach), organ = mask_of_mesh(deformation.mesh, grid);
     const CavityView pulled_back(warp_image(fixed.as(CV_32F), moved), organ, organ);
+    if (!may_hold_cavity(pulled_back)) return {};
     const Volume before = against_noise(imaging::resample(moving.as(CV_32F), grid, imaging::Interpolation::Linear));
     Volume core = without_counterpart(pulled_back, before);
     leave_what_is_in_view(core, moved, view);

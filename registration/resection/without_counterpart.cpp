@@ -44,6 +44,13 @@ private:
 
 }  // namespace
 
+bool may_hold_cavity(const CavityView& fixed) {
+    const cv::Mat organ = fixed.organ.voxels.reshape(1, 1), deviation = fixed.deviation.voxels.reshape(1, 1);
+    const int flat = cv::countNonZero(organ & (deviation < cavity_options.most_deviation * fixed.tissue_deviation));
+    constexpr double mm3_per_ml = 1000;
+    return flat * fixed.organ.geometry.voxel_volume() >= cavity_options.least_core_ml * mm3_per_ml;
+}
+
 Volume without_counterpart(const CavityView& fixed, const Volume& moving) {
     constexpr CavityOptions options = cavity_options;
     const Volume& organ = fixed.organ;

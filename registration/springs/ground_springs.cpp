@@ -19,9 +19,9 @@ double strain_energy_unit(const PreparedModel& prepared, const TissuePrior& tiss
 
 namespace {
 
-/// Of the wall of a cavity: free, and still a piece of tissue that nothing else holds stays somewhere. As surfaces in
-/// view (ImageOptions::expected_motion_mm).
-constexpr double cavity_wall_motion_mm = 100;
+/// Of the wall of a cavity and of surfaces that slide: free, and still a piece of tissue that nothing else holds stays
+/// somewhere. As surfaces in view (ImageOptions::expected_motion_mm).
+constexpr double free_surface_motion_mm = 100;
 
 }  // namespace
 
@@ -29,8 +29,9 @@ std::vector<tled::Spring> ground_springs(const PreparedModel& prepared, double e
                                          const std::function<ExpectedMotion(const InterfaceNode&)>& expected) {
     std::vector<tled::Spring> springs;
     for (const InterfaceNode& node : prepared.interfaces.nodes()) {
-        if (node.outer != 0) continue;
-        const ExpectedMotion motion = node.at_cavity ? ExpectedMotion(cavity_wall_motion_mm) : expected(node);
+        if (node.outer != 0 && !node.slides) continue;
+        const bool free = node.at_cavity || node.slides;
+        const ExpectedMotion motion = free ? ExpectedMotion(free_surface_motion_mm) : expected(node);
         const Eigen::Matrix3d across = node.normal * node.normal.transpose(),
                               along = Eigen::Matrix3d::Identity() - across,
                               information = across / (motion.across_mm * motion.across_mm) +

@@ -27,7 +27,7 @@ struct ExpectedMotion {
 };
 
 /// Weak springs from every node of the outer surface to where the rigid placement has it: the prior that it moved as
-/// far as `expected` says of it, the wall of a cavity as far as it likes. `energy` is the strain energy (mN mm) that
+/// far as `expected` says of it, the wall of a cavity and surfaces that slide as far as they like. `energy` is the strain energy (mN mm) that
 /// weighs as much as one standard deviation.
 std::vector<tled::Spring> ground_springs(const PreparedModel& prepared, double energy,
                                          const std::function<ExpectedMotion(const InterfaceNode&)>& expected);

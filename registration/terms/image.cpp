@@ -35,6 +35,17 @@ double median_distance(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
     return *middle;
 }
 
+void leave_out_beside_sliding(const PreparedModel& prepared, LocatedMatches& located) {
+    const meshing::PointTree sliding(prepared.interfaces.on_sliding_faces(prepared.model.mesh.nodes));
+    LocatedMatches kept;
+    for (std::size_t n = 0; n < located.matches.size(); ++n) {
+        if (sliding.any_within(located.matches[n].moving, sliding_match_options.beside_mm)) continue;
+        kept.matches.push_back(located.matches[n]);
+        kept.places.push_back(located.places[n]);
+    }
+    located = std::move(kept);
+}
+
 }  // namespace
 
 std::vector<Doubt> doubts_of(const ImageFit& fit, const std::string& name, const ImageDoubtLimits& limits) {
@@ -106,19 +117,7 @@ ImageTerm::ImageTerm(const PreparedModel& prepared, const ImageModel& moving, co
       energy_(energy),
       fixed_(fixed),
       search_(prepared.model.mesh, moving, fixed, options, tools),
-      view_(search_.seen()),
-      sliding_(prepared.interfaces.on_sliding_faces(prepared.model.mesh.nodes)) {}
-
-void ImageTerm::leave_out_beside_sliding(LocatedMatches& located) const {
-    if (prepared_.sliding.empty()) return;
-    LocatedMatches kept;
-    for (std::size_t n = 0; n < located.matches.size(); ++n) {
-        if (sliding_.any_within(located.matches[n].moving, sliding_match_options.beside_mm)) continue;
-        kept.matches.push_back(located.matches[n]);
-        kept.places.push_back(located.places[n]);
-    }
-    located = std::move(kept);
-}
+      view_(search_.seen()) {}
 
 void ImageTerm::tell_similarity(Observer& observer) const {
     if (search_.similarity() != Similarity::LinearCombination) return;
@@ -130,7 +129,7 @@ void ImageTerm::tell_similarity(Observer& observer) const {
 void ImageTerm::search(const State& state, Observer& observer) {
     if (search_.done() == 0 && !echo_pose_) tell_similarity(observer);
     LocatedMatches located = search_.search(state, observer);
-    leave_out_beside_sliding(located);
+    if (!prepared_.sliding.empty()) leave_out_beside_sliding(prepared_, located);
     found_.matches = std::move(located.matches);
     found_.places = std::move(located.places);
     found_.strongest.resize(found_.matches.size());

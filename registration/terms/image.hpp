@@ -1,7 +1,6 @@
 #pragma once
 /// A bare intraoperative volume: blocks of the preoperative image, then all of it, belong where they were found.
 
-#include "meshing/search/point_tree.hpp"
 #include "registration/matching/image_search.hpp"
 #include "registration/matching/points/field_of_view.hpp"
 #include "registration/springs/pull.hpp"
@@ -138,14 +137,12 @@ private:
     const imaging::Volume& fixed_;
     ImageSearch search_;
     FieldOfView view_;
-    meshing::PointTree sliding_;  // spread over the surfaces that slide
     bool has_placed_ = false;
     std::optional<EchoPose> echo_pose_;
     Found found_;
     Memory memory_;
 
     void search(const State& state, Observer& observer);
-    void leave_out_beside_sliding(LocatedMatches& located) const;
     void tell_similarity(Observer& observer) const;
     [[nodiscard]] std::optional<Eigen::Isometry3d> rigid_motion() const;
     /// Of all matches, in `memory_`.

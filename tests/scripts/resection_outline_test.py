@@ -3,10 +3,12 @@
 import importlib.machinery
 import importlib.util
 import pathlib
+import sys
 import unittest
 
 import numpy
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "scripts"))  # what it imports
 PATH = pathlib.Path(__file__).resolve().parents[2] / "scripts" / "resection_outline"
 loader = importlib.machinery.SourceFileLoader("resection_outline", str(PATH))
 script = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
