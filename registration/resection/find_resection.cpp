@@ -23,15 +23,14 @@ using imaging::Volume;
 
 /// What of the images a cavity is told by, on one grid.
 struct Look {
-    CavityView fixed;
-    Volume moving;
+    CavityView fixed, moving;
 
     Look(const PreparedModel& whole, const Volume& moving_image, const Volume& fixed_image, const Volume& field)
         : Look(imaging::mask_of_all(warp_labels(whole.labels, field)), moving_image, fixed_image, field) {}
 
 private:
     Look(const Volume& organ, const Volume& moving_image, const Volume& fixed_image, const Volume& field)
-        : fixed(fixed_image, organ, organ), moving(detail::against_noise(warp_image(moving_image.as(CV_32F), field))) {}
+        : fixed(fixed_image, organ, organ), moving(warp_image(moving_image.as(CV_32F), field), organ, organ) {}
 };
 
 /// Labelled voxels that a forward field leads into the cavity.

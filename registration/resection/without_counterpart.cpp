@@ -1,7 +1,5 @@
 #include "registration/resection/without_counterpart.hpp"
 
-#include "registration/resection/find_resection.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -44,27 +42,19 @@ private:
 
 }  // namespace
 
-bool may_hold_cavity(const CavityView& fixed) {
-    const cv::Mat organ = fixed.organ.voxels.reshape(1, 1), deviation = fixed.deviation.voxels.reshape(1, 1);
-    const int flat = cv::countNonZero(organ & (deviation < cavity_options.most_deviation * fixed.tissue_deviation));
-    constexpr double mm3_per_ml = 1000;
-    return flat * fixed.organ.geometry.voxel_volume() >= cavity_options.least_core_ml * mm3_per_ml;
-}
-
-Volume without_counterpart(const CavityView& fixed, const Volume& moving) {
+Volume without_counterpart(const CavityView& fixed, const CavityView& moving) {
     constexpr CavityOptions options = cavity_options;
     const Volume& organ = fixed.organ;
-    const Volume deviation = local_deviation(moving);
     const double most = options.most_deviation * fixed.tissue_deviation,
-                 least = options.least_counterpart * median(values_in(deviation, organ));
-    const ExpectedGrey expected(moving, fixed.grey, organ);
+                 least = options.least_counterpart * moving.tissue_deviation;
+    const ExpectedGrey expected(moving.grey, fixed.grey, organ);
     Volume core(organ.geometry, CV_8UC1);
     for (std::int64_t n = 0; n < organ.geometry.voxel_count(); ++n) {
         const bool flat = organ.data<std::uint8_t>()[n] && fixed.deviation.data<float>()[n] < most;
         core.data<std::uint8_t>()[n] =
             flat &&
-            (deviation.data<float>()[n] > least ||
-             expected.distance(moving.data<float>()[n], fixed.grey.data<float>()[n]) > options.least_difference);
+            (moving.deviation.data<float>()[n] > least ||
+             expected.distance(moving.grey.data<float>()[n], fixed.grey.data<float>()[n]) > options.least_difference);
     }
     return core;
 }

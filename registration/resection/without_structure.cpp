@@ -50,6 +50,12 @@ CavityView::CavityView(const Volume& image, Volume whole, const Volume& tissue)
       deviation(local_deviation(grey)),
       tissue_deviation(median(values_in(deviation, tissue))) {}
 
+CavityView::CavityView(Volume whole, Volume its_grey, Volume its_deviation, double of_tissue)
+    : organ(std::move(whole)),
+      grey(std::move(its_grey)),
+      deviation(std::move(its_deviation)),
+      tissue_deviation(of_tissue) {}
+
 imaging::Geometry grid_about(const imaging::Geometry& image, const Eigen::Matrix3Xd& points, double margin_mm) {
     imaging::Geometry grid = image;
     grid.spacing = image.spacing.cwiseMax(cavity_options.grid_mm);

@@ -17,6 +17,8 @@ struct CavityView {
 
     /// Of an image of one component on the grid of two masks; both are `organ` where nothing is known to be gone.
     CavityView(const imaging::Volume& image, imaging::Volume organ, const imaging::Volume& tissue);
+    /// Of what is known of an image already.
+    CavityView(imaging::Volume organ, imaging::Volume grey, imaging::Volume deviation, double tissue_deviation);
 };
 
 /// The grid of an image, not finer than the options have it, about points (3 × P, LPS mm) with a margin around them.

@@ -115,7 +115,6 @@ ImageTerm::ImageTerm(const PreparedModel& prepared, const ImageModel& moving, co
       name_(std::move(name)),
       options_(options),
       energy_(energy),
-      fixed_(fixed),
       search_(prepared.model.mesh, moving, fixed, options, tools),
       view_(search_.seen()) {}
 
@@ -224,7 +223,7 @@ Contribution ImageTerm::linearise(const RoundPlan& plan, const State& state, Obs
     const bool echoes = search_.similarity() == Similarity::LinearCombination;
     const double agreement = search_.agreement().value_or(shared_errors.full_agreement);
     const DatumKind kind =
-        echoes ? ultrasound_kind(agreement) : image_kind(moving_.image.geometry, fixed_.geometry, agreement);
+        echoes ? ultrasound_kind(agreement) : image_kind(moving_.image.geometry, search_.image().geometry, agreement);
     result.springs = pulled_by(kind, lumped_springs(found_.shares, memory_.forces, state.displacement));
     for (PulledNode& pulled : result.springs)
         if (view_.distance(state.placement * (prepared_.model.mesh.nodes.col(pulled.spring.node) +
@@ -284,7 +283,8 @@ LeftBehind ImageTerm::left_behind_of(const LocatedMatches& blocks, const State& 
 std::vector<Doubt> ImageTerm::doubts_of_blocks(const State& state) const {
     if (shows_echoes()) return {};
     const auto doubts = [&](const LocatedMatches& blocks) {
-        return doubts_of(left_behind_of(blocks, state), larger_voxel(moving_.image.geometry, fixed_.geometry), name_);
+        return doubts_of(left_behind_of(blocks, state), larger_voxel(moving_.image.geometry, search_.image().geometry),
+                         name_);
     };
     if (doubts(search_.blocks()).empty()) return {};
     return doubts(search_.block_search(state, silent_observer()));  // the first may have erred, far from where they are
@@ -299,7 +299,7 @@ void ImageTerm::judge(const State& state, UpdateResult& result) {
     for (Doubt& doubt : doubts_of_blocks(state)) result.doubts.push_back(std::move(doubt));
     if (!shows_echoes()) {
         const Deformation here{prepared_.model.mesh, state.displacement, state.placement};
-        if (auto doubt = doubt_of_image(tissue_gone(here, moving_.image, fixed_, view_), name_))
+        if (auto doubt = doubt_of_image(tissue_gone(here, moving_.image, search_.image(), view_), name_))
             result.doubts.push_back(std::move(*doubt));
         return;
     }

@@ -134,7 +134,6 @@ private:
     std::string name_;
     const ImageOptions& options_;
     double energy_;
-    const imaging::Volume& fixed_;
     ImageSearch search_;
     FieldOfView view_;
     bool has_placed_ = false;
