@@ -9,6 +9,7 @@
 #include "registration/resection/find_resection.hpp"
 #include "registration/resection/gap.hpp"
 #include "registration/springs/ground_springs.hpp"
+#include "registration/terms/outline.hpp"
 #include "registration/update.hpp"
 #include "registration/warp.hpp"
 #include "tests/registration/doubt_codes.hpp"
@@ -238,6 +239,49 @@ TEST(Resection, OfACollapsedCavityFollowsItsWall) {
     EXPECT_GT(shown.min_jacobian, 0.4);
     EXPECT_THAT(codes(shown.doubts), ::testing::Not(::testing::Contains("resected.no_cavity")));
     EXPECT_THAT(codes(hidden.doubts), ::testing::Contains("resected.no_cavity"));
+}
+
+/// The top of the ball sank by up to 7 mm.
+Vector3d before_sinking(const Vector3d& y) {
+    const double up = std::max(0.0, y[2]) / radius;
+    return y + 7 * up * up * Vector3d::UnitZ();
+}
+
+/// What a stripped image shows: the tissue, exactly nothing around it; or something around it.
+Volume stripped(const imaging::Geometry& grid, const std::function<Vector3d(const Vector3d&)>& before,
+                bool shows_around) {
+    return sampled(grid, [&](const Vector3d& y) {
+        const Vector3d X = before(y);
+        if (X.norm() < radius) return in_tumour(X) ? -2 : Texture()(X);
+        return shows_around ? Texture()(y + Vector3d(0, 70, 0)) : 0.0;
+    });
+}
+
+TEST(Resection, TheOuterSurfaceGoesWhereTheImageEnds) {
+    const auto model_of = [](bool shows_around) {
+        PreparedModel model = prepare(labelled_ball(), without({tumour}));
+        ImageModelOptions image;
+        image.features.count = 800;
+        image.blocks.grid_spacing_mm = voxel_mm;
+        prepare_image(model,
+                      stripped(
+                          model.labels.geometry, [](const Vector3d& X) { return X; }, shows_around),
+                      image);
+        return model;
+    };
+    const PreparedModel alone = model_of(false), surrounded = model_of(true);
+    const Volume seen = stripped(alone.labels.geometry, before_sinking, false), shown = imaging::mask_of_all(seen);
+    EXPECT_NE(detail::outline_term(alone, shown, quick()), nullptr);
+    EXPECT_EQ(detail::outline_term(surrounded, shown, quick()), nullptr) << "where it ends nobody knows";
+    const UpdateResult result = update(alone, {.image = seen}, quick());
+    std::vector<double> off;
+    for (const InterfaceNode& node : alone.interfaces.nodes()) {
+        if (node.outer != 0 || node.at_cavity) continue;
+        const Vector3d y = result.deformation.deformed_nodes().col(node.node);
+        if (y[2] > 0) off.push_back(std::abs(before_sinking(y).norm() - alone.model.mesh.nodes.col(node.node).norm()));
+    }
+    EXPECT_LT(summarise(off).mean, 0.5);
+    EXPECT_LT(summarise(off).percentile_95, 1.5);
 }
 
 /// Without being told; of air as of fluid, whose grey tissue has too.
