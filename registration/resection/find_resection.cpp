@@ -52,6 +52,13 @@ Volume led_into(const Volume& cavity, const Volume& labels, const Deformation& d
     return gone;
 }
 
+/// Of the voxels of a mask.
+Volume near_the_outside(const Volume& mask, const Volume& labels) {
+    Volume near = mask.clone();
+    near.voxels.setTo(0, imaging::erode(imaging::mask_of_all(labels), cavity_options.surface_mm).voxels);
+    return near;
+}
+
 }  // namespace
 
 ImageModelOptions image_of_first_look() {
@@ -88,6 +95,7 @@ FoundResection find_resection(const PreparedModel& whole, const Deformation& def
     }
     found.gone_ml = millilitres(found.gone);
     found.cavity_ml = millilitres(cavity);
+    found.at_surface_ml = millilitres(near_the_outside(found.gone, whole.labels));
     found.cavity = imaging::resample(cavity, fixed.geometry, imaging::Interpolation::Nearest);
     return found;
 }
@@ -102,6 +110,13 @@ std::vector<Doubt> doubts_of(const FoundResection& found, const Volume& gap) {
                           "draw what is gone in the moving labels, and name its label by --resected"});
         return doubts;
     }
+    const double at_surface = found.at_surface_ml / found.gone_ml;
+    if (at_surface > cavity_options.most_at_surface)
+        doubts.push_back({"resected.unclear", at_surface, cavity_options.most_at_surface,
+                          detail::percent(at_surface) +
+                              " of the tissue that is taken for gone lies at the organ's outer surface, where it may "
+                              "have sunk instead",
+                          "draw what is gone in the moving labels, and name its label by --resected"});
     const Volume hole = imaging::mask_of_all(gap);
     Volume both = hole;
     both.voxels = hole.voxels & found.cavity.voxels;

@@ -23,6 +23,8 @@ struct CavityOptions {
     double reach_mm = 5;          ///< from what looks so to the wall, which boxes must not reach
     double opening_mm = 1.5;      ///< radius of the ball that fits into the cavity everywhere
     double least_ml = 3;          ///< less tissue without a counterpart is not said to be resected
+    double surface_mm = 3;        ///< so near to the outside tissue may have sunk instead; by hand, as …
+    double most_at_surface = 0.1;  ///< … the share of what is gone that lies there without a doubt
 };
 inline constexpr CavityOptions cavity_options{};
 
@@ -44,7 +46,8 @@ struct FoundResection {
     imaging::Volume gone;    ///< uint8, grid of the model's labels: labelled voxels whose tissue is gone
     imaging::Volume cavity;  ///< uint8, grid of the fixed image
     double gone_ml = 0, cavity_ml = 0;
-    double deviation = 0;  ///< of the fixed image in the core of the cavity, over the median of the organ's tissue
+    double at_surface_ml = 0;  ///< of what is gone: near to the outside of the organ
+    double deviation = 0;      ///< of the fixed image in the core of the cavity, over the median of the organ's tissue
 };
 
 /// Looks for it with a model of all tissue that was registered to the fixed image. `gone` holds no voxel where there is

@@ -298,6 +298,10 @@ TEST(Resection, IsFoundInAnImage) {
         EXPECT_GT(dice(found.gone, imaging::mask_of(labelled_ball(), tumour)), 0.8);
         EXPECT_LT(found.deviation, 0.4);
         EXPECT_TRUE(doubts_of(found, found.cavity).empty());
+        EXPECT_LT(found.at_surface_ml, 0.05 * found.gone_ml);
+        FoundResection sunk = found;
+        sunk.at_surface_ml = 0.5 * found.gone_ml;
+        EXPECT_THAT(codes(doubts_of(sunk, found.cavity)), ::testing::ElementsAre("resected.unclear"));
         Volume elsewhere = found.cavity.clone();
         elsewhere.voxels = 1 - elsewhere.voxels;
         EXPECT_THAT(codes(doubts_of(found, elsewhere)), ::testing::ElementsAre("resected.unclear"));
