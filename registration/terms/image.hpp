@@ -72,7 +72,7 @@ std::vector<Doubt> doubts_of(const ImageFit& fit, const std::string& name = "ima
 
 /// Tissue that slides along other tissue.
 struct SlidingMatchOptions {
-    /// Matches so near to a surface that slides see both sides of it, and are left out. Chosen on the seeds 1 and 2 of
+    /// Matches so near to a surface that slides see both sides of it, and are left out. By hand; looked at on 1 and 2 of
     /// `scripts/sliding_pairs`.
     double beside_mm = 4;
 };
