@@ -72,8 +72,8 @@ std::vector<Doubt> doubts_of(const ImageFit& fit, const std::string& name = "ima
 
 /// Tissue that slides along other tissue.
 struct SlidingMatchOptions {
-    /// Matches so near to a surface that slides see both sides of it, and are left out. By hand; looked at on 1 and 2 of
-    /// `scripts/sliding_pairs`.
+    /// Matches so near to a surface that slides see both sides of it, and are left out. By hand; looked at on 1 and 2
+    /// of `scripts/sliding_pairs`.
     double beside_mm = 4;
 };
 inline constexpr SlidingMatchOptions sliding_match_options{};
