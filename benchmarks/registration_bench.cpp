@@ -1,14 +1,15 @@
 // Registration from every kind of intraoperative data against known truth, with sweeps of one option:
 //     registration_bench DATA [--case PART] [--OPTION V1,V2,…] [--mesh-edge MM] [--poisson NU] [--count POINTS]
 //                        [--errors FOLDER] [--repeats N] [--device cpu|gpu|auto]
-// DATA holds phantom-brainshift, phantom-brain-sag, phantom-liver and lung-ct; PART selects cases whose name holds it.
-// Errors are at the landmarks or, where there is a true field, at its points in the mask; FOLDER gets them point by
-// point, as CSV. With --repeats every update runs N times, and a line per case tells the time from data in to warped
-// image out, the model prepared: on the processor (the default) by warp_by_mesh(), on a GPU by GpuWarp; voxels outside
-// the mesh follow the placement. Then N updates go on each from the last one,
-// while the patient moves at random by half a millimetre along each axis from one to the next (but for a held head) and
-// every tenth point of a surface is another one's; a second line tells their times and errors. On a processor newer
-// than the OpenBLAS set OPENBLAS_CORETYPE, as the program does by itself: factors take three times as long without.
+// DATA holds phantom-brainshift, phantom-brain-sag, phantom-liver, lung-ct and ultrasound, a folder of `tissuewarp
+// study patient --problems ultrasound:SEED --evidence ultrasound`; PART selects cases whose name holds it. Errors are
+// at the landmarks or, where there is a true field, at its points in the mask; FOLDER gets them point by point, as CSV.
+// With --repeats every update runs N times, and a line per case tells the time from data in to warped image out, the
+// model prepared: on the processor (the default) by warp_by_mesh(), on a GPU by GpuWarp; voxels outside the mesh follow
+// the placement. Then N updates go on each from the last one, while the patient moves at random by half a millimetre
+// along each axis from one to the next (but for a held head) and every tenth point of a surface is another one's; a
+// second line tells their times and errors. On a processor newer than the OpenBLAS set OPENBLAS_CORETYPE, as the
+// program does by itself: factors take three times as long without.
 
 #include "core/errors.hpp"
 #include "imaging/image_io.hpp"
@@ -87,13 +88,13 @@ std::vector<std::function<Case()>> cases(const fs::path& data, const std::string
     };
     const fs::path shift = data / "phantom-brainshift", sag = data / "phantom-brain-sag", lung = data / "lung-ct",
                    liver = data / "phantom-liver";
-    const auto shift_case = [shift](const std::string& image) {
-        return [shift, image] {
+    const auto image_case = [](const fs::path& folder) {
+        return [folder] {
             return Case{{},
-                        imaging::read_volume(shift / "preop.nii.gz"),
-                        imaging::read_labels(shift / "preop_labels.nii.gz"),
-                        {.image = imaging::read_volume(shift / image)},
-                        read_landmarks(shift / "landmarks.csv")};
+                        imaging::read_volume(folder / "preop.nii.gz"),
+                        imaging::read_labels(folder / "preop_labels.nii.gz"),
+                        {.image = imaging::read_volume(folder / "intraop.nii.gz")},
+                        read_landmarks(folder / "landmarks.csv")};
         };
     };
     const auto sag_case = [sag](const std::string& image) {
@@ -145,7 +146,8 @@ std::vector<std::function<Case()>> cases(const fs::path& data, const std::string
     };
     add("liver surface", surface_case(liver, 0.7, true));
     add("brain shift surface", surface_case(shift, 0.3, false));  // the head is held: both images are in one frame
-    add("brain shift image", shift_case("intraop.nii.gz"));
+    add("brain shift image", image_case(shift));
+    add("ultrasound", image_case(data / "ultrasound"));
     add("brain sag clean image", sag_case("intraop.nii.gz"));
     add("brain sag degraded image", sag_case("intraop_degraded.nii.gz"));
     add("lung image and masks", lung_case(true));

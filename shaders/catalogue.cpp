@@ -138,6 +138,12 @@ const std::array<MatchKernel, match_pass_count> match_kernels{{
     {"match_solve", {"match.cells"}},
     {"match_look", {"match.block"}},
     {"match_walk", {"match.block"}},
+    {"match_echo_bricks", {"match.echo", "match.echo.linear"}},
+    {"match_echo_window", {"match.echo", "match.echo.linear"}},
+    {"match_echo_costs", {"match.echo", "match.echo.linear"}},
+    {"match_echo_bricks", {"match.echo", "match.echo.structure"}},
+    {"match_echo_window", {"match.echo", "match.echo.structure"}},
+    {"match_echo_costs", {"match.echo", "match.echo.structure"}},
 }};
 
 }  // namespace

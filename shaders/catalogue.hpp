@@ -137,9 +137,15 @@ enum class MatchPass {
     Window,
     Solve,
     Look,
-    Walk
+    Walk,
+    LinearBricks,
+    LinearWindow,
+    LinearCosts,
+    StructureBricks,
+    StructureWindow,
+    StructureCosts
 };
-inline constexpr int match_pass_count = 16;
+inline constexpr int match_pass_count = 22;
 /// Steps downhill of MatchPass::Walk, at most.
 inline constexpr int match_walk_steps = 8;
 /// Candidates from which it begins, at most; they are among one of so many places of a first look, the lowest.

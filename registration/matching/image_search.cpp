@@ -22,7 +22,7 @@ ImageSearch::ImageSearch(const meshing::TetMesh& mesh, const ImageModel& moving,
     engine_.finish_fixed(fixed_);
     const bool stated = options.similarity == Similarity::LinearCombination;
     if (stated || (options.similarity == Similarity::Auto && shows_echoes()))
-        ultrasound_.emplace(mesh, moving.image, fixed_);
+        ultrasound_.emplace(mesh, moving.image, fixed_, engine_.echoes());
 }
 
 bool ImageSearch::shows_echoes() const {

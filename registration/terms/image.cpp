@@ -121,7 +121,7 @@ ImageTerm::ImageTerm(const PreparedModel& prepared, const ImageModel& moving, co
 void ImageTerm::tell_similarity(Observer& observer) const {
     if (search_.similarity() != Similarity::LinearCombination) return;
     observer.note("the fixed " + name_ +
-                  " is taken for ultrasound: what the moving one shows is fitted to its echoes, on the processor "
+                  " is taken for ultrasound: what the moving one shows is fitted to its echoes "
                   "(--similarity states how images are compared)");
 }
 

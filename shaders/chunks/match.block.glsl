@@ -48,9 +48,3 @@ float cost_of(uvec2 sum, float least) {
     const float full_difference = 255.0 * 255.0 * 12.0;
     return float(sum.y) < least ? nowhere : float(sum.x) / (full_difference * float(sum.y));
 }
-
-/// An entry of the cube of places within some reach, i fastest.
-ivec3 place_in_cube(uint n, int cube_reach) {
-    int side = 2 * cube_reach + 1, m = int(n);
-    return ivec3(m % side, m / side % side, m / (side * side)) - cube_reach;
-}

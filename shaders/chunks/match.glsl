@@ -50,6 +50,19 @@
 #define BINDING_MATCH_SMOOTHED_4 12
 #define BINDING_MATCH_SMOOTHED_5 13
 
+// Ultrasound, whose passes share no other block.
+#define BINDING_ECHO_SEARCH 1
+#define BINDING_ECHO_WEIGHTS 2
+#define BINDING_ECHO_SEEN 3
+#define BINDING_ECHO_FIXED 4
+#define BINDING_ECHO_MOVING 5
+#define BINDING_ECHO_SHOWN 6
+#define BINDING_ECHO_SOURCE 7
+#define BINDING_ECHO_TARGET 8
+#define BINDING_ECHO_PLACES 9
+#define BINDING_ECHO_SHARES 10
+#define BINDING_ECHO_COSTS 11
+
 const int match_rim = 8;         // GridSamples::rim
 const int octahedron_radius = 2; // voxels from a voxel to the six neighbours whose patches are compared
 const int patch_radius = 4;      // voxels, where a Gaussian of one voxel has ended
@@ -80,3 +93,9 @@ bool within(uvec3 voxel, uvec3 margin) {
 /// The grid without its rim.
 uvec3 grid_size() { return wide_size.xyz - uint(2 * match_rim); }
 uint grid_offset(uvec3 voxel) { return voxel.x + grid_size().x * (voxel.y + grid_size().y * voxel.z); }
+
+/// An entry of the cube of places within some reach, i fastest.
+ivec3 place_in_cube(uint n, int cube_reach) {
+    int side = 2 * cube_reach + 1, m = int(n);
+    return ivec3(m % side, m / side % side, m / (side * side)) - cube_reach;
+}

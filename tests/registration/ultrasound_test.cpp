@@ -1,4 +1,6 @@
 /// Ultrasound of a generated organ: known as such, explained by the other image, and registered.
+#include "registration/matching/dense/image_engine.hpp"
+#include "registration/matching/gpu/gpu_echo_engine.hpp"
 #include "registration/matching/ultrasound/echo_costs.hpp"
 #include "registration/matching/ultrasound/echo_pose.hpp"
 #include "registration/matching/ultrasound/speckle.hpp"
@@ -192,6 +194,35 @@ TEST(EchoCosts, AreThoseOfVoxelsOneByOne) {
     EXPECT_GT(lost, 0);
 }
 
+/// Windows that are lost are the same, and costs to rounding.
+void expect_alike(const detail::EchoCosts& found, const detail::EchoCosts& expected) {
+    EXPECT_EQ(found.at, expected.at);
+    EXPECT_EQ(found.window_share, expected.window_share);
+    ASSERT_EQ(found.cost.size(), expected.cost.size());
+    double most = 0;
+    for (std::size_t n = 0; n < found.cost.size(); ++n) {
+        ASSERT_EQ(std::isfinite(found.cost[n]), std::isfinite(expected.cost[n])) << n;
+        if (std::isfinite(found.cost[n])) most = std::max<double>(most, std::abs(found.cost[n] - expected.cost[n]));
+    }
+    EXPECT_LT(most, 1e-4);
+}
+
+// A few shifts at a time, the last fewer, and all at once.
+TEST(EchoEngine, TheDeviceSaysWhatTheProcessorSays) {
+    const detail::EchoImages images = random_images();
+    detail::MatchDevice device(-1);
+    detail::CpuEchoEngine cpu;
+    for (const std::size_t most_values : {std::size_t{30000}, std::size_t{1} << 24U}) {
+        detail::GpuEchoEngine gpu(device, most_values);
+        for (const int reach : {3, 2}) {
+            const detail::EchoCostOptions linear{8, reach, 2};
+            expect_alike(gpu.linear_combination(images, linear), cpu.linear_combination(images, linear));
+            const detail::StructureCostOptions structure{9, 1, reach, 2};
+            expect_alike(gpu.structure(images, structure), cpu.structure(images, structure));
+        }
+    }
+}
+
 Eigen::Vector3i least_shift(const detail::EchoCosts& costs) {
     Eigen::VectorXd total = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(costs.lattice()));
     for (std::size_t n = 0; n < costs.at.size(); ++n)
@@ -250,6 +281,23 @@ TEST(UltrasoundUpdate, FindsTheOrganAndSaysHowItCompared) {
     before.placement.setIdentity();
     EXPECT_GT(error_in_view(before, moved()), 4);
     EXPECT_LT(error_in_view(result.deformation, moved()), 1);
+}
+
+// Through what an update asks, and both measures of likeness.
+TEST(UltrasoundSearch, FindsThePoseOnADeviceWhereTheProcessorDoes) {
+    const Organ one = organ();
+    const detail::SeenImage seen(echoes(one.labels.geometry, moved()));
+    const detail::State rest{Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, one.model.rest.node_count)};
+    detail::UltrasoundSearchOptions options;
+    options.pose.costs.reach = options.structure.reach = 4;  // a software rasteriser takes its time
+    const auto pose_by = [&](detail::ImageEngine& engine) {
+        detail::UltrasoundSearch search(one.model.model.mesh, one.image, seen, engine.echoes(), options);
+        return search.pose(rest, silent_observer());
+    };
+    const detail::EchoPose expected = pose_by(*detail::make_cpu_image_engine(one.model.model.mesh, *one.model.image)),
+                           found = pose_by(*detail::make_gpu_image_engine(one.model.model.mesh, *one.model.image));
+    EXPECT_LT((found.motion.matrix() - expected.motion.matrix()).cwiseAbs().maxCoeff(), 0.05);
+    EXPECT_NEAR(found.support, expected.support, 1e-2 * expected.support);
 }
 
 TEST(UltrasoundDoubts, AreOfEchoesThatNothingExplainsAndOfPosesThatFitAsWell) {

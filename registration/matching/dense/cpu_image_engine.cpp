@@ -47,12 +47,14 @@ public:
     }
 
     BlockEngine& blocks() override { return *blocks_; }
+    EchoEngine& echoes() override { return echoes_; }
 
 private:
     const meshing::TetMesh& mesh_;
     const ImageModel& image_;
     std::optional<SeenImage> fixed_;
     std::unique_ptr<BlockEngine> blocks_;
+    CpuEchoEngine echoes_;
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include "meshing/point_location.hpp"
 #include "registration/matching/blocks/block_engine.hpp"
 #include "registration/matching/dense/dense_force.hpp"
+#include "registration/matching/ultrasound/echo_engine.hpp"
 #include "registration/prepare.hpp"
 #include "registration/state.hpp"
 
@@ -29,6 +30,8 @@ public:
     virtual DenseForces forces(const State& state, std::size_t level) = 0;
     /// Looks for blocks in the fixed image.
     virtual BlockEngine& blocks() = 0;
+    /// Compares it with ultrasound.
+    virtual EchoEngine& echoes() = 0;
 };
 
 /// Of an image of the tissue that is meshed; both outlive the engine.

@@ -4,6 +4,7 @@
 #include "registration/matching/dense/image_engine.hpp"
 #include "registration/matching/dense/rows_of_cells.hpp"
 #include "registration/matching/gpu/gpu_block_engine.hpp"
+#include "registration/matching/gpu/gpu_echo_engine.hpp"
 #include "registration/matching/points/template_images.hpp"
 
 #include <cstring>
@@ -84,7 +85,8 @@ public:
         : matching_(gpu_index),
           levels_(levels_of(matching_.device(), mesh, image)),
           memory_(matching_.device(), static_cast<std::size_t>(mesh.node_count()), levels_.back()),
-          blocks_(matching_, described(levels_), image.blocks.options().block_radius) {}
+          blocks_(matching_, described(levels_), image.blocks.options().block_radius),
+          echoes_(matching_) {}
 
     /// The device smooths while the processor prepares the first search.
     void begin_fixed(const imaging::Volume& image) override {
@@ -95,6 +97,7 @@ public:
     void finish_fixed(const SeenImage& fixed) override { matching_.set_seen(fixed.seen); }
 
     BlockEngine& blocks() override { return blocks_; }
+    EchoEngine& echoes() override { return echoes_; }
 
     DenseForces forces(const State& state, std::size_t number) override {
         const Level& level = levels_.at(number);
@@ -111,6 +114,7 @@ private:
     std::vector<Level> levels_;
     Memory memory_;
     GpuBlockEngine blocks_;
+    GpuEchoEngine echoes_;
 
     /// Leaves values and what is seen on the wide grid.
     void pull_back(const Level& level, const State& state) {

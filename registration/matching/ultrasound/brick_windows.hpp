@@ -33,6 +33,8 @@ public:
     [[nodiscard]] std::ptrdiff_t step(int axis) const { return steps_[static_cast<std::size_t>(axis)]; }
     /// The first and the last brick of a window, from its middle.
     [[nodiscard]] std::pair<int, int> window(int axis, std::size_t brick) const;
+    /// Bricks from the middle of a window to its end.
+    [[nodiscard]] int radius() const { return radius_; }
     /// Of the brick `d` from the middle.
     [[nodiscard]] float weight(int d) const { return weights_[static_cast<std::size_t>(d + radius_)]; }
 

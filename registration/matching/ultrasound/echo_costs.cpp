@@ -48,6 +48,10 @@ Eigen::Vector3i EchoCosts::shift(std::size_t entry) const {
     return {m % s - reach, m / s % s - reach, m / (s * s) - reach};
 }
 
+ShiftedWindows windows_of(const EchoCostOptions& options) {
+    return {options.window_mm, options.reach, options.stride, options.least_share, options.most_lost};
+}
+
 EchoCosts echo_costs(const EchoImages& images, const EchoCostOptions& options) {
     const std::vector<Explaining> moving = explaining(images);
     const auto add = [&](std::size_t n, std::size_t from, Sums& sums) {
@@ -58,9 +62,7 @@ EchoCosts echo_costs(const EchoImages& images, const EchoCostOptions& options) {
         sums.tail<4>() += products;
     };
     const auto cost = [&](const Sums& sums) { return unexplained(sums, options.ridge); };
-    const ShiftedWindows windows{options.window_mm, options.reach, options.stride, options.least_share,
-                                 options.most_lost};
-    return costs_of_shifts<Sums>(images, windows, add, cost);
+    return costs_of_shifts<Sums>(images, windows_of(options), add, cost);
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -20,6 +20,7 @@ struct ShiftedWindows {
     int reach, stride;  ///< voxels: shifts of up to the one, places apart by the other
     double least_share, most_lost;
 };
+ShiftedWindows windows_of(const EchoCostOptions& options);
 
 /// Sums (Eigen arrays) of bricks, and smoothed along one axis and along two; 0 where nothing is ever written.
 template <class Sums>
@@ -54,20 +55,26 @@ void window_sums(const BrickWindows& windows, const Eigen::Vector3i& shift, cons
         each(n, along(0, windows.places()[n], windows, work.along_kj));
 }
 
+/// Of windows about their places; no cost is known.
+inline EchoCosts costs_to_be(const BrickWindows& windows, const ShiftedWindows& how, double step_mm) {
+    EchoCosts result;
+    result.step_mm = step_mm;
+    result.reach = how.reach;
+    result.places = windows.grid();
+    result.at = windows.places();
+    result.window_share = windows.shares();
+    result.cost.resize(result.at.size() * result.lattice());
+    return result;
+}
+
 /// `add(n, from, sums)` what a voxel of the ultrasound that is seen adds where the moving image's voxel `from` is
 /// shifted to it: 1 first, and nothing where that is not shown. `cost(sums)` of a window. Threads do not change the
 /// result.
 template <class Sums, class Add, class Cost>
 EchoCosts costs_of_shifts(const EchoImages& images, const ShiftedWindows& how, const Add& add, const Cost& cost) {
     const BrickWindows windows(images, how.stride, how.window_mm, how.least_share);
-    EchoCosts result;
-    result.step_mm = images.grid.spacing[0];
-    result.reach = how.reach;
-    result.places = windows.grid();
-    result.at = windows.places();
-    result.window_share = windows.shares();
+    EchoCosts result = costs_to_be(windows, how, images.grid.spacing[0]);
     const std::size_t lattice = result.lattice();
-    result.cost.resize(result.at.size() * lattice);
     const auto bricks = static_cast<std::size_t>(windows.grid().voxel_count());
     tbb::enumerable_thread_specific<BrickSums<Sums>> works([&] { return BrickSums<Sums>(bricks); });
     tbb::parallel_for(std::size_t{0}, lattice, [&](std::size_t entry) {

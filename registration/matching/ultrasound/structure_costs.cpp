@@ -1,11 +1,11 @@
 #include "registration/matching/ultrasound/structure_costs.hpp"
 
-#include "registration/matching/ultrasound/shifted_windows.hpp"
+#include "registration/matching/descriptors/matching_image.hpp"
 
 #include <algorithm>
 #include <array>
-#include <cstdint>
 #include <cstdlib>
+#include <tuple>
 #include <vector>
 
 namespace tissuewarp::registration::detail {
@@ -26,20 +26,18 @@ MatchingImage described(const imaging::Geometry& grid, const std::vector<float>&
     return matching_image(image, all, grid, SearchRegion(grid));
 }
 
-/// As wide as what one instruction compares; beyond the channels 0.
-using Descriptor = std::array<std::uint8_t, 16>;
-static_assert(descriptor_channels <= 16);
+static_assert(descriptor_channels <= std::tuple_size_v<StructureDescriptor>);
 
 /// Mean over the channels, 0..1.
-float difference(const Descriptor& one, const Descriptor& other) {
+float difference(const StructureDescriptor& one, const StructureDescriptor& other) {
     constexpr float most = 255.F * descriptor_channels;
     int sum = 0;
     for (std::size_t c = 0; c < one.size(); ++c) sum += std::abs(int(one[c]) - int(other[c]));
     return static_cast<float>(sum) / most;
 }
 
-std::vector<Descriptor> descriptors_at(const std::vector<std::size_t>& voxels, const MatchingImage& image) {
-    std::vector<Descriptor> result(voxels.size(), Descriptor{});
+std::vector<StructureDescriptor> descriptors_at(const std::vector<std::size_t>& voxels, const MatchingImage& image) {
+    std::vector<StructureDescriptor> result(voxels.size(), StructureDescriptor{});
     for (std::size_t n = 0; n < voxels.size(); ++n)
         std::copy_n(image.descriptors.get() + voxels[n] * descriptor_channels, descriptor_channels, result[n].begin());
     return result;
@@ -60,23 +58,29 @@ std::vector<std::size_t> every(int step, imaging::Geometry& grid) {
 
 }  // namespace
 
-EchoCosts structure_costs(const EchoImages& images, const StructureCostOptions& options) {
-    const MatchingImage echoes = described(images.grid, images.echo), moving = described(images.grid, images.grey);
-    EchoImages compared{images.grid, {}, {}, {}, {}, {}};
-    const std::vector<std::size_t> fine = every(options.step, compared.grid);
+Structure structure_of(const EchoImages& images, int step) {
+    Structure result{{images.grid, {}, {}, {}, {}, {}}, {}, {}};
+    const std::vector<std::size_t> fine = every(step, result.images.grid);
     for (const std::size_t n : fine) {
-        compared.echo.push_back(images.echo[n]);
-        compared.seen.push_back(images.seen[n]);
-        compared.shown.push_back(images.shown[n]);
+        result.images.seen.push_back(images.seen[n]);
+        result.images.shown.push_back(images.shown[n]);
     }
-    const std::vector<Descriptor> seen = descriptors_at(fine, echoes), like = descriptors_at(fine, moving);
+    result.echo = descriptors_at(fine, described(images.grid, images.echo));
+    result.moving = descriptors_at(fine, described(images.grid, images.grey));
+    return result;
+}
+
+ShiftedWindows windows_of(const StructureCostOptions& options) {
+    return {options.window_mm, options.reach, options.stride, options.least_share, options.most_lost};
+}
+
+EchoCosts structure_costs(const EchoImages& images, const StructureCostOptions& options) {
+    const Structure structure = structure_of(images, options.step);
     const auto add = [&](std::size_t n, std::size_t from, Sums& sums) {
-        if (compared.shown[from] != 0) sums += Sums(1, difference(seen[n], like[from]));
+        if (structure.images.shown[from] != 0) sums += Sums(1, difference(structure.echo[n], structure.moving[from]));
     };
     const auto cost = [](const Sums& sums) { return sums[D] / sums[W]; };
-    const ShiftedWindows windows{options.window_mm, options.reach, options.stride, options.least_share,
-                                 options.most_lost};
-    return costs_of_shifts<Sums>(compared, windows, add, cost);
+    return costs_of_shifts<Sums>(structure.images, windows_of(options), add, cost);
 }
 
 }  // namespace tissuewarp::registration::detail

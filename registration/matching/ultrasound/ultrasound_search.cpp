@@ -9,12 +9,12 @@
 namespace tissuewarp::registration::detail {
 
 UltrasoundSearch::UltrasoundSearch(const meshing::TetMesh& mesh, const imaging::Volume& moving, const SeenImage& fixed,
-                                   const UltrasoundSearchOptions& options)
-    : mesh_(mesh), options_(options), source_(mesh, moving, fixed) {}
+                                   EchoEngine& engine, const UltrasoundSearchOptions& options)
+    : mesh_(mesh), engine_(engine), options_(options), source_(mesh, moving, fixed) {}
 
 EchoCosts UltrasoundSearch::costs(const State& state, const EchoLevel& level) {
     const double reach_mm = (level.costs.reach + 1) * level.spacing_mm;
-    return echo_costs(source_.on_grid(state, level.spacing_mm, reach_mm), level.costs);
+    return engine_.linear_combination(source_.on_grid(state, level.spacing_mm, reach_mm), level.costs);
 }
 
 EchoPose UltrasoundSearch::pose(const State& by_headers, Observer& observer) {
@@ -24,7 +24,7 @@ EchoPose UltrasoundSearch::pose(const State& by_headers, Observer& observer) {
     std::vector<PoseCosts> kinds;
     kinds.push_back({costs(by_headers, options_.pose)});
     kinds.push_back(
-        {structure_costs(source_.on_grid(by_headers, spacing_mm, reach_mm), structure), options_.structure_weight});
+        {engine_.structure(source_.on_grid(by_headers, spacing_mm, reach_mm), structure), options_.structure_weight});
     return echo_pose(kinds, {}, observer);
 }
 

@@ -2,9 +2,9 @@
 /// The searches of a model in intraoperative ultrasound.
 
 #include "registration/matching/dense/dense_search.hpp"
+#include "registration/matching/ultrasound/echo_engine.hpp"
 #include "registration/matching/ultrasound/echo_matches.hpp"
 #include "registration/matching/ultrasound/echo_pose.hpp"
-#include "registration/matching/ultrasound/structure_costs.hpp"
 
 namespace tissuewarp::registration::detail {
 
@@ -28,7 +28,7 @@ class UltrasoundSearch {
 public:
     /// Of a moving image of the tissue that is meshed; all outlive this.
     UltrasoundSearch(const meshing::TetMesh& mesh, const imaging::Volume& moving, const SeenImage& fixed,
-                     const UltrasoundSearchOptions& options = {});
+                     EchoEngine& engine, const UltrasoundSearchOptions& options = {});
 
     [[nodiscard]] int count() const { return static_cast<int>(options_.levels.size()); }
     /// Where the tissue lies as a whole, from where the headers put it.
@@ -41,6 +41,7 @@ public:
 
 private:
     const meshing::TetMesh& mesh_;
+    EchoEngine& engine_;
     UltrasoundSearchOptions options_;
     int sought_ = 0;
     EchoSource source_;
