@@ -7,6 +7,7 @@
 #include "registration/engine_choice.hpp"
 #include "registration/pose/start_pose.hpp"
 #include "registration/register.hpp"
+#include "registration/resection/tissue_cubes.hpp"
 #include "registration/surroundings/rigid_surroundings.hpp"
 
 #include <string>
@@ -24,7 +25,10 @@ std::vector<detail::ImageTools> image_tools_of(const PreparedModel& prepared, co
     const auto locator = std::make_shared<const meshing::PointLocator>(mesh);
     std::vector<detail::ImageTools> tools;
     const auto add = [&](const ImageModel& image) {
-        tools.push_back({detail::make_image_engine(mesh, image, options, observer), locator, {}});
+        tools.push_back({detail::make_image_engine(mesh, image, options, observer),
+                         locator,
+                         {},
+                         std::make_shared<const detail::TissueCubes>(mesh, *locator, image.image)});
     };
     add(*prepared.image);
     for (const auto& contrast : prepared.contrasts) add(*contrast);

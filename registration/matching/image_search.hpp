@@ -55,6 +55,7 @@ public:
     [[nodiscard]] int places_sought() const { return ultrasound_ ? ultrasound_->sought() : 0; }
     /// Where points of the moving image are in the fixed one.
     [[nodiscard]] Eigen::Matrix3Xd deformed(const Eigen::Matrix3Xd& points, const State& state) const;
+    [[nodiscard]] const ImageModel& moving() const { return moving_; }
     /// The fixed image, float32.
     [[nodiscard]] const imaging::Volume& image() const { return fixed_.image; }
     /// Where the fixed image shows something.

@@ -5,13 +5,10 @@
 #include "registration/doubts.hpp"
 #include "registration/field.hpp"
 #include "registration/field/mesh_labels.hpp"
-#include "registration/field/voxel_sampler.hpp"
 #include "registration/resection/find_resection.hpp"
 #include "registration/resection/without_counterpart.hpp"
 #include "registration/resection/without_structure.hpp"
 #include "registration/warp.hpp"
-
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -45,46 +42,6 @@ void leave_what_is_in_view(Volume& mask, const Volume& moved, const FieldOfView&
     });
 }
 
-/// Along the LPS axes.
-imaging::Geometry lattice_about(const Eigen::Matrix3Xd& points, double apart_mm) {
-    const Vector3d lower = points.rowwise().minCoeff(), upper = points.rowwise().maxCoeff();
-    imaging::Geometry grid;
-    grid.spacing.setConstant(apart_mm);
-    grid.origin = lower;
-    for (Eigen::Index axis = 0; axis < 3; ++axis)
-        grid.size[static_cast<std::size_t>(axis)] = 1 + static_cast<int>((upper[axis] - lower[axis]) / apart_mm);
-    return grid;
-}
-
-/// Means and deviations of an image in cubes about where `place` has the voxels of a mask.
-template <class Place>
-CavityView cubes_of(const Volume& image, const Volume& mask, const Place& place) {
-    const Volume values = image.as(CV_32F);
-    const VoxelSampler<float> sampler{values};
-    Volume grey(mask.geometry, CV_32FC1), deviation(mask.geometry, CV_32FC1);
-    tbb::parallel_for(0, mask.geometry.size[2], [&](int k) {
-        for (int j = 0; j < mask.geometry.size[1]; ++j)
-            for (int i = 0; i < mask.geometry.size[0]; ++i) {
-                const std::int64_t n = mask.offset(i, j, k);
-                if (mask.data<std::uint8_t>()[n] == 0) continue;
-                const Vector3d middle = place(n, mask.geometry.point({double(i), double(j), double(k)}));
-                double sum = 0, squares = 0;
-                for (int corner = 0; corner < 27; ++corner) {
-                    const Vector3d step(corner % 3 - 1, corner / 3 % 3 - 1, corner / 9 - 1);
-                    float value = 0;
-                    sampler.linear(values.geometry.index(middle + cavity_options.window_mm * step), &value);
-                    sum += value;
-                    squares += double(value) * value;
-                }
-                const double mean = sum / 27;
-                grey.data<float>()[n] = float(mean);
-                deviation.data<float>()[n] = float(std::sqrt(std::max(0.0, squares / 27 - mean * mean)));
-            }
-    });
-    const double in_organ = median(values_in(deviation, mask));
-    return {mask, std::move(grey), std::move(deviation), in_organ};
-}
-
 /// Pearson's, of as many values.
 double correlation(const std::vector<float>& a, const std::vector<float>& b) {
     const Eigen::Map<const Eigen::ArrayXf> x(a.data(), Eigen::Index(a.size())), y(b.data(), Eigen::Index(b.size()));
@@ -105,23 +62,9 @@ Vector3d middle_of(const Volume& piece) {
 
 }  // namespace
 
-bool may_be_gone(const Deformation& deformation, const Volume& moving, const Volume& fixed, const FieldOfView& view) {
-    const imaging::Geometry grid = lattice_about(deformation.mesh.nodes, tissue_gone_options.apart_mm);
-    const Volume moved = displacement_near_mesh(deformation, grid, 1);
-    Volume organ = mask_of_mesh(deformation.mesh, grid);
-    const auto at_rest = [&](std::int64_t /*n*/, const Vector3d& X) { return X; };
-    const auto deformed = [&](std::int64_t n, const Vector3d& X) {
-        const cv::Vec3f& u = moved.data<cv::Vec3f>()[n];
-        return Vector3d(X + Vector3d(u[0], u[1], u[2]));
-    };
-    Volume core = without_counterpart(cubes_of(fixed, organ, deformed), cubes_of(moving, organ, at_rest));
-    leave_what_is_in_view(core, moved, view);
-    return !pieces_of(core, cavity_options.least_core_ml).empty();
-}
-
-TissueGone tissue_gone(const Deformation& deformation, const Volume& moving, const Volume& fixed,
-                       const FieldOfView& view) {
-    if (!may_be_gone(deformation, moving, fixed, view)) return {};
+TissueGone tissue_gone(const TissueCubes& cubes, const Deformation& deformation, const Volume& moving,
+                       const Volume& fixed, const FieldOfView& view) {
+    if (!cubes.may_be_gone(deformation, fixed, view)) return {};
     const imaging::Geometry grid = grid_about(moving.geometry, deformation.mesh.nodes, margin_mm);
     const int reach = static_cast<int>(std::ceil(margin_mm / grid.spacing.minCoeff()));
     const Volume moved = displacement_near_mesh(deformation, grid, reach), organ = mask_of_mesh(deformation.mesh, grid);

@@ -4,6 +4,7 @@
 #include "imaging/volume.hpp"
 #include "registration/deformation.hpp"
 #include "registration/matching/points/field_of_view.hpp"
+#include "registration/resection/tissue_cubes.hpp"
 #include "registration/result.hpp"
 
 #include <Eigen/Core>
@@ -18,7 +19,6 @@ struct TissueGoneOptions {
     /// Chosen on `study coverage --problems untold:` and `unresected:1-10`: 0.12 and less in cavities, 0.4 and more in
     /// tumours.
     double least_likeness = 0.25;
-    double apart_mm = 4;  ///< places of the first look. By hand: cavities of 3 ml hold fourteen
 };
 inline constexpr TissueGoneOptions tissue_gone_options{};
 
@@ -27,16 +27,12 @@ struct TissueGone {
     Eigen::Vector3d place = Eigen::Vector3d::Zero();  ///< middle of the largest piece, LPS mm
 };
 
-/// Whether the same rule finds anything at places of a lattice, in cubes of 27 places each: the close look takes longer
-/// than an update.
-bool may_be_gone(const Deformation& deformation, const imaging::Volume& moving, const imaging::Volume& fixed,
-                 const FieldOfView& view);
-
 /// What of the deformed model lies, in view, where the fixed image has no structure and the moving one has: cavities of
 /// fluid or air, by the same rule as find_resection(), looked for in the moving frame, so that no field is inverted; so
-/// is the place. Images are of one component.
-TissueGone tissue_gone(const Deformation& deformation, const imaging::Volume& moving, const imaging::Volume& fixed,
-                       const FieldOfView& view);
+/// is the place. Looked for only where `cubes`, of the moving image, say that there may be some. Images are of one
+/// component.
+TissueGone tissue_gone(const TissueCubes& cubes, const Deformation& deformation, const imaging::Volume& moving,
+                       const imaging::Volume& fixed, const FieldOfView& view);
 
 struct UnlabelledOptions {
     double half_mm = 2.5;  ///< a cube of twice that fits into all that counts: boundaries are drawn a voxel off. Chosen

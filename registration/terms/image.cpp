@@ -10,11 +10,13 @@
 #include <Eigen/Eigenvalues>
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <utility>
@@ -111,11 +113,11 @@ std::vector<Doubt> doubts_of_echoes(double agreement, const std::optional<EchoPo
 ImageTerm::ImageTerm(const PreparedModel& prepared, const ImageModel& moving, const imaging::Volume& fixed,
                      std::string name, const ImageOptions& options, ImageTools& tools, double energy)
     : prepared_(prepared),
-      moving_(moving),
       name_(std::move(name)),
       options_(options),
       energy_(energy),
       search_(prepared.model.mesh, moving, fixed, options, tools),
+      cubes_(*tools.cubes),
       view_(search_.seen()) {}
 
 void ImageTerm::tell_similarity(Observer& observer) const {
@@ -217,13 +219,14 @@ Contribution ImageTerm::linearise(const RoundPlan& plan, const State& state, Obs
     });
     result.held_back = static_cast<int>(std::count_if(
         matches.begin(), matches.end(), [&](const PulledMatch& match) { return match.residual_mm > most_mm; }));
-    result.candidates = std::max(static_cast<int>(moving_.blocks.points().cols()), static_cast<int>(matches.size()));
+    result.candidates =
+        std::max(static_cast<int>(search_.moving().blocks.points().cols()), static_cast<int>(matches.size()));
     result.matched = static_cast<int>(matches.size());
     result.mean_residual_mm = mean_residual(matches);
     const bool echoes = search_.similarity() == Similarity::LinearCombination;
     const double agreement = search_.agreement().value_or(shared_errors.full_agreement);
-    const DatumKind kind =
-        echoes ? ultrasound_kind(agreement) : image_kind(moving_.image.geometry, search_.image().geometry, agreement);
+    const DatumKind kind = echoes ? ultrasound_kind(agreement)
+                                  : image_kind(search_.moving().image.geometry, search_.image().geometry, agreement);
     result.springs = pulled_by(kind, lumped_springs(found_.shares, memory_.forces, state.displacement));
     for (PulledNode& pulled : result.springs)
         if (view_.distance(state.placement * (prepared_.model.mesh.nodes.col(pulled.spring.node) +
@@ -233,7 +236,7 @@ Contribution ImageTerm::linearise(const RoundPlan& plan, const State& state, Obs
 }
 
 int ImageTerm::blocks_in_view(const State& state) const {
-    const Eigen::Matrix3Xd places = search_.deformed(moving_.blocks.points(), state);
+    const Eigen::Matrix3Xd places = search_.deformed(search_.moving().blocks.points(), state);
     int count = 0;
     for (Eigen::Index n = 0; n < places.cols(); ++n) count += view_.distance(places.col(n)) < 0;
     return std::max(count, static_cast<int>(search_.blocks_found()));
@@ -283,28 +286,35 @@ LeftBehind ImageTerm::left_behind_of(const LocatedMatches& blocks, const State& 
 std::vector<Doubt> ImageTerm::doubts_of_blocks(const State& state) const {
     if (shows_echoes()) return {};
     const auto doubts = [&](const LocatedMatches& blocks) {
-        return doubts_of(left_behind_of(blocks, state), larger_voxel(moving_.image.geometry, search_.image().geometry),
-                         name_);
+        return doubts_of(left_behind_of(blocks, state),
+                         larger_voxel(search_.moving().image.geometry, search_.image().geometry), name_);
     };
     if (doubts(search_.blocks()).empty()) return {};
     return doubts(search_.block_search(state, silent_observer()));  // the first may have erred, far from where they are
 }
 
+std::optional<Doubt> ImageTerm::doubt_of_tissue_gone(const State& state) const {
+    if (shows_echoes()) return std::nullopt;
+    const Deformation here{prepared_.model.mesh, state.displacement, state.placement};
+    return doubt_of_image(tissue_gone(cubes_, here, search_.moving().image, search_.image(), view_), name_);
+}
+
 void ImageTerm::judge(const State& state, UpdateResult& result) {
-    result.images.push_back(fit(state));
+    ImageFit fitted;
+    std::vector<Doubt> of_blocks;
+    std::optional<Doubt> of_tissue_gone;
+    tbb::parallel_invoke([&] { fitted = fit(state); }, [&] { of_blocks = doubts_of_blocks(state); },
+                         [&] { of_tissue_gone = doubt_of_tissue_gone(state); });
+    result.images.push_back(fitted);
     ImageDoubtLimits limits = image_doubt_limits;
-    if (search_.similarity() == Similarity::LinearCombination)
-        limits.most_residual_mm = echo_doubt_limits.most_residual_mm;
-    for (Doubt& doubt : doubts_of(result.images.back(), name_, limits)) result.doubts.push_back(std::move(doubt));
-    for (Doubt& doubt : doubts_of_blocks(state)) result.doubts.push_back(std::move(doubt));
-    if (!shows_echoes()) {
-        const Deformation here{prepared_.model.mesh, state.displacement, state.placement};
-        if (auto doubt = doubt_of_image(tissue_gone(here, moving_.image, search_.image(), view_), name_))
-            result.doubts.push_back(std::move(*doubt));
-        return;
-    }
-    for (Doubt& doubt : doubts_of_echoes(search_.agreement().value_or(0), echo_pose_, name_))
-        result.doubts.push_back(std::move(doubt));
+    if (shows_echoes()) limits.most_residual_mm = echo_doubt_limits.most_residual_mm;
+    const auto add = [&](std::vector<Doubt> doubts) {
+        std::move(doubts.begin(), doubts.end(), std::back_inserter(result.doubts));
+    };
+    add(doubts_of(fitted, name_, limits));
+    add(std::move(of_blocks));
+    if (of_tissue_gone) add({*of_tissue_gone});
+    if (shows_echoes()) add(doubts_of_echoes(search_.agreement().value_or(0), echo_pose_, name_));
 }
 
 }  // namespace tissuewarp::registration::detail

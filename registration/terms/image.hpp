@@ -130,11 +130,11 @@ private:
     };
 
     const PreparedModel& prepared_;
-    const ImageModel& moving_;
     std::string name_;
     const ImageOptions& options_;
     double energy_;
     ImageSearch search_;
+    const TissueCubes& cubes_;
     FieldOfView view_;
     bool has_placed_ = false;
     std::optional<EchoPose> echo_pose_;
@@ -151,6 +151,7 @@ private:
     [[nodiscard]] ImageFit fit(const State& state);
     [[nodiscard]] LeftBehind left_behind_of(const LocatedMatches& blocks, const State& state) const;
     [[nodiscard]] std::vector<Doubt> doubts_of_blocks(const State& state) const;
+    [[nodiscard]] std::optional<Doubt> doubt_of_tissue_gone(const State& state) const;
 
     static double mean_residual(const std::vector<PulledMatch>& matches);
 };

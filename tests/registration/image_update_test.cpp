@@ -7,6 +7,7 @@
 #include "registration/matching/image_mask.hpp"
 #include "registration/matching/image_matching.hpp"
 #include "registration/prepared/prepared_io.hpp"
+#include "registration/resection/tissue_cubes.hpp"
 #include "registration/terms/image.hpp"
 #include "registration/tissues.hpp"
 #include "registration/uncertainty.hpp"
@@ -140,8 +141,11 @@ struct ShiftedImage {
     const meshing::TetMesh& mesh = prepared.model.mesh;
     const Volume image = sampled(prepared.labels.geometry, [this](const auto& y) { return Texture()(y - shift); });
     const ImageOptions options;
-    detail::ImageTools tools{
-        detail::make_cpu_image_engine(mesh, *prepared.image), std::make_shared<const meshing::PointLocator>(mesh), {}};
+    const std::shared_ptr<const meshing::PointLocator> locator = std::make_shared<const meshing::PointLocator>(mesh);
+    detail::ImageTools tools{detail::make_cpu_image_engine(mesh, *prepared.image),
+                             locator,
+                             {},
+                             std::make_shared<const detail::TissueCubes>(mesh, *locator, prepared.image->image)};
     detail::ImageTerm term{prepared, *prepared.image, image, "image", options, tools, 1};
     detail::State state{Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, mesh.nodes.cols())};
 

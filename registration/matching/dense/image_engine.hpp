@@ -43,11 +43,14 @@ std::unique_ptr<ImageEngine> make_cpu_image_engine(const meshing::TetMesh& mesh,
 std::unique_ptr<ImageEngine> make_gpu_image_engine(const meshing::TetMesh& mesh, const ImageModel& image,
                                                    int gpu_index = -1);
 
+class TissueCubes;
+
 /// What updates from one image after the other share: nothing that an image says.
 struct ImageTools {
     std::unique_ptr<ImageEngine> engine;
     std::shared_ptr<const meshing::PointLocator> locator;  ///< in the model at rest
     SeenMemory memory;                                     ///< of the image in hand
+    std::shared_ptr<const TissueCubes> cubes;              ///< of the moving image
 };
 
 }  // namespace tissuewarp::registration::detail
