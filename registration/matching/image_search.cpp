@@ -30,9 +30,8 @@ bool ImageSearch::shows_echoes() const {
     if (!is_speckled(fixed_)) return false;
     const State by_headers{Eigen::Isometry3d::Identity(), Eigen::Matrix3Xd::Zero(3, mesh_.nodes.cols())};
     const Eigen::Matrix3Xd& points = moving_.blocks.points();
-    const FieldOfView view(fixed_.seen);
-    Eigen::Index expected = 0;
-    for (Eigen::Index n = 0; n < points.cols(); ++n) expected += view.distance(points.col(n)) < 0;
+    const std::vector<char> in_view = FieldOfView(fixed_.seen).holds(points);
+    const auto expected = std::count(in_view.begin(), in_view.end(), char{1});
     if (expected == 0) return false;
     const auto found = block_search(by_headers, silent_observer()).matches.size();
     return double(found) < most_found * double(expected) && has_more_speckle(fixed_, SeenImage(moving_.image));

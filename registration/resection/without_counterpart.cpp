@@ -1,5 +1,8 @@
 #include "registration/resection/without_counterpart.hpp"
 
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -17,13 +20,13 @@ class ExpectedGrey {
 public:
     ExpectedGrey(const Volume& moving, const Volume& fixed, const Volume& organ) {
         std::vector<float> sorted = values_in(moving, organ);
-        std::sort(sorted.begin(), sorted.end());
+        tbb::parallel_sort(sorted.begin(), sorted.end());
         for (std::size_t b = 1; b < bins && !sorted.empty(); ++b) limits_.push_back(sorted[b * sorted.size() / bins]);
         std::array<std::vector<float>, bins> values;
         for (std::int64_t n = 0; n < fixed.geometry.voxel_count(); ++n)
             if (organ.data<std::uint8_t>()[n])
                 values[bin_of(moving.data<float>()[n])].push_back(fixed.data<float>()[n]);
-        for (std::size_t b = 0; b < bins; ++b) of_bin_[b] = spread_of(values[b]);
+        tbb::parallel_for(std::size_t{0}, bins, [&](std::size_t b) { of_bin_[b] = spread_of(values[b]); });
     }
     /// In deviations.
     [[nodiscard]] double distance(float moving, float fixed) const {

@@ -228,18 +228,26 @@ Contribution ImageTerm::linearise(const RoundPlan& plan, const State& state, Obs
     const DatumKind kind = echoes ? ultrasound_kind(agreement)
                                   : image_kind(search_.moving().image.geometry, search_.image().geometry, agreement);
     result.springs = pulled_by(kind, lumped_springs(found_.shares, memory_.forces, state.displacement));
-    for (PulledNode& pulled : result.springs)
-        if (view_.distance(state.placement * (prepared_.model.mesh.nodes.col(pulled.spring.node) +
-                                              state.displacement.col(pulled.spring.node))) >= 0)
-            pulled.shows_mm = -1;
+    leave_out_of_view(state, result.springs);
     return result;
 }
 
+void ImageTerm::leave_out_of_view(const State& state, std::vector<PulledNode>& springs) const {
+    const auto count = static_cast<Eigen::Index>(springs.size());
+    Eigen::Matrix3Xd places(3, count);
+    for (Eigen::Index n = 0; n < count; ++n) {
+        const int node = springs[static_cast<std::size_t>(n)].spring.node;
+        places.col(n) = state.placement * (prepared_.model.mesh.nodes.col(node) + state.displacement.col(node));
+    }
+    const std::vector<char> in_view = view_.holds(places);
+    for (std::size_t n = 0; n < springs.size(); ++n)
+        if (!in_view[n]) springs[n].shows_mm = -1;
+}
+
 int ImageTerm::blocks_in_view(const State& state) const {
-    const Eigen::Matrix3Xd places = search_.deformed(search_.moving().blocks.points(), state);
-    int count = 0;
-    for (Eigen::Index n = 0; n < places.cols(); ++n) count += view_.distance(places.col(n)) < 0;
-    return std::max(count, static_cast<int>(search_.blocks_found()));
+    const std::vector<char> in_view = view_.holds(search_.deformed(search_.moving().blocks.points(), state));
+    const auto count = std::count(in_view.begin(), in_view.end(), char{1});
+    return std::max(static_cast<int>(count), static_cast<int>(search_.blocks_found()));
 }
 
 ImageFit ImageTerm::fit(const State& state) {
@@ -271,11 +279,15 @@ LeftBehind ImageTerm::left_behind_of(const LocatedMatches& blocks, const State& 
     for (const InterfaceNode& node : prepared_.interfaces.nodes())
         if (node.outer == 0) surface.push_back(prepared_.model.mesh.nodes.col(node.node));
     const meshing::PointTree outside(surface);
+    std::vector<char> is_deep(blocks.matches.size());
+    tbb::parallel_for(std::size_t{0}, is_deep.size(), [&](std::size_t n) {
+        is_deep[n] = !outside.any_within(blocks.matches[n].moving, left_behind_limits.depth_mm);
+    });
     std::vector<BlockMatch> deep;
     std::vector<Eigen::Vector3d> went;
     for (std::size_t n = 0; n < blocks.matches.size(); ++n) {
+        if (!is_deep[n]) continue;
         const Eigen::Vector3d& at = blocks.matches[n].moving;
-        if (outside.any_within(at, left_behind_limits.depth_mm)) continue;
         deep.push_back(blocks.matches[n]);
         went.push_back(state.placement *
                        (at + displacement_at(prepared_.model.mesh, state.displacement, blocks.places[n])));

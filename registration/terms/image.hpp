@@ -146,6 +146,8 @@ private:
     [[nodiscard]] std::optional<Eigen::Isometry3d> rigid_motion() const;
     /// Of all matches, in `memory_`.
     const std::vector<PulledMatch>& pulled(const State& state);
+    /// Springs that pull at what the fixed image does not show tell nothing of it.
+    void leave_out_of_view(const State& state, std::vector<PulledNode>& springs) const;
     /// Blocks whose places in this state the fixed image shows.
     [[nodiscard]] int blocks_in_view(const State& state) const;
     [[nodiscard]] ImageFit fit(const State& state);

@@ -75,4 +75,11 @@ double FieldOfView::distance(const Eigen::Vector3d& point) const {
     return (directions_.transpose() * point - support_).maxCoeff();
 }
 
+std::vector<char> FieldOfView::holds(const Eigen::Matrix3Xd& points) const {
+    std::vector<char> result(static_cast<std::size_t>(points.cols()));
+    tbb::parallel_for(std::size_t{0}, result.size(),
+                      [&](std::size_t n) { result[n] = distance(points.col(static_cast<Eigen::Index>(n))) < 0; });
+    return result;
+}
+
 }  // namespace tissuewarp::registration::detail

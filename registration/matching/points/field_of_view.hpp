@@ -5,6 +5,8 @@
 
 #include <Eigen/Core>
 
+#include <vector>
+
 namespace tissuewarp::registration::detail {
 
 struct FieldOfViewOptions {
@@ -18,6 +20,8 @@ public:
     explicit FieldOfView(const imaging::Volume& seen);
     /// mm from a point (LPS) to the hull's furthest half-space: positive outside, negative inside.
     [[nodiscard]] double distance(const Eigen::Vector3d& point) const;
+    /// Of points (3 × P), 1 where they lie in the hull, 0 elsewhere; in all threads.
+    [[nodiscard]] std::vector<char> holds(const Eigen::Matrix3Xd& points) const;
 
 private:
     Eigen::Matrix3Xd directions_;
