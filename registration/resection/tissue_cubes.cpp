@@ -7,6 +7,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -28,14 +29,22 @@ imaging::Geometry lattice_about(const Eigen::Matrix3Xd& points, double apart_mm)
     return grid;
 }
 
-/// Mean and deviation of an image in a cube.
-std::pair<double, double> spread_in_cube(const VoxelSampler<float>& sampler, const imaging::Geometry& image,
+/// From the middle of a cube to its 27 points, voxels of an image.
+std::array<Vector3d, 27> points_of_cube(const imaging::Geometry& image) {
+    std::array<Vector3d, 27> points;
+    for (int n = 0; n < 27; ++n)
+        points[static_cast<std::size_t>(n)] =
+            image.point_to_index() * cavity_options.window_mm * Vector3d(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+    return points;
+}
+
+/// Mean and deviation of an image in a cube about a voxel index.
+std::pair<double, double> spread_in_cube(const VoxelSampler<float>& sampler, const std::array<Vector3d, 27>& cube,
                                          const Vector3d& middle) {
     double sum = 0, squares = 0;
-    for (int corner = 0; corner < 27; ++corner) {
-        const Vector3d step(corner % 3 - 1, corner / 3 % 3 - 1, corner / 9 - 1);
+    for (const Vector3d& point : cube) {
         float value = 0;
-        sampler.linear(image.index(middle + cavity_options.window_mm * step), &value);
+        sampler.linear(middle + point, &value);
         sum += value;
         squares += double(value) * value;
     }
@@ -49,9 +58,10 @@ template <class Cubes, class Place>
 CavityView view_of(const Volume& image, const Volume& organ, const Cubes& cubes, const Place& place) {
     const Volume values = image.as(CV_32F);
     const VoxelSampler<float> sampler{values};
+    const std::array<Vector3d, 27> cube = points_of_cube(values.geometry);
     Volume grey(organ.geometry, CV_32FC1), deviation(organ.geometry, CV_32FC1);
     tbb::parallel_for(std::size_t{0}, cubes.size(), [&](std::size_t n) {
-        const auto [mean, spread] = spread_in_cube(sampler, values.geometry, place(n));
+        const auto [mean, spread] = spread_in_cube(sampler, cube, values.geometry.index(place(n)));
         grey.data<float>()[cubes[n].voxel] = float(mean);
         deviation.data<float>()[cubes[n].voxel] = float(spread);
     });
