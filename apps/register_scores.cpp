@@ -78,7 +78,8 @@ void doubt_scores(RegistrationRun& run) {
     if (!run.products.gap.empty() && !run.inputs.fixed_labels.empty())
         if (auto doubt = doubt_of_gap(run.products.gap, run.inputs.fixed_labels)) doubts.push_back(std::move(*doubt));
     if (!run.resection) return;
-    for (Doubt& doubt : doubts_of(*run.resection, run.products.gap)) doubts.push_back(std::move(doubt));
+    for (Doubt& doubt : doubts_of(*run.resection, run.result.deformation, run.products.gap))
+        doubts.push_back(std::move(doubt));
 }
 
 std::string codes(const std::vector<Doubt>& doubts) {

@@ -126,7 +126,7 @@ public:
         cv::Mat both;
         cv::bitwise_and(told.voxels, imaging::mask_of_all(truth).voxels, both);
         return Hole{2 * count(both) / (count(told.voxels) + count(truth.voxels)),
-                    found_ ? doubts_of(*found_, gap) : std::vector<registration::Doubt>()};
+                    found_ ? doubts_of(*found_, deformation, gap) : std::vector<registration::Doubt>()};
     }
 
     /// Of a partial image or ultrasound: whether it shows where the target is. Of everything else yes.

@@ -9,6 +9,8 @@
 #include "registration/resection/without_structure.hpp"
 #include "registration/warp.hpp"
 
+#include <Eigen/LU>
+
 #include <cstdint>
 #include <vector>
 
@@ -32,6 +34,12 @@ private:
     Look(const Volume& organ, const Volume& moving_image, const Volume& fixed_image, const Volume& field)
         : fixed(fixed_image, organ, organ), moving(warp_image(moving_image.as(CV_32F), field), organ, organ) {}
 };
+
+/// Of a tetrahedron, mm³.
+double volume_of(const Eigen::Matrix<double, 3, 4>& corners) {
+    const Eigen::Matrix3d edges = corners.rightCols<3>().colwise() - corners.col(0);
+    return edges.determinant() / 6;
+}
 
 /// Labelled voxels that a forward field leads into the cavity.
 Volume led_into(const Volume& cavity, const Volume& labels, const Deformation& deformation) {
@@ -100,14 +108,29 @@ FoundResection find_resection(const PreparedModel& whole, const Deformation& def
     return found;
 }
 
-std::vector<Doubt> doubts_of(const FoundResection& found, const Volume& gap) {
+double squeezed_ml(const Deformation& deformation, const Volume& gone) {
+    const Volume near = imaging::dilate(gone, cavity_options.squeezed_mm).as(CV_32S);
+    const meshing::TetMesh& mesh = deformation.mesh;
+    double lost = 0;
+    for (const auto& tet : mesh.tets.colwise()) {
+        const Eigen::Matrix<double, 3, 4> rest = mesh.nodes(Eigen::all, tet),
+                                          deformed = rest + deformation.displacement(Eigen::all, tet);
+        if (detail::label_at(near, rest.rowwise().mean()) == 0) continue;
+        const double before = volume_of(rest), after = volume_of(deformed);
+        if (after < cavity_options.squeezed * before) lost += before - after;
+    }
+    return lost / 1000;
+}
+
+std::vector<Doubt> doubts_of(const FoundResection& found, const Deformation& deformation, const Volume& gap) {
     constexpr double least_agreement = 0.7;
+    constexpr const char* remedy = "draw what is gone in the moving labels, and name its label by --resected";
     std::vector<Doubt> doubts;
     if (found.gone_ml == 0) {
         doubts.push_back({"resected.not_found", 0, cavity_options.least_ml,
                           "no cavity was found in the fixed image that tissue without a counterpart lies at: all of it "
                           "is taken to be there",
-                          "draw what is gone in the moving labels, and name its label by --resected"});
+                          remedy});
         return doubts;
     }
     const double at_surface = found.at_surface_ml / found.gone_ml;
@@ -116,7 +139,14 @@ std::vector<Doubt> doubts_of(const FoundResection& found, const Volume& gap) {
                           detail::percent(at_surface) +
                               " of the tissue that is taken for gone lies at the organ's outer surface, where it may "
                               "have sunk instead",
-                          "draw what is gone in the moving labels, and name its label by --resected"});
+                          remedy});
+    const double squeezed = squeezed_ml(deformation, found.gone),
+                 most_squeezed = cavity_options.most_squeezed * found.gone_ml;
+    if (squeezed > most_squeezed)
+        doubts.push_back({"resected.unclear", squeezed, most_squeezed,
+                          "tissue about the hole is squeezed by " + detail::to_text(squeezed) +
+                              " ml: more is gone than lies in the cavity, which collapsed",
+                          remedy});
     const Volume hole = imaging::mask_of_all(gap);
     Volume both = hole;
     both.voxels = hole.voxels & found.cavity.voxels;
@@ -126,7 +156,7 @@ std::vector<Doubt> doubts_of(const FoundResection& found, const Volume& gap) {
                           "the hole that the model leaves and the cavity that was found in the image overlap by a Dice "
                           "of " +
                               detail::to_text(agreement) + " only",
-                          "draw what is gone in the moving labels, and name its label by --resected"});
+                          remedy});
     return doubts;
 }
 

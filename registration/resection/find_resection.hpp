@@ -25,6 +25,10 @@ struct CavityOptions {
     double least_ml = 3;          ///< less tissue without a counterpart is not said to be resected
     double surface_mm = 3;        ///< so near to the outside tissue may have sunk instead; by hand, as …
     double most_at_surface = 0.1;  ///< … the share of what is gone that lies there without a doubt
+    double squeezed = 0.95;        ///< of its volume at rest: less is left of tissue that has no room …
+    double squeezed_mm = 20;       ///< … so near to what is taken for gone. Both by hand
+    double most_squeezed = 0.4;  ///< of what is taken for gone, that is lost so without a doubt. Chosen on *sought* 1,
+                                 ///< 2, 3 and 8
 };
 inline constexpr CavityOptions cavity_options{};
 
@@ -55,8 +59,12 @@ struct FoundResection {
 FoundResection find_resection(const PreparedModel& whole, const Deformation& deformation, const imaging::Volume& moving,
                               const imaging::Volume& fixed, Observer& observer = silent_observer());
 
-/// What speaks against a resection that was found, or none. `gap` is the hole that the model without it leaves, on the
-/// grid of the fixed image; empty where none was found.
-std::vector<Doubt> doubts_of(const FoundResection& found, const imaging::Volume& gap);
+/// Volume that tissue near a mask (uint8, moving frame) lost where it was squeezed, ml. Tissue keeps its volume: what
+/// has no room was not there.
+double squeezed_ml(const Deformation& deformation, const imaging::Volume& gone);
+
+/// What speaks against a resection that was found, or none. `deformation` is that of the model without it, `gap` the
+/// hole that it leaves, on the grid of the fixed image; empty where none was found.
+std::vector<Doubt> doubts_of(const FoundResection& found, const Deformation& deformation, const imaging::Volume& gap);
 
 }  // namespace tissuewarp::registration

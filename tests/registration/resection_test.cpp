@@ -297,14 +297,18 @@ TEST(Resection, IsFoundInAnImage) {
         EXPECT_GT(dice(found.cavity, true_cavity(seen.geometry)), 0.8);
         EXPECT_GT(dice(found.gone, imaging::mask_of(labelled_ball(), tumour)), 0.8);
         EXPECT_LT(found.deviation, 0.4);
-        EXPECT_TRUE(doubts_of(found, found.cavity).empty());
+        Deformation rest{whole.model.mesh, Eigen::Matrix3Xd::Zero(3, whole.rest.node_count)};
+        EXPECT_TRUE(doubts_of(found, rest, found.cavity).empty());
         EXPECT_LT(found.at_surface_ml, 0.05 * found.gone_ml);
         FoundResection sunk = found;
         sunk.at_surface_ml = 0.5 * found.gone_ml;
-        EXPECT_THAT(codes(doubts_of(sunk, found.cavity)), ::testing::ElementsAre("resected.unclear"));
+        EXPECT_THAT(codes(doubts_of(sunk, rest, found.cavity)), ::testing::ElementsAre("resected.unclear"));
         Volume elsewhere = found.cavity.clone();
         elsewhere.voxels = 1 - elsewhere.voxels;
-        EXPECT_THAT(codes(doubts_of(found, elsewhere)), ::testing::ElementsAre("resected.unclear"));
+        EXPECT_THAT(codes(doubts_of(found, rest, elsewhere)), ::testing::ElementsAre("resected.unclear"));
+        Deformation squeezed = rest;
+        squeezed.displacement = -0.1 * rest.mesh.nodes;
+        EXPECT_THAT(codes(doubts_of(found, squeezed, found.cavity)), ::testing::ElementsAre("resected.unclear"));
     }
 }
 
@@ -316,7 +320,7 @@ TEST(Resection, IsNotFoundWhereNothingIsGone) {
     const UpdateResult first = update(whole, {.image = seen}, quick());
     const FoundResection found = find_resection(whole, first.deformation, moving, seen);
     EXPECT_EQ(found.gone_ml, 0);
-    EXPECT_THAT(codes(doubts_of(found, {})), ::testing::ElementsAre("resected.not_found"));
+    EXPECT_THAT(codes(doubts_of(found, first.deformation, {})), ::testing::ElementsAre("resected.not_found"));
 }
 
 /// Whoever takes all of it for present hears what is not.
