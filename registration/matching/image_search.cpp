@@ -18,7 +18,7 @@ ImageSearch::ImageSearch(const meshing::TetMesh& mesh, const ImageModel& moving,
       locator_(*tools.locator),
       fixed_(fixed, tools.memory, [&](const imaging::Volume& image) { tools.engine->begin_fixed(image); }),
       engine_(*tools.engine),
-      dense_(mesh, moving, engine_, tools.places) {
+      dense_(mesh, moving, engine_) {
     engine_.finish_fixed(fixed_);
     const bool stated = options.similarity == Similarity::LinearCombination;
     if (stated || (options.similarity == Similarity::Auto && shows_echoes()))

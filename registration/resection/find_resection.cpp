@@ -67,6 +67,22 @@ Volume near_the_outside(const Volume& mask, const Volume& labels) {
     return near;
 }
 
+/// Volume that tissue near a mask (uint8, moving frame) lost where it was squeezed, ml. Tissue keeps its volume: what
+/// has no room was not there.
+double squeezed_ml(const Deformation& deformation, const Volume& gone) {
+    const Volume near = imaging::dilate(gone, cavity_options.squeezed_mm).as(CV_32S);
+    const meshing::TetMesh& mesh = deformation.mesh;
+    double lost = 0;
+    for (const auto& tet : mesh.tets.colwise()) {
+        const Eigen::Matrix<double, 3, 4> rest = mesh.nodes(Eigen::all, tet),
+                                          deformed = rest + deformation.displacement(Eigen::all, tet);
+        if (detail::label_at(near, rest.rowwise().mean()) == 0) continue;
+        const double before = volume_of(rest), after = volume_of(deformed);
+        if (after < cavity_options.squeezed * before) lost += before - after;
+    }
+    return lost / 1000;
+}
+
 }  // namespace
 
 ImageModelOptions image_of_first_look() {
@@ -106,20 +122,6 @@ FoundResection find_resection(const PreparedModel& whole, const Deformation& def
     found.at_surface_ml = millilitres(near_the_outside(found.gone, whole.labels));
     found.cavity = imaging::resample(cavity, fixed.geometry, imaging::Interpolation::Nearest);
     return found;
-}
-
-double squeezed_ml(const Deformation& deformation, const Volume& gone) {
-    const Volume near = imaging::dilate(gone, cavity_options.squeezed_mm).as(CV_32S);
-    const meshing::TetMesh& mesh = deformation.mesh;
-    double lost = 0;
-    for (const auto& tet : mesh.tets.colwise()) {
-        const Eigen::Matrix<double, 3, 4> rest = mesh.nodes(Eigen::all, tet),
-                                          deformed = rest + deformation.displacement(Eigen::all, tet);
-        if (detail::label_at(near, rest.rowwise().mean()) == 0) continue;
-        const double before = volume_of(rest), after = volume_of(deformed);
-        if (after < cavity_options.squeezed * before) lost += before - after;
-    }
-    return lost / 1000;
 }
 
 std::vector<Doubt> doubts_of(const FoundResection& found, const Deformation& deformation, const Volume& gap) {

@@ -59,10 +59,6 @@ struct FoundResection {
 FoundResection find_resection(const PreparedModel& whole, const Deformation& deformation, const imaging::Volume& moving,
                               const imaging::Volume& fixed, Observer& observer = silent_observer());
 
-/// Volume that tissue near a mask (uint8, moving frame) lost where it was squeezed, ml. Tissue keeps its volume: what
-/// has no room was not there.
-double squeezed_ml(const Deformation& deformation, const imaging::Volume& gone);
-
 /// What speaks against a resection that was found, or none. `deformation` is that of the model without it, `gap` the
 /// hole that it leaves, on the grid of the fixed image; empty where none was found.
 std::vector<Doubt> doubts_of(const FoundResection& found, const Deformation& deformation, const imaging::Volume& gap);

@@ -1,8 +1,6 @@
 /// Data inside elements against the same energy minimised as a dense system.
 #include "registration/springs/pull.hpp"
 
-#include "registration/matching/dense/remembered_places.hpp"
-
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
 
@@ -99,26 +97,6 @@ TEST(Pull, PointsJustOutsideAreDrawnToTheMeshAndFarOnesAreNotFound) {
     EXPECT_GE(near->barycentric.minCoeff(), 0);
     EXPECT_NEAR(near->barycentric.sum(), 1, 1e-12);
     EXPECT_FALSE(locate_near(locator, {-20, 3, 3}));
-}
-
-void expect_same_place(const std::optional<meshing::Location>& found,
-                       const std::optional<meshing::Location>& expected) {
-    ASSERT_EQ(found.has_value(), expected.has_value());
-    if (!found) return;
-    EXPECT_EQ(found->tet, expected->tet);
-    EXPECT_EQ(found->barycentric, expected->barycentric);
-}
-
-// A cell tells of another place where other voxels of it count.
-TEST(RememberedPlaces, AreThoseOfThePointsInHand) {
-    const meshing::PointLocator locator(two_tets());
-    RememberedPlaces places;
-    places.reserve(2);
-    const std::vector<Eigen::Vector3d> points{{1, 2, 3}, {1, 2, 3}, {-1, 3, 3}, {-20, 3, 3}, {-20, 3, 3}, {1, 2, 3}};
-    for (const Eigen::Vector3d& point : points) {
-        expect_same_place(places.locate(locator, 0, point), locate_near(locator, point));
-        expect_same_place(places.locate(locator, 1, {2, 1, 1}), locate_near(locator, {2, 1, 1}));
-    }
 }
 
 }  // namespace

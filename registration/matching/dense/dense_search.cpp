@@ -21,15 +21,6 @@ Eigen::Matrix3d deformation_gradient(const meshing::TetMesh& mesh, const State& 
     return state.placement.linear() * deformed * rest.inverse();
 }
 
-/// Of each force.
-std::vector<std::size_t> cells_of(const DenseForces& dense) {
-    std::vector<std::size_t> cells;
-    cells.reserve(dense.forces.size());
-    for (std::size_t n = 0; n < dense.said.size(); ++n)
-        if (dense.said[n] != 0) cells.push_back(n);
-    return cells;
-}
-
 }  // namespace
 
 BlockMatch as_match(const DenseForce& force, const meshing::TetMesh& mesh, const State& state,
@@ -43,34 +34,20 @@ BlockMatch as_match(const DenseForce& force, const meshing::TetMesh& mesh, const
     return match;
 }
 
-std::optional<meshing::Location> RememberedPlaces::locate(const meshing::PointLocator& locator, std::size_t cell,
-                                                          const Eigen::Vector3d& point) {
-    Entry& entry = entries_[cell];
-    if (!entry.known || entry.point != point) entry = {true, point, locate_near(locator, point)};
-    return entry.place;
-}
-
-DenseSearch::DenseSearch(const meshing::TetMesh& mesh, const ImageModel& image, ImageEngine& engine,
-                         std::vector<RememberedPlaces>& places)
-    : mesh_(mesh), image_(image), engine_(engine), places_(places) {
-    places_.resize(static_cast<std::size_t>(image.blocks.options().levels));
-}
+DenseSearch::DenseSearch(const meshing::TetMesh& mesh, const ImageModel& image, ImageEngine& engine)
+    : mesh_(mesh), image_(image), engine_(engine) {}
 
 DenseMatches DenseSearch::matches(const State& state, int coarsening, const LocatedMatches& known,
                                   const meshing::PointLocator& locator) const {
     const int finest = image_.blocks.options().levels - 1;
-    const auto level = static_cast<std::size_t>(std::max(0, finest - coarsening));
-    const DenseForces dense = engine_.forces(state, level);
-    const std::vector<std::size_t> cells = cells_of(dense);
-    RememberedPlaces& places = places_[level];
-    places.reserve(dense.said.size());
+    const DenseForces dense = engine_.forces(state, static_cast<std::size_t>(std::max(0, finest - coarsening)));
     DenseMatches result{{}, dense.agreement};
     LocatedMatches& found = result.found;
     found.reserve(dense.forces.size() + known.matches.size());
     found.matches.resize(dense.forces.size());
     found.places.resize(dense.forces.size());
     tbb::parallel_for(std::size_t{0}, dense.forces.size(), [&](std::size_t n) {
-        const auto place = places.locate(locator, cells[n], dense.forces[n].place);
+        const auto place = locate_near(locator, dense.forces[n].place);
         if (!place) return;
         found.places[n] = *place;
         found.matches[n] = as_match(dense.forces[n], mesh_, state, *place);

@@ -43,9 +43,8 @@ BlockMatch as_match(const DenseForce& force, const meshing::TetMesh& mesh, const
 
 class DenseSearch {
 public:
-    /// `engine` has been made for both and given the fixed image. `places` are of the levels of the template.
-    DenseSearch(const meshing::TetMesh& mesh, const ImageModel& image, ImageEngine& engine,
-                std::vector<RememberedPlaces>& places);
+    /// `engine` has been made for both and given the fixed image.
+    DenseSearch(const meshing::TetMesh& mesh, const ImageModel& image, ImageEngine& engine);
 
     /// What `known`, found before, and the whole image say about where tissue belongs, on the grid that is `coarsening`
     /// times doubled from the template's finest (or its coarsest): a match for each cell of voxels that has a force,
@@ -58,7 +57,6 @@ private:
     const meshing::TetMesh& mesh_;
     const ImageModel& image_;
     ImageEngine& engine_;
-    std::vector<RememberedPlaces>& places_;
 };
 
 }  // namespace tissuewarp::registration::detail

@@ -4,7 +4,6 @@
 #include "meshing/point_location.hpp"
 #include "registration/matching/blocks/block_engine.hpp"
 #include "registration/matching/dense/dense_force.hpp"
-#include "registration/matching/dense/remembered_places.hpp"
 #include "registration/matching/ultrasound/echo_engine.hpp"
 #include "registration/prepare.hpp"
 #include "registration/state.hpp"
@@ -52,7 +51,6 @@ struct ImageTools {
     std::shared_ptr<const meshing::PointLocator> locator;  ///< in the model at rest
     SeenMemory memory;                                     ///< of the image in hand
     std::shared_ptr<const TissueCubes> cubes;              ///< of the moving image
-    std::vector<RememberedPlaces> places = {};             ///< of dense forces, by the levels of the template
 };
 
 }  // namespace tissuewarp::registration::detail
