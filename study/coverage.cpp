@@ -4,6 +4,7 @@
 #include "core/errors.hpp"
 #include "imaging/labels.hpp"
 #include "meshing/point_location.hpp"
+#include "registration/evaluation.hpp"
 #include "registration/field.hpp"
 #include "registration/resection/find_resection.hpp"
 #include "registration/resection/gap.hpp"
@@ -192,6 +193,7 @@ std::vector<CoverageRow> rows_of(const Phantom& phantom, Patient& patient, Evide
     add_codes(doubts, result.doubts);
     add_codes(doubts, doubts_of(uncertainty, options.update.equilibrium.tolerance_mm));
     if (hole) add_codes(doubts, hole->doubts);
+    const double least_det_j = registration::mesh_jacobians(result.deformation).minimum;
     std::vector<CoverageRow> rows;
     for (std::size_t k = 0; k < estimates.size(); ++k) {
         const auto column = static_cast<Eigen::Index>(k);
@@ -200,7 +202,7 @@ std::vector<CoverageRow> rows_of(const Phantom& phantom, Patient& patient, Evide
         if (!estimates[k] || !place) continue;  // in the organ, out of its mesh
         const Eigen::Vector3d u = meshing::interpolate(prepared.model.mesh, nodal, *place);
         rows.push_back({phantom.seed, evidence, static_cast<int>(k), X + u - is.col(column), z, doubts, u.norm(),
-                        patient.in_view(evidence, column), *estimates[k], hole ? hole->dice : -1});
+                        patient.in_view(evidence, column), *estimates[k], hole ? hole->dice : -1, least_det_j});
     }
     return rows;
 }

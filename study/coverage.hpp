@@ -66,6 +66,7 @@ struct CoverageRow {
     registration::ErrorEstimate estimate;
     double cavity_dice =
         -1;  ///< of the registration, by images: of its hole, or the cavity found, with the true one; -1: none
+    double least_det_j = 1;  ///< of the registration's tetrahedra
 };
 
 /// Registers the phantoms of the seeds to each kind of evidence. Each seed's rows are kept in

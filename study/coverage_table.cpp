@@ -13,7 +13,7 @@ constexpr const char* header =
     "deviation,"
     "interval,trust,"
     "xx,yy,zz,xy,yz,zx,"
-    "cavity_dice";
+    "cavity_dice,least_det_j";
 
 CoverageRow parsed(detail::TableLine& line) {
     CoverageRow row;
@@ -36,6 +36,7 @@ CoverageRow parsed(detail::TableLine& line) {
     for (double* value : {&c(0, 0), &c(1, 1), &c(2, 2), &c(0, 1), &c(1, 2), &c(0, 2)}) *value = line.number();
     c.triangularView<Eigen::StrictlyLower>() = c.transpose();
     row.cavity_dice = line.number();
+    row.least_det_j = line.number();
     return row;
 }
 
@@ -55,8 +56,7 @@ void write_coverage(const std::filesystem::path& path, const std::vector<Coverag
             out << ',' << value;
         out << ',' << static_cast<int>(e.trust);
         for (const double value : {c(0, 0), c(1, 1), c(2, 2), c(0, 1), c(1, 2), c(0, 2)}) out << ',' << value;
-        out << ',' << row.cavity_dice;
-        out << '\n';
+        out << ',' << row.cavity_dice << ',' << row.least_det_j << '\n';
     }
     write_file(out.str(), path);
 }

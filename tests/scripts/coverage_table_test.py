@@ -15,15 +15,15 @@ coverage_table = importlib.util.module_from_spec(importlib.util.spec_from_loader
 loader.exec_module(coverage_table)
 
 COLUMNS = ("seed", "evidence", "doubt_codes", "error_x", "error_y", "error_z", "in_view", "interval", "trust",
-           "xx", "yy", "zz", "xy", "yz", "zx")
+           "xx", "yy", "zz", "xy", "yz", "zx", "cavity_dice", "least_det_j")
 
 
-def written(folder, seed, rows):
+def written(folder, seed, rows, dice=-1, least_det_j=0.8):
     """Rows of (evidence, codes, error along x, in view, radius)."""
     folder.mkdir(parents=True, exist_ok=True)
     lines = [",".join(COLUMNS)]
     for evidence, codes, error, in_view, radius in rows:
-        lines.append(f"{seed},{evidence},{codes},{error},0,0,{in_view},{radius},1,1,1,1,0,0,0")
+        lines.append(f"{seed},{evidence},{codes},{error},0,0,{in_view},{radius},1,1,1,1,0,0,0,{dice},{least_det_j}")
     (folder / f"phantom_{seed}.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -51,6 +51,15 @@ class CoverageTable(unittest.TestCase):
         self.assertIn("| `placement.loose` | 1 | 1 |", text)
         self.assertIn("| `data.contradict` | 1 | 0 |", text)
         self.assertIn("| labels | 4 | 4.75 | 12.00 | 2.00 | 50.0 |", text)
+
+    def test_folds_and_holes(self):
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name) / "resected"
+            written(folder, 1, [("image", "", 1, 1, 2)] * 10, dice=0.9)
+            written(folder, 2, [("image", "", 1, 1, 2)] * 10, dice=0.7, least_det_j=-0.1)
+            written(folder, 3, [("labels", "", 1, 1, 2)] * 10)
+            text = self.printed(folder)
+        self.assertIn("least det J -0.10; 1 of 3 registrations fold; Dice of the hole 0.800, least 0.70, of 2", text)
 
     def test_places_out_of_view_have_a_line_of_their_own(self):
         with tempfile.TemporaryDirectory() as name:

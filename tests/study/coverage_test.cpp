@@ -146,6 +146,8 @@ TEST(Coverage, APhantomIsMeasuredOnceAndKept) {
     ASSERT_GT(rows.size(), 160u);
     for (const CoverageRow& row : rows) {
         EXPECT_TRUE(row.error.allFinite());
+        EXPECT_GT(row.least_det_j, 0.5);
+        EXPECT_LT(row.least_det_j, 1);
         EXPECT_GT(row.estimate.deviation_mm, 0.30);  // 0.34 to 4.2, of the surface alone more
         EXPECT_LT(row.estimate.deviation_mm, row.evidence == Evidence::Surface ? 20 : 4.6);
         EXPECT_NEAR(row.estimate.interval_mm, registration::interval_mm(row.estimate, 0.95),
@@ -153,7 +155,9 @@ TEST(Coverage, APhantomIsMeasuredOnceAndKept) {
         EXPECT_TRUE(row.evidence != Evidence::Surface || row.estimate.trust == registration::Trust::Unknown);
     }
     const auto kept = fs::last_write_time(folder / "phantom_5.csv");
-    EXPECT_EQ(measured_coverage(folder, options).size(), rows.size());
+    const auto read = measured_coverage(folder, options);
+    ASSERT_EQ(read.size(), rows.size());
+    EXPECT_NEAR(read.back().least_det_j, rows.back().least_det_j, 1e-5);
     EXPECT_EQ(fs::last_write_time(folder / "phantom_5.csv"), kept);
 }
 
