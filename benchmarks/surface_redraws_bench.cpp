@@ -203,7 +203,9 @@ public:
         if (const auto doubt = doubt_of_data(expected)) result.doubts.push_back(*doubt);
         elastic_.push_back(mean_error(PointTransform(result.deformation)(moving), targets));
         constexpr double failure_mm = 5;
-        const bool failed = elastic_.back() > failure_mm, doubted = !result.doubts.empty();
+        const bool failed = elastic_.back() > failure_mm;
+        const bool doubted = std::any_of(result.doubts.begin(), result.doubts.end(),
+                                         [](const Doubt& doubt) { return doubt.severity == Severity::Doubt; });
         failed_ += failed;
         failed_doubted_ += failed && doubted;
         good_doubted_ += !failed && doubted;
@@ -211,7 +213,8 @@ public:
                     draw.story.c_str(), result.surface->coverage, rigid_.back(), elastic_.back(),
                     result.surface->inlier_share, result.surface->residual_mm, result.surface->rival_mm,
                     result.surface->rival_support, expected.interval_mm, seconds);
-        for (const Doubt& doubt : result.doubts) std::printf(" %s;", doubt.code.c_str());
+        for (const Doubt& doubt : result.doubts)
+            std::printf(" %s%s;", doubt.code.c_str(), doubt.severity == Severity::Doubt ? "" : " (a notice)");
         std::printf(" |\n");
         std::fflush(stdout);
     }

@@ -20,6 +20,7 @@ RoundSolver::RoundSolver(const PreparedModel& prepared, Terms& terms, tled::Engi
     : prepared_(prepared),
       terms_(terms),
       observer_(observer),
+      slid_(prepared),
       solver_(prepared, engine, options, terms.take_own_metric()) {}
 
 Round RoundSolver::solve(const RoundPlan& plan, Standing& standing) {
@@ -62,6 +63,7 @@ tled::NodalConditions RoundSolver::linearised(const RoundPlan& plan, Standing& s
     tled::Conditions all;
     for (const PulledNode& pulled : sum.springs) all.springs.push_back(pulled.spring);
     if (sum.forces.cols() == 0) sum.forces.setZero(3, prepared_.rest.node_count);
+    if (const Eigen::Matrix3Xd slid = slid_.forces(state.displacement); slid.cols() > 0) sum.forces += slid;
     all.external_force = sum.forces;
     standing.result.pulls = {std::move(sum.springs),
                              state.placement,

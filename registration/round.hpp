@@ -2,6 +2,7 @@
 /// One round of a registration: linearise the terms → equilibrium → follow.
 
 #include "registration/solver.hpp"
+#include "registration/springs/slid_surfaces.hpp"
 #include "registration/terms/terms.hpp"
 
 namespace tissuewarp::registration::detail {
@@ -30,6 +31,7 @@ private:
     const PreparedModel& prepared_;
     Terms& terms_;
     Observer& observer_;
+    SlidSurfaces slid_;
     Solver solver_;
 
     [[nodiscard]] tled::NodalConditions linearised(const RoundPlan& plan, Standing& standing, Round& record);

@@ -74,6 +74,15 @@ std::vector<std::array<int, 3>> Interfaces::outer_faces() const {
     return faces;
 }
 
+std::vector<std::array<int, 3>> Interfaces::faces_between(int inner, int outer) const {
+    std::vector<std::array<int, 3>> faces;
+    for (std::size_t f = 0; f < faces_.size(); ++f) {
+        const InterfaceNode& node = nodes_[static_cast<std::size_t>(face_entries_[f][0])];
+        if (node.inner == inner && node.outer == outer) faces.push_back(faces_[f]);
+    }
+    return faces;
+}
+
 Eigen::Matrix3Xd Interfaces::on_sliding_faces(const Eigen::Matrix3Xd& positions) const {
     constexpr double apart_mm = 1.5;
     std::vector<Eigen::Vector3d> points;

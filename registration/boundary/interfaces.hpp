@@ -34,6 +34,8 @@ public:
     [[nodiscard]] std::vector<InterfaceNode>& nodes() { return nodes_; }
     /// Triangles of mesh nodes between tissue and the outside.
     [[nodiscard]] std::vector<std::array<int, 3>> outer_faces() const;
+    /// Triangles of mesh nodes between the tissue of two labels, or a label and the outside (0), outward of the first.
+    [[nodiscard]] std::vector<std::array<int, 3>> faces_between(int inner, int outer) const;
     /// Points spread over the faces that slide, about 1.5 mm apart: 3 × P, of `positions` (3 × mesh nodes).
     [[nodiscard]] Eigen::Matrix3Xd on_sliding_faces(const Eigen::Matrix3Xd& positions) const;
     /// Unit normals at other node positions (3 × mesh nodes), one column per interface node.
