@@ -84,17 +84,16 @@ double radius_mm(const Eigen::Matrix3d& covariance, double z) {
 detail::DataUncertainty open_on_coarse(const PreparedModel& prepared, const PreparedModel& coarse,
                                        const LastPulls& given, const Eigen::Matrix3Xd& displacement,
                                        const UncertaintyOptions& options) {
-    const meshing::TetMesh& mesh = coarse.model.mesh;
     // Targets from where the tissue is: a coarse node lies elsewhere and moved otherwise than the one whose spring it
     // has.
     LastPulls residuals = given;
     for (PulledNode& pulled : residuals.springs) pulled.spring.target -= displacement.col(pulled.spring.node);
     LastPulls pulls = detail::pulls_on(coarse, prepared, residuals);
-    const Eigen::Matrix3Xd there = detail::carried(prepared.model.mesh, displacement, mesh.nodes);
+    const Eigen::Matrix3Xd there = detail::carried(prepared, displacement, coarse);
     for (PulledNode& pulled : pulls.springs) pulled.spring.target += there.col(pulled.spring.node);
     const double energy = tled::elastic_energy(prepared.rest, displacement);
     detail::DataUncertainty data = detail::open_parts(coarse, pulls, there, energy, options).data;
-    data.covariance = detail::carried(mesh, data.covariance, prepared.model.mesh.nodes);
+    data.covariance = detail::carried(coarse, data.covariance, prepared);
     return data;
 }
 

@@ -1,10 +1,12 @@
 #include "registration/loads/coarse_twin.hpp"
 
 #include "meshing/search/point_tree.hpp"
+#include "registration/loads/tissue_sides.hpp"
 #include "registration/springs/pull.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <utility>
 
 namespace tissuewarp::registration::detail {
@@ -44,25 +46,75 @@ std::vector<tled::Spring> moved(const std::vector<tled::Spring>& springs, const 
     return lumped_springs(to, pulls, Eigen::Matrix3Xd::Zero(3, to.nodes.cols()));
 }
 
+/// Those at nodes of one side.
+std::vector<tled::Spring> at_side(const std::vector<tled::Spring>& springs, const std::vector<int>& sides, int label) {
+    std::vector<tled::Spring> result = springs;
+    std::erase_if(result, [&](const tled::Spring& spring) { return sides[std::size_t(spring.node)] != label; });
+    return result;
+}
+
+/// Each side's to that side's tissue.
+std::vector<tled::Spring> moved(const std::vector<tled::Spring>& springs, const PreparedModel& from,
+                                const PreparedModel& to, const meshing::PointLocator& locator) {
+    const std::vector<int> sides = sides_of(from);
+    const Eigen::Matrix3Xd& nodes = from.model.mesh.nodes;
+    std::vector<tled::Spring> result = moved(at_side(springs, sides, 0), nodes, to.model.mesh, locator);
+    for (const int label : sliding_labels(from)) {
+        const Side side = side_of(to.model.mesh, label);
+        for (tled::Spring spring :
+             moved(at_side(springs, sides, label), nodes, side.mesh, meshing::PointLocator(side.mesh))) {
+            spring.node = side.nodes[std::size_t(spring.node)];
+            result.push_back(spring);
+        }
+    }
+    return result;
+}
+
 double total(const std::vector<tled::Spring>& springs) {
     double sum = 0;
     for (const tled::Spring& spring : springs) sum += spring.stiffness.trace();
     return sum;
 }
 
-/// On every interface node that of the nearest, all together as stiff as they were. Summed up, springs along normals
-/// that differ would hold a coarse mesh along its surface too.
-std::vector<tled::Spring> sampled(const std::vector<tled::Spring>& springs, const Eigen::Matrix3Xd& from,
+/// The nearest of some springs.
+class NearestSpring {
+public:
+    NearestSpring(std::vector<tled::Spring> springs, const Eigen::Matrix3Xd& nodes)
+        : springs_(std::move(springs)), tree_(places(springs_, nodes)) {}
+
+    [[nodiscard]] const tled::Spring& to(const Eigen::Vector3d& place) const {
+        return springs_[static_cast<std::size_t>(tree_.nearest(place).index)];
+    }
+
+private:
+    std::vector<tled::Spring> springs_;
+    meshing::PointTree tree_;
+
+    static std::vector<Eigen::Vector3d> places(const std::vector<tled::Spring>& springs,
+                                               const Eigen::Matrix3Xd& nodes) {
+        std::vector<Eigen::Vector3d> result;
+        result.reserve(springs.size());
+        for (const tled::Spring& spring : springs) result.emplace_back(nodes.col(spring.node));
+        return result;
+    }
+};
+
+/// On every interface node that of the nearest, of the same side where tissue slides, all together as stiff as they
+/// were. Summed up, springs along normals that differ would hold a coarse mesh along its surface too.
+std::vector<tled::Spring> sampled(const std::vector<tled::Spring>& springs, const PreparedModel& from,
                                   const PreparedModel& to) {
     if (springs.empty()) return {};
-    std::vector<Eigen::Vector3d> places;
-    places.reserve(springs.size());
-    for (const tled::Spring& spring : springs) places.emplace_back(from.col(spring.node));
-    const meshing::PointTree tree(places);
+    const std::vector<int> sides_from = sides_of(from), sides_to = sides_of(to);
+    std::map<int, NearestSpring> nearest;
+    nearest.try_emplace(0, springs, from.model.mesh.nodes);
+    for (const int label : sliding_labels(from))
+        if (const auto of_side = at_side(springs, sides_from, label); !of_side.empty())
+            nearest.try_emplace(label, of_side, from.model.mesh.nodes);
     std::vector<tled::Spring> result;
     for (const InterfaceNode& node : to.interfaces.nodes()) {
-        const int nearest = tree.nearest(to.model.mesh.nodes.col(node.node)).index;
-        const tled::Spring& spring = springs[static_cast<std::size_t>(nearest)];
+        const auto side = nearest.find(sides_to[std::size_t(node.node)]);
+        const tled::Spring& spring =
+            (side == nearest.end() ? nearest.at(0) : side->second).to(to.model.mesh.nodes.col(node.node));
         result.push_back({node.node, spring.stiffness, spring.target});
     }
     const double share = total(springs) / total(result);
@@ -112,6 +164,20 @@ Eigen::MatrixXd carried(const meshing::TetMesh& from, const Eigen::MatrixXd& nod
     return result;
 }
 
+Eigen::MatrixXd carried(const PreparedModel& from, const Eigen::MatrixXd& nodal, const PreparedModel& to) {
+    const Eigen::Matrix3Xd& places = to.model.mesh.nodes;
+    Eigen::MatrixXd result = carried(from.model.mesh, nodal, places);
+    const std::vector<int> sides = sides_of(to);
+    for (const int label : sliding_labels(to)) {
+        const Side side = side_of(from.model.mesh, label);
+        std::vector<int> there;
+        for (std::size_t n = 0; n < sides.size(); ++n)
+            if (sides[n] == label) there.push_back(static_cast<int>(n));
+        result(Eigen::all, there) = carried(side.mesh, nodal(Eigen::all, side.nodes), places(Eigen::all, there));
+    }
+    return result;
+}
+
 PreparedModel coarse_model(const PreparedModel& prepared, double edge_length, Observer& observer) {
     return prepare(prepared.labels, coarse_options(prepared.options, edge_length), observer);
 }
@@ -141,16 +207,16 @@ PreparedModel coarse_model_for_loads(const PreparedModel& prepared, meshing::Tet
 
 LastPulls pulls_on(const PreparedModel& coarse, const PreparedModel& prepared, const LastPulls& given) {
     const meshing::TetMesh& mesh = coarse.model.mesh;
-    const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
     const meshing::PointLocator locator(mesh);
     LastPulls pulls;
     const bool labels = !given.of(Origin::Hold).empty();
     for (const std::vector<PulledNode>& kind : by_kind(given.data())) {
         const std::vector<tled::Spring> springs = springs_of(kind);
-        add(pulls, kind.front(), labels ? sampled(springs, nodes, coarse) : moved(springs, nodes, mesh, locator));
+        add(pulls, kind.front(),
+            labels ? sampled(springs, prepared, coarse) : moved(springs, prepared, coarse, locator));
     }
     for (const Origin origin : {Origin::Prior, Origin::Support})
-        add(pulls, {{}, origin}, moved(given.of(origin), nodes, mesh, locator));
+        add(pulls, {{}, origin}, moved(given.of(origin), prepared, coarse, locator));
     pulls.energy = given.energy;
     pulls.prior_moves = given.prior_moves;
     pulls.parts_alone = given.parts_alone;

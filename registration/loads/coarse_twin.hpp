@@ -44,4 +44,7 @@ LastPulls pulls_on(const PreparedModel& coarse, const PreparedModel& prepared, c
 /// Values at the nodes of `from` (C × N) at the places `to` (3 × P): between them, and of the nearest element outside.
 Eigen::MatrixXd carried(const meshing::TetMesh& from, const Eigen::MatrixXd& nodal, const Eigen::Matrix3Xd& to);
 
+/// The same at the nodes of a model of the same organ. Where tissue slides, each side's are those of its own side.
+Eigen::MatrixXd carried(const PreparedModel& from, const Eigen::MatrixXd& nodal, const PreparedModel& to);
+
 }  // namespace tissuewarp::registration::detail

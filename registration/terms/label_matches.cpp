@@ -20,6 +20,19 @@ bool at_border(const imaging::Geometry& grid, const Eigen::Vector3d& point) {
     return false;
 }
 
+/// What may lie beyond a node beside what lay there: where labels slid, the outside in place of the other one, or the
+/// other one in place of the outside.
+std::vector<int> also_beyond(const InterfaceNode& node, const std::vector<std::array<int, 2>>& sliding) {
+    if (node.slides) return {0};
+    std::vector<int> labels;
+    if (node.outer != 0) return labels;
+    for (const auto& [first, second] : sliding) {
+        if (first == node.inner) labels.push_back(second);
+        if (second == node.inner) labels.push_back(first);
+    }
+    return labels;
+}
+
 }  // namespace
 
 std::vector<Match> match_interfaces(const PreparedModel& prepared, const LabelBoundaryField& fixed,
@@ -33,7 +46,11 @@ std::vector<Match> match_interfaces(const PreparedModel& prepared, const LabelBo
         const Eigen::Vector3d normal = state.placement.linear() * normals.col(static_cast<Eigen::Index>(i));
         const Eigen::Vector3d point = state.placement * Eigen::Vector3d(prepared.model.mesh.nodes.col(node.node) +
                                                                         state.displacement.col(node.node));
-        const double crossing = fixed.crossing(point, normal, node.inner, node.outer, plan.range_mm, max_angle_deg);
+        double crossing = fixed.crossing(point, normal, node.inner, node.outer, plan.range_mm, max_angle_deg);
+        for (const int outer : also_beyond(node, prepared.options.sliding)) {
+            const double other = fixed.crossing(point, normal, node.inner, outer, plan.range_mm, max_angle_deg);
+            if (!(std::abs(crossing) <= std::abs(other)) && !std::isnan(other)) crossing = other;
+        }
         if (std::isnan(crossing) || at_border(fixed_grid, point + crossing * normal)) return;
         const double distance = crossing - node.offset;
         matches[i].found = true;

@@ -2,11 +2,13 @@
 
 #include "registration/loads/unknown_bends.hpp"
 #include "registration/loads/unknown_loads.hpp"
+#include "registration/loads/white_noise.hpp"
 #include "registration/pose/rigid_part.hpp"
 #include "registration/pose/shown_motions.hpp"
 #include "registration/springs/ground_springs.hpp"
 #include "registration/uncertainty/error_model.hpp"
 #include "registration/uncertainty/held_out.hpp"
+#include "registration/uncertainty/slip_motions.hpp"
 #include "tled/model/symmetric.hpp"
 #include "tled/stiffness/tangent_stiffness.hpp"
 
@@ -183,6 +185,17 @@ MatrixXd missed_if_rigid(const LastPulls& pulls, const Eigen::Matrix3Xd& nodes, 
     return registration.inverse(forces_of(pulls.of(Origin::Prior), motion));
 }
 
+/// As many draws of how far parts may have slid beyond what was found.
+MatrixXd drawn_slips(const MatrixXd& slips, Eigen::Index count, std::uint64_t seed) {
+    std::mt19937_64 generator(seed);
+    return slips * white_noise(slips.cols(), count, generator);
+}
+
+/// What a registration does not follow of motions (3N × k, mm): u − S K_D u.
+MatrixXd missed_of(const MatrixXd& motions, const LastPulls& pulls, const LinearRegistration& registration) {
+    return motions - registration.inverse(forces_of(pulls.of(Origin::Datum), motions));
+}
+
 bool has_prior(const LastPulls& pulls) {
     return std::any_of(pulls.springs.begin(), pulls.springs.end(),
                        [](const PulledNode& pulled) { return pulled.origin == Origin::Prior; });
@@ -202,11 +215,13 @@ OpenParts open_parts(const PreparedModel& prepared, const LastPulls& given, cons
     DataUncertainty result;
     result.covariance = covariances_of(model.error) +
                         covariances_of(registration.inverse(forces_of(data, errors, prepared.rest.node_count)));
+    const MatrixXd slips = slip_motions(prepared, displacement);
+    if (slips.cols() > 0) result.covariance += sum_of_squares(missed_of(slips, pulls, registration));
     const Covariances placement =
         sum_of_squares(beside(unseen_motions(pulls, nodes), missed_if_rigid(pulls, nodes, displacement, registration)));
     constexpr int draws = HeldOutOptions().draws;
-    result.held_out = held_out(prepared, pulls, registration.posterior(), displacement, model.truths.leftCols(draws),
-                               few_of(errors, draws));
+    const MatrixXd truths = model.truths.leftCols(draws) + drawn_slips(slips, draws, options.seed + 3);
+    result.held_out = held_out(prepared, pulls, registration.posterior(), displacement, truths, few_of(errors, draws));
     if (result.held_out) result.covariance *= std::max(1.0, result.held_out->z * result.held_out->z);
     result.covariance += placement;
     return {std::move(result), std::move(registration).stiffness()};
