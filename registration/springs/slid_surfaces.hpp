@@ -10,6 +10,7 @@
 
 namespace tissuewarp::registration::detail {
 
+/// Where a node lies on the other surface. Chosen by hand.
 struct SlidSurfaceOptions {
     double reach_mm = 20;  ///< a pair whose nodes both lie farther than this from the other surface stays as it is
     double most_beside_mm = 0.5;  ///< … or beside its rim, and farther than above it

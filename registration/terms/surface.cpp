@@ -133,9 +133,9 @@ Contribution SurfaceTerm::linearise(const RoundPlan& plan, const State& state, O
             if (match.found) distances.push_back(std::abs(match.distance_mm));
         if (distances.empty())
             throw InvalidInput("no point of the intraoperative surface lies within " + to_text(reach) +
-                               " mm of the model; " +
-                               (inward_ ? "its normals point inwards: turn them round"
-                                        : "check the frame and the unit of the points"));
+                               (inward_ ? " mm of a part of the model that faces as it does; its normals point "
+                                          "inwards: turn them round"
+                                        : " mm of the model; check the frame and the unit of the points"));
         const auto high = distances.begin() +
                           static_cast<std::ptrdiff_t>(double(distances.size() - 1) * robust_rounds.first_percentile);
         std::nth_element(distances.begin(), high, distances.end());

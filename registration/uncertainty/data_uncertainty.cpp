@@ -166,12 +166,16 @@ double unseen_deviation_mm(double share, const HardlyShown& hardly) {
     return hardly.deviation_mm * std::min(1.0, std::sqrt(hardly.below_share / share) - 1);
 }
 
-/// One deviation of each motion of the organ as a whole beyond what the springs of the data leave open, 3N × 6, mm.
-MatrixXd unseen_motions(const LastPulls& pulls, const Eigen::Matrix3Xd& nodes) {
+/// One deviation of each motion of the organ as a whole beyond what the springs of the data leave open, 3N × 6, mm. Parts
+/// that slid one way are hardly told from others that were turned the other way.
+MatrixXd unseen_motions(const LastPulls& pulls, const PreparedModel& prepared, const Eigen::Matrix3Xd& displacement) {
+    const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
     if (!pulls.placement_sought) return MatrixXd(nodes.size(), 0);
     ShownMotions shown = shown_motions(pulls, nodes);
+    HardlyShown hardly = pulls.hardly_shown;
+    hardly.deviation_mm = std::hypot(hardly.deviation_mm, slip_model.of_slip * slid_mm(prepared.sliding, displacement));
     for (Eigen::Index k = 0; k < shown.shares.size(); ++k)
-        shown.motions.col(k) *= unseen_deviation_mm(shown.shares[k], pulls.hardly_shown);
+        shown.motions.col(k) *= unseen_deviation_mm(shown.shares[k], hardly);
     return std::move(shown.motions);
 }
 
@@ -218,7 +222,7 @@ OpenParts open_parts(const PreparedModel& prepared, const LastPulls& given, cons
     const MatrixXd slips = slip_motions(prepared, displacement);
     if (slips.cols() > 0) result.covariance += sum_of_squares(missed_of(slips, pulls, registration));
     const Covariances placement =
-        sum_of_squares(beside(unseen_motions(pulls, nodes), missed_if_rigid(pulls, nodes, displacement, registration)));
+        sum_of_squares(beside(unseen_motions(pulls, prepared, displacement), missed_if_rigid(pulls, nodes, displacement, registration)));
     constexpr int draws = HeldOutOptions().draws;
     const MatrixXd truths = model.truths.leftCols(draws) + drawn_slips(slips, draws, options.seed + 3);
     result.held_out = held_out(prepared, pulls, registration.posterior(), displacement, truths, few_of(errors, draws));

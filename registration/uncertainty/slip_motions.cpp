@@ -23,18 +23,6 @@ std::vector<bool> nodes_of(const meshing::TetMesh& mesh, int label) {
     return nodes;
 }
 
-/// Root mean square of how far the surfaces slid, mm, each pair weighed by its stiffness.
-double slid_mm(const std::vector<tled::SlidingPair>& pairs, const Eigen::Matrix3Xd& displacement) {
-    double squared = 0, weights = 0;
-    for (const tled::SlidingPair& pair : pairs) {
-        const Vector3d apart = displacement.col(pair.first) - displacement.col(pair.second),
-                       along = apart - pair.normal.dot(apart) * pair.normal;
-        squared += pair.stiffness * along.squaredNorm();
-        weights += pair.stiffness;
-    }
-    return std::sqrt(squared / weights);
-}
-
 /// Of six motions (3N × 6) those sums that lead surfaces along themselves, each of mean square 1 mm² at the pairs.
 MatrixXd along_surface(const std::vector<tled::SlidingPair>& pairs, const MatrixXd& motions) {
     Eigen::Matrix<double, 6, 6> across = Eigen::Matrix<double, 6, 6>::Zero(), all = across;
@@ -54,6 +42,17 @@ MatrixXd along_surface(const std::vector<tled::SlidingPair>& pairs, const Matrix
 }
 
 }  // namespace
+
+double slid_mm(const std::vector<tled::SlidingPair>& pairs, const Eigen::Matrix3Xd& displacement) {
+    double squared = 0, weights = 0;
+    for (const tled::SlidingPair& pair : pairs) {
+        const Vector3d apart = displacement.col(pair.first) - displacement.col(pair.second),
+                       along = apart - pair.normal.dot(apart) * pair.normal;
+        squared += pair.stiffness * along.squaredNorm();
+        weights += pair.stiffness;
+    }
+    return weights > 0 ? std::sqrt(squared / weights) : 0;
+}
 
 MatrixXd slip_motions(const PreparedModel& prepared, const Eigen::Matrix3Xd& displacement) {
     const meshing::TetMesh& mesh = prepared.model.mesh;

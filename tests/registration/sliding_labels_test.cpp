@@ -1,9 +1,11 @@
 /// Tissue whose parts slide on one another.
 #include "core/errors.hpp"
 #include "registration/field.hpp"
+#include "registration/loads/coarse_twin.hpp"
 #include "registration/prepared/prepared_io.hpp"
 #include "registration/springs/slid_surfaces.hpp"
 #include "registration/uncertainty.hpp"
+#include "registration/uncertainty/slip_motions.hpp"
 #include "registration/update.hpp"
 #include "tests/registration/shapes.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -20,6 +22,7 @@ namespace {
 using namespace test;
 using Eigen::Matrix3Xd;
 using Eigen::Vector3d;
+using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 using tissuewarp::test::TemporaryFolder;
@@ -214,6 +217,95 @@ TEST(SlidingLabels, StayTogetherOnARoundSurface) {
     }
     ASSERT_GT(within, 20);
     EXPECT_NEAR(entered / within, 0, 0.06) << "0.27 mm, nine tenths of s²/2R, where they keep the heights of rest";
+}
+
+/// 3 × N: the tissue of the upper half went along x, nodes that both halves share did not.
+Matrix3Xd gone_apart(const PreparedModel& prepared) {
+    const meshing::TetMesh& mesh = prepared.model.mesh;
+    Matrix3Xd result = Matrix3Xd::Zero(3, mesh.nodes.cols());
+    for (int t = 0; t < mesh.tet_count(); ++t)
+        if (mesh.labels[t] == upper)
+            for (const int node : mesh.tets.col(t)) result(0, node) = slid_mm;
+    return result;
+}
+
+TEST(SlidingLabels, AreCarriedToAnotherMeshSideBySide) {
+    const PreparedModel prepared = prepared_with({{lower, upper}});
+    const Matrix3Xd gone = gone_apart(prepared);
+    const Eigen::MatrixXd carried = detail::carried(prepared, gone, prepared);
+    LastPulls pulls;
+    for (const tled::SlidingPair& pair : prepared.sliding)
+        for (const int node : {pair.first, pair.second})
+            pulls.springs.push_back({{node, Eigen::Matrix3d::Identity(), gone.col(node)}, Origin::Datum});
+    for (const bool labels : {false, true}) {
+        if (labels) pulls.springs.push_back({{0, Eigen::Matrix3d::Identity(), Vector3d::Zero()}, Origin::Hold});
+        const std::vector<tled::Spring> springs = detail::pulls_on(prepared, prepared, pulls).of(Origin::Datum);
+        int at_surface = 0;
+        for (const tled::Spring& spring : springs) {
+            const auto is_there = [&](const tled::SlidingPair& pair) {
+                return pair.first == spring.node || pair.second == spring.node;
+            };
+            if (std::none_of(prepared.sliding.begin(), prepared.sliding.end(), is_there)) continue;
+            if (labels && spring.stiffness.trace() == 0) continue;
+            ++at_surface;
+            EXPECT_NEAR(spring.target[0], gone(0, spring.node), 1e-9) << labels << ", node " << spring.node;
+        }
+        EXPECT_GE(at_surface, 98);
+    }
+    for (const tled::SlidingPair& pair : prepared.sliding)
+        for (const int node : {pair.first, pair.second}) EXPECT_NEAR(carried(0, node), gone(0, node), 1e-9);
+}
+
+TEST(SlidingLabels, MayHaveSlidFartherThanWasFound) {
+    const PreparedModel prepared = prepared_with({{lower, upper}});
+    const Eigen::MatrixXd slips = detail::slip_motions(prepared, gone_apart(prepared));
+    ASSERT_EQ(slips.cols(), 3) << "two shifts and a turn";
+    for (int k = 0; k < 3; ++k) {
+        double squared = 0;
+        for (const tled::SlidingPair& pair : prepared.sliding) {
+            EXPECT_NEAR(slips(3 * pair.first + 2, k), 0, 1e-6);
+            EXPECT_EQ(slips.col(k).segment<3>(3 * pair.second).norm(), 0) << "the first part moves, the other one not";
+            squared += pair.stiffness * slips.col(k).segment<3>(3 * pair.first).squaredNorm();
+        }
+        double weights = 0;
+        for (const tled::SlidingPair& pair : prepared.sliding) weights += pair.stiffness;
+        EXPECT_NEAR(std::sqrt(squared / weights), detail::slip_model.of_slip * slid_mm, 0.05);
+    }
+    EXPECT_EQ(detail::slip_motions(prepared_with({}), gone_apart(prepared_with({}))).cols(), 0);
+}
+
+// Where the upper half is gone from the lower one's edge the outside lies, and beyond the other edge nothing below it.
+TEST(SlidingLabels, FindWhatLiesBesideThemByThen) {
+    const PreparedModel prepared = prepared_with({{lower, upper}});
+    constexpr double far_mm = 10;
+    const imaging::Volume before = layer_labels();
+    imaging::Volume fixed(before.geometry, CV_32SC1);
+    for_each_voxel(fixed, [&](const Vector3d& index, std::int64_t n) {
+        const Vector3d place = fixed.geometry.point(index), from = place - far_mm * Vector3d::UnitX();
+        const auto within = [](const Vector3d& X) { return (X.array() > 0).all() && (X.array() < edge_mm).all(); };
+        const bool is_upper = place[2] > edge_mm / 2;
+        fixed.data<std::int32_t>()[n] = is_upper ? (within(from) ? upper : 0) : within(place) ? lower : 0;
+    });
+    Intraoperative seen;
+    seen.labels = fixed;
+    const UpdateResult result = update(prepared, seen, where_headers_have_it());
+    std::vector<int> pulled;
+    for (const tled::Spring& spring : result.pulls.of(Origin::Datum))
+        if (spring.stiffness(2, 2) > 0) pulled.push_back(spring.node);
+    const auto near = [](double a, double b) { return std::abs(a - b) < 1; };
+    int alone = 0;
+    for (const tled::SlidingPair& pair : prepared.sliding) {
+        const Vector3d X = prepared.model.mesh.nodes.col(pair.first);
+        if (X[1] < 5 || X[1] > edge_mm - 5) continue;  // edges show no boundary
+        const bool uncovered = near(X[0], edge_mm / 6), over_nothing = near(X[0], edge_mm * 5 / 6);
+        if (!uncovered && !over_nothing) continue;
+        ++alone;
+        EXPECT_THAT(pulled, Contains(uncovered ? pair.first : pair.second)) << X.transpose();
+    }
+    EXPECT_EQ(alone, 10);
+    const auto held_out = uncertainty(prepared, result).held_out();
+    ASSERT_TRUE(held_out);
+    EXPECT_LT(held_out->z, held_out_doubt_limits.most_z) << "what slid is no contradiction";
 }
 
 TEST(SlidingLabels, ErrorsAreEstimatedOfEachSide) {
