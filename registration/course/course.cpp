@@ -52,6 +52,12 @@ void Course::find_loads() {
     add_time(at.result.times, stages::unknown_loads, stopwatch.lap());
 }
 
+void Course::follow_loads() {
+    Stopwatch stopwatch;
+    let_act(found_beside(found, at.state.displacement));
+    add_time(at.result.times, stages::unknown_loads, stopwatch.lap());
+}
+
 void Course::let_act(FoundLoads loads_found) {
     found = std::move(loads_found);
     at.state.found_loads = found.forces();
