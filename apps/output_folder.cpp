@@ -70,6 +70,7 @@ private:
 
 OutputFolder::OutputFolder(fs::path folder, IsResult is_result)
     : folder_(std::move(folder)), is_result_(std::move(is_result)) {
+    if (folder_.empty()) throw InvalidInput("the output folder has no name; give one by --output");
     created_ = missing_folders(folder_);
     try {
         require_writable_folder(folder_);

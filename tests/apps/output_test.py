@@ -64,6 +64,12 @@ class OutputFolder(PhantomTest):
             self.assertIn("report.json': it is a folder", result.stderr)
             self.assertEqual(os.listdir(self.output), ["report.json"])
 
+    def test_an_output_folder_without_a_name_is_refused(self):
+        result = run("register", "--moving-labels", self.phantom.moving_labels, "--fixed-labels", self.phantom.fixed_labels,
+                     "--output", "")
+        self.assertEqual(result.returncode, 2, result.stderr)
+        self.assertIn("the output folder has no name; give one by --output", result.stderr)
+
     def test_a_folder_in_the_way_of_one_file_is_refused(self):
         folder = self.phantom.folder / "scores.json"
         folder.mkdir()
