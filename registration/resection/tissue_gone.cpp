@@ -1,6 +1,7 @@
 #include "registration/resection/tissue_gone.hpp"
 
 #include "imaging/filters.hpp"
+#include "imaging/label_extents.hpp"
 #include "imaging/labels.hpp"
 #include "registration/doubts.hpp"
 #include "registration/field.hpp"
@@ -10,7 +11,11 @@
 #include "registration/resection/without_structure.hpp"
 #include "registration/warp.hpp"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <utility>
@@ -60,6 +65,45 @@ Vector3d middle_of(const Volume& piece) {
     return sum / count;
 }
 
+/// 1 where a label of the first map lies and the second, which has that label too, has none.
+Volume lacking_labels(const Volume& shown, const Volume& fixed_labels) {
+    const imaging::LabelExtents known = imaging::label_extents(fixed_labels);
+    Volume lacking(shown.geometry, CV_8UC1);
+    const auto *here = shown.data<std::int32_t>(), *there = fixed_labels.data<std::int32_t>();
+    tbb::parallel_for(tbb::blocked_range<std::int64_t>(0, shown.geometry.voxel_count()), [&](const auto& range) {
+        for (std::int64_t n = range.begin(); n < range.end(); ++n)
+            lacking.data<std::uint8_t>()[n] = here[n] != 0 && there[n] == 0 && known.contains(here[n]);
+    });
+    return lacking;
+}
+
+/// Whether some voxel of a mask has the centres of all faces of the cube of box_mean() about it too. The middle of a
+/// cube that the mask holds does, and tissue whose boundary is drawn a voxel off does not: then no mean need be made.
+bool may_hold_cube(const Volume& mask, double half_mm) {
+    const auto& size = mask.geometry.size;
+    std::array<int, 3> half{};
+    for (std::size_t axis = 0; axis < 3; ++axis) half[axis] = voxels_of_half(half_mm, mask.geometry, axis);
+    const auto holds = [&](std::array<int, 3> voxel) {
+        return mask.data<std::uint8_t>()[mask.offset(voxel[0], voxel[1], voxel[2])] != 0;
+    };
+    const auto is_middle = [&](const std::array<int, 3>& voxel) {
+        for (std::size_t axis = 0; axis < 3; ++axis)
+            for (const int step : {-half[axis], half[axis]}) {
+                std::array<int, 3> face = voxel;
+                face[axis] = std::clamp(face[axis] + step, 0, size[axis] - 1);
+                if (!holds(face)) return false;
+            }
+        return true;
+    };
+    std::atomic<bool> found = false;
+    tbb::parallel_for(0, size[2], [&](int k) {
+        for (int j = 0; j < size[1] && !found; ++j)
+            for (int i = 0; i < size[0]; ++i)
+                if (holds({i, j, k}) && is_middle({i, j, k})) found = true;
+    });
+    return found;
+}
+
 }  // namespace
 
 TissueGone tissue_gone(const TissueCubes& cubes, const Deformation& deformation, const Volume& moving,
@@ -85,14 +129,9 @@ TissueGone tissue_gone(const TissueCubes& cubes, const Deformation& deformation,
 
 TissueGone tissue_unlabelled(const Volume& shown, const Volume& fixed_labels) {
     constexpr float all = 0.999F, any = 1e-6F;  // of boxes of some hundred voxels
-    const std::vector<int> labels = imaging::labels_in(fixed_labels);
-    Volume lacking(shown.geometry, CV_32FC1);
-    auto* lacks = lacking.data<float>();
-    for (std::int64_t n = 0; n < shown.geometry.voxel_count(); ++n) {
-        const int label = shown.data<std::int32_t>()[n];
-        lacks[n] = float(label != 0 && fixed_labels.data<std::int32_t>()[n] == 0 &&
-                         std::binary_search(labels.begin(), labels.end(), label));
-    }
+    const Volume lacks = lacking_labels(shown, fixed_labels);
+    if (!may_hold_cube(lacks, unlabelled_options.half_mm)) return {};
+    const Volume lacking = lacks.as(CV_32F);
     Volume within = box_mean(lacking, unlabelled_options.half_mm);
     within.voxels = (within.voxels > all) / 255;
     if (cv::countNonZero(within.voxels.reshape(1, 1)) == 0) return {};

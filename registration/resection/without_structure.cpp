@@ -17,15 +17,17 @@ namespace tissuewarp::registration::detail {
 using Eigen::Vector3d;
 using imaging::Volume;
 
+int voxels_of_half(double half_mm, const imaging::Geometry& grid, std::size_t axis) {
+    return std::max(1, static_cast<int>(std::lround(half_mm / grid.spacing[static_cast<Eigen::Index>(axis)])));
+}
+
 Volume box_mean(const Volume& image, double half_mm) {
     Volume result = image.clone();
     const auto& size = image.geometry.size;
     const std::array<std::int64_t, 3> stride{1, size[0], std::int64_t{size[0]} * size[1]};
     for (std::size_t axis = 0; axis < 3; ++axis) {
         const std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
-        const double spacing = image.geometry.spacing[static_cast<Eigen::Index>(axis)];
-        const int half = std::max(1, static_cast<int>(std::lround(half_mm / spacing)));
-        const int last = size[axis] - 1;
+        const int half = voxels_of_half(half_mm, image.geometry, axis), last = size[axis] - 1;
         tbb::parallel_for(0, size[v], [&](int b) {
             std::vector<double> line(static_cast<std::size_t>(size[axis]));
             for (int a = 0; a < size[u]; ++a) {

@@ -27,6 +27,9 @@ imaging::Geometry grid_about(const imaging::Geometry& image, const Eigen::Matrix
 /// Smoothed so that noise does not look like structure, float32.
 imaging::Volume against_noise(const imaging::Volume& image);
 
+/// Half the length of a box along an axis: as many voxels, one at least.
+int voxels_of_half(double half_mm, const imaging::Geometry& grid, std::size_t axis);
+
 /// Means of an image (float32) over boxes of twice `half_mm`, and a voxel at least either way, about each voxel;
 /// borders replicate.
 imaging::Volume box_mean(const imaging::Volume& image, double half_mm);

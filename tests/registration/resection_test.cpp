@@ -8,6 +8,8 @@
 #include "registration/record.hpp"
 #include "registration/resection/find_resection.hpp"
 #include "registration/resection/gap.hpp"
+#include "registration/resection/tissue_gone.hpp"
+#include "registration/resection/without_structure.hpp"
 #include "registration/springs/ground_springs.hpp"
 #include "registration/terms/outline.hpp"
 #include "registration/update.hpp"
@@ -353,6 +355,32 @@ TEST(Resection, OfWhichLabelsSayNothingIsDoubted) {
 }
 
 /// Label maps: the cavity is background in what was seen; what is left of the tumour is told of.
+// A cube of two voxels of 1.5 mm to either side of its middle: what is thinner is a boundary drawn a voxel off.
+TEST(Resection, UnlabelledTissueIsACubeAtLeast) {
+    Volume shown(plain_grid({20, 20, 20}, voxel_mm, {0, 0, 0}), CV_32SC1);
+    shown.voxels.setTo(organ);
+    const auto without = [&](const std::function<bool(const Vector3d&)>& lacks) {
+        Volume labels(shown.geometry, CV_32SC1);
+        for_each_voxel(labels, [&](const Vector3d& index, std::int64_t n) {
+            labels.data<std::int32_t>()[n] = lacks(index) ? 0 : organ;
+        });
+        return detail::tissue_unlabelled(shown, labels).ml;
+    };
+    const auto within = [](const Vector3d& index, int half) {
+        return (index - Vector3d(10, 10, 10)).cwiseAbs().maxCoeff() < half + 0.5;
+    };
+    const int half = detail::voxels_of_half(detail::unlabelled_options.half_mm, shown.geometry, 0);
+    EXPECT_EQ(half, 2);
+    EXPECT_NEAR(without([&](const Vector3d& index) { return within(index, half); }), 0.125 * 27 / 8, 1e-3);
+    EXPECT_EQ(without([&](const Vector3d& index) { return within(index, half - 1); }), 0);
+    EXPECT_EQ(without([&](const Vector3d& index) { return std::abs(index[2] - 10) < half - 0.5; }), 0) << "a slab";
+    EXPECT_EQ(without([&](const Vector3d& index) {
+                  return within(index, half) && (index - Vector3d(10, 10, 10)).cwiseAbs().minCoeff() < 0.5;
+              }),
+              0)
+        << "three plates that cross hold the middles of a cube's faces, and no cube";
+}
+
 TEST(Resection, IsFollowedInLabels) {
     const PreparedModel& model = resected_ball();
     Volume seen(model.labels.geometry, CV_32SC1);
