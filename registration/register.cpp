@@ -32,8 +32,8 @@ void search_on(Course& course) {
 }
 
 /// What data show was done by loads that nobody stated; these also move what they do not show. A second time, since
-/// the first brings more points within reach; the three numbers of weight then follow by the springs of the first time.
-/// Where tissue does not bear them, all stays as it was without.
+/// the first brings more points within reach; the three numbers of weight then follow by the springs of the first time,
+/// where these lead to about the same. Where tissue does not bear loads, all stays as it was without.
 void explain_by_loads(Course& course) {
     for (int time = 0; time < course_options.load_searches && course.terms.unknown_loads(); ++time) {
         if (course.at.result.cut_short ||
@@ -42,7 +42,8 @@ void explain_by_loads(Course& course) {
         const Standing before = course.at;
         const FoundLoads acted = course.found;
         try {
-            time > 0 && *course.terms.unknown_loads() == LoadKind::Weight ? course.follow_loads() : course.find_loads();
+            const bool may_follow = time > 0 && course.terms.unknown_loads() == LoadKind::Weight;
+            if (!may_follow || !course.follow_loads()) course.find_loads();
             course.settle_loads();
         } catch (const SolverFailure& failure) {
             course.observer.note(std::string("unknown loads are left out: ") + failure.what());

@@ -52,10 +52,14 @@ void Course::find_loads() {
     add_time(at.result.times, stages::unknown_loads, stopwatch.lap());
 }
 
-void Course::follow_loads() {
+bool Course::follow_loads() {
     Stopwatch stopwatch;
-    let_act(found_beside(found, at.state.displacement));
+    constexpr double whole = 1;
+    FoundLoads next = found_beside(found, at.state.displacement, whole);
+    const bool near = difference_mm(next, found) < course_options.most_followed_mm;
+    if (near) let_act(std::move(next));
     add_time(at.result.times, stages::unknown_loads, stopwatch.lap());
+    return near;
 }
 
 void Course::let_act(FoundLoads loads_found) {

@@ -25,8 +25,9 @@ struct Course {
     Round solve(const RoundPlan& plan);
     /// By what pulled in the last round.
     void find_loads();
-    /// From those that act, by what pulls now and the springs that pulled when they were found.
-    void follow_loads();
+    /// From those that act, by what pulls now and the springs that pulled when they were found; false, and nothing
+    /// done, where that leads far from them.
+    bool follow_loads();
     void let_act(FoundLoads loads_found);
     /// Rounds under loads that were found.
     void settle_loads();

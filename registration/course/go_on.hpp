@@ -35,7 +35,8 @@ struct GoOnCourse {
     /// That look for what they match. Chosen on labels of the brain shift and the liver's surface
     /// (docs/lab/performance.md).
     int rounds = 3;
-    int load_rounds = 4;             ///< at most, each under loads found anew. By hand
+    int load_rounds = 4;     ///< at most, each under loads found anew. By hand
+    double load_step = 0.5;  ///< a round answers loads by less than linear tissue: whole steps swing about the end
     double settled_loads_mm = 0.05;  ///< a change of the loads that moves tissue by less is the last. By hand
     double most_growth = 2;          ///< over the change before: they do not lead to loads that data show. By hand
     double most_load_change_mm = 3;  ///< as much at once does not either. By hand

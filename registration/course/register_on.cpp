@@ -30,7 +30,7 @@ void let_loads_follow(Course& course) {
     if (!course.found.search->may_be_followed) return seek_loads(course);
     double most_mm = go_on_course.most_load_change_mm;
     for (int done = 0; !course.at.result.cut_short && done < go_on_course.load_rounds; ++done) {
-        FoundLoads next = found_beside(course.found, course.at.state.displacement);
+        FoundLoads next = found_beside(course.found, course.at.state.displacement, go_on_course.load_step);
         const double change_mm = difference_mm(next, course.found);
         const bool settled = change_mm < go_on_course.settled_loads_mm;
         if (!settled && change_mm > most_mm) return seek_loads(course);

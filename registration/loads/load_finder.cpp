@@ -35,14 +35,13 @@ double difference_mm(const FoundLoads& a, const FoundLoads& b) {
     return std::sqrt(3 * moved.squaredNorm() / double(moved.size()));
 }
 
-FoundLoads found_beside(const FoundLoads& acting, const Eigen::Matrix3Xd& displacement) {
+FoundLoads found_beside(const FoundLoads& acting, const Eigen::Matrix3Xd& displacement, double step) {
     const LoadSearch& search = *acting.search;
     const Eigen::VectorXd work =
         search.fit.work_without(acting.coefficients, search.kind->forces.transpose() * displacement.reshaped());
     const double size = search.fit.likeliest_size(work, search.expected);
     const Eigen::VectorXd next = search.fit.coefficients(work, size);
-    constexpr double half = 0.5;  // a round answers loads by less than linear tissue: full steps swing about the end
-    return {size, acting.coefficients + half * (next - acting.coefficients), acting.search};
+    return {size, acting.coefficients + step * (next - acting.coefficients), acting.search};
 }
 
 FoundLoads LoadFinder::find(LoadKind kind, const LastPulls& given, Observer& observer) {

@@ -58,9 +58,9 @@ struct FoundLoads {
 /// Root mean square of the displacements that the two differ by, mm. Of one search.
 double difference_mm(const FoundLoads& a, const FoundLoads& b);
 
-/// After a displacement (3 × N, mm, moving frame) under these and what data pull now: half a step towards those that
-/// data show now (LoadFit::work_without).
-FoundLoads found_beside(const FoundLoads& acting, const Eigen::Matrix3Xd& displacement);
+/// After a displacement (3 × N, mm, moving frame) under these and what data pull now: those that data show now
+/// (LoadFit::work_without), or a part of the step towards them.
+FoundLoads found_beside(const FoundLoads& acting, const Eigen::Matrix3Xd& displacement, double step);
 
 class LoadFinder {
 public:
