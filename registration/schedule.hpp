@@ -36,9 +36,9 @@ struct CourseOptions {
     int more_searches = 4;
     int rounds_of_search = 2;  ///< weigh what such a search found
     int load_searches = 2;     ///< unknown loads are looked for so often: the first brings more points within reach
-    double most_followed_mm = 0.25;  ///< weight that moves tissue by less beside the first is found by its springs
-    int load_rounds = 4;             ///< under the loads found, at most
-    int contact_rounds = 10;         ///< that change the contact alone, at most
+    double most_followed_mm = 0.1;  ///< weight that moves tissue by less beside the first is found by its springs
+    int load_rounds = 4;            ///< under the loads found, at most
+    int contact_rounds = 10;        ///< that change the contact alone, at most
 };
 inline constexpr CourseOptions course_options{};
 
