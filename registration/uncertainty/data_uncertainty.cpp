@@ -166,8 +166,8 @@ double unseen_deviation_mm(double share, const HardlyShown& hardly) {
     return hardly.deviation_mm * std::min(1.0, std::sqrt(hardly.below_share / share) - 1);
 }
 
-/// One deviation of each motion of the organ as a whole beyond what the springs of the data leave open, 3N × 6, mm. Parts
-/// that slid one way are hardly told from others that were turned the other way.
+/// One deviation of each motion of the organ as a whole beyond what the springs of the data leave open, 3N × 6, mm.
+/// Parts that slid one way are hardly told from others that were turned the other way.
 MatrixXd unseen_motions(const LastPulls& pulls, const PreparedModel& prepared, const Eigen::Matrix3Xd& displacement) {
     const Eigen::Matrix3Xd& nodes = prepared.model.mesh.nodes;
     if (!pulls.placement_sought) return MatrixXd(nodes.size(), 0);
@@ -221,8 +221,8 @@ OpenParts open_parts(const PreparedModel& prepared, const LastPulls& given, cons
                         covariances_of(registration.inverse(forces_of(data, errors, prepared.rest.node_count)));
     const MatrixXd slips = slip_motions(prepared, displacement);
     if (slips.cols() > 0) result.covariance += sum_of_squares(missed_of(slips, pulls, registration));
-    const Covariances placement =
-        sum_of_squares(beside(unseen_motions(pulls, prepared, displacement), missed_if_rigid(pulls, nodes, displacement, registration)));
+    const Covariances placement = sum_of_squares(beside(unseen_motions(pulls, prepared, displacement),
+                                                        missed_if_rigid(pulls, nodes, displacement, registration)));
     constexpr int draws = HeldOutOptions().draws;
     const MatrixXd truths = model.truths.leftCols(draws) + drawn_slips(slips, draws, options.seed + 3);
     result.held_out = held_out(prepared, pulls, registration.posterior(), displacement, truths, few_of(errors, draws));
