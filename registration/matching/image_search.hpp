@@ -35,6 +35,9 @@ public:
         return ultrasound_ ? Similarity::LinearCombination : Similarity::SelfSimilarity;
     }
 
+    /// The next search is the first again.
+    void begin_anew() { done_ = 0; }
+
     [[nodiscard]] int done() const { return done_; }
     /// How many there are to be.
     [[nodiscard]] int count() const {

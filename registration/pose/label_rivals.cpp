@@ -2,32 +2,12 @@
 
 #include "registration/pose/label_distance.hpp"
 #include "registration/pose/pose_search.hpp"
+#include "registration/pose/rival_poses.hpp"
 
 #include <algorithm>
-#include <array>
 #include <limits>
-#include <vector>
 
 namespace tissuewarp::registration::detail {
-
-namespace {
-
-/// The 48 signed permutations of the axes: 24 rotations, the identity first, and their reflections.
-std::vector<Eigen::Matrix3d> symmetries_of_a_cube() {
-    std::vector<Eigen::Matrix3d> result;
-    std::array<int, 3> axes{0, 1, 2};
-    do
-        for (int signs = 0; signs < 8; ++signs) {
-            Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
-            for (int row = 0; row < 3; ++row)
-                matrix(row, axes[static_cast<std::size_t>(row)]) = signs >> row & 1 ? -1 : 1;
-            result.push_back(matrix);
-        }
-    while (std::next_permutation(axes.begin(), axes.end()));
-    return result;
-}
-
-}  // namespace
 
 bool is_better_rival(double rival_mm, double than_mm) {
     return rival_mm < label_rival_options.better * than_mm && rival_mm < than_mm - label_rival_options.better_mm;

@@ -1,6 +1,7 @@
 #include "registration/pose/rival_poses.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 
@@ -79,6 +80,20 @@ std::vector<Eigen::Matrix3d> start_rotations(double angle_deg) {
                     Eigen::AngleAxisd(angle_deg * EIGEN_PI / 180, corner.normalized()).toRotationMatrix());
             }
     return rotations;
+}
+
+std::vector<Eigen::Matrix3d> symmetries_of_a_cube() {
+    std::vector<Eigen::Matrix3d> result;
+    std::array<int, 3> axes{0, 1, 2};
+    do
+        for (int signs = 0; signs < 8; ++signs) {
+            Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
+            for (int row = 0; row < 3; ++row)
+                matrix(row, axes[static_cast<std::size_t>(row)]) = signs >> row & 1 ? -1 : 1;
+            result.push_back(matrix);
+        }
+    while (std::next_permutation(axes.begin(), axes.end()));
+    return result;
 }
 
 }  // namespace tissuewarp::registration::detail

@@ -62,4 +62,7 @@ void tell_what_headers_decide(const ChosenPose& pose, const std::string& data, O
 /// About the corners of an icosahedron by an angle, none first: starts all around one.
 std::vector<Eigen::Matrix3d> start_rotations(double angle_deg);
 
+/// The 48 signed permutations of the axes: 24 rotations, the identity first, and their reflections.
+std::vector<Eigen::Matrix3d> symmetries_of_a_cube();
+
 }  // namespace tissuewarp::registration::detail

@@ -3,10 +3,12 @@
 #include "registration/pose/robust_weight.hpp"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 #include <Eigen/Cholesky>
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <vector>
 
 namespace tissuewarp::registration::detail {
@@ -51,64 +53,97 @@ public:
     }
 
     [[nodiscard]] FoundPose descend(FoundPose pose, const Descent& descent) const {
+        const Eigen::Index stride = std::max<Eigen::Index>(1, data_.count() / descent.points);
+        std::vector<int> nearest(static_cast<std::size_t>((data_.count() + stride - 1) / stride), -1);
         for (int step = 0; step < descent.steps; ++step) {
             const double t = double(step) / std::max(1, descent.steps - 1);
             const double scale = descent.first_scale_mm * std::pow(descent.last_scale_mm / descent.first_scale_mm, t);
-            if (!improve(pose.placement, scale, stride(descent.points))) break;
+            if (!improve(pose.placement, scale, stride, nearest)) break;
         }
-        pose.cost = cost(pose.placement, stride(descent.points));
+        pose.cost = cost(pose.placement, stride, nearest);
         return pose;
     }
 
 private:
+    /// Of Gauss–Newton, in the moving frame: a shift, then a rotation about the centre times the radius.
+    struct Normals {
+        Eigen::Matrix<double, 6, 6> matrix = Eigen::Matrix<double, 6, 6>::Zero();
+        Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
+        double weights = 0;
+
+        Normals operator+(const Normals& other) const {
+            return {matrix + other.matrix, right + other.right, weights + other.weights};
+        }
+    };
+
+    struct Misfit {
+        double sum = 0, areas = 0;
+
+        Misfit operator+(const Misfit& other) const { return {sum + other.sum, areas + other.areas}; }
+    };
+
     const meshing::SurfaceTree& model_;
     const meshing::SurfaceMesh& surface_;
     const SurfaceData& data_;
     double scale_mm_, radius_;
     Eigen::Vector3d centre_;
 
-    [[nodiscard]] Eigen::Index stride(int points) const { return std::max<Eigen::Index>(1, data_.count() / points); }
-
+    /// `nearest`: the triangle of the last match, where there was one.
     [[nodiscard]] std::optional<meshing::SurfaceTree::Hit> match(const Eigen::Vector3d& point,
-                                                                 const Eigen::Vector3d& normal, double scale) const {
-        return model_.closest(point, rules.reach * scale, {normal, rules.least_cosine, data_.oriented});
+                                                                 const Eigen::Vector3d& normal, double scale,
+                                                                 int& nearest) const {
+        const auto hit =
+            model_.closest(point, rules.reach * scale, {normal, rules.least_cosine, data_.oriented}, nearest);
+        if (hit) nearest = hit->triangle;
+        return hit;
     }
 
-    [[nodiscard]] double cost(const Eigen::Isometry3d& placement, Eigen::Index stride) const {
+    /// A sum over every `stride`-th point, by stretches, whichever threads take them: of[n, nearest].
+    template <class Sum, class Of>
+    [[nodiscard]] Sum sum(Eigen::Index stride, std::vector<int>& nearest, const Of& of) const {
+        constexpr std::size_t stretch = 128;  // points
+        return tbb::parallel_deterministic_reduce(
+            tbb::blocked_range<std::size_t>(0, nearest.size(), stretch), Sum{},
+            [&](const tbb::blocked_range<std::size_t>& range, Sum result) {
+                for (std::size_t k = range.begin(); k < range.end(); ++k)
+                    of(static_cast<Eigen::Index>(k) * stride, nearest[k], result);
+                return result;
+            },
+            std::plus<>());
+    }
+
+    [[nodiscard]] double cost(const Eigen::Isometry3d& placement, Eigen::Index stride,
+                              std::vector<int>& nearest) const {
         const Eigen::Isometry3d back = placement.inverse();
-        double sum = 0, areas = 0;
-        for (Eigen::Index n = 0; n < data_.count(); n += stride) {
-            const auto hit = match(back * data_.points.col(n), back.linear() * data_.normals.col(n), scale_mm_);
+        const Misfit misfit = sum<Misfit>(stride, nearest, [&](Eigen::Index n, int& near, Misfit& result) {
+            const auto hit = match(back * data_.points.col(n), back.linear() * data_.normals.col(n), scale_mm_, near);
             const double squared = hit ? hit->distance * hit->distance : 0;
-            sum += data_.areas[n] * (hit ? squared / (squared + scale_mm_ * scale_mm_) : 1);
-            areas += data_.areas[n];
-        }
-        return sum / areas;
+            result.sum += data_.areas[n] * (hit ? squared / (squared + scale_mm_ * scale_mm_) : 1);
+            result.areas += data_.areas[n];
+        });
+        return misfit.sum / misfit.areas;
     }
 
-    /// One Gauss–Newton step in the moving frame; false when it changes nothing any more or nothing is near.
-    bool improve(Eigen::Isometry3d& placement, double scale, Eigen::Index stride) const {
+    /// One Gauss–Newton step; false when it changes nothing any more or nothing is near.
+    bool improve(Eigen::Isometry3d& placement, double scale, Eigen::Index stride, std::vector<int>& nearest) const {
         const Eigen::Isometry3d back = placement.inverse();
-        Eigen::Matrix<double, 6, 6> matrix = Eigen::Matrix<double, 6, 6>::Zero();
-        Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
-        double weights = 0;
-        for (Eigen::Index n = 0; n < data_.count(); n += stride) {
+        Normals normals = sum<Normals>(stride, nearest, [&](Eigen::Index n, int& near, Normals& result) {
             const Eigen::Vector3d point = back * data_.points.col(n), normal = back.linear() * data_.normals.col(n);
-            const auto hit = match(point, normal, scale);
-            if (!hit) continue;
+            const auto hit = match(point, normal, scale, near);
+            if (!hit) return;
             const double sign = normal.dot(hit->normal) < 0 ? -1 : 1;
             const Eigen::Vector3d between = (hit->normal + sign * normal).normalized();
             const Eigen::Vector3d arm = 0.5 * (hit->point + point) - centre_;
             Eigen::Matrix<double, 6, 1> row;
             row << between, arm.cross(between) / radius_;
             const double weight = data_.areas[n] * robust_weight(hit->distance, scale);
-            matrix += weight * row * row.transpose();
-            right += weight * between.dot(point - hit->point) * row;
-            weights += weight;
-        }
-        if (weights <= 0) return false;
-        matrix.diagonal().array() += rules.damping * weights;
-        const Eigen::Matrix<double, 6, 1> step = matrix.ldlt().solve(right);
+            result.matrix += weight * row * row.transpose();
+            result.right += weight * between.dot(point - hit->point) * row;
+            result.weights += weight;
+        });
+        if (normals.weights <= 0) return false;
+        normals.matrix.diagonal().array() += rules.damping * normals.weights;
+        const Eigen::Matrix<double, 6, 1> step = normals.matrix.ldlt().solve(normals.right);
         const Eigen::Vector3d rotation = step.tail<3>() / radius_;
         Eigen::Isometry3d moved = Eigen::Isometry3d::Identity();
         if (rotation.norm() > 0)
@@ -183,7 +218,11 @@ SurfacePose search_surface_pose(const meshing::SurfaceTree& model, const meshing
     const FoundPose near_headers = poses.front();
     poses = distinct_poses(std::move(poses), surface.nodes, rules.finalists);
     poses.push_back(near_headers);
-    descend_all(search, poses, {rules.fine_points, rules.fine_steps, rules.fine_first_scale * scale, scale});
+    const double middle_scale = rules.fine_middle_scale * scale;
+    descend_all(search, poses,
+                {rules.fine_points, rules.fine_first_steps, rules.fine_first_scale * scale, middle_scale});
+    poses = distinct_poses(poses, surface.nodes, poses.size());
+    descend_all(search, poses, {rules.fine_points, rules.fine_steps, middle_scale, scale});
     observer.checkpoint("rigid alignment", 1.0);
     return {choose_pose(poses, surface.nodes, Eigen::Isometry3d::Identity()), scale};
 }

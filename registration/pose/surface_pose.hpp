@@ -21,8 +21,9 @@ struct SurfacePoseOptions {
     int coarse_points = 150, coarse_steps = 15;              ///< of the descent of each start
     double coarse_first_scale = 6, coarse_last_scale = 1.5;  ///< over the final scale
     std::size_t finalists = 12;                              ///< that go on
-    int fine_points = 800, fine_steps = 40;                  ///< of their descent
-    double fine_first_scale = 2;                             ///< over the final scale
+    int fine_points = 800;                                   ///< of their descent
+    int fine_first_steps = 10, fine_steps = 30;              ///< with all of them; with those that still differ
+    double fine_first_scale = 2, fine_middle_scale = 1.7;    ///< over the final scale
     double damping = 1e-3;        ///< of the weights' sum: what the points do not show does not move
     double least_step_mm = 1e-3;  ///< a descent ends below it
 };
@@ -35,7 +36,8 @@ struct SurfacePose {
 /// Starts: the placement that the headers say, and rotations of 25° about twelve axes, each with the middle of the
 /// points on places all over the surface that face their way. Each start goes down a symmetric point-to-plane distance
 /// (Rusinkiewicz, ACM Trans Graph 38 (2019) 85) under Geman–McClure weights whose scale falls (graduated non-convexity:
-/// Yang et al., IEEE RA-L 5 (2020) 1127), with few points at first; the best with more. The cost decides, and where
+/// Yang et al., IEEE RA-L 5 (2020) 1127), with few points at first; the best with more, as long as they
+/// do not meet. The cost decides, and where
 /// several poses fit alike the headers (choose_pose). `surface` is the one in `model`.
 SurfacePose search_surface_pose(const meshing::SurfaceTree& model, const meshing::SurfaceMesh& surface,
                                 const SurfaceData& data, const AlignmentOptions& options, Observer& observer);

@@ -4,6 +4,7 @@
 #include "registration/doubts.hpp"
 #include "registration/matching/image_matching.hpp"
 #include "registration/pose/least_trimmed_motion.hpp"
+#include "registration/pose/turned_image.hpp"
 #include "registration/resection/tissue_gone.hpp"
 #include "registration/terms/view_prior.hpp"
 
@@ -151,9 +152,28 @@ Alignment ImageTerm::pose(const Eigen::Isometry3d& /*start*/, Observer& observer
         return {echo_pose_->motion, 0};
     }
     search(by_headers, observer);
+    search_turned(by_headers, observer);
     const std::optional<Eigen::Isometry3d> motion = rigid_motion();
     has_placed_ = motion.has_value();
     return {motion.value_or(Eigen::Isometry3d::Identity()), 0};
+}
+
+void ImageTerm::search_turned(const State& by_headers, Observer& observer) {
+    const int in_view = blocks_in_view(by_headers);
+    const double least = image_pose_options.found_share * in_view;
+    if (double(search_.blocks_found()) >= least) return;
+    const std::vector<FoundPose> poses =
+        turned_poses(search_.moving().image, prepared_.model.mesh.nodes, search_.image(), search_.seen(), observer);
+    for (const FoundPose& pose : poses) {
+        const State turned{pose.placement, by_headers.displacement};
+        if (double(search_.block_search(turned, observer).matches.size()) < least) continue;
+        search_.begin_anew();
+        search(turned, observer);
+        const double angle = Eigen::AngleAxisd(pose.placement.linear()).angle() * 180 / EIGEN_PI;
+        observer.note("the fixed " + name_ + " lies otherwise than the headers say, turned by " +
+                      std::to_string(std::lround(angle)) + " degrees: there its blocks were found");
+        return;
+    }
 }
 
 std::optional<Eigen::Isometry3d> ImageTerm::rigid_motion() const {

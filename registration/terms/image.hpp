@@ -22,6 +22,9 @@ struct ImagePoseOptions {
     /// Of the blocks' distances, median: where a rigid motion leaves less, it is no deformation that it takes for one.
     /// Chosen by hand; 0.6 was left on the degraded sag.
     double most_left = 0.25;
+    /// Of the blocks in view: where fewer are found, the image may be turned, and the first pose that finds as many is
+    /// taken. By hand; of `study coverage --problems turned` 1 to 10 were looked at (docs/decisions/large_motion.md).
+    double found_share = 1.0 / 3;
 };
 inline constexpr ImagePoseOptions image_pose_options{};
 
@@ -97,8 +100,9 @@ public:
     [[nodiscard]] HardlyTold hardly_told() const override { return hardly_told_motions.image; }
     /// The rigid motion that most matches of a first search agree on, the rest of them is for the tissue. Where part of
     /// the organ is out of view, a deformation of the part in view would turn it as a whole: then none, unless the
-    /// headers are far off or a rigid motion explains nearly all; the placement then follows the tissue in view. Throws
-    /// InvalidInput when too few blocks were found.
+    /// headers are far off or a rigid motion explains nearly all; the placement then follows the tissue in view. Where
+    /// hardly a block is found by the headers, the image may be turned (turned_image.hpp). Throws InvalidInput when too
+    /// few blocks were found.
     [[nodiscard]] Alignment pose(const Eigen::Isometry3d& start, Observer& observer) override;
     /// False of ultrasound: its doubts are about the poses that a search tells apart.
     [[nodiscard]] bool take_over(const UpdateResult& last) override;
@@ -143,6 +147,8 @@ private:
 
     void search(const State& state, Observer& observer);
     void tell_similarity(Observer& observer) const;
+    /// From where hardly a block was found; leaves what the best start finds, and says so.
+    void search_turned(const State& by_headers, Observer& observer);
     [[nodiscard]] std::optional<Eigen::Isometry3d> rigid_motion() const;
     /// Of all matches, in `memory_`.
     const std::vector<PulledMatch>& pulled(const State& state);

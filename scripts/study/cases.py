@@ -210,6 +210,7 @@ def whole_breath(number):
         return Case(targets={"landmarks": (rows[:, :3], rows[:, 3:])}, fixed_organ=fixed, moving_organ=moving, tools={
             "tissuewarp": Tissuewarp(["--moving-labels", moving, "--fixed-labels", fixed, "--tissue", "lung"]),
             "elastix": Elastix(fixed_map, moving_map, ["elastix-affine.txt", "elastix-labels.txt"]),
+            "plastimatch": Plastimatch(fixed_map, moving_map, "plastimatch-labels.txt"),
         })
     return build
 

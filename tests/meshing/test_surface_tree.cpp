@@ -73,6 +73,24 @@ TEST(SurfaceTree, AgreesWithLookingAtEveryTriangle) {
     EXPECT_GT(gated, 50);  // the gate decided
 }
 
+TEST(SurfaceTree, AGuessChangesNothing) {
+    for (const SurfaceMesh& surface : {uneven_surface(), box_surface()}) {
+        const SurfaceTree tree(surface);
+        Numbers numbers(2);
+        for (int n = 0; n < 2000; ++n) {
+            const Vector3d point = (30 * numbers.in_cube()).array().round();  // on the box many triangles are as near
+            const NormalGate gate{numbers.direction(), n % 3 == 0 ? -1.0 : 0.6, n % 2 == 0};
+            const double reach = n % 5 == 0 ? 2 : 1e3;
+            const auto without = tree.closest(point, reach, gate);
+            const auto with = tree.closest(point, reach, gate, 7 * n % surface.triangle_count());
+            ASSERT_EQ(bool(without), bool(with)) << n;
+            if (!with) continue;
+            EXPECT_EQ(with->triangle, without->triangle) << n;
+            EXPECT_EQ(with->point, without->point) << n;
+        }
+    }
+}
+
 TEST(SurfaceTree, OfTrianglesAsNearTheFirstIsTaken) {
     const SurfaceMesh surface = box_surface();
     const SurfaceTree tree(surface);

@@ -4,8 +4,10 @@
 #include "core/errors.hpp"
 #include "registration/evaluation.hpp"
 #include "registration/field.hpp"
+#include "registration/matching/descriptors/matching_image.hpp"
 #include "registration/matching/image_mask.hpp"
 #include "registration/matching/image_matching.hpp"
+#include "registration/pose/turned_image.hpp"
 #include "registration/prepared/prepared_io.hpp"
 #include "registration/resection/tissue_cubes.hpp"
 #include "registration/terms/image.hpp"
@@ -14,6 +16,7 @@
 #include "tests/registration/doubt_codes.hpp"
 #include "tests/registration/textured_phantom.hpp"
 #include "tests/support/label_shapes.hpp"
+#include "tests/support/noted.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -94,6 +97,87 @@ TEST(ImageUpdate, GoesOnFromTheLastOne) {
     EXPECT_TRUE(next.beginning.at_last) << next.beginning.why;
     EXPECT_LT(next.rounds.size(), anew.rounds.size());
     EXPECT_LT(summarise(node_errors(next, now)).mean, summarise(node_errors(anew, now)).mean + 0.05);
+}
+
+/// An organ as images show one: brighter than what is around it, and lobes of many sizes that do not repeat.
+class SeenOrgan {
+public:
+    SeenOrgan() {
+        cv::RNG random(5);
+        for (int n = 0; n < 120; ++n) {
+            const double size = random.uniform(2.5, 9.0);
+            lobes_.push_back(
+                {Eigen::Vector3d(random.uniform(-40.0, 40.0), random.uniform(-40.0, 40.0), random.uniform(-40.0, 40.0)),
+                 size, random.gaussian(1)});
+        }
+    }
+    [[nodiscard]] double operator()(const Eigen::Vector3d& x) const {
+        double sum = x.cwiseQuotient(Eigen::Vector3d(30, 26, 24)).squaredNorm() < 1 ? 1 : 0;
+        for (const Lobe& lobe : lobes_)
+            sum += lobe.height * std::exp(-(x - lobe.middle).squaredNorm() / (2 * lobe.size * lobe.size));
+        return sum;
+    }
+
+private:
+    struct Lobe {
+        Eigen::Vector3d middle;
+        double size, height;
+    };
+    std::vector<Lobe> lobes_;
+};
+
+struct TurnedOrgan {
+    SeenOrgan shows;
+    PreparedModel prepared = textured_model();
+    std::vector<Eigen::Isometry3d> turns{shapes::motion(180, {0, 0, 1}, {4, -3, 2}),
+                                         shapes::motion(95, {1, 0, 0}, {-6, 2, 5}),
+                                         shapes::motion(137, {1, 2, -1}, {3, 7, -4})};
+
+    TurnedOrgan() {
+        ImageModelOptions image;
+        image.features.count = 800;
+        image.blocks.grid_spacing_mm = spacing_mm;
+        prepare_image(prepared, sampled(prepared.labels.geometry, shows), image);
+    }
+
+    [[nodiscard]] Volume seen(const Eigen::Isometry3d& pose) const {
+        return sampled(prepared.labels.geometry,
+                       [&](const auto& y) { return shows(before_displacement(pose.inverse() * y)); });
+    }
+};
+
+// By the headers none of the blocks is within reach.
+TEST(ImageUpdate, FindsAnImageThatIsTurnedByAnyAngle) {
+    const TurnedOrgan organ;
+    for (const Eigen::Isometry3d& turn : organ.turns) {
+        tissuewarp::test::Noted observer;
+        const auto result = update(organ.prepared, {.image = organ.seen(turn)}, quick(), observer);
+        EXPECT_LT(summarise(node_errors(result, turn)).mean, 0.4);
+        EXPECT_THAT(observer.notes, testing::HasSubstr("lies otherwise than the headers say"));
+    }
+}
+
+// Without a search for blocks: however the image is turned, and hardly at all.
+TEST(TurnedImage, IsPlacedByWhatBothImagesShow) {
+    TurnedOrgan organ;
+    organ.turns.push_back(shapes::motion(10, {0, 1, 0}, {3, 0, 1}));
+    for (const Eigen::Isometry3d& turn : organ.turns) {
+        const Volume image = organ.seen(turn);
+        const std::vector<detail::FoundPose> found =
+            detail::turned_poses(organ.prepared.image->image, organ.prepared.model.mesh.nodes, image,
+                                 detail::SeenImage(image).seen, silent_observer());
+        ASSERT_FALSE(found.empty());
+        const Eigen::Isometry3d apart = found.front().placement.inverse() * turn;
+        EXPECT_LT(Eigen::AngleAxisd(apart.linear()).angle() * 180 / EIGEN_PI, 12);
+    }
+}
+
+TEST(TurnedImage, NoPoseExplainsMoreThanTheRightOne) {
+    const TurnedOrgan organ;
+    const Volume image = sampled(organ.prepared.labels.geometry, organ.shows);
+    EXPECT_TRUE(detail::turned_poses(organ.prepared.image->image, organ.prepared.model.mesh.nodes, image,
+                                     detail::SeenImage(image).seen, silent_observer())
+                    .empty());
 }
 
 struct Collapse {

@@ -1,5 +1,7 @@
 #include "registration/matching/ultrasound/speckle.hpp"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -42,6 +44,15 @@ std::optional<Patch> patch_of(const SeenImage& image, const Voxel& stride, int i
     return Patch{sum / count, std::sqrt(std::max(0.0, left) / (count - 4))};
 }
 
+std::vector<Patch> patches_of_slice(const SeenImage& image, const Voxel& stride, int k) {
+    const auto& size = image.image.geometry.size;
+    std::vector<Patch> patches;
+    for (int j = stride[1]; j < size[1] - stride[1]; j += apart * stride[1])
+        for (int i = stride[0]; i < size[0] - stride[0]; i += apart * stride[0])
+            if (const auto patch = patch_of(image, stride, i, j, k)) patches.push_back(*patch);
+    return patches;
+}
+
 double percentile(std::vector<double>& values, double share) {
     const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * double(values.size() - 1));
     std::nth_element(values.begin(), at, values.end());
@@ -51,23 +62,22 @@ double percentile(std::vector<double>& values, double share) {
 }  // namespace
 
 double speckle_of(const SeenImage& image, const SpeckleOptions& options) {
-    const auto& size = image.image.geometry.size;
     const Voxel stride = stride_of(image.image.geometry, options.step_mm);
-    std::vector<double> means, deviations;
-    for (int k = stride[2]; k < size[2] - stride[2]; k += apart * stride[2])
-        for (int j = stride[1]; j < size[1] - stride[1]; j += apart * stride[1])
-            for (int i = stride[0]; i < size[0] - stride[0]; i += apart * stride[0])
-                if (const auto patch = patch_of(image, stride, i, j, k)) {
-                    means.push_back(patch->mean);
-                    deviations.push_back(patch->deviation);
-                }
-    if (means.empty()) return 0;
-    std::vector<double> sorted = means;
-    const double dark = percentile(sorted, 0.01);
-    std::vector<double> speckle;
-    for (std::size_t n = 0; n < means.size(); ++n)
-        if (means[n] > dark) speckle.push_back(deviations[n] / (means[n] - dark));
-    return speckle.empty() ? 0 : percentile(speckle, 0.5);
+    const int step = apart * stride[2], inner = std::max(0, image.image.geometry.size[2] - 2 * stride[2]);
+    std::vector<std::vector<Patch>> slices(static_cast<std::size_t>((inner + step - 1) / step));
+    tbb::parallel_for(std::size_t{0}, slices.size(), [&](std::size_t n) {
+        slices[n] = patches_of_slice(image, stride, stride[2] + static_cast<int>(n) * step);
+    });
+    std::vector<Patch> patches;
+    for (const auto& slice : slices) patches.insert(patches.end(), slice.begin(), slice.end());
+    if (patches.empty()) return 0;
+    std::vector<double> values;
+    for (const Patch& patch : patches) values.push_back(patch.mean);
+    const double dark = percentile(values, 0.01);
+    values.clear();
+    for (const Patch& patch : patches)
+        if (patch.mean > dark) values.push_back(patch.deviation / (patch.mean - dark));
+    return values.empty() ? 0 : percentile(values, 0.5);
 }
 
 bool is_speckled(const SeenImage& image, const SpeckleOptions& options) {
