@@ -36,9 +36,8 @@ struct SurfacePose {
 /// Starts: the placement that the headers say, and rotations of 25° about twelve axes, each with the middle of the
 /// points on places all over the surface that face their way. Each start goes down a symmetric point-to-plane distance
 /// (Rusinkiewicz, ACM Trans Graph 38 (2019) 85) under Geman–McClure weights whose scale falls (graduated non-convexity:
-/// Yang et al., IEEE RA-L 5 (2020) 1127), with few points at first; the best with more, as long as they
-/// do not meet. The cost decides, and where
-/// several poses fit alike the headers (choose_pose). `surface` is the one in `model`.
+/// Yang et al., IEEE RA-L 5 (2020) 1127), with few points at first; the best with more, as long as they do not meet.
+/// The cost decides, and where several poses fit alike the headers (choose_pose). `surface` is the one in `model`.
 SurfacePose search_surface_pose(const meshing::SurfaceTree& model, const meshing::SurfaceMesh& surface,
                                 const SurfaceData& data, const AlignmentOptions& options, Observer& observer);
 

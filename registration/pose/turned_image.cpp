@@ -202,10 +202,15 @@ FoundPose made_finer(const FoundPose& pose, const Samples& samples, const imagin
 
 std::vector<FoundPose> turned_poses(const Volume& moving, const Matrix3Xd& nodes, const Volume& fixed,
                                     const Volume& seen, Observer& observer) {
+    const auto is_flat = [](const Volume& image) {
+        return *std::min_element(image.geometry.size.begin(), image.geometry.size.end()) < 2;
+    };
+    if (is_flat(moving) || is_flat(fixed)) return {};
     const std::vector<Eigen::Matrix3d> turns = rotations();
     std::vector<FoundPose> poses(turns.size());
     {
         const Samples samples(moving, nodes, rules.coarse_mm, rules.coarse_samples);
+        if (samples.values.empty()) return {};
         const FixedGrid grid(fixed, seen, rules.coarse_mm);
         tbb::parallel_for(std::size_t{0}, turns.size(),
                           [&](std::size_t n) { poses[n] = best_shift(turns[n], samples, grid); });

@@ -11,7 +11,7 @@ namespace tissuewarp::registration::detail {
 struct TurnedImageOptions {
     double coarse_mm = 12, fine_mm = 6;             ///< voxels of the grids that are compared
     double beyond_mm = 12;                          ///< the organ's surroundings count so far from its nodes
-    int coarse_samples = 300, fine_samples = 1500;  ///< at most
+    int coarse_samples = 300, fine_samples = 1500;  ///< about
     double start_rotation_deg = 25;                 ///< about the corners of an icosahedron, from each of 24
     double least_in_view = 0.5;                     ///< share of the samples
     std::size_t finalists = 24, most = 3;           ///< poses made finer; returned

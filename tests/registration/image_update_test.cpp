@@ -180,6 +180,16 @@ TEST(TurnedImage, NoPoseExplainsMoreThanTheRightOne) {
                     .empty());
 }
 
+TEST(TurnedImage, ASliceIsNotLookedAt) {
+    const PreparedModel prepared = textured_model();
+    imaging::Geometry slice = prepared.labels.geometry;
+    slice.size[2] = 1;
+    const Volume image = sampled(slice, Texture());
+    EXPECT_TRUE(detail::turned_poses(prepared.image->image, prepared.model.mesh.nodes, image,
+                                     detail::SeenImage(image).seen, silent_observer())
+                    .empty());
+}
+
 struct Collapse {
     double mean_error_mm = 0;
     std::vector<std::string> doubts;
