@@ -9,7 +9,8 @@
 
 namespace tissuewarp::registration::detail {
 
-/// How the pose of a surface is searched beside AlignmentOptions. Chosen by hand; on which data is not recorded.
+/// How the pose of a surface is searched beside AlignmentOptions. Chosen by hand; on which data is not recorded, but
+/// for the steps before descents that met go on as one: the surface of the liver phantom was looked at.
 struct SurfacePoseOptions {
     double least_cosine = 0.5;          ///< between the normals of a point and its triangle
     double start_rotation_deg = 25;     ///< about the corners of an icosahedron

@@ -90,7 +90,7 @@ private:
     double count_ = 0, sum_a_ = 0, sum_b_ = 0, aa_ = 0, bb_ = 0, ab_ = 0;
 };
 
-/// The fixed image on a coarse grid with a rim that nothing is seen in.
+/// The fixed image on a coarse grid.
 class FixedGrid {
 public:
     FixedGrid(const Volume& fixed, const Volume& seen, double spacing_mm) {
