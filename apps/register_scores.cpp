@@ -65,8 +65,9 @@ void score_warped(RegistrationRun& run) {
 
 void score_forward_field(RegistrationRun& run) {
     const imaging::Volume organ = imaging::mask_of_all(organ_of(run.inputs.moving_labels, run.options));
-    run.scores.organ = field_jacobians(run.products.moving_to_fixed, &organ);
-    run.scores.grid = field_jacobians(run.products.moving_to_fixed);
+    const imaging::Volume determinant = jacobian_determinant(run.products.moving_to_fixed);
+    run.scores.organ = jacobian_report(determinant, &organ);
+    run.scores.grid = jacobian_report(determinant);
 }
 
 void doubt_scores(RegistrationRun& run) {

@@ -20,8 +20,13 @@ void require_mask(const Volume& mask, double radius_mm) {
 /// Voxels whose centre lies within the radius of the centre of a voxel != 0, as 0 and 255. Exact for every radius.
 cv::Mat grown(const cv::Mat& mask, const Eigen::Vector3d& spacing, double radius_mm) {
     cv::Mat squared = detail::squared_to_voxels(mask, 0, spacing[0]);
-    detail::parabola_pass(squared, 1, spacing[1]);
-    detail::parabola_pass(squared, 2, spacing[2]);
+    for (const int axis : {1, 2}) {
+        constexpr double widest_window = 16;  // voxels to a side: of wider ones parabolas are the faster
+        if (radius_mm <= widest_window * spacing[axis])
+            detail::window_pass(squared, axis, spacing[axis], radius_mm);
+        else
+            detail::parabola_pass(squared, axis, spacing[axis]);
+    }
     // A voxel exactly on the sphere belongs to the ball, in spite of rounding.
     const double limit = std::pow(radius_mm * (1.0 + 1e-6), 2);
     cv::Mat near;

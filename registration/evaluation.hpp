@@ -79,6 +79,9 @@ JacobianReport mesh_jacobians(const Deformation& deformation);
 /// det J of a forward field on its grid, every voxel, or those of a mask.
 JacobianReport field_jacobians(const imaging::Volume& moving_to_fixed, const imaging::Volume* mask = nullptr);
 
+/// The same of jacobian_determinant() of the field.
+JacobianReport jacobian_report(const imaging::Volume& determinant, const imaging::Volume* mask = nullptr);
+
 /// `field.folds` where such a report of all voxels holds folded ones, which no tissue has, and how many the organ's
 /// does; or where the backward field was left folded.
 std::optional<Doubt> doubt_of_folds(const JacobianReport& everywhere, const JacobianReport& in_organ,

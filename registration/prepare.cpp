@@ -71,6 +71,7 @@ std::vector<tled::SlidingPair> open_where_tissue_slides(meshing::TetMesh& mesh, 
 void make_ready(const tled::RestStiffness& stiffness) {
     if (!stiffness.is_large()) stiffness.analyse();
     (void)stiffness.approximate_lowest_eigenvalue();
+    (void)stiffness.approximate_highest_eigenvalue();
 }
 
 /// Precondition: require_surroundings.

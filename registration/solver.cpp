@@ -12,7 +12,9 @@ Solver::Solver(const PreparedModel& prepared, tled::Engine& engine, const Update
       asked_for_(options.equilibrium.method),
       equilibrium_(options.equilibrium),
       step_mm_(options.most_step_mm),
-      own_metric_(own_metric) {}
+      own_metric_(own_metric) {
+    equilibrium_.known_highest = prepared.stiffness.approximate_highest_eigenvalue();
+}
 
 tled::EquilibriumResult Solver::solve(const StepBoundConditions& conditions, const Eigen::Matrix3Xd& start,
                                       Observer& observer) {
@@ -37,7 +39,7 @@ tled::EquilibriumResult Solver::try_to_solve(const tled::NodalConditions& condit
     tled::EquilibriumResult solved = tled::equilibrium(engine_, metric_ ? *metric_ : prepared_.stiffness, conditions,
                                                        equilibrium_, &start, observer);
     equilibrium_.method = solved.method;  // chosen and explained once, not in every round
-    equilibrium_.known_highest = solved.highest;
+    if (solved.highest > 0) equilibrium_.known_highest = solved.highest;
     return solved;
 }
 

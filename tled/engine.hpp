@@ -11,6 +11,7 @@
 #include <Eigen/Core>
 
 #include <memory>
+#include <span>
 #include <string>
 
 namespace tissuewarp::tled {
@@ -21,6 +22,11 @@ struct StepCoefficients {
     /// Δt, s, in which viscous stresses move on, by steps of their own (docs/decisions/viscous_steps.md); without it
     /// (0) they rest as they are. Not read where no material is viscous.
     double time_step = 0.0;
+};
+
+struct Steps {
+    int count = 0;
+    StepCoefficients coefficients;
 };
 
 /// Scalars of the present state, reduced where the engine runs. Sums are over free degrees of freedom.
@@ -39,6 +45,12 @@ struct Observation {
 struct SmallestJacobian {
     double value = 1;
     int tet = -1;
+};
+
+/// A displacement (3 × N, mm) and the smallest det F of it.
+struct CheckedDisplacement {
+    Eigen::Matrix3Xd value;
+    SmallestJacobian smallest;
 };
 
 enum class Processor { Cpu, Gpu };
@@ -77,6 +89,8 @@ public:
     [[nodiscard]] virtual Observation observe() = 0;
     /// At the present displacement; a quarter of a force evaluation.
     [[nodiscard]] virtual SmallestJacobian smallest_jacobian() = 0;
+    /// run() of each, then displacement() and smallest_jacobian(): a GPU is waited for once.
+    [[nodiscard]] virtual CheckedDisplacement run_and_check(std::span<const Steps> steps) = 0;
     /// Whether every material's energy is finite for det F ≤ 0, so that inverted tissue finds back.
     [[nodiscard]] virtual bool admits_inversion() const = 0;
 
@@ -109,8 +123,8 @@ struct GpuStepShape {
     friend bool operator==(const GpuStepShape&, const GpuStepShape&) = default;
 };
 
-/// What measured best on an H100 for a mesh of so many tetrahedra (docs/lab/performance.md), carried over to a device of
-/// so many multiprocessors; where these are unknown (0), to one of as many as an H100 has.
+/// What measured best on an H100 for a mesh of so many tetrahedra (docs/lab/performance.md), carried over to a device
+/// of so many multiprocessors; where these are unknown (0), to one of as many as an H100 has.
 GpuStepShape suggested_gpu_step_shape(int element_count, Element element = Element::T4, int multiprocessors = 0);
 
 /// "two passes", "2910:5:640" (tetrahedra, fan, workgroup) or "2910:5:640:132" (workgroups at once).

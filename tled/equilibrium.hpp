@@ -43,8 +43,7 @@ struct EquilibriumResult {
     int force_evaluations = 0;
     int lifted_residuals = 0;  ///< triangular solves
     double min_jacobian = 1;
-    double highest = 0;  ///< eigenvalue of diag(K)⁻¹K, a little more; 0 where self-checked relaxation did not end with
-                         ///< steps for it
+    double highest = 0;  ///< eigenvalue of diag(K)⁻¹K, a little more, as self-checked relaxation took it; 0 of others
     EquilibriumMethod method = EquilibriumMethod::Automatic;  ///< the one used
     std::string reason;                                       ///< why this one
 };

@@ -156,6 +156,27 @@ void parabola_pass(cv::Mat& squared, int axis, double spacing) {
     });
 }
 
+void window_pass(cv::Mat& squared, int axis, double spacing, double reach_mm) {
+    const std::int64_t nx = squared.size[2], slice = nx * squared.size[1];
+    const int length = axis == 1 ? squared.size[1] : squared.size[0];
+    const int sheets = axis == 1 ? squared.size[0] : squared.size[1];
+    const std::int64_t stride = axis == 1 ? nx : slice, sheet = axis == 1 ? slice : nx;
+    const int reach = static_cast<int>(std::min(std::ceil(reach_mm / spacing), double(length - 1)));
+    tbb::enumerable_thread_specific<std::vector<float>> scratch(static_cast<std::size_t>(length * nx));
+    tbb::parallel_for(0, sheets, [&](int s) {
+        float* values = squared.ptr<float>() + s * sheet;
+        float* before = scratch.local().data();
+        for (int p = 0; p < length; ++p) std::copy_n(values + p * stride, nx, before + p * nx);
+        for (int p = 0; p < length; ++p)
+            for (int q = std::max(0, p - reach); q <= std::min(length - 1, p + reach); ++q) {
+                const float parabola = static_cast<float>(std::pow(spacing * (q - p), 2));
+                const float* from = before + q * nx;
+                float* row = values + p * stride;
+                for (std::int64_t i = 0; i < nx; ++i) row[i] = std::min(row[i], from[i] + parabola);
+            }
+    });
+}
+
 cv::Mat squared_to_voxels(const cv::Mat& mask, int axis, double spacing) {
     return squared_to_seeds(mask, axis, spacing, [](const auto& inside, int length, std::vector<int>& seeds) {
         for (int p = 0; p < length; ++p)

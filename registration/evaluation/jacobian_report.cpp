@@ -6,6 +6,7 @@
 
 #include <Eigen/Dense>
 
+#include <array>
 #include <cstdio>
 #include <numeric>
 #include <string>
@@ -14,7 +15,6 @@ namespace tissuewarp::registration {
 
 namespace {
 
-using detail::percentile;
 using imaging::Geometry;
 using imaging::Volume;
 
@@ -82,13 +82,17 @@ JacobianReport mesh_jacobians(const Deformation& deformation) {
 }
 
 JacobianReport field_jacobians(const Volume& moving_to_fixed, const Volume* mask) {
-    if (mask && !imaging::same_grid(mask->geometry, moving_to_fixed.geometry))
+    return jacobian_report(jacobian_determinant(moving_to_fixed), mask);
+}
+
+JacobianReport jacobian_report(const Volume& determinant, const Volume* mask) {
+    if (mask && !imaging::same_grid(mask->geometry, determinant.geometry))
         throw InvalidInput("field Jacobians: the mask lies on another grid; resample it onto the grid of the field");
-    const Volume determinant = jacobian_determinant(moving_to_fixed);
     const Volume chosen = mask ? Volume(mask->geometry, cv::Mat(mask->voxels != 0)) : Volume();
     const Geometry& grid = determinant.geometry;
     const auto* value = determinant.data<float>();
     std::vector<float> values;
+    values.reserve(static_cast<std::size_t>(mask ? 0 : grid.voxel_count()));
     std::vector<std::int64_t> folded;
     for (std::int64_t n = 0; n < grid.voxel_count(); ++n) {
         if (mask && !chosen.data<std::uint8_t>()[n]) continue;
@@ -114,11 +118,12 @@ JacobianReport field_jacobians(const Volume& moving_to_fixed, const Volume* mask
     }
     report.minimum = *std::min_element(values.begin(), values.end());
     report.maximum = *std::max_element(values.begin(), values.end());
-    report.percentile_1 = percentile(values, 1.0);
-    report.percentile_5 = percentile(values, 5.0);
-    report.median = percentile(values, 50.0);
-    report.percentile_95 = percentile(values, 95.0);
-    report.percentile_99 = percentile(values, 99.0);
+    const std::array found = detail::percentiles(values, std::array{1.0, 5.0, 50.0, 95.0, 99.0});
+    report.percentile_1 = found[0];
+    report.percentile_5 = found[1];
+    report.median = found[2];
+    report.percentile_95 = found[3];
+    report.percentile_99 = found[4];
     report.folded_share = static_cast<double>(report.folded) / static_cast<double>(values.size());
     return report;
 }

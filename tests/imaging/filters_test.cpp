@@ -266,6 +266,13 @@ TEST(Morphology, AgreesWithBruteForce) {
     }
 }
 
+TEST(Morphology, AgreesWithBruteForceFarBeyondAVoxel) {
+    const Volume mask = random_mask(plain_grid({40, 36, 5}, {0.1, 0.1, 0.25}), 1, 6);
+    for (const double radius : {0.35, 1.55, 1.7})  // windows of 4 and 16 voxels, and wider ones than are taken
+        EXPECT_TRUE(test::same_voxels(dilate(mask, radius).voxels, brute_force_dilation(mask, radius).voxels))
+            << radius;
+}
+
 TEST(Morphology, OpeningRemovesWhatIsThinnerThanTheBall) {
     Volume mask(plain_grid({30, 30, 30}), CV_8U);
     for (int i = 0; i < 30; ++i) mask.data<std::uint8_t>()[mask.offset(i, 2, 2)] = 1;  // a wire

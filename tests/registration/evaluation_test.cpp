@@ -1,4 +1,7 @@
 #include "registration/evaluation.hpp"
+
+#include "registration/evaluation/percentile.hpp"
+#include "registration/field.hpp"
 #include "registration/io/slicer_markups.hpp"
 
 #include "core/errors.hpp"
@@ -39,6 +42,21 @@ TEST(Summary, OfOneValueAndOfNone) {
     EXPECT_EQ(one.percentile_95, 7.0);
     EXPECT_EQ(summarise({}).count, 0);
     EXPECT_THROW(summarise({1.0, std::nan("")}), InvalidInput);
+}
+
+TEST(Percentiles, AreThoseOfTheSortedValues) {
+    std::vector<float> values;
+    for (int n = 0; n < 1237; ++n) values.push_back(static_cast<float>(n * 733 % 1237) / 7.0F);
+    std::vector<float> ascending = values;
+    std::sort(ascending.begin(), ascending.end());
+    constexpr std::array wanted{0.0, 1.0, 5.0, 50.0, 95.0, 99.0, 100.0};
+    const std::array found = detail::percentiles(values, wanted);
+    for (std::size_t n = 0; n < wanted.size(); ++n) {
+        const double place = wanted[n] / 100 * 1236;
+        const auto below = static_cast<std::size_t>(place), above = std::min<std::size_t>(below + 1, 1236);
+        const double expected = ascending[below] + (place - double(below)) * (ascending[above] - ascending[below]);
+        EXPECT_NEAR(found[n], expected, 1e-4) << wanted[n];
+    }
 }
 
 TEST(TargetError, SeparatesLandmarksThatMoved) {
@@ -252,6 +270,8 @@ TEST(FieldJacobians, FindsAFoldItsVolumeAndItsPlace) {
     for_each_voxel(mask,
                    [&](const Eigen::Vector3d& index, std::int64_t n) { mask.data<std::uint8_t>()[n] = index[0] < 5; });
     EXPECT_EQ(field_jacobians(field, &mask).folded, 0);
+    EXPECT_EQ(jacobian_report(jacobian_determinant(field), &mask).folded, 0);
+    EXPECT_EQ(jacobian_report(jacobian_determinant(field)).folded_mm3, report.folded_mm3);
     mask.voxels.setTo(0);
     EXPECT_THROW(field_jacobians(field, &mask), InvalidInput);
     field.data<cv::Vec3f>()[30][1] = std::nanf("");

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <Eigen/Geometry>
 
+#include <array>
 #include <cmath>
 #include <string>
 #include <tuple>
@@ -199,6 +200,23 @@ TEST_P(Engines, RunningInPortionsIsRunningAtOnce) {
         engine->internal_force();
     }
     EXPECT_EQ(engine->displacement(), at_once);
+}
+
+TEST_P(Engines, ToRunAndCheckIsToRunAndThenToLook) {
+    const StepCoefficients first = stable_coefficients(model, rest), then{0.5 * first.momentum, first.gain, 0};
+    engine->set_state(wavy(X, 0.3), zero);
+    engine->run(30, first);
+    engine->run(12, then);
+    const Matrix3Xd displacement = engine->displacement();
+    const SmallestJacobian smallest = engine->smallest_jacobian();
+    engine->set_state(wavy(X, 0.3), zero);
+    for (const CheckedDisplacement& found :
+         {engine->run_and_check(std::array{Steps{30, first}, Steps{0, first}, Steps{12, then}}),
+          engine->run_and_check({})}) {
+        EXPECT_EQ(found.value, displacement);
+        EXPECT_EQ(found.smallest.value, smallest.value);
+        EXPECT_EQ(found.smallest.tet, smallest.tet);
+    }
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <array>
 #include <set>
 
 namespace tissuewarp::tled {
@@ -163,6 +164,14 @@ TEST_P(GpuSteps, GoOnOneByOneWherePatchesDoNotRunAtTheSameTime) {
     const Matrix3Xd expected = after(shape, {40}, wavy(X, 0.3), zero);
     shape.at_once = 1000;
     EXPECT_LT(largest(after(shape, {40}, wavy(X, 0.3), zero) - expected), 1e-5 * largest(expected));
+    const auto engine = make_gpu_engine(rest, -1, shape);
+    engine->set_conditions(conditions);
+    engine->set_state(wavy(X, 0.3), zero);
+    const StepCoefficients coefficients = stable_coefficients(model, rest);
+    const CheckedDisplacement checked =
+        engine->run_and_check(std::array{Steps{15, coefficients}, Steps{25, coefficients}});
+    EXPECT_LT(largest(checked.value - expected), 1e-5 * largest(expected));
+    EXPECT_LT(largest(engine->displacement() - checked.value), 1e-12);
 }
 
 // The last bits of a result follow from the shape of the steps: whoever keeps the result must be able to keep that too.

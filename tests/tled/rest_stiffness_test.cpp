@@ -199,6 +199,8 @@ TEST_P(RestStiffnessTest, DiagonalAndLowestEigenvalueAgreeWithADenseSolver) {
     const Eigen::VectorXd scale = K.diagonal().cwiseSqrt().cwiseInverse();
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(scale.asDiagonal() * K * scale.asDiagonal());
     EXPECT_NEAR(stiffness.lowest_eigenvalue(), modes.eigenvalues()[0], 1e-3 * modes.eigenvalues()[0]);
+    EXPECT_GT(stiffness.approximate_highest_eigenvalue(), modes.eigenvalues().maxCoeff());
+    EXPECT_LT(stiffness.approximate_highest_eigenvalue(), 1.11 * modes.eigenvalues().maxCoeff());
 }
 
 TEST_P(RestStiffnessTest, TheLowestEigenvalueWithoutAFactorIsAboutThatWithOne) {

@@ -172,6 +172,10 @@ public:
     [[nodiscard]] SmallestJacobian smallest_jacobian() override {
         return forces_.smallest_jacobian(displacement_.data());
     }
+    [[nodiscard]] CheckedDisplacement run_and_check(std::span<const Steps> steps) override {
+        for (const Steps& each : steps) run(each.count, each.coefficients);
+        return {displacement(), smallest_jacobian()};
+    }
 
     [[nodiscard]] std::string description() const override {
         return std::string("CPU ") + (sizeof(T) == 4 ? "float32" : "float64") + ", " + detail::instruction_set() +

@@ -34,9 +34,8 @@ Enrichment::Enrichment(const HierarchicalTissue& tissue, const BubbleConditions&
         }
         block = block.inverse().eval();
     });
-    Matrix3Xd rough = Matrix3Xd::Zero(3, space_.size());
-    for (int i = space_.corner_count; i < space_.size(); ++i)
-        rough.col(i) << 1.0, (i % 2 == 0 ? 1.0 : -1.0), (i % 3) - 1.0;
+    Matrix3Xd rough = every_wave_length(space_.size());
+    rough.leftCols(space_.corner_count).setZero();
     constrain(rough);
     largest_ = largest_eigenvalue([this](const Matrix3Xd& x) { return multiply(x); },
                                   [this](const Matrix3Xd& x) { return divide_by_blocks(x); }, std::move(rough));

@@ -4,6 +4,7 @@
 
 #include "core/errors.hpp"
 #include "shaders/catalogue.hpp"
+#include "shaders/readback.hpp"
 #include "tled/engine.hpp"
 #include "tled/gpu/gpu_effects.hpp"
 #include "tled/gpu/gpu_force.hpp"
@@ -12,6 +13,7 @@
 #include "tled/gpu/right_forces.hpp"
 #include "tled/material/stress_clock.hpp"
 
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -38,21 +40,11 @@ void require_shape(const Matrix3Xd& matrix, int node_count, const char* what) {
                            std::to_string(node_count) + " nodes");
 }
 
-void require_limits(const shaders::Device& device) {
-    const auto offers = [&](int count, const char* what, int needed) {
-        if (count >= needed) return;
-        throw GpuUnavailable(device.renderer() + " offers " + std::to_string(count) + " " + what +
-                             "; the solver needs " + std::to_string(needed) + "; take the CPU engine");
-    };
-    offers(device.limits().storage_blocks, "storage blocks per shader", shaders::storage_blocks_of_passes);
-    offers(device.limits().storage_bindings, "storage bindings", 24);  // to which chunks/bindings.glsl counts
-}
-
 class GpuEngine final : public Engine {
 public:
     GpuEngine(const RestState& rest, int device, const GpuStepShape& shape)
         : device_(device),
-          programs_((require_limits(device_), device_)),
+          programs_((detail::require_limits(device_), device_)),
           node_count_(rest.node_count),
           admits_inversion_(tled::admits_inversion(rest)),
           force_(device_, programs_, rest, blocks_),
@@ -154,16 +146,19 @@ public:
     }
 
     void run(int steps, const StepCoefficients& coefficients) override {
-        if (steps <= 0) return;
         const CurrentContext current = device_.make_current();
-        const std::vector<detail::StressSteps> parts = stress_clock_.next(steps, coefficients.time_step);
-        if (over_patches_) {
-            blocks_.set("Displacement", displacement_);
-            patches_->run(parts, coefficients, effects_.on_nodes(), blocks_);
-            previous_residual_known_ = false;
-            return;
-        }
-        run_two_passes(parts, coefficients);
+        const std::vector<detail::GpuSteps> parts = in_parts(std::array{Steps{steps, coefficients}});
+        take(parts);
+        if (over_patches_ && patches_->gave_up()) take_one_by_one(parts);
+    }
+
+    [[nodiscard]] CheckedDisplacement run_and_check(std::span<const Steps> steps) override {
+        const CurrentContext current = device_.make_current();
+        const std::vector<detail::GpuSteps> parts = in_parts(steps);
+        take(parts);
+        if (auto found = checked_displacement()) return std::move(*found);
+        take_one_by_one(parts);
+        return checked_displacement().value();
     }
 
     [[nodiscard]] Matrix3Xd displacement() const override { return downloaded(displacement_); }
@@ -267,6 +262,45 @@ private:
         shaders::check_errors("imposed displacements");
     }
 
+    [[nodiscard]] std::vector<detail::GpuSteps> in_parts(std::span<const Steps> steps) {
+        std::vector<detail::GpuSteps> result;
+        for (const auto& [count, coefficients] : steps)
+            if (count > 0) result.push_back({stress_clock_.next(count, coefficients.time_step), coefficients});
+        return result;
+    }
+
+    /// Over patches they may give up, and leave the nodes as they are.
+    void take(const std::vector<detail::GpuSteps>& steps) {
+        if (steps.empty()) return;
+        if (over_patches_) {
+            blocks_.set("Displacement", displacement_);
+            patches_->take(steps, effects_.on_nodes(), blocks_);
+            previous_residual_known_ = false;
+        } else {
+            for (const auto& [parts, coefficients] : steps) run_two_passes(parts, coefficients);
+        }
+    }
+
+    void take_one_by_one(const std::vector<detail::GpuSteps>& steps) {
+        patches_->take_one_by_one();
+        take(steps);
+    }
+
+    /// Nothing where patches gave up.
+    [[nodiscard]] std::optional<CheckedDisplacement> checked_displacement() {
+        blocks_.set("Displacement", displacement_);
+        const shaders::StorageBuffer& partials = observation_.reduce_elements(force_, blocks_);
+        std::vector pieces{shaders::Readback::Piece{displacement_, displacement_.bytes()},
+                           shaders::Readback::Piece{partials, partials.bytes()}};
+        if (patches_) pieces.push_back({patches_->progress(), patches_->progress().bytes()});
+        if (!readback_)
+            readback_.emplace(device_, shaders::Readback::bytes_of(pieces), "displacements on their way down");
+        const auto fetched = readback_->fetch(pieces);
+        if (over_patches_ && patches_->gave_up(fetched[2])) return std::nullopt;
+        return CheckedDisplacement{detail::unpacked({reinterpret_cast<const Float4*>(fetched[0].data()), nodes()}),
+                                   observation_.smallest_of(fetched[1])};
+    }
+
     void run_two_passes(const std::vector<detail::StressSteps>& parts, const StepCoefficients& coefficients) {
         const Program& step = node_program(shaders::node_step_program(effects_.on_nodes(), StoreResidual::No));
         const Program& last = node_program(shaders::node_step_program(effects_.on_nodes(), StoreResidual::Yes));
@@ -337,8 +371,9 @@ private:
     std::optional<detail::GpuPatches> patches_;  ///< absent where patches do not know the scene
     Buffer<Float4> displacement_, increment_, inverse_mass_, residual_, previous_residual_, previous_displacement_,
         imposed_, kept_displacement_, kept_increment_;
-    bool over_patches_ = false;  ///< whether steps take patches, which do not know all effects
-    Matrix3Xd mass_;             ///< 3 × N
+    std::optional<shaders::Readback> readback_;  ///< by run_and_check()
+    bool over_patches_ = false;                  ///< whether steps take patches, which do not know all effects
+    Matrix3Xd mass_;                             ///< 3 × N
     Mask constrained_;
     bool previous_residual_known_ = false;
 };

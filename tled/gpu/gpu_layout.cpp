@@ -88,7 +88,7 @@ std::vector<Float4> packed(const Eigen::Matrix3Xd& vectors) {
     return result;
 }
 
-Eigen::Matrix3Xd unpacked(const std::vector<Float4>& vectors) {
+Eigen::Matrix3Xd unpacked(std::span<const Float4> vectors) {
     Eigen::Matrix3Xd result(3, static_cast<Eigen::Index>(vectors.size()));
     parallel_ranges(0, vectors.size(), nodes_at_once, [&](std::size_t begin, std::size_t end) {
         for (std::size_t a = begin; a < end; ++a)

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace tissuewarp::tled::detail {
@@ -38,6 +39,6 @@ GpuPressure gpu_pressure(const RestState& rest);
 
 /// 3 × N in float64 to N float32 vectors of four, and back.
 std::vector<Float4> packed(const Eigen::Matrix3Xd& vectors);
-Eigen::Matrix3Xd unpacked(const std::vector<Float4>& vectors);
+Eigen::Matrix3Xd unpacked(std::span<const Float4> vectors);
 
 }  // namespace tissuewarp::tled::detail

@@ -47,12 +47,24 @@ Observation GpuObservation::nodes(const shaders::Program& program, BlockBuffers&
 }
 
 SmallestJacobian GpuObservation::smallest_jacobian(const GpuForce& force, BlockBuffers& blocks) const {
+    reduce_elements(force, blocks);
+    const std::vector<ElementPartial> partials = element_partials_.download();
+    return smallest_of(std::as_bytes(std::span(partials)));
+}
+
+const shaders::StorageBuffer& GpuObservation::reduce_elements(const GpuForce& force, BlockBuffers& blocks) const {
     const shaders::Program& elements = programs_.get(shaders::observe_elements_program());
     force.set_all_elements(elements);
     reduce(elements, blocks, element_partials_);
+    return element_partials_;
+}
+
+SmallestJacobian GpuObservation::smallest_of(std::span<const std::byte> partials) const {
     float least = std::numeric_limits<float>::max();
     std::uint32_t element = std::numeric_limits<std::uint32_t>::max();
-    for (const ElementPartial& part : element_partials_.download())
+    const std::span parts(reinterpret_cast<const ElementPartial*>(partials.data()),
+                          partials.size() / sizeof(ElementPartial));
+    for (const ElementPartial& part : parts)
         if (part.volume_change < least || (part.volume_change == least && part.element < element)) {
             least = part.volume_change;
             element = part.element;

@@ -7,7 +7,9 @@
 #include "tled/engine.hpp"
 #include "tled/gpu/gpu_force.hpp"
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace tissuewarp::tled::detail {
@@ -22,6 +24,10 @@ public:
 
     /// At the Displacement of `blocks`; −∞ where no J is finite.
     [[nodiscard]] SmallestJacobian smallest_jacobian(const GpuForce& force, BlockBuffers& blocks) const;
+
+    /// The same in two parts: what the device is to do and where it leaves its results, and what they say.
+    const shaders::StorageBuffer& reduce_elements(const GpuForce& force, BlockBuffers& blocks) const;
+    [[nodiscard]] SmallestJacobian smallest_of(std::span<const std::byte> partials) const;
 
 private:
     /// What shaders/kernels/observe_nodes.comp leaves per workgroup.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 
 namespace tissuewarp::tled::detail {
 namespace {
@@ -173,17 +174,17 @@ bool GpuPatches::take(const shaders::NodeEffects& effects) const {
     return !effects.surface_force && storage_blocks(averages_, !tissue_->empty(), effects) <= storage_blocks_;
 }
 
-void GpuPatches::run(const std::vector<StressSteps>& steps, const StepCoefficients& coefficients,
-                     const shaders::NodeEffects& effects, const BlockBuffers& blocks) {
-    take_steps(steps, coefficients, effects, blocks);
-    // The nodes still hold the state that the run began with.
-    if (many_steps_ && gave_up()) {
-        many_steps_ = false;
-        forget_state();
-        take_steps(steps, coefficients, effects, blocks);
-    }
+void GpuPatches::take(const std::vector<GpuSteps>& steps, const shaders::NodeEffects& effects,
+                      const BlockBuffers& blocks) {
+    for (const auto& [parts, coefficients] : steps) take_steps(parts, coefficients, effects, blocks);
     store(blocks);
     shaders::check_errors("time steps over patches");
+}
+
+void GpuPatches::take_one_by_one() {
+    many_steps_ = false;
+    progress_->clear();
+    forget_state();
 }
 
 GpuPatches::Run GpuPatches::next_steps(int steps, const StepCoefficients& coefficients) const {
@@ -317,10 +318,13 @@ void GpuPatches::forget_tangents() {
         state_->upload(none, (state_planes + tangent_planes * o) * slot_count_);
 }
 
+/// What was bound before stays where a patch gave up: the state is then not that of any step.
 void GpuPatches::store(const BlockBuffers& blocks) {
+    if (tissue_->viscous() && gave_up()) return;
     const Program& store = programs_.get(shaders::patch_store_program());
     store.set(0, static_cast<std::uint32_t>(node_count_));
     store.set(1, static_cast<std::uint32_t>(slot_count_));
+    store.set(2, static_cast<std::uint32_t>(capacity_.patches));
     blocks.bind(store);
     store.dispatch(node_count_);
     shaders::storage_barrier();
@@ -334,9 +338,16 @@ GpuStepShape GpuPatches::shape() const {
 }
 
 bool GpuPatches::gave_up() const {
+    if (!many_steps_) return false;
     std::array<std::uint32_t, 1> flag{};
     progress_->download(flag, progress_->size() - 1);
     return flag[0] != 0;
+}
+
+bool GpuPatches::gave_up(std::span<const std::byte> progress) const {
+    std::uint32_t flag = 0;
+    std::memcpy(&flag, progress.data() + progress.size() - sizeof flag, sizeof flag);
+    return many_steps_ && flag != 0;
 }
 
 }  // namespace tissuewarp::tled::detail

@@ -8,9 +8,16 @@
 #include "tled/gpu/patch_tissue.hpp"
 #include "tled/material/stress_clock.hpp"
 
+#include <cstddef>
 #include <span>
+#include <vector>
 
 namespace tissuewarp::tled::detail {
+
+struct GpuSteps {
+    std::vector<StressSteps> parts;  ///< one step at least
+    StepCoefficients coefficients;
+};
 
 class GpuPatches {
 public:
@@ -24,10 +31,16 @@ public:
     /// Whether steps over patches know these effects, and the device has storage blocks for them.
     [[nodiscard]] bool take(const shaders::NodeEffects& effects) const;
 
-    /// Advances what is bound as Displacement and Increment, and as ViscousStress where tissue is viscous; at least one
-    /// step.
-    void run(const std::vector<StressSteps>& steps, const StepCoefficients& coefficients,
-             const shaders::NodeEffects& effects, const BlockBuffers& blocks);
+    /// Advances what is bound as Displacement and Increment, and as ViscousStress where tissue is viscous; or, where a
+    /// patch waited too long for its neighbours, leaves it as it was: gave_up() says so.
+    void take(const std::vector<GpuSteps>& steps, const shaders::NodeEffects& effects, const BlockBuffers& blocks);
+    /// Of the last steps. It waits for them.
+    [[nodiscard]] bool gave_up() const;
+    /// The same from the bytes of progress().
+    [[nodiscard]] bool gave_up(std::span<const std::byte> progress) const;
+    [[nodiscard]] const shaders::StorageBuffer& progress() const { return *progress_; }
+    /// From now on one step in a dispatch: after steps that gave up.
+    void take_one_by_one();
     /// Those of a step within a run.
     [[nodiscard]] std::vector<Pass> passes(const shaders::NodeEffects& effects) const;
     /// As asked for, without many steps in a dispatch once the device has proved unable to run them.
@@ -68,8 +81,6 @@ private:
     void load(const BlockBuffers& blocks);
     void forget_tangents();
     void store(const BlockBuffers& blocks);
-    /// Whether a patch waited too long for its neighbours: the state is then not that of any step.
-    [[nodiscard]] bool gave_up() const;
 
     const shaders::Device& device_;
     shaders::ProgramCache& programs_;

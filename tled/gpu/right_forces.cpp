@@ -1,6 +1,7 @@
 #include "tled/gpu/right_forces.hpp"
 
 #include "core/errors.hpp"
+#include "shaders/catalogue.hpp"
 #include "tled/model/internal_force.hpp"
 #include "tled/model/kinematics.hpp"
 
@@ -31,6 +32,16 @@ Matrix3Xd test_displacement(const RestState& rest) {
 }
 
 }  // namespace
+
+void require_limits(const shaders::Device& device) {
+    const auto offers = [&](int count, const char* what, int needed) {
+        if (count >= needed) return;
+        throw GpuUnavailable(device.renderer() + " offers " + std::to_string(count) + " " + what +
+                             "; the solver needs " + std::to_string(needed) + "; take the CPU engine");
+    };
+    offers(device.limits().storage_blocks, "storage blocks per shader", shaders::storage_blocks_of_passes);
+    offers(device.limits().storage_bindings, "storage bindings", 24);  // to which chunks/bindings.glsl counts
+}
 
 void require_right_forces(Engine& engine, const RestState& rest) {
     const Matrix3Xd still = Matrix3Xd::Zero(3, rest.node_count);

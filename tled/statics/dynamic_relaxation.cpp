@@ -58,16 +58,15 @@ private:
         const StepCoefficients coefficients = heavy_ball(spectrum_);
         while (steps > 0) {
             const int now = std::min(steps, std::max(1, search_.options.steps_per_check));
-            search_.require_evaluations(now);
-            search_.engine.run(now, coefficients);
             steps -= now;
-            const Matrix3Xd u = search_.engine.displacement();
-            const bool inverted = !(search_.engine.smallest_jacobian().value > 0);
-            if (!u.allFinite() || (inverted && !search_.engine.admits_inversion())) {
-                spectrum_ = restarted(search_, mass_, ++restarts_, search_.stiffness.lowest_eigenvalue());
+            const std::optional<Matrix3Xd> u = search_.stepped(std::array{Steps{now, coefficients}});
+            if (!u) {
+                go_back(search_, ++restarts_);
+                spectrum_ = shortened(
+                    spectrum_at(search_, mass_, search_.residual(), search_.stiffness.lowest_eigenvalue()), restarts_);
                 return false;
             }
-            search_.keep(u, error);
+            search_.keep(*u, error);
         }
         return true;
     }

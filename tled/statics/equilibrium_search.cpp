@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <utility>
 
 namespace tissuewarp::tled::detail {
 
@@ -70,6 +71,14 @@ void EquilibriumSearch::require_evaluations(int count) {
     result_.force_evaluations += count;
 }
 
+std::optional<Matrix3Xd> EquilibriumSearch::stepped(std::span<const Steps> steps) {
+    for (const Steps& each : steps) require_evaluations(each.count);
+    CheckedDisplacement u = engine.run_and_check(steps);
+    const bool inverted = !(u.smallest.value > 0);
+    if (!u.value.allFinite() || (inverted && !engine.admits_inversion())) return std::nullopt;
+    return std::move(u.value);
+}
+
 Matrix3Xd EquilibriumSearch::residual() {
     require_evaluations(1);
     Matrix3Xd r = engine.residual();
@@ -96,10 +105,13 @@ void EquilibriumSearch::keep(const Matrix3Xd& displacement, double error_mm) {
 }
 
 EquilibriumResult EquilibriumSearch::finish() {
-    if (!admissible(good_) || !(smallest_.value > 0))
+    engine.set_state(good_, Matrix3Xd::Zero(3, good_.cols()));
+    CheckedDisplacement last = engine.run_and_check({});
+    smallest_ = last.smallest;
+    if (!(smallest_.value > 0))
         fail("it holds inverted tissue (" + place(smallest_) + "), which its law admits",
              "take neo-hookean-lnj, which does not, smaller loads or softer springs");
-    result_.displacement = engine.displacement();
+    result_.displacement = std::move(last.value);
     result_.estimated_error_mm = good_error_mm_;
     result_.min_jacobian = smallest_.value;
     return std::move(result_);

@@ -6,6 +6,8 @@
 #include "tled/model/vectors.hpp"
 #include "tled/stiffness/tangent_factor.hpp"
 
+#include <optional>
+#include <span>
 #include <string>
 
 namespace tissuewarp::tled::detail {
@@ -24,6 +26,8 @@ public:
     [[nodiscard]] bool admissible(const Eigen::Matrix3Xd& displacement);
     /// From now on whatever laws admit.
     void keep_upright() { upright_ = true; }
+    /// Where steps lead, 3 × N mm; nothing where tissue is inverted there whose law does not admit it. Counted.
+    [[nodiscard]] std::optional<Eigen::Matrix3Xd> stepped(std::span<const Steps> steps);
     /// At the engine's state. Counted; throws when too many or not finite.
     [[nodiscard]] Eigen::Matrix3Xd residual();
     /// K₀⁻¹ r, mm: to first order the displacement still missing.

@@ -84,11 +84,13 @@ Spectrum spectrum_of(double highest, const EquilibriumSearch& search, const Matr
     return bounded(reserve * highest, search, mass, lowest_at_rest);
 }
 
-Spectrum restarted(EquilibriumSearch& search, const Matrix3Xd& mass, int restarts, double lowest_at_rest) {
+void go_back(EquilibriumSearch& search, int restarts) {
     if (restarts > most_restarts || !search.admissible(search.last_good())) search.fail_stalled();
-    Spectrum spectrum = spectrum_at(search, mass, search.residual(), lowest_at_rest);
-    spectrum.highest *= 1 << restarts;
     search.observer.note("relaxation restarted from the last good state with a smaller step");
+}
+
+Spectrum shortened(Spectrum spectrum, int restarts) {
+    spectrum.highest *= 1 << restarts;
     return spectrum;
 }
 

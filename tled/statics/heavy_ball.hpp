@@ -28,8 +28,11 @@ Spectrum spectrum_at(EquilibriumSearch& search, const Eigen::Matrix3Xd& mass, co
 Spectrum spectrum_of(double highest, const EquilibriumSearch& search, const Eigen::Matrix3Xd& mass,
                      double lowest_at_rest);
 
-/// spectrum_at() for the `restarts`th time, after steps that inverted tissue: back at the last good state, with λ_max
-/// taken 2^restarts times as large. Fails where that state is none, or after six.
-Spectrum restarted(EquilibriumSearch& search, const Eigen::Matrix3Xd& mass, int restarts, double lowest_at_rest);
+/// After steps that inverted tissue, for the `restarts`th time: back to the last good state, at rest, with a note.
+/// Fails where that state is none, or after six.
+void go_back(EquilibriumSearch& search, int restarts);
+
+/// With λ_max taken 2^restarts times as large.
+Spectrum shortened(Spectrum spectrum, int restarts);
 
 }  // namespace tissuewarp::tled::detail

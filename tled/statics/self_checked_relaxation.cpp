@@ -9,6 +9,9 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <span>
+#include <utility>
+#include <vector>
 
 namespace tissuewarp::tled::detail {
 
@@ -43,12 +46,16 @@ public:
     EquilibriumResult run(const Matrix3Xd* start) {
         search_.keep(first_state(start), unknown_error());
         if (settle_as_before()) return finished(search_.options.known_highest);
-        spectrum_ = spectrum_at(search_, mass_, search_.residual(), lowest_at_rest_);
-        if (open() && settle()) return finished(spectrum_.highest);
-        if (start == nullptr && start_from_part() && open() && settle()) return finished(spectrum_.highest);
-        do spectrum_ = restarted(search_, mass_, ++restarts_, lowest_at_rest_);
-        while (!(open() && settle()));
-        return search_.finish();  // with steps shorter than the eigenvalue asks for
+        spectrum_ = spectrum_here();
+        if (relax()) return finished(spectrum_.highest);
+        if (start == nullptr && start_from_part() && relax()) return finished(spectrum_.highest);
+        Spectrum here;
+        do {
+            go_back(search_, ++restarts_);
+            here = spectrum_here();
+            spectrum_ = shortened(here, restarts_);
+        } while (!relax());
+        return finished(here.highest);
     }
 
 private:
@@ -57,15 +64,26 @@ private:
     Matrix3Xd mass_;
     double lowest_at_rest_;
     Spectrum spectrum_;
+    std::optional<Spectrum> sought_;  // spectrum_at() of sought_at_
+    Matrix3Xd sought_at_;
     int restarts_ = 0;
     bool as_before_ = false;  // whether λ_max is that of another state
+
+    /// At the last good state, which the engine is at: sought again only where that has moved.
+    [[nodiscard]] Spectrum spectrum_here() {
+        if (!sought_ || sought_at_ != search_.last_good()) {
+            sought_ = spectrum_at(search_, mass_, search_.residual(), lowest_at_rest_);
+            sought_at_ = search_.last_good();
+        }
+        return *sought_;
+    }
 
     /// With λ_max as it is known; otherwise, and where that proves wrong, leaves the engine at the last good state.
     bool settle_as_before() {
         if (!(search_.options.known_highest > 0)) return false;
         spectrum_ = spectrum_of(search_.options.known_highest, search_, mass_, lowest_at_rest_);
         as_before_ = true;
-        const bool settled = open() && settle();
+        const bool settled = relax();
         as_before_ = false;
         if (!settled && !search_.admissible(search_.last_good())) search_.fail_stalled();
         return settled;
@@ -115,7 +133,7 @@ private:
         if (!drawn) return false;
         search_.observer.note("loads that would tear tissue at once: begun with the answer to a part of them");
         search_.keep(*drawn, unknown_error());
-        spectrum_ = spectrum_at(search_, mass_, search_.residual(), lowest_at_rest_);
+        spectrum_ = spectrum_here();
         return true;
     }
 
@@ -165,40 +183,30 @@ private:
         return search_.engine.internal_force();
     }
 
-    /// Where steps lead; nothing where tissue was inverted.
-    std::optional<Matrix3Xd> stepped(int steps, const StepCoefficients& coefficients) {
-        search_.require_evaluations(steps);
-        search_.engine.run(steps, coefficients);
-        Matrix3Xd u = search_.engine.displacement();
-        if (!is_whole(u)) return std::nullopt;
-        return u;
+    /// False where tissue was inverted.
+    bool relax() {
+        std::optional<Matrix3Xd> opened = open();
+        return opened && settle(std::move(*opened));
     }
 
     /// One look at the end suffices: tissue inverted on the way has come right again there, or shows.
-    bool open() {
+    std::optional<Matrix3Xd> open() {
         const StepCoefficients last = heavy_ball(spectrum_);
+        std::vector<Steps> steps;
         for (const Opening& opening : openings) {
             if (!(opening.momentum < last.momentum)) break;
-            search_.require_evaluations(opening.steps);
-            search_.engine.run(opening.steps, {opening.momentum, 1 / spectrum_.highest});
+            steps.push_back({opening.steps, {opening.momentum, 1 / spectrum_.highest}});
         }
-        return is_whole(search_.engine.displacement());
-    }
-
-    /// At the engine's state.
-    [[nodiscard]] bool is_whole(const Matrix3Xd& displacement) {
-        const bool inverted = !(search_.engine.smallest_jacobian().value > 0);
-        return displacement.allFinite() && (!inverted || search_.engine.admits_inversion());
+        return search_.stepped(steps);
     }
 
     /// Windows of steps until what is left after the last is foreseen to be less than the tolerance; false where tissue
     /// was inverted. Movements d of windows that contract by q leave q/(1 − q) d.
-    bool settle() {
-        Matrix3Xd before = search_.engine.displacement();
+    bool settle(Matrix3Xd before) {
         double last = 0, least = 0;
         for (int window = 0, idle = 0;; ++window) {
             const int steps = static_cast<int>(std::ceil(neper_a_window / decay(spectrum_)));
-            std::optional<Matrix3Xd> after = stepped(steps, heavy_ball(spectrum_));
+            std::optional<Matrix3Xd> after = search_.stepped(std::array{Steps{steps, heavy_ball(spectrum_)}});
             if (!after) return false;
             const double moved = largest_difference(*after, before), foreseen = std::exp(-neper_a_window);
             const double seen = window == 0 ? slowest : moved / std::max(last, 1e-300);

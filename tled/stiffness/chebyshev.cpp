@@ -14,6 +14,12 @@ double largest_eigenvalue(const Product& multiply, const Product& divide, Matrix
     return value > 0.0 ? 1.1 * value : 1.0;
 }
 
+Matrix3Xd every_wave_length(Eigen::Index count) {
+    Matrix3Xd x(3, count);
+    for (Eigen::Index i = 0; i < count; ++i) x.col(i) << 1.0, (i % 2 == 0 ? 1.0 : -1.0), double(i % 3) - 1.0;
+    return x;
+}
+
 void chebyshev_steps(const Product& multiply, const Product& divide, double largest, Matrix3Xd& x,
                      Matrix3Xd& residual) {
     const double centre = 0.625 * largest, radius = 0.375 * largest, ratio = centre / radius;

@@ -11,6 +11,7 @@
 #include "tled/model/held_tissue.hpp"
 #include "tled/model/springs.hpp"
 #include "tled/parallel/parallel_pair.hpp"
+#include "tled/stiffness/chebyshev.hpp"
 #include "tled/stiffness/cholmod_factor.hpp"
 #include "tled/stiffness/conjugate_gradients.hpp"
 #include "tled/stiffness/effect_stiffness.hpp"
@@ -108,6 +109,8 @@ struct RestStiffness::Impl {
     mutable std::unique_ptr<detail::CholmodFactor> made;  // by factor()
     std::once_flag lowest_known;
     double lowest = 0.0;
+    std::once_flag highest_known;
+    double highest = 0.0;
     Matrix3Xd slowest_about;  // where slowest() begins, if given
     mutable std::once_flag approximation_known;
     mutable detail::Mode approximation;  // by slowest()
@@ -186,7 +189,8 @@ const detail::TwoLevel& RestStiffness::Impl::two_levels() const {
     std::call_once(divided, [this] {
         const auto product = [this](const Matrix3Xd& x) { return multiply_free(x); };
         levels =
-            std::make_unique<const detail::TwoLevel>(free_rows(conditions), product, position, conditions.constrained);
+            std::make_unique<const detail::TwoLevel>(free_rows(conditions), product, position, conditions.constrained,
+                                                     detail::TwoLevel::suggested_cells(position.cols()));
     });
     return *levels;
 }
@@ -369,6 +373,17 @@ double RestStiffness::approximate_lowest_eigenvalue() const {
 
 const Matrix3Xd& RestStiffness::approximate_slowest_mode() const {
     return impl_->slowest().x;
+}
+
+double RestStiffness::approximate_highest_eigenvalue() const {
+    std::call_once(impl_->highest_known, [this] {
+        const Matrix3Xd D = diagonal(impl_->conditions);
+        impl_->highest = detail::largest_eigenvalue(
+            [this](const Matrix3Xd& x) { return impl_->multiply_free(x); },
+            [&](const Matrix3Xd& x) -> Matrix3Xd { return x.cwiseQuotient(D); },
+            impl_->conditions.constrained.select(0.0, detail::every_wave_length(impl_->position.cols())));
+    });
+    return impl_->highest;
 }
 
 long long RestStiffness::factor_nonzeros() const {

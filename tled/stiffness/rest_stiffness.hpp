@@ -56,7 +56,7 @@ public:
     [[nodiscard]] Eigen::MatrixXd inverse_between(const std::vector<int>& nodes) const;
 
     /// Of more nodes than this the following are found without a factor, whose entries and work grow too fast.
-    static constexpr int most_factorised_nodes = 15000;
+    static constexpr int most_factorised_nodes = 6000;
     [[nodiscard]] bool is_large() const;
 
     /// About K⁻¹ f, 3 × N, symmetric and positive definite: with the factor, or of a large mesh by a cycle of two
@@ -85,6 +85,9 @@ public:
     [[nodiscard]] double approximate_lowest_eigenvalue() const;
     /// And its mode, 3 × N.
     [[nodiscard]] const Eigen::Matrix3Xd& approximate_slowest_mode() const;
+
+    /// The largest λ of it, a tenth above what ten steps of the power method find.
+    [[nodiscard]] double approximate_highest_eigenvalue() const;
 
     /// Non-zeros of the factor, for reports.
     [[nodiscard]] long long factor_nonzeros() const;

@@ -6,6 +6,7 @@
 
 #include <Eigen/LU>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <utility>
@@ -33,13 +34,6 @@ Product division_by_blocks(const BlockRows& K) {
     };
 }
 
-/// Every wave length in it.
-Matrix3Xd rough(Eigen::Index count) {
-    Matrix3Xd x(3, count);
-    for (Eigen::Index i = 0; i < count; ++i) x.col(i) << 1.0, (i % 2 == 0 ? 1.0 : -1.0), double(i % 3) - 1.0;
-    return x;
-}
-
 }  // namespace
 
 TwoLevel::TwoLevel(const BlockRows& K, Product multiply, const Matrix3Xd& position,
@@ -49,7 +43,12 @@ TwoLevel::TwoLevel(const BlockRows& K, Product multiply, const Matrix3Xd& positi
       divide_(division_by_blocks(K)),
       constrained_(constrained),
       smooth_(smooth_factor(galerkin(lattice_, K))) {
-    largest_ = largest_eigenvalue(multiply_, divide_, constrained_.select(0.0, rough(position.cols())));
+    largest_ = largest_eigenvalue(multiply_, divide_, constrained_.select(0.0, every_wave_length(position.cols())));
+}
+
+int TwoLevel::suggested_cells(Eigen::Index nodes) {
+    constexpr Eigen::Index nodes_of_cell = 14, most = 3000;
+    return static_cast<int>(std::clamp<Eigen::Index>(nodes / nodes_of_cell, 1, most));
 }
 
 MatrixXd TwoLevel::smooth_columns(const MatrixXd& forces) const {

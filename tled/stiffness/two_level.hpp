@@ -17,7 +17,10 @@ public:
     /// K with all its rows, zero in those of constrained degrees of freedom; `multiply` is by the same matrix. About
     /// `cells` cells of the lattice hold nodes. Throws InvalidInput where K is not positive definite.
     TwoLevel(const BlockRows& K, Product multiply, const Eigen::Matrix3Xd& position,
-             const Eigen::Matrix<bool, 3, Eigen::Dynamic>& constrained, int cells = 3000);
+             const Eigen::Matrix<bool, 3, Eigen::Dynamic>& constrained, int cells);
+
+    /// Cells for a mesh of so many nodes: one to 14 nodes, 3000 at most. Chosen on *brainshift*.
+    static int suggested_cells(Eigen::Index nodes);
 
     /// P (Pᵀ K P)⁻¹ Pᵀ of many forces, 3N × k: the smooth displacements of least energy. Between nothing and K⁻¹.
     [[nodiscard]] Eigen::MatrixXd smooth_columns(const Eigen::MatrixXd& forces) const;
