@@ -225,15 +225,16 @@ std::optional<Surroundings> rigid_surroundings(const Deformation& given, const V
     const bool slides = detail::organ_slid(deformation, beside, outside);
     if (slides) observer.note(sliding_note);
     if (!slides && moved_against(given, *motion) > choice.most_moved_mm) return given.surroundings;
-    const imaging::LinearSampler score(
-        rigid_score(views_of(deformation, slides ? beside.across : beside.with, outside), outside.moving));
-    const imaging::MaskLookup known(given.surroundings ? given.surroundings->rigid : Volume());
+    const Volume score =
+        rigid_score(views_of(deformation, slides ? beside.across : beside.with, outside), outside.moving);
     const bool with_bodies = given.surroundings && !given.surroundings->bodies.empty();  // whole, wherever they are
-    Volume mask(with_bodies ? moving.geometry : voxels_around(moving.geometry, outside.grid), CV_8UC1);
-    for_each_place(mask.geometry, [&](const Eigen::Vector3d& X, std::int64_t n) {
-        const std::uint8_t body = known.value(X);
-        mask.data<std::uint8_t>()[n] = body == 0 && score.value(X) >= 1.0 ? 1 : body;
-    });
+    const Geometry grid = with_bodies ? moving.geometry : voxels_around(moving.geometry, outside.grid);
+    Volume mask(grid, cv::min(imaging::resample(score, grid, imaging::Interpolation::Linear).voxels >= 1.0, 1));
+    const imaging::MaskLookup known(given.surroundings ? given.surroundings->rigid : Volume());
+    if (!known.empty())
+        for_each_place(grid, [&](const Eigen::Vector3d& X, std::int64_t n) {
+            if (const std::uint8_t body = known.value(X); body != 0) mask.data<std::uint8_t>()[n] = body;
+        });
     Surroundings found{*motion, mask, slides};
     if (with_bodies) found.bodies = given.surroundings->bodies;
     return beside_organ(std::move(found), deformation);

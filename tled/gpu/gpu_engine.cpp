@@ -274,7 +274,7 @@ private:
         if (steps.empty()) return;
         if (over_patches_) {
             blocks_.set("Displacement", displacement_);
-            patches_->take(steps, effects_.on_nodes(), blocks_);
+            patches_->run(steps, effects_.on_nodes(), blocks_);
             previous_residual_known_ = false;
         } else {
             for (const auto& [parts, coefficients] : steps) run_two_passes(parts, coefficients);

@@ -174,8 +174,8 @@ bool GpuPatches::take(const shaders::NodeEffects& effects) const {
     return !effects.surface_force && storage_blocks(averages_, !tissue_->empty(), effects) <= storage_blocks_;
 }
 
-void GpuPatches::take(const std::vector<GpuSteps>& steps, const shaders::NodeEffects& effects,
-                      const BlockBuffers& blocks) {
+void GpuPatches::run(const std::vector<GpuSteps>& steps, const shaders::NodeEffects& effects,
+                     const BlockBuffers& blocks) {
     for (const auto& [parts, coefficients] : steps) take_steps(parts, coefficients, effects, blocks);
     store(blocks);
     shaders::check_errors("time steps over patches");

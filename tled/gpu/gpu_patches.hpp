@@ -33,7 +33,7 @@ public:
 
     /// Advances what is bound as Displacement and Increment, and as ViscousStress where tissue is viscous; or, where a
     /// patch waited too long for its neighbours, leaves it as it was: gave_up() says so.
-    void take(const std::vector<GpuSteps>& steps, const shaders::NodeEffects& effects, const BlockBuffers& blocks);
+    void run(const std::vector<GpuSteps>& steps, const shaders::NodeEffects& effects, const BlockBuffers& blocks);
     /// Of the last steps. It waits for them.
     [[nodiscard]] bool gave_up() const;
     /// The same from the bytes of progress().
